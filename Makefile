@@ -1,0 +1,53 @@
+# Thin over `python -m pipeline`; every target builds the environment first when it is missing.
+PYTHON ?= python3.11
+VENV   := .venv
+PY     := $(VENV)/bin/python
+STAMP  := $(VENV)/.installed
+OUT    ?= reports/out
+ROBOT  ?= urdf/hexapod.toml
+ARGS   ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help env reports test test-slow lint check bench urdf lock clean
+
+help:  ## Print this list
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
+
+env: $(STAMP)  ## Build the environment in .venv from the lock file
+
+$(STAMP): requirements.lock pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(PY) -m pip install --quiet --require-hashes -r requirements.lock
+	$(PY) -m pip install --quiet --no-deps -e .
+	@touch $@
+
+reports: $(STAMP)  ## Compute standing and walking, write CSV and figures to reports/out (OUT=, ROBOT=, ARGS=)
+	$(PY) -m pipeline reports --robot $(ROBOT) --out $(OUT) $(ARGS)
+
+test: $(STAMP)  ## Run the tests (Table III among them)
+	$(PY) -m pytest -m "not slow"
+
+test-slow: $(STAMP)  ## Run the long tests
+	$(PY) -m pytest -m slow
+
+lint: $(STAMP)  ## Check style and types
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+
+check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
+	$(PY) -m pipeline check $(ROBOT)
+
+bench: $(STAMP)  ## Print speed ratios measured in one run
+	$(PY) -m tests.bench
+
+urdf: $(STAMP)  ## Build the URDFs from their TOML
+	$(PY) -m pipeline urdf
+
+lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
+	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
+	  --no-emit-trusted-host --strip-extras --extra dev --allow-unsafe \
+	  -o requirements.lock pyproject.toml
+
+clean:  ## Remove what a run wrote
+	rm -rf reports/out .pytest_cache .mypy_cache .ruff_cache .hypothesis

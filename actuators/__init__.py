@@ -1,0 +1,1 @@
+"""Friction, transmission and motor laws, chains of them, and their energy accounting."""

@@ -1,0 +1,59 @@
+"""The exceptions of the actuator room: one root, a subclass for each kind of fact."""
+
+import difflib
+from collections.abc import Sequence
+
+
+class ActuatorError(Exception):
+    """Root of every error raised by `actuators`; its message is one line: place and remedy."""
+
+
+class UnitError(ActuatorError):
+    """A unit that is not in the table, or a unit of another dimension than the one asked for."""
+
+
+class ParameterError(ActuatorError):
+    """A parameter that is missing, misspelt, malformed or outside its bounds."""
+
+
+class CatalogError(ActuatorError):
+    """A component or an alternative of the catalogue that does not fit together."""
+
+
+class UnphysicalElementError(ActuatorError):
+    """An element whose parameters contradict its law, such as negative friction."""
+
+
+class ShaftError(ActuatorError):
+    """A time series at a shaft whose arrays do not fit together or run backwards in time."""
+
+
+class ChainError(ActuatorError):
+    """A chain of elements that is doubly named, or asked for an element or stage it lacks."""
+
+
+class SelfLockingError(ActuatorError):
+    """A self-locking gear asked to move against the sense in which its pinion is driven."""
+
+
+class EnergyError(ActuatorError):
+    """An energy account that cannot be drawn up, such as one over no time at all."""
+
+
+def one_line(text: object) -> str:
+    """Return the text on a single line of at most 200 characters."""
+    line = " ".join(str(text).split())
+    return line if len(line) <= 200 else line[:197] + "..."
+
+
+def closest(name: str, known: Sequence[str]) -> str:
+    """Return a hint naming the closest known name, or all known names where none is close.
+
+    Args:
+        name: What was written.
+        known: What would have been accepted.
+    """
+    match = difflib.get_close_matches(one_line(name), known, n=1)
+    if match:
+        return f"did you mean '{match[0]}'?"
+    return "known: " + (", ".join(sorted(known)) or "none")

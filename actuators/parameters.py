@@ -1,0 +1,279 @@
+"""Parameters with unit, basis, source and interval, loaded from TOML; standard library only."""
+
+import dataclasses
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from actuators.errors import ParameterError, UnitError, closest, one_line
+from actuators.units import dimension, from_si, si_unit, to_si
+
+BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified", "assumed")
+UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
+_KEYS: Final = ("value", "unit", "basis", "source", "interval", "bounds", "reason")
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number with everything needed to judge it.
+
+    Attributes:
+        name: Key in its set.
+        value: Value in SI units.
+        unit: Unit as written in the file.
+        value_as_written: Value in `unit`.
+        basis: One of `BASES`.
+        source: Where the number comes from: table, data sheet, formula.
+        interval: Where the true value is thought to lie, SI; required by `UNCERTAIN_BASES`.
+        bounds: Outside of these the value is refused, SI.
+        reason: Why this value, for an assumption.
+
+    Raises:
+        ParameterError: On construction, where an attribute contradicts another.
+    """
+
+    name: str
+    value: float
+    unit: str
+    value_as_written: float
+    basis: str
+    source: str
+    interval: Interval | None = None
+    bounds: Interval | None = None
+    reason: str = ""
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.value):
+            raise ParameterError(f"'{self.name}': {self.value} is not a finite number: give one")
+        if self.basis not in BASES:
+            raise ParameterError(
+                f"'{self.name}': unknown basis {self.basis!r:.40}: {closest(self.basis, BASES)}"
+            )
+        if not self.source.strip():
+            raise ParameterError(f"'{self.name}': no source: say where the number comes from")
+        if self.basis in UNCERTAIN_BASES and self.interval is None:
+            raise ParameterError(
+                f"'{self.name}': basis '{self.basis}' needs an interval = [low, high]"
+            )
+        if self.basis == "assumed" and not self.reason.strip():
+            raise ParameterError(f"'{self.name}': basis 'assumed' needs a reason")
+        for kind, pair in (("interval", self.interval), ("bounds", self.bounds)):
+            if pair is None:
+                continue
+            low, high = (from_si(x, self.unit) for x in pair)
+            if not pair[0] <= pair[1]:
+                raise ParameterError(f"'{self.name}': {kind} [{low:g}, {high:g}] runs backwards")
+            if not pair[0] <= self.value <= pair[1]:
+                raise ParameterError(
+                    f"'{self.name}': value {self.value_as_written:g} {self.unit} lies outside "
+                    f"its {kind} [{low:g}, {high:g}]: correct one of them"
+                )
+
+
+class ParameterSet(Mapping[str, float]):
+    """An ordered, unchangeable set of parameters: `set[name]` is the SI value.
+
+    Args:
+        parameters: In the order of their rows.
+        where: File or component the set comes from, for messages.
+    """
+
+    def __init__(self, parameters: tuple[Parameter, ...], where: str) -> None:
+        self._parameters: Final = {p.name: p for p in parameters}
+        self.where: Final = where
+
+    def __getitem__(self, name: str) -> float:
+        return self.parameter(name).value
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._parameters)
+
+    def __len__(self) -> int:
+        return len(self._parameters)
+
+    def parameter(self, name: str) -> Parameter:
+        """Return the parameter with its unit, basis and source.
+
+        Raises:
+            ParameterError: No parameter has this name.
+        """
+        if name not in self._parameters:
+            raise ParameterError(
+                f"{self.where}: no parameter '{one_line(name)}': "
+                f"{closest(str(name), list(self._parameters))}"
+            )
+        return self._parameters[name]
+
+    def rows(self) -> tuple[Parameter, ...]:
+        """Return the parameters in order, as rows of a table."""
+        return tuple(self._parameters.values())
+
+    def replaced(self, name: str, value: float, **changes: Any) -> "ParameterSet":
+        """Return a new set in which one parameter has another value.
+
+        Args:
+            name: Which parameter.
+            value: New value in SI units, inside the parameter's bounds.
+            **changes: New `basis`, `source`, `interval` (SI) and `reason`. Without them the
+                parameter becomes an assumption whose interval spans the old one and the value.
+
+        Raises:
+            ParameterError: Unknown name, or a value or change that contradicts the rest.
+        """
+        old = self.parameter(name)
+        spread = (old.value, value, *(old.interval or ()))
+        new: dict[str, Any] = {
+            "basis": "assumed",
+            "source": "set in place of the file's value",
+            "reason": f"replaces {old.value_as_written:g} {old.unit} ({old.basis})",
+            "interval": (min(spread), max(spread)),
+        }
+        new |= changes
+        new |= {"value": value, "value_as_written": from_si(value, old.unit)}
+        try:
+            replacement = dataclasses.replace(old, **new)
+        except ParameterError as error:
+            raise ParameterError(f"{self.where}: {error}") from None
+        except TypeError as error:
+            raise ParameterError(f"{self.where}: '{name}': {one_line(error)}") from None
+        rows = tuple(replacement if p.name == name else p for p in self.rows())
+        return ParameterSet(rows, self.where)
+
+
+def read_toml(path: str | Path) -> dict[str, Any]:
+    """Return the contents of a TOML file.
+
+    Raises:
+        ParameterError: The file is missing, unreadable or not TOML.
+    """
+    name = Path(path).name
+    try:
+        return tomllib.loads(Path(path).read_bytes().decode("utf-8"))
+    except (OSError, ValueError) as error:  # TOML and UTF-8 errors are ValueErrors
+        detail = error.strerror if isinstance(error, OSError) else error
+        raise ParameterError(f"{one_line(name)}: cannot be read: {one_line(detail)}") from None
+    except RecursionError:
+        raise ParameterError(f"{one_line(name)}: tables are nested too deeply") from None
+
+
+def parameters_from_table(
+    table: object, schema: Mapping[str, str], where: str, optional: frozenset[str] = frozenset()
+) -> ParameterSet:
+    """Turn a TOML table of parameters into a set.
+
+    Args:
+        table: `{name: {value, unit, basis, source, interval, bounds, reason}}`; `interval` and
+            `bounds` are `[low, high]` in the parameter's own unit.
+        schema: Dimension of every expected name; it also gives the order.
+        where: File and table, for messages.
+        optional: Names of the schema that may be missing.
+
+    Raises:
+        ParameterError: A name or key that is unknown or missing, a value that is not a finite
+            number of the right dimension, or attributes that contradict one another.
+    """
+    if not isinstance(table, Mapping):
+        raise ParameterError(f"{where}: expected a table of parameters")
+    for name in table:
+        if name not in schema:
+            raise ParameterError(
+                f"{where}: unknown parameter '{one_line(name)}': {closest(name, list(schema))}"
+            )
+    missing = [name for name in schema if name not in table and name not in optional]
+    if missing:
+        raise ParameterError(f"{where}: missing parameter '{missing[0]}': add it with its basis")
+    rows = tuple(
+        _parameter(name, table[name], schema[name], where) for name in schema if name in table
+    )
+    return ParameterSet(rows, where)
+
+
+def load_parameters(
+    path: str | Path, schema: Mapping[str, str], table: str = "parameters"
+) -> ParameterSet:
+    """Load the parameters of one TOML file.
+
+    Args:
+        path: The file.
+        schema: As for `parameters_from_table`.
+        table: Name of the table that holds them.
+
+    Raises:
+        ParameterError: As for `read_toml` and `parameters_from_table`.
+    """
+    contents = read_toml(path)
+    name = one_line(Path(path).name)
+    if table not in contents:
+        raise ParameterError(f"{name}: no table [{table}]: {closest(table, list(contents))}")
+    return parameters_from_table(contents[table], schema, f"{name} [{table}]")
+
+
+def _parameter(name: str, entry: object, expected: str, where: str) -> Parameter:
+    """Return one parameter from its TOML entry."""
+    place = f"{where}: '{name}'"
+    if not isinstance(entry, Mapping):
+        raise ParameterError(f"{place}: expected {{value, unit, basis, source}}")
+    for key in entry:
+        if key not in _KEYS:
+            raise ParameterError(f"{place}: unknown key '{one_line(key)}': {closest(key, _KEYS)}")
+    for key in ("value", "unit", "basis", "source"):
+        if key not in entry:
+            raise ParameterError(f"{place}: missing key '{key}'")
+    for key in ("unit", "basis", "source", "reason"):
+        if not isinstance(entry.get(key, ""), str):
+            raise ParameterError(f"{place}: '{key}' must be text in quotation marks")
+    unit: str = entry["unit"]
+    try:
+        found = dimension(unit)
+    except UnitError as error:
+        raise ParameterError(f"{place}: {error}") from None
+    if found != expected:
+        raise ParameterError(
+            f"{place}: '{unit}' is a unit of {found}, expected {expected} "
+            f"such as '{si_unit(expected)}'"
+        )
+    written = _number(entry["value"], f"{place}: value")
+    try:
+        return Parameter(
+            name=name,
+            value=to_si(written, unit),
+            unit=unit,
+            value_as_written=written,
+            basis=entry["basis"],
+            source=entry["source"],
+            interval=_pair(entry.get("interval"), unit, f"{place}: interval"),
+            bounds=_pair(entry.get("bounds"), unit, f"{place}: bounds"),
+            reason=entry.get("reason", ""),
+        )
+    except ParameterError as error:
+        message = str(error)
+        raise ParameterError(
+            message if message.startswith(where) else f"{where}: {message}"
+        ) from None
+
+
+def _number(value: object, place: str) -> float:
+    """Return a finite float."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ParameterError(f"{place} must be a number, not {one_line(repr(value))[:40]}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if not math.isfinite(number):
+        raise ParameterError(f"{place} must be a finite number")
+    return number
+
+
+def _pair(value: object, unit: str, place: str) -> Interval | None:
+    """Return a pair [low, high] in SI units, or None where there is none."""
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 2:
+        raise ParameterError(f"{place} must be [low, high]")
+    return to_si(_number(value[0], place), unit), to_si(_number(value[1], place), unit)

@@ -1,0 +1,119 @@
+"""Catalogue units and their SI factors; standard library only."""
+
+import math
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Final
+
+from actuators.errors import UnitError, closest
+
+_RPM: Final = math.pi / 30.0  # [rad/s]
+_DEG: Final = math.pi / 180.0  # [rad]
+
+# dimension -> {unit: factor to SI}. The first unit of each dimension is the SI unit.
+_TABLE: Final[Mapping[str, Mapping[str, float]]] = {
+    "ratio": {"1": 1.0, "%": 1e-2},
+    "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
+    "mass": {"kg": 1.0, "g": 1e-3},
+    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "frequency": {"Hz": 1.0},
+    "angle": {"rad": 1.0, "deg": _DEG},
+    "angular velocity": {"rad/s": 1.0, "deg/s": _DEG, "rpm": _RPM},
+    "angular acceleration": {"rad/s^2": 1.0},
+    "velocity": {"m/s": 1.0, "mm/s": 1e-3, "m/min": 1.0 / 60.0},
+    "acceleration": {"m/s^2": 1.0},
+    "force": {"N": 1.0, "kN": 1e3},
+    "torque": {"N*m": 1.0, "mN*m": 1e-3, "cN*m": 1e-2, "N*cm": 1e-2},
+    "inertia": {"kg*m^2": 1.0, "g*cm^2": 1e-7, "kg*cm^2": 1e-4},
+    "rotational stiffness": {"N*m/rad": 1.0, "N*m/deg": 1.0 / _DEG},
+    "viscous friction": {
+        "N*m*s/rad": 1.0,
+        "mN*m*s/rad": 1e-3,
+        "mN*m/krpm": 1e-3 / (1e3 * _RPM),
+        "mN*m/rpm": 1e-3 / _RPM,
+    },
+    "stiffness": {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3},
+    "damping": {"N*s/m": 1.0},
+    "density": {"kg/m^3": 1.0, "g/cm^3": 1e3},
+    "power": {"W": 1.0, "mW": 1e-3},
+    "energy": {"J": 1.0, "mJ": 1e-3, "Wh": 3600.0},
+    "current": {"A": 1.0, "mA": 1e-3},
+    "voltage": {"V": 1.0, "mV": 1e-3},
+    "resistance": {"ohm": 1.0, "mohm": 1e-3},
+    "inductance": {"H": 1.0, "mH": 1e-3},
+    # A volt second per radian is a newton metre per ampere.
+    "torque constant": {
+        "N*m/A": 1.0,
+        "mN*m/A": 1e-3,
+        "V*s/rad": 1.0,
+        "V/krpm": 1.0 / (1e3 * _RPM),
+    },
+    "thermal resistance": {"K/W": 1.0},
+    "temperature coefficient": {"1/K": 1.0, "%/K": 1e-2},
+    "temperature": {"K": 1.0, "degC": 1.0},
+}
+_OFFSET: Final[Mapping[str, float]] = {"degC": 273.15}  # added after scaling [K]
+
+_DIMENSION: Final = MappingProxyType(
+    {unit: name for name, units in _TABLE.items() for unit in units}
+)
+_FACTOR: Final = MappingProxyType({unit: f for units in _TABLE.values() for unit, f in units.items()})
+
+
+def known_units() -> tuple[str, ...]:
+    """Return every unit of the table, in its order."""
+    return tuple(_DIMENSION)
+
+
+def known_dimensions() -> tuple[str, ...]:
+    """Return every dimension of the table, in its order."""
+    return tuple(_TABLE)
+
+
+def dimension(unit: str) -> str:
+    """Return the dimension of a unit, such as `torque` for `mN*m`.
+
+    Raises:
+        UnitError: The unit is not in the table; the message offers the closest one.
+    """
+    if not isinstance(unit, str) or unit not in _DIMENSION:
+        raise UnitError(f"unknown unit {unit!r:.40}: {closest(str(unit), known_units())}")
+    return _DIMENSION[unit]
+
+
+def si_unit(dimension_name: str) -> str:
+    """Return the SI unit of a dimension, such as `N*m` for `torque`.
+
+    Raises:
+        UnitError: The dimension is not in the table.
+    """
+    if dimension_name not in _TABLE:
+        raise UnitError(
+            f"unknown dimension {dimension_name!r:.40}: "
+            f"{closest(str(dimension_name), known_dimensions())}"
+        )
+    return next(iter(_TABLE[dimension_name]))
+
+
+def to_si(value: float, unit: str) -> float:
+    """Return a value in SI units.
+
+    Args:
+        value: The number as written.
+        unit: A unit of the table.
+
+    Raises:
+        UnitError: The unit is not in the table.
+    """
+    dimension(unit)
+    return value * _FACTOR[unit] + _OFFSET.get(unit, 0.0)
+
+
+def from_si(value: float, unit: str) -> float:
+    """Return an SI value in a unit of the table; the inverse of `to_si`.
+
+    Raises:
+        UnitError: The unit is not in the table.
+    """
+    dimension(unit)
+    return (value - _OFFSET.get(unit, 0.0)) / _FACTOR[unit]

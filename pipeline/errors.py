@@ -1,0 +1,35 @@
+"""What can go wrong in the pipeline room, each named for the fact."""
+
+from __future__ import annotations
+
+
+class PipelineError(Exception):
+    """Root of every error the pipeline room raises; its message is one line."""
+
+
+class RobotFileError(PipelineError):
+    """The robot file is missing, malformed or contradicts itself."""
+
+
+class UrdfError(PipelineError):
+    """The URDF cannot be read or lacks what the robot file names."""
+
+
+class UnphysicalModelError(PipelineError):
+    """The model has an inertia, mass or geometry that no body can have."""
+
+
+class GaitError(PipelineError):
+    """The gait's numbers contradict each other or cannot be walked."""
+
+
+class OutOfReachError(PipelineError):
+    """A foot target lies outside what the leg reaches."""
+
+
+class TippingError(PipelineError):
+    """A foot would have to pull on the ground: the robot tips."""
+
+
+class InvalidMotionError(PipelineError):
+    """A motion holds no samples, or values that are not finite."""

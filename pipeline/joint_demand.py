@@ -1,0 +1,199 @@
+"""Torque demanded of every joint: inverse dynamics minus what the ground supplies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pipeline.contact_forces import ContactForces, least_tangential_forces
+from pipeline.errors import GaitError, TippingError
+from pipeline.kinematics import foot_force_torques, foot_positions
+from pipeline.motion import Motion, Segment
+from pipeline.robot import Robot
+from pipeline.stability import stability_margins
+
+Array = NDArray[np.float64]
+#: Samples per block of leg kinematics: small enough for the cache, large enough for numpy.
+_BLOCK = 2048
+
+
+@dataclass(frozen=True)
+class JointDemand:
+    """Motion and torque of the actuated joints over one segment.
+
+    Attributes:
+        joints: Names, in the robot file's order; they label the columns.
+        time: Shape (N,) [s].
+        position: Shape (N, J) [rad].
+        velocity: Shape (N, J) [rad/s].
+        acceleration: Shape (N, J) [rad/s^2].
+        torque: What the actuator must apply to the joint, shape (N, J) [N*m].
+        segment: The segment's name.
+    """
+
+    joints: tuple[str, ...]
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    torque: Array
+    segment: str
+
+
+def inverse_dynamics(
+    robot: Robot, segment: Segment, *, quasi_static: bool = False, threads: int = 1
+) -> Array:
+    """Generalised forces without contact, by Pinocchio's RNEA over the batch.
+
+    Args:
+        robot: The robot; its model's armature is zero, reflected rotor inertia being the actuator
+            chain's.
+        segment: The motion.
+        quasi_static: Leave out the links' inertial terms: gravity alone.
+        threads: For Pinocchio's thread pool.
+
+    Returns:
+        Generalised forces, shape (N, nv) [N, N*m].
+    """
+    q, v, a = segment.configuration, segment.velocity, segment.acceleration
+    if quasi_static:
+        v = np.zeros_like(v)
+        a = np.zeros_like(a)
+    pool = robot.pool(threads)
+    # Pinocchio drops the sample axis of a single sample.
+    return np.asarray(pin.rneaInParallel(threads, pool, q.T, v.T, a.T)).T.reshape(v.shape)
+
+
+def contact_forces(robot: Robot, segment: Segment, generalised: Array) -> ContactForces:
+    """Ground forces that supply the wrench demanded of the base.
+
+    Args:
+        robot: A robot with a floating base.
+        segment: The motion.
+        generalised: From `inverse_dynamics`, shape (N, nv).
+
+    Raises:
+        TippingError: A foot would have to pull; names foot, instant, force and margin.
+        GaitError: Fewer than three feet stand.
+    """
+    if len(segment.stance) < 3:
+        raise GaitError(
+            f"segment '{segment.name}' stands on {len(segment.stance)} feet; a statically stable "
+            "stance needs at least 3"
+        )
+    legs = robot.leg_names
+    q = robot.leg_positions(segment.configuration)
+    n = q.shape[0]
+    feet = np.concatenate([foot_positions(robot.chains, q[s]) for s in _blocks(n)])
+    stance = [legs.index(leg) for leg in segment.stance]
+    rotation = robot.base_rotation(segment.configuration)  # base -> world, (N, 3, 3) or None
+    wrench = generalised[:, :6]
+    standing = feet[:, stance]
+    if rotation is None:
+        force_world_stance = least_tangential_forces(wrench, standing)
+        force_stance = force_world_stance
+    else:
+        turned = np.concatenate(
+            [
+                np.einsum("nij,nj->ni", rotation, wrench[:, :3]),
+                np.einsum("nij,nj->ni", rotation, wrench[:, 3:]),
+            ],
+            axis=1,
+        )
+        world_feet = np.einsum("nij,nfj->nfi", rotation, standing)
+        force_world_stance = least_tangential_forces(turned, world_feet)
+        force_stance = np.einsum("nji,nfj->nfi", rotation, force_world_stance)
+    _refuse_pulling(robot, segment, force_world_stance[..., 2])
+
+    force = np.zeros((n, len(legs), 3))
+    force_world = np.zeros_like(force)
+    force[:, stance] = force_stance
+    force_world[:, stance] = force_world_stance
+    return ContactForces(legs, segment.stance, segment.time, feet, force, force_world)
+
+
+def _refuse_pulling(robot: Robot, segment: Segment, normal: Array) -> None:
+    lowest = float(normal.min())
+    # A foot that is exactly unloaded (a tripod at the edge of its stability) still stands.
+    if lowest < -1e-9 * max(1.0, float(np.abs(normal).max())):
+        sample, foot = np.unravel_index(int(normal.argmin()), normal.shape)
+        margin = stability_margins(robot, segment)[sample]
+        raise TippingError(
+            f"the robot tips at t = {segment.time[sample]:.4g} s ({segment.name}): the foot of leg "
+            f"'{segment.stance[foot]}' would have to pull with {-lowest:.1f} N, static margin "
+            f"{1e3 * margin:.1f} mm; widen the hip spacing or shorten the stroke"
+        )
+
+
+def _blocks(n: int) -> list[slice]:
+    return [slice(i, min(i + _BLOCK, n)) for i in range(0, n, _BLOCK)]
+
+
+def segment_demand(
+    robot: Robot, segment: Segment, *, quasi_static: bool = False, threads: int = 1
+) -> tuple[JointDemand, ContactForces | None]:
+    """Joint torques over one segment, with the contact forces they rest on.
+
+    Args:
+        robot: With floating base the ground carries it; with fixed base there is no contact.
+        segment: The motion.
+        quasi_static: Leave out the links' inertial terms.
+        threads: For Pinocchio's thread pool.
+
+    Returns:
+        The demand and the contact forces (None for a fixed base).
+
+    Raises:
+        TippingError: A foot would have to pull.
+    """
+    generalised = inverse_dynamics(robot, segment, quasi_static=quasi_static, threads=threads)
+    torque = generalised[:, robot.velocity_index]
+    contacts = None
+    if robot.floating:
+        contacts = contact_forces(robot, segment, generalised)
+        q = robot.leg_positions(segment.configuration)
+        for s in _blocks(q.shape[0]):
+            part = foot_force_torques(robot.chains, q[s], contacts.force[s])
+            torque[s, robot.leg_columns.ravel()] -= part.reshape(part.shape[0], -1)
+    demand = JointDemand(
+        joints=robot.joints,
+        time=segment.time,
+        position=segment.configuration[:, robot.position_index],
+        velocity=segment.velocity[:, robot.velocity_index],
+        acceleration=segment.acceleration[:, robot.velocity_index],
+        torque=torque,
+        segment=segment.name,
+    )
+    return demand, contacts
+
+
+@dataclass(frozen=True)
+class MotionDemand:
+    """Demand and contact forces of a whole motion, segment by segment."""
+
+    segments: tuple[JointDemand, ...]
+    contacts: tuple[ContactForces | None, ...]
+    period: float | None
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return self.segments[0].joints
+
+
+def motion_demand(
+    robot: Robot, motion: Motion, *, quasi_static: bool = False, threads: int = 1
+) -> MotionDemand:
+    """Joint demand along a motion; see `segment_demand`."""
+    parts = [
+        segment_demand(robot, segment, quasi_static=quasi_static, threads=threads)
+        for segment in motion.segments
+    ]
+    return MotionDemand(
+        tuple(demand for demand, _ in parts),
+        tuple(contacts for _, contacts in parts),
+        motion.period,
+    )

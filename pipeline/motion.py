@@ -1,0 +1,94 @@
+"""A motion as a list of segments with closed ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import InvalidMotionError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of motion during which the same feet stand on the ground.
+
+    Both ends belong to the segment: the last sample of one and the first of the next share their
+    time but hold the left and the right limit, because forces jump at contact events.
+
+    Attributes:
+        name: For people, e.g. ``"support of lf, lr, rm"``.
+        time: Increasing, shape (N,) [s].
+        configuration: Pinocchio configuration, shape (N, nq) [m, quaternion, rad].
+        velocity: Pinocchio tangent velocity, shape (N, nv) [m/s, rad/s].
+        acceleration: Its derivative, shape (N, nv) [m/s^2, rad/s^2].
+        stance: Names of the legs whose feet carry load.
+    """
+
+    name: str
+    time: Array
+    configuration: Array
+    velocity: Array
+    acceleration: Array
+    stance: tuple[str, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse what no later stage could compute with.
+
+        Raises:
+            InvalidMotionError: No samples, times that do not increase, shapes that differ or values
+                that are not finite.
+        """
+        n = self.time.shape[0]
+        if n == 0:
+            raise InvalidMotionError(f"segment '{self.name}' has no samples; at least 1 is needed")
+        if np.any(np.diff(self.time) <= 0):
+            row = int(np.argmax(np.diff(self.time) <= 0)) + 1
+            raise InvalidMotionError(
+                f"segment '{self.name}', sample {row}: time does not increase; sort the samples"
+            )
+        for label, values in (
+            ("time", self.time),
+            ("configuration", self.configuration),
+            ("velocity", self.velocity),
+            ("acceleration", self.acceleration),
+        ):
+            if values.shape[0] != n:
+                raise InvalidMotionError(
+                    f"segment '{self.name}': {label} has {values.shape[0]} samples, time has {n}"
+                )
+            finite = np.isfinite(values).reshape(n, -1).all(axis=1)
+            if not finite.all():
+                raise InvalidMotionError(
+                    f"segment '{self.name}', sample {int(np.argmin(finite))}: {label} is not finite"
+                )
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Segments in order of time.
+
+    Attributes:
+        segments: At least one; each starts where the one before ended.
+        period: Duration after which the motion repeats [s], or None when it does not.
+    """
+
+    segments: tuple[Segment, ...]
+    period: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a motion without segments.
+
+        Raises:
+            InvalidMotionError: If there is no segment.
+        """
+        if not self.segments:
+            raise InvalidMotionError("the motion has no segments; at least 1 is needed")
+
+    @property
+    def samples(self) -> int:
+        """Number of samples over all segments."""
+        return sum(segment.time.size for segment in self.segments)

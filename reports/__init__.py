@@ -1,0 +1,1 @@
+"""Tables, figures and sidecars of results computed elsewhere."""

@@ -1,0 +1,37 @@
+"""Fixtures shared by all rooms."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from pipeline.gait import tripod_gait
+from pipeline.joint_demand import MotionDemand, motion_demand
+from pipeline.motion import Motion
+from pipeline.robot import Robot, load_robot
+from pipeline.robot_file import load_robot_file
+
+ROOT = Path(__file__).parents[1]
+os.environ.setdefault("MPLBACKEND", "Agg")
+
+
+@pytest.fixture(scope="session")
+def root() -> Path:
+    return ROOT
+
+
+@pytest.fixture(scope="session")
+def hexapod() -> Robot:
+    return load_robot(load_robot_file(ROOT / "urdf" / "hexapod.toml"))
+
+
+@pytest.fixture(scope="session")
+def walk(hexapod: Robot) -> Motion:
+    return tripod_gait(hexapod)
+
+
+@pytest.fixture(scope="session")
+def walk_demand(hexapod: Robot, walk: Motion) -> MotionDemand:
+    return motion_demand(hexapod, walk)

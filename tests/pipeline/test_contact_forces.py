@@ -1,0 +1,94 @@
+"""Least tangential foot forces against a general optimiser, balance and push-only."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from pipeline.contact_forces import least_tangential_forces
+from pipeline.errors import TippingError
+from pipeline.gait import tripod_gait
+from pipeline.joint_demand import contact_forces, inverse_dynamics, motion_demand
+from pipeline.motion import Motion
+from pipeline.robot import Robot, load_robot
+from pipeline.stability import stability_margins, support_margin
+
+TRIPOD = np.array([[0.30, 0.25, -0.31], [-0.24, 0.26, -0.31], [0.02, -0.27, -0.31]])
+SIX = np.array([[x, y, -0.3] for x in (-0.27, 0.0, 0.27) for y in (-0.26, 0.26)])
+
+
+def wrench_of(feet: np.ndarray, force: np.ndarray) -> np.ndarray:
+    return np.concatenate([force.sum(axis=0), np.cross(feet, force).sum(axis=0)])
+
+
+def random_wrench(feet: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    force = rng.normal(size=feet.shape) * [5, 5, 10] + [0, 0, 100]
+    return wrench_of(feet, force)
+
+
+@pytest.mark.parametrize("feet", [TRIPOD, SIX, SIX[:4]], ids=["three", "six", "four"])
+def test_forces_add_up_to_the_wrench(feet: np.ndarray) -> None:
+    rng = np.random.default_rng(1)
+    wrench = np.array([random_wrench(feet, rng) for _ in range(50)])
+    force = least_tangential_forces(wrench, np.repeat(feet[None], 50, axis=0))
+    for row in range(50):
+        np.testing.assert_allclose(wrench_of(feet, force[row]), wrench[row], atol=1e-9)
+
+
+@pytest.mark.parametrize("feet", [TRIPOD, SIX], ids=["three", "six"])
+def test_no_other_distribution_has_less_tangential_force(feet: np.ndarray) -> None:
+    """SLSQP on the definition itself, from a random start."""
+    rng = np.random.default_rng(2)
+    wrench = random_wrench(feet, rng)
+    ours = least_tangential_forces(wrench[None], feet[None])[0]
+    found = minimize(
+        lambda f: float((f.reshape(-1, 3)[:, :2] ** 2).sum()),
+        rng.normal(size=feet.size),
+        jac=lambda f: (2 * f.reshape(-1, 3) * [1, 1, 0]).ravel(),
+        constraints={"type": "eq", "fun": lambda f: wrench_of(feet, f.reshape(-1, 3)) - wrench},
+        method="SLSQP",
+        options={"ftol": 1e-14, "maxiter": 500},
+    )
+    assert found.success
+    np.testing.assert_allclose(ours[:, :2], found.x.reshape(-1, 3)[:, :2], atol=1e-4)
+
+
+def test_unequal_heights_are_balanced() -> None:
+    feet = TRIPOD + np.array([[0, 0, 0.02], [0, 0, -0.01], [0, 0, 0]])
+    wrench = random_wrench(feet, np.random.default_rng(3))
+    force = least_tangential_forces(wrench[None], feet[None])[0]
+    np.testing.assert_allclose(wrench_of(feet, force), wrench, atol=1e-9)
+
+
+def test_feet_that_would_pull_are_released() -> None:
+    """Weight over a corner of six feet: no normal force is negative, the wrench is met."""
+    weight = np.array([0.0, 0.0, 400.0])
+    point = np.array([0.26, 0.2, 0.0])
+    wrench = np.concatenate([weight, np.cross(point, weight)])
+    force = least_tangential_forces(wrench[None], SIX[None])[0]
+    assert force[:, 2].min() >= 0
+    np.testing.assert_allclose(wrench_of(SIX, force), wrench, atol=1e-9)
+
+
+def test_margin_is_the_distance_to_the_nearest_edge() -> None:
+    square = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]], dtype=float)
+    for point, margin in (((0, 0), 1.0), ((0.5, 0.2), 0.5), ((1.25, 0), -0.25)):
+        assert support_margin(square, np.array([point], dtype=float))[0] == pytest.approx(margin)
+    shuffled = square[:, [2, 0, 3, 1]]
+    assert support_margin(shuffled, np.array([[0.5, 0.2]]))[0] == pytest.approx(0.5)
+
+
+def test_walking_needs_little_friction_and_stays_stable(hexapod: Robot, walk: Motion) -> None:
+    for segment in walk.segments:
+        contacts = contact_forces(hexapod, segment, inverse_dynamics(hexapod, segment))
+        assert contacts.force_world[..., 2].min() >= 0
+        assert np.nanmax(contacts.friction_needed) < 0.3
+        assert stability_margins(hexapod, segment).min() > 0
+
+
+def test_a_robot_that_tips_says_where_and_when(hexapod: Robot) -> None:
+    robot = load_robot(hexapod.spec.with_parameters({"hip_spacing": 0.20}))
+    motion = tripod_gait(robot, samples=51)
+    with pytest.raises(TippingError, match=r"tips at t = .* leg '\w+' would have to pull"):
+        motion_demand(robot, motion)
