@@ -61,7 +61,8 @@ def check_file(path: Path) -> list[Finding]:
         raise UrdfError(f"{path}: cannot be read as text") from None
     root = _root(text, str(path))
     findings = _inertias(root) + _limits(root)
-    parse_urdf(text, str(path), floating=False)
+    if all(finding.passed for finding in findings):
+        parse_urdf(text, str(path), floating=False)  # what is left to refuse: names and topology
     return findings
 
 

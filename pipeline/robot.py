@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -169,6 +173,20 @@ def load_robot(spec: RobotSpec) -> Robot:
     return robot
 
 
+@contextmanager
+def _parser_silenced() -> Iterator[None]:
+    """Keep the C++ parser from writing to the process's standard error: one line is ours."""
+    sys.stderr.flush()
+    saved = os.dup(2)
+    with open(os.devnull, "wb") as sink:
+        os.dup2(sink.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+
+
 def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
     """A Pinocchio model from URDF text.
 
@@ -176,9 +194,10 @@ def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
         UrdfError: The text is not a URDF; one line.
     """
     try:
-        if floating:
-            return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
-        return pin.buildModelFromXML(text)
+        with _parser_silenced():
+            if floating:
+                return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
+            return pin.buildModelFromXML(text)
     except (ValueError, RuntimeError) as error:
         reason = " ".join(str(error).split())[:160]
         raise UrdfError(f"{where}: not a URDF that Pinocchio can read ({reason})") from None
