@@ -57,7 +57,9 @@ _OFFSET: Final[Mapping[str, float]] = {"degC": 273.15}  # added after scaling [K
 _DIMENSION: Final = MappingProxyType(
     {unit: name for name, units in _TABLE.items() for unit in units}
 )
-_FACTOR: Final = MappingProxyType({unit: f for units in _TABLE.values() for unit, f in units.items()})
+_FACTOR: Final = MappingProxyType(
+    {unit: f for units in _TABLE.values() for unit, f in units.items()}
+)
 
 
 def known_units() -> tuple[str, ...]:

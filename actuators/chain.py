@@ -1,0 +1,256 @@
+"""A chain of elements from the joint to the supply, and its answers in motion and at rest."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from actuators.arrays import FloatArray, Scalars
+from actuators.element import Element
+from actuators.errors import ChainError, closest
+from actuators.motor import DCMotor
+from actuators.shaft import ShaftSeries
+
+JOINT_STAGE: Final = "out"
+SUPPLY_STAGE: Final = "el"
+
+
+@dataclass(frozen=True, eq=False)
+class HoldingResult:
+    """What holds given joint torques at standstill; arrays have the shape of the joint torques.
+
+    Attributes:
+        low: Least motor torque that holds [N*m].
+        high: Greatest motor torque that holds [N*m].
+        motor_torque: The one of least magnitude between them [N*m].
+        current: [A].
+        voltage: [V].
+        power: Electrical power [W].
+    """
+
+    low: FloatArray
+    high: FloatArray
+    motor_torque: FloatArray
+    current: FloatArray
+    voltage: FloatArray
+    power: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class ChainResult:
+    """What a chain needs for a motion.
+
+    Attributes:
+        chain: The chain's name.
+        shafts: Series at every named stage, from `out` to the motor's.
+        losses: Dissipated power by element (N, J) [W], copper loss of the motor last.
+        stored: Rate of stored energy by element (N, J) [W].
+        current: (N, J) [A].
+        voltage: (N, J) [V].
+        electrical_power: From the supply to the motor (N, J) [W].
+    """
+
+    chain: str
+    shafts: Mapping[str, ShaftSeries]
+    losses: Mapping[str, FloatArray]
+    stored: Mapping[str, FloatArray]
+    current: FloatArray
+    voltage: FloatArray
+    electrical_power: FloatArray
+
+    @property
+    def joint(self) -> ShaftSeries:
+        """The series at the joint."""
+        return self.shafts[JOINT_STAGE]
+
+    @property
+    def motor(self) -> ShaftSeries:
+        """The series at the motor's air gap."""
+        return tuple(self.shafts.values())[-1]
+
+    @property
+    def stages(self) -> tuple[str, ...]:
+        """Names of the stages from `out` to `el`."""
+        return (*self.shafts, SUPPLY_STAGE)
+
+    def stage_power(self, stage: str) -> FloatArray:
+        """Return the power towards the joint at a stage, (N, J) [W].
+
+        Raises:
+            ChainError: The chain has no such stage.
+        """
+        if stage == SUPPLY_STAGE:
+            return self.electrical_power
+        if stage not in self.shafts:
+            raise ChainError(f"{self.chain}: no stage '{stage}': {closest(stage, self.stages)}")
+        return self.shafts[stage].power
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """An actuator: elements in order from the joint to the motor, and the motor.
+
+    Attributes:
+        name: Name of the alternative.
+        elements: From the joint to the motor.
+        motor: The converter at the end.
+        stages: Stage name to the element whose motor side it is, for the stages between `out` and
+            `el`; the last one is at the motor.
+
+    Raises:
+        ChainError: A name stands twice, a stage names no element, or the motor's shaft is unnamed.
+    """
+
+    name: str
+    elements: tuple[Element, ...]
+    motor: DCMotor
+    stages: Mapping[str, str]
+
+    def __post_init__(self) -> None:
+        names = [e.name for e in self.elements] + [self.motor.name]
+        for name in names:
+            if names.count(name) > 1:
+                raise ChainError(f"{self.name}: element '{name}' stands twice: rename one")
+        order = []
+        for stage, name in self.stages.items():
+            if name not in names[:-1]:
+                raise ChainError(
+                    f"{self.name}: stage '{stage}' follows no element '{name}': "
+                    f"{closest(name, names[:-1])}"
+                )
+            order.append(names.index(name))
+        if order != sorted(set(order)) or {JOINT_STAGE, SUPPLY_STAGE} & set(self.stages):
+            raise ChainError(f"{self.name}: stages must be in order and not named out or el")
+        if not order or order[-1] != len(self.elements) - 1:
+            raise ChainError(f"{self.name}: name the stage after the last element")
+
+    @property
+    def ratio(self) -> Scalars:
+        """Motor speed over joint speed."""
+        total: Scalars = 1.0
+        for element in self.elements:
+            total = total * element.gearing
+        return total
+
+    def element(self, name: str) -> Element:
+        """Return an element by name.
+
+        Raises:
+            ChainError: There is none of that name.
+        """
+        return self.elements[self._index(name)]
+
+    def replaced(self, element: Element) -> "Chain":
+        """Return a chain in which the element of the same name is this one.
+
+        Raises:
+            ChainError: There is none of that name.
+        """
+        at = self._index(element.name)
+        return replace(self, elements=(*self.elements[:at], element, *self.elements[at + 1 :]))
+
+    def inserted(self, element: Element, before: str) -> "Chain":
+        """Return a chain with an element on the joint side of another.
+
+        Args:
+            element: The new element.
+            before: Name of the element whose joint side it takes.
+
+        Raises:
+            ChainError: There is no such element, or the new name is taken.
+        """
+        at = self._index(before)
+        return replace(self, elements=(*self.elements[:at], element, *self.elements[at:]))
+
+    def moving(self, joint: ShaftSeries) -> ChainResult:
+        """Return everything the chain needs for a motion of its joints.
+
+        Samples of a joint at rest (`direction` zero) get the holding torque of least magnitude
+        at every stage: no power flows through a standing shaft, only R I^2 into the motor.
+
+        Args:
+            joint: Series at the joints, best split by `split_at_reversals`.
+        """
+        at_rest = joint.direction == 0.0
+        standing = bool(at_rest.any())
+        low = high = joint.torque
+        stage_after = {element: stage for stage, element in self.stages.items()}
+        shafts = {JOINT_STAGE: joint}
+        losses: dict[str, FloatArray] = {}
+        stored: dict[str, FloatArray] = {}
+        side = joint
+        for element in self.elements:
+            motor_side = element.moving(side)
+            loss = element.loss(side, motor_side)
+            rate = element.stored(side, motor_side)
+            if loss is not None:
+                losses[element.name] = loss
+            if rate is not None:
+                stored[element.name] = rate
+            if standing:
+                low, high = element.holding(low, high)
+            side = motor_side
+            if element.name in stage_after:
+                shown = side
+                if standing:
+                    held = least_magnitude(low, high)
+                    shown = side.with_torque(np.where(at_rest, held, side.torque))
+                shafts[stage_after[element.name]] = shown
+        last = tuple(shafts.values())[-1]
+        current = self.motor.current(last.torque)
+        voltage = self.motor.voltage(current, last.velocity)
+        losses[self.motor.name] = self.motor.copper_loss(current)
+        return ChainResult(
+            chain=self.name,
+            shafts=shafts,
+            losses=losses,
+            stored=stored,
+            current=current,
+            voltage=voltage,
+            electrical_power=voltage * current,
+        )
+
+    def holding(self, torque: FloatArray) -> HoldingResult:
+        """Return what holds joint torques at standstill.
+
+        Each element maps the interval of torques that hold; the motor supplies the one of least
+        magnitude. This one rule gives Tables IV to VI and the zeros of the irreversible actuator.
+
+        Args:
+            torque: (..., J) [N*m].
+        """
+        low = high = np.asarray(torque, dtype=float)
+        for element in self.elements:
+            low, high = element.holding(low, high)
+        motor_torque = least_magnitude(low, high)
+        current = self.motor.current(motor_torque)
+        voltage = self.motor.voltage(current, np.zeros_like(current))
+        return HoldingResult(low, high, motor_torque, current, voltage, voltage * current)
+
+    def driving(self, motor: ShaftSeries) -> ShaftSeries:
+        """Return what reaches the joints from the motor's torque, all motion being known.
+
+        Args:
+            motor: Series at the motor's shaft.
+
+        Raises:
+            SelfLockingError: A self-locking gear is asked to move against its pinion's torque.
+        """
+        side = motor
+        for element in reversed(self.elements):
+            side = element.driving(side)
+        return side
+
+    def _index(self, name: str) -> int:
+        """Return the place of an element in the list."""
+        names = [e.name for e in self.elements]
+        if name not in names:
+            raise ChainError(f"{self.name}: no element '{name}': {closest(name, names)}")
+        return names.index(name)
+
+
+def least_magnitude(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the value of least magnitude in each interval [low, high]."""
+    value: FloatArray = np.clip(0.0, low, high)
+    return value

@@ -1,0 +1,65 @@
+"""The permanent-magnet DC motor as a converter of electrical into mechanical power (Fig. 5).
+
+I = torque / k        U = R I + k velocity        P = U I = torque velocity + R I^2
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+
+
+@dataclass(frozen=True, eq=False)
+class DCMotor:
+    """Conversion only: rotor friction and inertia are elements of their own.
+
+    Attributes:
+        name: Names the row of its copper loss.
+        torque_constant: k, of torque per current and of voltage per speed [N*m/A = V*s/rad].
+        resistance: R of the winding at its working temperature [ohm].
+        max_speed: Permissible speed [rad/s].
+        supply_voltage: Voltage at hand [V].
+        continuous_current: Permissible root mean square current [A].
+        peak_current: Permissible instantaneous current [A].
+
+    Raises:
+        UnphysicalElementError: A constant or limit is not positive.
+
+    Note:
+        Inductance is left out: with 0.08 mH and 0.3 ohm it matters below a millisecond.
+    """
+
+    name: str
+    torque_constant: Scalars
+    resistance: Scalars
+    max_speed: float = math.inf
+    supply_voltage: float = math.inf
+    continuous_current: float = math.inf
+    peak_current: float = math.inf
+
+    def __post_init__(self) -> None:
+        require_non_negative(
+            self.name, torque_constant=self.torque_constant, resistance=self.resistance
+        )
+        require(np.greater(self.torque_constant, 0.0), self.name, "torque_constant must be > 0")
+        for limit in ("max_speed", "supply_voltage", "continuous_current", "peak_current"):
+            require(getattr(self, limit) > 0.0, self.name, f"{limit} must be > 0")
+
+    def current(self, torque: FloatArray) -> FloatArray:
+        """Return the current (...) [A] for an air-gap torque [N*m]."""
+        return torque / self.torque_constant
+
+    def voltage(self, current: FloatArray, velocity: FloatArray) -> FloatArray:
+        """Return the voltage at the terminals (...) [V]."""
+        return self.resistance * current + self.torque_constant * velocity
+
+    def copper_loss(self, current: FloatArray) -> FloatArray:
+        """Return R I^2, (...) [W]."""
+        return self.resistance * current * current
+
+    def torque(self, voltage: FloatArray, velocity: FloatArray) -> FloatArray:
+        """Return the air-gap torque (...) [N*m] that a voltage gives at a speed (forward)."""
+        current = (voltage - self.torque_constant * velocity) / self.resistance  # [A]
+        return self.torque_constant * current

@@ -1,0 +1,165 @@
+"""Motion and torque of a set of joints at one shaft of their actuators.
+
+Sign convention: ratios are positive, so torque and velocity keep the joint's positive sense at
+every shaft; torque times velocity is positive where power flows from the supply to the joint.
+
+sgn(0) is decided here and nowhere else, as `ShaftSeries.direction`:
+
+- A series is a concatenation of closed blocks. A repeated time stamp is a break between two
+  blocks and carries the left and the right limit; its interval has no width.
+- In a block in which velocity keeps its sign, every sample has that sign, also those where the
+  velocity is zero: they stand for the one-sided limit.
+- A block whose speed stays below `REST_SPEED` is at rest: direction and velocity are zero, and
+  only static balance holds it.
+- In a block in which velocity changes sign (not yet split by `split_at_reversals`) a sample below
+  `REST_SPEED` takes the direction of the sample before it, at the block's start of the one after.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from actuators.arrays import FloatArray, Scalars
+from actuators.errors import ShaftError
+
+REST_SPEED: Final = 1e-9  # [rad/s]
+
+
+@dataclass(frozen=True, eq=False)
+class ShaftSeries:
+    """Samples of every joint at one shaft; build it with `at_joint`.
+
+    Attributes:
+        joints: Names of the J joints.
+        time: (N,) [s], not decreasing; a repeated stamp is a break.
+        position: (N, J) [rad].
+        velocity: (N, J) [rad/s].
+        acceleration: (N, J) [rad/s^2].
+        torque: (N, J) [N*m].
+        direction: (N, J) in {-1, 0, +1}: sgn(velocity) as decided by this module.
+    """
+
+    joints: tuple[str, ...]
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    torque: FloatArray
+    direction: FloatArray
+
+    @classmethod
+    def at_joint(
+        cls,
+        joints: Sequence[str],
+        time: ArrayLike,
+        position: ArrayLike,
+        velocity: ArrayLike,
+        acceleration: ArrayLike,
+        torque: ArrayLike,
+    ) -> "ShaftSeries":
+        """Return a checked series with its directions decided.
+
+        Args:
+            joints: Names of the J joints.
+            time: (N,) [s].
+            position: (N, J) [rad].
+            velocity: (N, J) [rad/s].
+            acceleration: (N, J) [rad/s^2].
+            torque: (N, J) [N*m].
+
+        Raises:
+            ShaftError: Shapes differ, a value is not finite, time runs backwards, or a joint is
+                named twice.
+        """
+        names = tuple(joints)
+        if len(set(names)) != len(names) or not names:
+            raise ShaftError(f"joints {names}: expected at least one name, none of them twice")
+        t = np.asarray(time, dtype=float)
+        if t.ndim != 1 or t.size == 0:
+            raise ShaftError(f"time has shape {t.shape}: expected (N,) with N >= 1")
+        shape = (t.size, len(names))
+        arrays: dict[str, FloatArray] = {}
+        for name, values in (
+            ("position", position),
+            ("velocity", velocity),
+            ("acceleration", acceleration),
+            ("torque", torque),
+        ):
+            array = np.asarray(values, dtype=float)
+            if array.shape != shape:
+                raise ShaftError(f"{name} has shape {array.shape}: expected {shape} (time, joint)")
+            if not np.isfinite(array).all():
+                row, column = np.argwhere(~np.isfinite(array))[0]
+                raise ShaftError(f"{name} of '{names[column]}' is not finite in sample {row}")
+            arrays[name] = array
+        if not np.isfinite(t).all() or (np.diff(t) < 0.0).any():
+            raise ShaftError("time must be finite and never decrease: sort the samples")
+        direction, rest = directions(t, arrays["velocity"])
+        if rest.any():
+            arrays["velocity"] = np.where(rest, 0.0, arrays["velocity"])
+        return cls(joints=names, time=t, direction=direction, **arrays)
+
+    @property
+    def power(self) -> FloatArray:
+        """Power through the shaft towards the joint, (N, J) [W]."""
+        return self.torque * self.velocity
+
+    def with_torque(self, torque: FloatArray) -> "ShaftSeries":
+        """Return the same motion with another torque, (N, J) [N*m]; arrays are shared."""
+        return replace(self, torque=torque)
+
+    def geared(self, ratio: Scalars, torque: FloatArray) -> "ShaftSeries":
+        """Return the motion of a shaft that turns `ratio` times as fast, with its torque.
+
+        Args:
+            ratio: Positive, dimensionless, for all joints or (J,).
+            torque: (N, J) [N*m] at the faster shaft.
+        """
+        return ShaftSeries(
+            joints=self.joints,
+            time=self.time,
+            position=self.position * ratio,
+            velocity=self.velocity * ratio,
+            acceleration=self.acceleration * ratio,
+            torque=torque,
+            direction=self.direction,
+        )
+
+
+def block_starts(time: FloatArray) -> NDArray[np.intp]:
+    """Return the index of each block's first sample: 0 and every second of a repeated stamp."""
+    return np.concatenate(([0], np.flatnonzero(np.diff(time) == 0.0) + 1))
+
+
+def directions(time: FloatArray, velocity: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Decide sgn(velocity) for every sample by the rules of this module.
+
+    Args:
+        time: (N,) [s].
+        velocity: (N, J) [rad/s].
+
+    Returns:
+        Directions (N, J) in {-1, 0, +1}, and which samples lie in a block at rest (N, J).
+    """
+    starts = block_starts(time)
+    lengths = np.diff(np.append(starts, time.size))
+    high = np.maximum.reduceat(velocity, starts, axis=0) >= REST_SPEED  # (blocks, J)
+    low = np.minimum.reduceat(velocity, starts, axis=0) <= -REST_SPEED
+    per_block = high.astype(float) - low.astype(float)
+    direction = np.repeat(per_block, lengths, axis=0)
+    rest = np.repeat(~(high | low), lengths, axis=0)
+    for block, joint in np.argwhere(high & low):
+        part = slice(starts[block], starts[block] + lengths[block])
+        direction[part, joint] = _signs_filled(velocity[part, joint])
+    return direction, rest
+
+
+def _signs_filled(velocity: FloatArray) -> FloatArray:
+    """Return signs (n,) in which samples at rest copy the moving sample before, or the first."""
+    moving = np.flatnonzero(np.abs(velocity) >= REST_SPEED)
+    source = np.searchsorted(moving, np.arange(velocity.size), side="right") - 1
+    signs: FloatArray = np.sign(velocity[moving[np.maximum(source, 0)]])
+    return signs
