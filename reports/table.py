@@ -1,0 +1,115 @@
+"""A named table whose every column says what it means and in which unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.errors import TableError
+
+#: What a column may hold: a NumPy vector, or a sequence in which None stands for "no value".
+Column = Sequence[Any] | NDArray[Any]
+_NAME = re.compile(r"[A-Za-z0-9_.-]+")
+_HEADER = re.compile(r"[A-Za-z0-9_]+")
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of equal length, ready to be written.
+
+    Attributes:
+        name: File name without ending, e.g. ``"standing"``.
+        columns: Header to values, in the order of the file. NaN and None are empty cells.
+        meanings: Header to (meaning, unit); the unit is ``""`` for names and ``"1"`` for pure
+            numbers.
+        description: One sentence on what the table holds and its sign conventions.
+    """
+
+    name: str
+    columns: Mapping[str, Column]
+    meanings: Mapping[str, tuple[str, str]]
+    description: str = ""
+    rows: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Refuse what a reader could not use.
+
+        Raises:
+            TableError: No columns, headers that are not plain words or differ only in case,
+                unequal lengths, columns without a meaning or meanings without a column.
+        """
+        if not _NAME.fullmatch(self.name):
+            raise TableError(f"table '{self.name}': the name must be a plain file name")
+        if not self.columns:
+            raise TableError(f"table '{self.name}' has no columns; at least 1 is needed")
+        folded: dict[str, str] = {}
+        for header in self.columns:
+            if not _HEADER.fullmatch(header):
+                raise TableError(
+                    f"table '{self.name}', column '{header}': use letters, digits and underscores"
+                )
+            if header.casefold() in folded:
+                raise TableError(
+                    f"table '{self.name}': headers '{folded[header.casefold()]}' and '{header}' "
+                    "are the same word; rename one"
+                )
+            folded[header.casefold()] = header
+        missing = [header for header in self.columns if not all(self._meaning(header))]
+        if missing:
+            raise TableError(
+                f"table '{self.name}', column '{missing[0]}' has no meaning; state it and its unit"
+            )
+        extra = [header for header in self.meanings if header not in self.columns]
+        if extra:
+            raise TableError(f"table '{self.name}': meaning of '{extra[0]}', which is no column")
+        lengths = {header: _length(self.name, header, v) for header, v in self.columns.items()}
+        first = next(iter(lengths))
+        for header, length in lengths.items():
+            if length != lengths[first]:
+                raise TableError(
+                    f"table '{self.name}': column '{header}' has {length} rows, "
+                    f"'{first}' has {lengths[first]}"
+                )
+        object.__setattr__(self, "rows", lengths[first])
+
+    def _meaning(self, header: str) -> tuple[bool, bool]:
+        entry = self.meanings.get(header)
+        return (entry is not None and bool(entry[0].strip()), entry is not None)
+
+
+def _length(table: str, header: str, values: Column) -> int:
+    if isinstance(values, np.ndarray) and values.ndim != 1:
+        raise TableError(
+            f"table '{table}', column '{header}' has {values.ndim} dimensions; a column has 1"
+        )
+    if isinstance(values, str):
+        raise TableError(f"table '{table}', column '{header}' is one text; give one per row")
+    return len(values)
+
+
+def table_from_rows(
+    name: str,
+    rows: Sequence[Mapping[str, Any]],
+    meanings: Mapping[str, tuple[str, str]],
+    description: str = "",
+) -> Table:
+    """A tidy table from one mapping per row; the columns are those of `meanings`, in its order.
+
+    Raises:
+        TableError: A row lacks a column or has one without a meaning.
+    """
+    expected = set(meanings)
+    for number, row in enumerate(rows):
+        if set(row) != expected:
+            odd = sorted(set(row) ^ expected)
+            raise TableError(
+                f"table '{name}', row {number}: columns {', '.join(odd)} are in the row or in the "
+                "meanings, not in both"
+            )
+    columns = {header: [row[header] for row in rows] for header in meanings}
+    return Table(name, columns, meanings, description)

@@ -1,0 +1,356 @@
+"""Tables of one walking cycle: demand, ground forces, stage energies, losses, limits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.chain import Chain, ChainResult
+from actuators.energy import loss_energies, stage_energies
+from actuators.limits import limit_rows
+from actuators.regeneration import BUS, Supply
+from pipeline.joint_demand import MotionDemand
+from reports.table import Table, table_from_rows
+from reports.wide import Quantity, wide_series
+
+Array = NDArray[np.float64]
+ALTERNATIVE = ("actuator alternative of section III", "")
+
+
+def walking_joint_demand(demand: MotionDemand) -> Table:
+    """Motion and torque of every joint over the cycle."""
+    parts = demand.segments
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    labels = np.concatenate([[part.segment] * part.time.size for part in parts]).tolist()
+    return wide_series(
+        "walking_joint_demand",
+        joined("time"),
+        demand.joints,
+        [
+            Quantity("position", "rad", "position", joined("position")),
+            Quantity("velocity", "rad/s", "velocity", joined("velocity")),
+            Quantity("acceleration", "rad/s^2", "acceleration", joined("acceleration")),
+            Quantity("torque", "N*m", "torque the actuator applies to the joint", joined("torque")),
+        ],
+        labels={"segment": (labels, "which feet support")},
+        description="One gait cycle; torque and velocity positive in the joint's direction.",
+    )
+
+
+def walking_contact_forces(demand: MotionDemand) -> Table:
+    """Ground forces of every foot over the cycle."""
+    parts = [contacts for contacts in demand.contacts if contacts is not None]
+    force = np.concatenate([part.force_world for part in parts])
+    needed = np.concatenate([part.friction_needed for part in parts])
+    stance = np.concatenate(
+        [
+            np.repeat([[float(leg in part.stance) for leg in part.legs]], part.time.size, axis=0)
+            for part in parts
+        ]
+    )
+    labels = [s.segment for s in demand.segments for _ in range(s.time.size)]
+    meaning = "force of the ground on the robot, world "
+    return wide_series(
+        "walking_contact_forces",
+        np.concatenate([part.time for part in parts]),
+        parts[0].legs,
+        [
+            Quantity("force_x", "N", meaning + "x", force[..., 0]),
+            Quantity("force_y", "N", meaning + "y", force[..., 1]),
+            Quantity("force_z", "N", meaning + "z", force[..., 2]),
+            Quantity("contact", "1", "1 on the ground, 0 in the air", stance),
+            Quantity("friction_needed", "1", "tangential over normal force", needed),
+        ],
+        labels={"segment": (labels, "which feet support")},
+        description="Least tangential foot forces; world frame, z up.",
+    )
+
+
+def walking_stability(demand: MotionDemand, margins: Sequence[Array]) -> Table:
+    """Static margin, lightest foot and friction needed, per segment."""
+    rows = []
+    for part, contacts, margin in zip(demand.segments, demand.contacts, margins, strict=True):
+        assert contacts is not None
+        normal = contacts.force_world[..., 2][:, [leg in contacts.stance for leg in contacts.legs]]
+        at = int(margin.argmin())
+        needed = contacts.friction_needed
+        rows.append(
+            {
+                "segment": part.segment,
+                "least_margin_m": float(margin[at]),
+                "at_time_s": float(part.time[at]),
+                "least_normal_force_N": float(normal.min()),
+                "greatest_friction_needed": float(np.nanmax(needed)),
+                "foot_of_greatest_friction": contacts.legs[
+                    int(np.nanargmax(needed)) % needed.shape[1]
+                ],
+            }
+        )
+    return table_from_rows(
+        "walking_stability",
+        rows,
+        {
+            "segment": ("which feet support", ""),
+            "least_margin_m": ("centre of mass to nearest edge of the support polygon", "m"),
+            "at_time_s": ("instant of the least margin", "s"),
+            "least_normal_force_N": ("lightest load on a supporting foot", "N"),
+            "greatest_friction_needed": ("largest tangential over normal force", "1"),
+            "foot_of_greatest_friction": ("leg that needs it", ""),
+        },
+    )
+
+
+def walking_stage_energy(results: Mapping[str, ChainResult]) -> Table:
+    """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20)."""
+    rows = [
+        {
+            "alternative": name,
+            "joint": joint,
+            "stage": stage.stage,
+            "forward_J": stage.forward[j],
+            "reverse_J": stage.reverse[j],
+        }
+        for name, result in results.items()
+        for stage in stage_energies(result)
+        for j, joint in enumerate(stage.joints)
+    ]
+    return table_from_rows(
+        "walking_stage_energy",
+        rows,
+        {
+            "alternative": ALTERNATIVE,
+            "joint": ("joint", ""),
+            "stage": ("shaft, from the joint (out) to the motor (m) and the supply (el)", ""),
+            "forward_J": ("E(+): energy per cycle from the supply towards the joint", "J"),
+            "reverse_J": ("E(-): energy per cycle the other way, as a positive number", "J"),
+        },
+    )
+
+
+def walking_losses(results: Mapping[str, ChainResult], supplies: Mapping[str, Supply]) -> Table:
+    """What every element turns into heat per cycle, and what is dumped at the supply."""
+    rows: list[dict[str, object]] = []
+    for name, result in results.items():
+        for element, loss in loss_energies(result).items():
+            rows.extend(
+                {"alternative": name, "joint": joint, "element": element, "loss_J": loss[j]}
+                for j, joint in enumerate(result.joint.joints)
+            )
+        supply = supplies[name]
+        rows.extend(
+            {"alternative": name, "joint": account, "element": "dumped_return", "loss_J": energy}
+            for account, energy in zip(supply.accounts, supply.dumped_energy, strict=True)
+        )
+    return table_from_rows(
+        "walking_losses",
+        rows,
+        {
+            "alternative": ALTERNATIVE,
+            "joint": ("joint; 'bus' where all joints share the supply", ""),
+            "element": (
+                "element of the chain; dumped_return: electrical energy that flows back and is lost",
+                "",
+            ),
+            "loss_J": ("energy dissipated per cycle", "J"),
+        },
+    )
+
+
+def leg_energies(supply: Supply, legs: Mapping[str, Sequence[str]]) -> dict[str, float]:
+    """Electrical energy per cycle of each leg and of the robot [J].
+
+    On a shared bus one leg's return feeds another, so only the robot has an energy of its own.
+    """
+    energy = dict(zip(supply.accounts, supply.supplied_energy.tolist(), strict=True))
+    total = {"robot": float(sum(energy.values()))}
+    if BUS in energy:
+        return total
+    return {leg: sum(energy[j] for j in joints) for leg, joints in legs.items()} | total
+
+
+def walking_energy(
+    supplies: Mapping[str, Supply], legs: Mapping[str, Sequence[str]], ideal: str
+) -> Table:
+    """Electrical energy per cycle, and its ratio to the ideal actuator's."""
+    base = leg_energies(supplies[ideal], legs)
+    rows = [
+        {
+            "alternative": name,
+            "leg": leg,
+            "electrical_J": energy,
+            "ratio_to_ideal": energy / base[leg] if base[leg] > 0 else None,
+        }
+        for name, supply in supplies.items()
+        for leg, energy in leg_energies(supply, legs).items()
+    ]
+    return table_from_rows(
+        "walking_energy",
+        rows,
+        {
+            "alternative": ALTERNATIVE,
+            "leg": ("leg, or the robot as a whole", ""),
+            "electrical_J": ("energy drawn from the supply per cycle", "J"),
+            "ratio_to_ideal": ("over that of the ideal actuator", "1"),
+        },
+    )
+
+
+def robot_energy(
+    demand: MotionDemand,
+    supplies: Mapping[str, Supply],
+    legs: Mapping[str, Sequence[str]],
+    weight: float,
+    speed: float,
+) -> Table:
+    """Average power, cost of transport, and how support and transfer share the energy.
+
+    Args:
+        demand: For the segments and their standing feet.
+        supplies: By alternative.
+        legs: Leg to its joints.
+        weight: Of the robot [N].
+        speed: Of walking [m/s].
+    """
+    assert demand.period is not None
+    rows = []
+    for name, supply in supplies.items():
+        energy = float(supply.supplied_energy.sum())
+        support = _support_energy(demand, supply, legs)
+        power = energy / demand.period
+        rows.append(
+            {
+                "alternative": name,
+                "energy_per_cycle_J": energy,
+                "average_power_W": power,
+                "cost_of_transport": power / (weight * speed),
+                "support_share": None if support is None else support / energy,
+                "transfer_share": None if support is None else 1 - support / energy,
+                "dumped_J": float(supply.dumped_energy.sum()),
+            }
+        )
+    return table_from_rows(
+        "robot_energy",
+        rows,
+        {
+            "alternative": ALTERNATIVE,
+            "energy_per_cycle_J": ("energy drawn from the supply per cycle", "J"),
+            "average_power_W": ("over one cycle", "W"),
+            "cost_of_transport": ("average power over weight times speed", "1"),
+            "support_share": ("share of joints while their foot supports; empty on a bus", "1"),
+            "transfer_share": ("share of joints while their foot is in the air", "1"),
+            "dumped_J": ("electrical energy per cycle that flows back and is lost", "J"),
+        },
+    )
+
+
+def _support_energy(
+    demand: MotionDemand, supply: Supply, legs: Mapping[str, Sequence[str]]
+) -> float | None:
+    if BUS in supply.accounts:
+        return None
+    from actuators.energy import split_integral
+
+    total = 0.0
+    for contacts in demand.contacts:
+        assert contacts is not None
+        start, end = contacts.time[0], contacts.time[-1]
+        # The segment's own rows: of the doubled stamps at its ends, the ones inside it.
+        first = int(np.searchsorted(supply.time, start, side="left"))
+        last = int(np.searchsorted(supply.time, end, side="right"))
+        columns = [supply.accounts.index(j) for leg in contacts.stance for j in legs[leg]]
+        time, power = supply.time[first:last], supply.electrical[first:last][:, columns]
+        forward, reverse = split_integral(time, power)
+        total += float((forward - supply.recovered * reverse).sum())
+    return total
+
+
+def motor_limits(results: Mapping[str, ChainResult], chains: Mapping[str, Chain]) -> Table:
+    """Peaks over the cycle against the motor's data sheet."""
+    rows = [
+        {
+            "alternative": name,
+            "joint": row.joint,
+            "quantity": row.quantity,
+            "unit": row.unit,
+            "limit": row.limit,
+            "peak": row.peak,
+            "at_time_s": row.peak_time,
+            "share_of_time_over": row.share_over,
+            "breach": row.breach,
+        }
+        for name, result in results.items()
+        for row in limit_rows(result, chains[name].motor)
+    ]
+    return table_from_rows(
+        "motor_limits",
+        rows,
+        {
+            "alternative": ALTERNATIVE,
+            "joint": ("joint", ""),
+            "quantity": ("motor speed, voltage, current, or rms_current over the cycle", ""),
+            "unit": ("unit of limit and peak", ""),
+            "limit": ("what the data sheet allows, in the row's unit", "see unit"),
+            "peak": ("largest magnitude over the cycle, in the row's unit", "see unit"),
+            "at_time_s": ("instant of the peak", "s"),
+            "share_of_time_over": ("share of the cycle above the limit", "1"),
+            "breach": ("whether the peak is above the limit", ""),
+        },
+    )
+
+
+def quasi_static_difference(
+    full: MotionDemand,
+    static: MotionDemand,
+    full_supplies: Mapping[str, Supply],
+    static_supplies: Mapping[str, Supply],
+    legs: Mapping[str, Sequence[str]],
+) -> tuple[Table, Table]:
+    """What the links' inertial terms change: in torque by joint, in energy by leg."""
+    torque = [np.concatenate([part.torque for part in d.segments]) for d in (full, static)]
+    joints = Table(
+        "quasi_static_torque",
+        {
+            "joint": list(full.joints),
+            "peak_torque_full_Nm": np.abs(torque[0]).max(axis=0),
+            "peak_torque_quasi_static_Nm": np.abs(torque[1]).max(axis=0),
+            "largest_difference_Nm": np.abs(torque[0] - torque[1]).max(axis=0),
+        },
+        {
+            "joint": ("joint", ""),
+            "peak_torque_full_Nm": ("largest magnitude with all inertial terms", "N*m"),
+            "peak_torque_quasi_static_Nm": ("without the links' inertial terms", "N*m"),
+            "largest_difference_Nm": ("largest difference at one instant", "N*m"),
+        },
+        "Full inverse dynamics against gravity and contact alone.",
+    )
+    rows = []
+    for name, supply in full_supplies.items():
+        other = leg_energies(static_supplies[name], legs)
+        for leg, energy in leg_energies(supply, legs).items():
+            rows.append(
+                {
+                    "alternative": name,
+                    "leg": leg,
+                    "full_J": energy,
+                    "quasi_static_J": other[leg],
+                    "relative_difference": (other[leg] - energy) / energy if energy else None,
+                }
+            )
+    energies = table_from_rows(
+        "quasi_static_energy",
+        rows,
+        {
+            "alternative": ALTERNATIVE,
+            "leg": ("leg, or the robot as a whole", ""),
+            "full_J": ("electrical energy per cycle with all inertial terms", "J"),
+            "quasi_static_J": ("without the links' inertial terms", "J"),
+            "relative_difference": ("quasi-static over full, less one", "1"),
+        },
+        "Reflected rotor inertia stays in the actuator chain in both.",
+    )
+    return joints, energies
