@@ -153,7 +153,7 @@ def walking_losses(results: Mapping[str, ChainResult], supplies: Mapping[str, Su
             "alternative": ALTERNATIVE,
             "joint": ("joint; 'bus' where all joints share the supply", ""),
             "element": (
-                "element of the chain; dumped_return: electrical energy that flows back and is lost",
+                "element of the chain; dumped_return: returned electrical energy that is lost",
                 "",
             ),
             "loss_J": ("energy dissipated per cycle", "J"),

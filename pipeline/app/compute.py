@@ -1,0 +1,141 @@
+"""Ties the rooms together: a robot's demand through every actuator alternative."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.chain import Chain, ChainResult, HoldingResult
+from actuators.regeneration import Supply, supply
+from actuators.reversals import split_at_reversals
+from actuators.shaft import ShaftSeries
+from pipeline.contact_forces import ContactForces
+from pipeline.gait import standing_posture, tripod_gait
+from pipeline.joint_demand import JointDemand, MotionDemand, motion_demand, segment_demand
+from pipeline.motion import Motion, Segment
+from pipeline.robot import Robot
+from pipeline.stability import stability_margins
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Regeneration:
+    """What becomes of electrical energy that flows back from a motor.
+
+    Attributes:
+        policy: ``none``, ``fraction`` or ``bus``.
+        fraction: Share that is used again, for ``fraction``.
+    """
+
+    policy: str = "none"
+    fraction: float = 0.0
+
+
+@dataclass(frozen=True)
+class Standing:
+    """The robot standing still.
+
+    Attributes:
+        segment: The posture.
+        demand: Torques to hold, one sample.
+        contacts: Ground forces, one sample.
+        holding: By alternative; arrays of shape (J,).
+    """
+
+    segment: Segment
+    demand: JointDemand
+    contacts: ContactForces
+    holding: Mapping[str, HoldingResult]
+
+
+@dataclass(frozen=True)
+class Walking:
+    """The robot over one gait cycle.
+
+    Attributes:
+        motion: The gait.
+        demand: At the joints.
+        margins: Static stability by segment [m].
+        results: By alternative.
+        supplies: What each alternative takes from the supply.
+    """
+
+    motion: Motion
+    demand: MotionDemand
+    margins: tuple[Array, ...]
+    results: Mapping[str, ChainResult]
+    supplies: Mapping[str, Supply]
+
+
+def joint_series(demand: MotionDemand) -> ShaftSeries:
+    """The joints' side of the actuators: segments in a row, split at velocity zeros."""
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part, name) for part in demand.segments])
+
+    return split_at_reversals(
+        ShaftSeries.at_joint(
+            demand.joints,
+            *(joined(n) for n in ("time", "position", "velocity", "acceleration", "torque")),
+        )
+    )
+
+
+def stand(
+    robot: Robot, chains: Mapping[str, Chain], feet: tuple[str, ...] | None = None
+) -> Standing:
+    """Stand still and hold.
+
+    Args:
+        robot: With a floating base.
+        chains: By alternative.
+        feet: Legs that stand; the robot file's by default.
+
+    Raises:
+        TippingError: A foot would have to pull.
+    """
+    segment = standing_posture(robot, feet)
+    demand, contacts = segment_demand(robot, segment)
+    assert contacts is not None
+    torque = demand.torque[0]
+    return Standing(
+        segment, demand, contacts, {name: chain.holding(torque) for name, chain in chains.items()}
+    )
+
+
+def walk(
+    robot: Robot,
+    chains: Mapping[str, Chain],
+    *,
+    samples: int,
+    quasi_static: bool = False,
+    regeneration: Regeneration | None = None,
+) -> Walking:
+    """Walk one cycle.
+
+    Args:
+        robot: With a floating base.
+        chains: By alternative.
+        samples: Per segment.
+        quasi_static: Leave out the links' inertial terms.
+        regeneration: What becomes of returned energy; none by default.
+
+    Raises:
+        TippingError: A foot would have to pull.
+    """
+    policy = regeneration or Regeneration()
+    motion = tripod_gait(robot, samples=samples)
+    demand = motion_demand(robot, motion, quasi_static=quasi_static)
+    series = joint_series(demand)
+    results = {name: chain.moving(series) for name, chain in chains.items()}
+    return Walking(
+        motion,
+        demand,
+        tuple(stability_margins(robot, segment) for segment in motion.segments),
+        results,
+        {name: supply(r, policy.policy, policy.fraction) for name, r in results.items()},
+    )
