@@ -1,0 +1,84 @@
+"""The kinds of catalogue components: which parameters, of which dimension, each one has."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from actuators.errors import CatalogError, closest, one_line
+from actuators.parameters import ParameterSet, parameters_from_table, read_toml
+
+MOTOR_KIND: Final = "dc_motor"
+
+_FRICTION: Final = {"coulomb": "torque", "load": "ratio", "viscous": "viscous friction"}
+_DRAG: Final = {"coulomb": "torque", "viscous": "viscous friction"}
+
+KINDS: Final[Mapping[str, Mapping[str, str]]] = {
+    "requirement": {"ratio": "ratio"},
+    MOTOR_KIND: {
+        "torque_constant": "torque constant",
+        "resistance": "resistance",
+        "max_speed": "angular velocity",
+        "supply_voltage": "voltage",
+        "continuous_current": "current",
+        "peak_current": "current",
+    },
+    "rotating_friction": {**_DRAG, "inertia": "inertia"},
+    "harmonic_drive": {"ratio": "ratio", **_FRICTION, "inertia": "inertia"},
+    "timing_belt": {"ratio": "ratio", **_FRICTION},
+    "planetary": {"ratio": "ratio", "coulomb": "torque"},
+    "hypoid": {
+        "ratio": "ratio",
+        "pinion_angle": "angle",
+        "wheel_angle": "angle",
+        "wheel_radius": "length",
+        "friction": "ratio",
+    },
+    "bearing": _DRAG,
+}
+_KEYS: Final = ("kind", "title", "note", "parameters")
+
+
+@dataclass(frozen=True)
+class Component:
+    """One component file of the catalogue.
+
+    Attributes:
+        name: The file's stem.
+        kind: One of `KINDS`.
+        title: What it is, in words.
+        note: What its values claim and what they do not; may be empty.
+        parameters: Its values.
+    """
+
+    name: str
+    kind: str
+    title: str
+    note: str
+    parameters: ParameterSet
+
+
+def load_component(path: Path) -> Component:
+    """Load one component file.
+
+    Raises:
+        ParameterError: The file cannot be read, or a parameter is wrong.
+        CatalogError: A key or the kind is unknown or missing.
+    """
+    file = one_line(path.name)
+    contents = read_toml(path)
+    for key in contents:
+        if key not in _KEYS:
+            raise CatalogError(f"{file}: unknown key '{one_line(key)}': {closest(key, _KEYS)}")
+    for key in ("kind", "title", "parameters"):
+        if key not in contents:
+            raise CatalogError(f"{file}: missing key '{key}'")
+    texts = {key: contents.get(key, "") for key in ("kind", "title", "note")}
+    for key, value in texts.items():
+        if not isinstance(value, str):
+            raise CatalogError(f"{file}: '{key}' must be text in quotation marks")
+    kind = texts["kind"]
+    if kind not in KINDS:
+        raise CatalogError(f"{file}: unknown kind '{one_line(kind)}': {closest(kind, list(KINDS))}")
+    parameters = parameters_from_table(contents["parameters"], KINDS[kind], file)
+    return Component(path.stem, kind, texts["title"], texts["note"], parameters)
