@@ -1,0 +1,1 @@
+"""One file per kind of figure; each function takes plain results and returns a Figure."""

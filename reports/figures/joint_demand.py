@@ -1,0 +1,137 @@
+"""Velocity and torque demanded of one joint over a gait cycle: Fig. 2 to 4 of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.errors import FigureError
+from reports.figures.style import (
+    BLUE,
+    QUIET,
+    SHADE,
+    VERMILION,
+    headline,
+    horizontal_grid,
+    new_figure,
+    number,
+    styled,
+    zero_line,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from pipeline.joint_demand import MotionDemand
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """One joint during one segment, both ends included.
+
+    Attributes:
+        time: Shape (N,) [s].
+        velocity: Shape (N,) [rad/s].
+        torque: Shape (N,) [N*m].
+        support: Whether the joint's leg stands on the ground.
+    """
+
+    time: Array
+    velocity: Array
+    torque: Array
+    support: bool
+
+
+def stretches(demand: MotionDemand, joint: str, leg: str) -> tuple[Stretch, ...]:
+    """The stretches of one joint out of a motion's demand.
+
+    Raises:
+        FigureError: The demand has no such joint.
+    """
+    if joint not in demand.joints:
+        raise FigureError(f"joint '{joint}' is not among {', '.join(demand.joints)}")
+    j = demand.joints.index(joint)
+    return tuple(
+        Stretch(
+            segment.time,
+            segment.velocity[:, j],
+            segment.torque[:, j],
+            contacts is not None and leg in contacts.stance,
+        )
+        for segment, contacts in zip(demand.segments, demand.contacts, strict=True)
+    )
+
+
+@styled
+def joint_demand_figure(
+    joint: str, parts: Sequence[Stretch], *, title: str = "", subtitle: str = ""
+) -> Figure:
+    """Two panels over the cycle: velocity above, torque below; support shaded.
+
+    Every stretch is drawn by itself, so that a jump between two is a gap and not a slope.
+
+    Raises:
+        FigureError: There is nothing to draw.
+    """
+    if not parts:
+        raise FigureError(f"joint '{joint}': no stretch of motion to draw")
+    figure = new_figure(7.0, 4.6)
+    headline(figure, title or f"{joint}: velocity and torque demand", subtitle)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    velocity = [p.velocity for p in parts]
+    torque = [p.torque for p in parts]
+    time = [p.time for p in parts]
+    _panel(upper, time, velocity, BLUE, "velocity [rad/s]", "rad/s")
+    _panel(lower, time, torque, VERMILION, "torque [N·m]", "N·m")
+    for part in parts:
+        first, last = float(part.time[0]), float(part.time[-1])
+        for axes in (upper, lower):
+            if part.support:
+                axes.axvspan(first, last, color=SHADE, linewidth=0, zorder=0)
+        upper.text(
+            (first + last) / 2,
+            1.02,
+            "support" if part.support else "transfer",
+            transform=upper.get_xaxis_transform(),
+            ha="center",
+            va="bottom",
+            color=QUIET,
+        )
+    lower.set_xlim(float(parts[0].time[0]), float(parts[-1].time[-1]))
+    lower.set_xlabel("time [s]")
+    figure.align_ylabels([upper, lower])
+    return figure
+
+
+def _panel(
+    axes: Axes, times: list[Array], values: list[Array], color: str, label: str, unit: str
+) -> None:
+    for time, value in zip(times, values, strict=True):
+        axes.plot(time, value, color=color, clip_on=False)
+    zero_line(axes)
+    horizontal_grid(axes)
+    axes.set_ylabel(label)
+    joined = np.concatenate(values)
+    low, high = float(joined.min()), float(joined.max())
+    span = max(high - low, 1e-12)
+    axes.set_ylim(min(low, 0.0) - 0.16 * span, max(high, 0.0) + 0.16 * span)
+    time = np.concatenate(times)
+    for index, above in ((int(joined.argmax()), True), (int(joined.argmin()), False)):
+        share = (time[index] - time[0]) / max(time[-1] - time[0], 1e-12)
+        axes.annotate(
+            f"{number(joined[index])} {unit}",
+            (time[index], joined[index]),
+            xytext=(0, 3 if above else -3),
+            textcoords="offset points",
+            ha="left" if share < 0.08 else "right" if share > 0.92 else "center",
+            va="bottom" if above else "top",
+            color=color,
+            fontsize=8.5,
+        )

@@ -1,0 +1,125 @@
+"""The common look of all figures: colours told apart by every eye, direct labels, little ink.
+
+Figures are made with Matplotlib's object interface; no pyplot, no global state. Matplotlib is
+imported when the first figure is drawn, not with this module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import wraps
+from typing import TYPE_CHECKING, Any, ParamSpec
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+P = ParamSpec("P")
+
+# Okabe and Ito (2008), Color Universal Design.
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
+INK, QUIET, FAINT, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#eef1f4"
+
+#: Colours in order, for things without a colour of their own.
+CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+#: Energy towards the joint, and energy that comes back.
+FORWARD, REVERSE = BLUE, ORANGE
+
+RC: dict[Any, Any] = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "mathtext.fontset": "dejavusans",
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": QUIET,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": False,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e6e9",
+    "grid.linewidth": 0.7,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "xtick.color": QUIET,
+    "ytick.color": QUIET,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "text.color": INK,
+    "lines.linewidth": 1.8,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.dpi": 150.0,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "legwatt",
+}
+
+
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Matplotlib's defaults with our changes, for the length of a block."""
+    import matplotlib
+
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(RC)
+        yield
+
+
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Draw under the common style, whatever the caller's Matplotlib settings are."""
+
+    @wraps(draw)
+    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with house_style():
+            return draw(*args, **kwargs)
+
+    return wrapper
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure with an Agg canvas and constrained layout; sizes in inches."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def headline(figure: Figure, title: str, subtitle: str = "") -> None:
+    """A title flush left, with a quiet second line."""
+    text = f"{title}\n" if subtitle else title
+    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold")
+    if subtitle:
+        # In the second, empty line of the title, for which the layout keeps room.
+        figure.canvas.draw_idle()
+        height = figure.get_size_inches()[1]
+        figure.text(0.012, 1 - 0.33 / height, subtitle, ha="left", va="center", color=QUIET)
+
+
+def horizontal_grid(axes: Axes) -> None:
+    """Faint horizontal lines, for reading values off a vertical scale."""
+    axes.grid(True, axis="y")
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+
+
+def zero_line(axes: Axes) -> None:
+    """A line at zero where signs matter."""
+    axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=1)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A value for a label: significant digits kept, true minus sign, no exponent near 1."""
+    if value == 0:
+        return "0"
+    text = f"{value:#.{digits}g}".rstrip(".")
+    return text.replace("-", "\N{MINUS SIGN}")
