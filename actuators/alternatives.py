@@ -1,4 +1,4 @@
-"""The alternatives as written in the catalogue: elements, their laws, and whence their arguments."""
+"""The alternatives as written in the catalogue: elements, laws and where arguments come from."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

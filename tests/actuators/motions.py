@@ -1,0 +1,56 @@
+"""Smooth random motions and series that the tests of this room share."""
+
+import numpy as np
+from hypothesis import strategies as st
+
+from actuators.build import load_catalog
+from actuators.reversals import split_at_reversals
+from actuators.shaft import ShaftSeries
+
+ALTERNATIVES = ("ideal", "rotor", "reversible", "irreversible")
+CHAINS = load_catalog().chains()
+seeds = st.integers(0, 2**32 - 1)
+
+
+def series(time, position, velocity, acceleration, torque, joints=None):
+    def column(x):
+        return np.asarray(x, dtype=float).reshape(len(time), -1)
+
+    n = column(position).shape[1]
+    names = joints or tuple(f"j{i}" for i in range(n))
+    return ShaftSeries.at_joint(
+        names, time, *(column(x) for x in (position, velocity, acceleration, torque))
+    )
+
+
+def harmonic(samples, joints=3, seed=0, period=3.0, torque=30.0):
+    """A periodic motion of three harmonics per joint with analytic derivatives."""
+    rng = np.random.default_rng(seed)
+    t = np.linspace(0.0, period, samples)[:, None]
+    q, v, a, load = (np.zeros((samples, joints)) for _ in range(4))
+    for k in (1, 2, 3):
+        w = 2.0 * np.pi * k / period
+        amplitude = rng.normal(size=joints) * 0.3 / k
+        phase = rng.uniform(0.0, 2.0 * np.pi, joints)
+        q += amplitude * np.sin(w * t + phase)
+        v += amplitude * w * np.cos(w * t + phase)
+        a -= amplitude * w**2 * np.sin(w * t + phase)
+        load += rng.normal(size=joints) * torque / k * np.cos(w * t + rng.uniform(0, 6.28, joints))
+    return series(t[:, 0], q, v, a, load)
+
+
+def constant(velocity, torque, acceleration=0.0):
+    """Two samples at one speed, one column per value."""
+    v = np.atleast_1d(np.asarray(velocity, dtype=float))
+    two = np.ones((2, 1))
+    return series(
+        [0.0, 1.0],
+        two * 0.0 * v,
+        two * v,
+        two * acceleration * np.ones_like(v),
+        two * np.asarray(torque, dtype=float) * np.ones_like(v),
+    )
+
+
+def split(s):
+    return split_at_reversals(s)

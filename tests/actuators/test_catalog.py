@@ -1,0 +1,106 @@
+import shutil
+
+import pytest
+
+from actuators.build import CATALOG, load_catalog
+from actuators.errors import ActuatorError, CatalogError, ParameterError
+from tests.actuators.motions import ALTERNATIVES
+
+
+def test_shipped_catalogue_builds_four_alternatives_of_ratio_400():
+    catalog = load_catalog()
+    chains = catalog.chains()
+    assert tuple(chains) == ALTERNATIVES
+    for chain in chains.values():
+        assert chain.ratio == pytest.approx(400.0, rel=1e-9)
+
+
+def test_every_parameter_names_basis_and_source():
+    for _, parameter in load_catalog().rows():
+        assert len(parameter.source) > 10
+        assert parameter.bounds is not None or parameter.basis in ("published", "datasheet")
+
+
+def test_alternative_3_counts_rotor_friction_once():
+    names = [e.name for e in load_catalog().chain("reversible").elements]
+    assert "rotor_friction" not in names
+    assert "rotor_inertia" in names
+
+
+def test_motor_is_consistent_with_its_data_sheet():
+    p = load_catalog().parameter
+    k, r = p("motor_re40_24v.torque_constant").value, p("motor_re40_24v.resistance").value
+    volts, stall = p("motor_re40_24v.supply_voltage").value, p("motor_re40_24v.peak_current").value
+    assert volts / r == pytest.approx(stall, rel=0.01)
+    no_load_speed = 793.8  # 7580 rpm [rad/s]
+    friction = p("rotor_re40.coulomb").value + p("rotor_re40.viscous").value * no_load_speed
+    assert friction / k == pytest.approx(0.137, rel=0.01)  # no-load current [A]
+    assert (volts - r * 0.137) / k == pytest.approx(no_load_speed, rel=0.01)
+
+
+@pytest.fixture
+def copy(tmp_path):
+    shutil.copytree(CATALOG, tmp_path / "catalog")
+    return tmp_path / "catalog"
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("alternatives.toml", '"hypoid.ratio"', '"hypod.ratio"', "did you mean 'hypoid'"),
+        ("alternatives.toml", '"hypoid.ratio"', '"hypoid.rato"', "did you mean 'ratio'"),
+        ("alternatives.toml", '"hypoid.ratio"', '"hypoid"', "expected component.parameter"),
+        ("alternatives.toml", 'law = "hypoid"', 'law = "hipoid"', "unknown law 'hipoid'"),
+        ("alternatives.toml", "wheel_angle =", "wheel_angel =", "did you mean 'wheel_angle'"),
+        ("alternatives.toml", 'friction = "hypoid.friction"\n', "", "lacks its argument"),
+        ("alternatives.toml", "motor_re40_24v", "motor_re40_48v", "did you mean 'motor_re40_24v'"),
+        ("alternatives.toml", 'stage = "ph"', 'stage = "mp"', "named twice"),
+        ("alternatives.toml", 'viscous = "pinion.viscous"\n', "", "used by no alternative"),
+        (
+            "alternatives.toml",
+            'title = "Alternative 1: ideal actuator"\n',
+            "",
+            "missing key 'title'",
+        ),
+        ("alternatives.toml", "[[ideal.element]]", "[[ideal.elements]]", "did you mean 'element'"),
+        ("planetary.toml", 'kind = "planetary"', 'kind = "planetry"', "did you mean 'planetary'"),
+        ("planetary.toml", "value = 12\n", "value = 13\n", "ratios multiply to 433.3"),
+        ("planetary.toml", "[parameters.ratio]", "[parameters.rati]", "unknown parameter 'rati'"),
+        ("planetary.toml", "title =", "titel =", "did you mean 'title'"),
+        ("hypoid.toml", "value = 0.125", "value = -0.125", "outside its"),
+        ("hypoid.toml", "value = 0.125", "value = 0.125.", "cannot be read"),
+    ],
+)
+def test_typos_give_one_clear_line(copy, file, old, new, message):
+    path = copy / file
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    with pytest.raises(ActuatorError, match=message) as caught:
+        load_catalog(copy)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_component_and_missing_catalogue(copy, tmp_path):
+    (copy / "hypoid.toml").unlink()
+    with pytest.raises(CatalogError, match="no component 'hypoid'"):
+        load_catalog(copy)
+    with pytest.raises(ParameterError, match=r"alternatives\.toml: cannot be read"):
+        load_catalog(tmp_path / "nowhere")
+
+
+def test_unused_component(copy):
+    shutil.copy(copy / "output_bearing.toml", copy / "spare.toml")
+    with pytest.raises(CatalogError, match=r"spare\.toml: parameter 'coulomb' is used by no"):
+        load_catalog(copy)
+
+
+def test_edits_do_not_touch_the_original():
+    catalog = load_catalog()
+    edited = catalog.replaced("planetary.coulomb", 0.004, basis="calibrated", source="fit here")
+    assert edited.parameter("planetary.coulomb").value == 0.004
+    assert catalog.parameter("planetary.coulomb").value == 0.008
+    with pytest.raises(CatalogError, match="no alternative 'reversibel'.*'reversible'"):
+        catalog.chain("reversibel")
+    with pytest.raises(CatalogError, match="change them together"):
+        catalog.replaced("planetary.ratio", 10.0).chain("irreversible")

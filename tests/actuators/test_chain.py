@@ -1,0 +1,151 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from actuators.balance import balance_residual
+from actuators.build import load_catalog
+from actuators.chain import Chain
+from actuators.errors import ChainError
+from actuators.friction import Friction
+from actuators.motor import DCMotor
+from actuators.ratio import Ratio
+from actuators.regeneration import supply
+from tests.actuators.motions import ALTERNATIVES, CHAINS, constant, harmonic, seeds, series, split
+
+REVERSIBLE = ("ideal", "rotor", "reversible")
+
+
+@pytest.mark.parametrize("alternative", ALTERNATIVES)
+@settings(max_examples=15)
+@given(seeds, st.floats(0.0, 200.0))
+def test_energy_balance_at_every_sample(alternative, seed, torque):
+    result = CHAINS[alternative].moving(split(harmonic(300, seed=seed, torque=torque)))
+    assert np.abs(balance_residual(result)).max() < 1e-9
+    for policy, fraction in (("none", 0.0), ("fraction", 0.6), ("bus", 0.0)):
+        account = supply(result, policy, fraction)
+        assert np.abs(balance_residual(result, account)).max() < 1e-9
+
+
+def test_balance_fails_when_a_loss_law_is_wrong():
+    result = CHAINS["irreversible"].moving(split(harmonic(300)))
+    result.losses["hypoid"][...] *= 1.001
+    assert np.abs(balance_residual(result)).max() > 1e-6
+
+
+@pytest.mark.parametrize("alternative", ALTERNATIVES)
+@settings(max_examples=10)
+@given(seeds)
+def test_losses_are_never_negative(alternative, seed):
+    result = CHAINS[alternative].moving(split(harmonic(200, seed=seed)))
+    for power in result.losses.values():
+        assert (power >= 0.0).all()
+
+
+@pytest.mark.parametrize("alternative", REVERSIBLE)
+@settings(max_examples=10)
+@given(seeds)
+def test_driving_the_whole_chain_inverts_moving(alternative, seed):
+    chain = CHAINS[alternative]
+    s = split(harmonic(200, seed=seed))
+    back = chain.driving(chain.moving(s).motor)
+    np.testing.assert_allclose(back.torque, s.torque, atol=1e-9)
+    np.testing.assert_allclose(back.velocity, s.velocity, atol=1e-12)
+
+
+def test_stages_are_those_of_the_figures():
+    s = constant(1.0, 10.0)
+    stages = {name: chain.moving(s).stages for name, chain in CHAINS.items()}
+    assert stages == {
+        "ideal": ("out", "m", "el"),
+        "rotor": ("out", "mt", "m", "el"),
+        "reversible": ("out", "wg", "m", "el"),
+        "irreversible": ("out", "2", "ph", "mp", "m", "el"),
+    }
+
+
+@pytest.mark.parametrize("alternative", ALTERNATIVES)
+def test_standing_series_equals_holding(alternative):
+    torques = np.array([0.0, -30.71, 1.46])
+    zero = np.zeros((2, 3))
+    result = CHAINS[alternative].moving(series([0.0, 3.0], zero, zero, zero, zero + torques))
+    held = CHAINS[alternative].holding(torques)
+    for values, expected in (
+        (result.motor.torque, held.motor_torque),
+        (result.current, held.current),
+        (result.voltage, held.voltage),
+        (result.electrical_power, held.power),
+    ):
+        np.testing.assert_array_equal(values, np.broadcast_to(expected, (2, 3)))
+    assert np.abs(balance_residual(result)).max() < 1e-12
+
+
+def test_one_joint_rests_while_another_moves():
+    two = np.ones((2, 1))
+    s = series([0, 1], two * [0, 0], two * [0.0, 1.0], two * [0, 0], two * [-30.71, 10.0])
+    result = CHAINS["reversible"].moving(s)
+    held = CHAINS["reversible"].holding(np.array([-30.71])).motor_torque[0]
+    moving = CHAINS["reversible"].moving(constant(1.0, 10.0)).motor.torque[0, 0]
+    np.testing.assert_allclose(result.motor.torque[0], [held, moving], rtol=1e-14)
+
+
+@pytest.mark.parametrize("alternative", ALTERNATIVES)
+@given(st.floats(-100.0, 100.0))
+def test_holding_contains_the_limits_of_moving(alternative, torque):
+    chain = CHAINS[alternative]
+    held = chain.holding(np.array([torque]))
+    for sign in (1.0, -1.0):
+        limit = chain.moving(constant(sign * 2e-9, torque)).motor.torque[0, 0]
+        assert held.low[0] - 1e-9 <= limit <= held.high[0] + 1e-9
+    assert abs(held.motor_torque[0]) <= abs(torque) / 400.0 + 1e-15
+
+
+def test_edits_return_new_chains():
+    chain = CHAINS["rotor"]
+    extra = Friction("seal", coulomb=1.0)
+    more = chain.inserted(extra, before="transmission")
+    assert [e.name for e in more.elements][:2] == ["seal", "transmission"]
+    assert len(chain.elements) == 3
+    s = constant(1.0, 0.0)
+    rise = more.moving(s).motor.torque - chain.moving(s).motor.torque
+    np.testing.assert_allclose(rise, 1.0 / 400.0)
+    weaker = more.replaced(Friction("seal", coulomb=0.0))
+    np.testing.assert_allclose(weaker.moving(s).motor.torque, chain.moving(s).motor.torque)
+    assert chain.element("transmission").gearing == 400.0
+
+
+@pytest.mark.parametrize(
+    ("elements", "stages", "message"),
+    [
+        ((Ratio("a", 2.0), Ratio("a", 2.0)), {"m": "a"}, "stands twice"),
+        ((Ratio("a", 2.0),), {"m": "b"}, "follows no element 'b'"),
+        ((Ratio("a", 2.0), Ratio("b", 2.0)), {"m": "a"}, "name the stage after the last"),
+        ((Ratio("a", 2.0), Ratio("b", 2.0)), {"x": "b", "y": "a"}, "in order"),
+        ((Ratio("a", 2.0),), {"out": "a"}, "not named out"),
+        ((), {}, "name the stage"),
+    ],
+)
+def test_bad_chains(elements, stages, message):
+    with pytest.raises(ChainError, match=message):
+        Chain("c", elements, DCMotor("w", 0.03, 0.3), stages)
+
+
+def test_unknown_names_offer_the_closest():
+    chain = CHAINS["rotor"]
+    with pytest.raises(ChainError, match="did you mean 'rotor_friction'"):
+        chain.element("rotor_fricton")
+    with pytest.raises(ChainError, match="no stage 'mx'"):
+        chain.moving(constant(1.0, 1.0)).stage_power("mx")
+
+
+def test_alternative_2_costs_more_than_1_in_motion_and_less_at_rest():
+    s = split(harmonic(500))
+    power = {name: supply(chain.moving(s)).supplied_energy.sum() for name, chain in CHAINS.items()}
+    assert power["ideal"] < power["rotor"] < power["reversible"]
+    assert power["rotor"] < power["irreversible"]
+
+
+def test_replaced_parameter_reaches_the_chain():
+    catalog = load_catalog().replaced("rotor_re40.coulomb", 0.0)
+    held = catalog.chain("rotor").holding(np.array([4.0]))
+    assert held.motor_torque[0] == pytest.approx(0.01)
