@@ -29,6 +29,17 @@ if TYPE_CHECKING:
     from actuators.energy import StageEnergy
 
 Array = NDArray[np.float64]
+#: Where the stages of the paper's alternatives lie, in a word that fits under a bar.
+STAGE_PLACES = {
+    "out": "joint",
+    "2": "hypoid",
+    "ph": "pinion",
+    "mp": "planet.",
+    "wg": "wave g.",
+    "mt": "rotor",
+    "m": "motor",
+    "el": "supply",
+}
 
 
 @styled
@@ -39,7 +50,7 @@ def stage_energy_figure(
     title: str,
     subtitle: str = "",
     upper: float | None = None,
-    places: Mapping[str, str] | None = None,
+    places: Mapping[str, str] = STAGE_PLACES,
 ) -> Figure:
     """One panel per joint, one pair of bars per stage: E(+) upwards, E(-) downwards.
 
@@ -75,14 +86,14 @@ def stage_energy_figure(
         axes.set_xticks(np.arange(len(stages)), symbols)
         for x, stage in enumerate(stages):
             axes.annotate(
-                (places or {}).get(stage.stage, ""),
+                places.get(stage.stage, ""),
                 (x, 0),
                 xycoords=axes.get_xaxis_transform(),
                 xytext=(0, -25),
                 textcoords="offset points",
                 ha="center",
                 color=QUIET,
-                fontsize=8,
+                fontsize=7.5,
             )
     room = 0.075 * (top + bottom)  # for the values at the ends of the bars
     panels[0].set_ylim(-bottom - room, top + room)
