@@ -1,0 +1,1 @@
+"""Calibrating what the paper does not print, and judging what it does."""

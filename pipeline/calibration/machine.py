@@ -1,0 +1,196 @@
+"""From free numbers to everything the paper prints, fast enough to be called ten thousand times.
+
+The work falls in two: the robot's part (geometry, gait, inverse dynamics) costs fifty times as much
+as the actuators' part, which takes a given demand. Only the two middle legs are followed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from actuators.build import Catalog
+from actuators.chain import Chain, ChainResult, HoldingResult
+from actuators.energy import stage_energy
+from actuators.reversals import split_at_reversals
+from actuators.shaft import ShaftSeries
+from pipeline.calibration.errors import CalibrationError
+from pipeline.calibration.published import Published
+from pipeline.gait import standing_posture, tripod_gait
+from pipeline.joint_demand import motion_demand, segment_demand
+from pipeline.robot import Robot, load_robot
+from pipeline.robot_file import RobotSpec
+
+Array = NDArray[np.float64]
+MIDDLE_LEGS = ("lm", "rm")
+PUBLISHED_LEG = "rm"
+#: Robot numbers solved from the reaction and the torques of Table III.
+POSTURE = ("trunk_com_left", "joint_2_lateral", "body_height")
+#: Samples per segment: within 0.2 % of the converged energies, see tests.
+SAMPLES = 81
+ROBOT = "robot"
+
+
+@dataclass(frozen=True)
+class RobotPart:
+    """What the robot asks of its middle legs.
+
+    Attributes:
+        robot: With the posture solved.
+        reaction: Vertical force on the middle right foot, standing [N].
+        standing_torque: Of the middle right leg's joints, standing [N*m], shape (3,).
+        series: Both middle legs' joints over a cycle.
+    """
+
+    robot: Robot
+    reaction: float
+    standing_torque: Array
+    series: ShaftSeries
+
+
+@dataclass(frozen=True)
+class ActuatorPart:
+    """What the alternatives make of it.
+
+    Attributes:
+        chains: By alternative.
+        walking: By alternative, both middle legs.
+        holding: By alternative, the middle right leg standing.
+        energy: Electrical energy per cycle, alternative to leg [J].
+    """
+
+    chains: Mapping[str, Chain]
+    walking: Mapping[str, ChainResult]
+    holding: Mapping[str, HoldingResult]
+    energy: Mapping[str, Mapping[str, float]]
+
+
+def standing_targets(published: Mapping[str, Published]) -> Array:
+    """Reaction [N] and torques of joints 2 and 3 [N*m] that fix the posture."""
+    names = ("standing_reaction_rm", "standing_torque_2", "standing_torque_3")
+    return np.array([published[name].value for name in names])
+
+
+def standing_state(spec: RobotSpec) -> tuple[Robot, float, Array]:
+    """Reaction and torques of the middle right leg, standing."""
+    robot = load_robot(spec)
+    demand, contacts = segment_demand(robot, standing_posture(robot))
+    assert contacts is not None
+    reaction = float(contacts.force_world[0, contacts.legs.index(PUBLISHED_LEG), 2])
+    columns = [demand.joints.index(j) for j in leg_joints(spec, PUBLISHED_LEG)]
+    return robot, reaction, demand.torque[0, columns]
+
+
+def leg_joints(spec: RobotSpec, leg: str) -> tuple[str, ...]:
+    """Joints of a leg."""
+    return next(entry.joints for entry in spec.legs if entry.name == leg)
+
+
+def solve_posture(spec: RobotSpec, target: Array, free: tuple[str, ...] = POSTURE) -> RobotSpec:
+    """Place the trunk's mass, joint 2 and the body's height so that standing comes out as printed.
+
+    Args:
+        spec: The robot.
+        target: Reaction [N], torque of joint 2 and of joint 3 [N*m].
+        free: Which of `POSTURE` to move; each serves the target of the same place.
+
+    Raises:
+        CalibrationError: No posture meets the targets.
+    """
+    chosen = [POSTURE.index(name) for name in free]
+    if not chosen:
+        return spec
+    scale = np.array([196.0, 30.0, 30.0])[chosen]
+
+    def placed(x: Array) -> RobotSpec:
+        return spec.with_parameters(dict(zip(free, map(float, x), strict=True)))
+
+    def error(x: Array) -> Array:
+        _, reaction, torque = standing_state(placed(x))
+        return (np.array([reaction, torque[1], torque[2]]) - target)[chosen] / scale
+
+    start = np.array([spec.parameters[name] for name in free])
+    found = optimize.root(error, start, method="hybr", options={"xtol": 1e-10, "eps": 1e-7})
+    if not found.success and np.abs(found.fun).max() > 1e-6:
+        raise CalibrationError("no posture of the robot gives the torques of Table III")
+    return placed(found.x)
+
+
+def robot_part(
+    spec: RobotSpec, values: Mapping[str, float], target: Array, free: tuple[str, ...] = POSTURE
+) -> RobotPart:
+    """Solve the posture and walk one cycle.
+
+    Args:
+        spec: The robot file.
+        values: Free numbers; those of the robot are applied.
+        target: As for `solve_posture`.
+        free: As for `solve_posture`.
+
+    Raises:
+        PipelineError: Out of reach, tipping, or no posture meets the targets.
+    """
+    own = {key.split(".")[1]: v for key, v in values.items() if key.startswith(ROBOT + ".")}
+    solved = solve_posture(spec.with_parameters(own), target, free)
+    robot, reaction, torque = standing_state(solved)
+    demand = motion_demand(robot, tripod_gait(robot, samples=SAMPLES))
+    joints = tuple(j for leg in MIDDLE_LEGS for j in leg_joints(solved, leg))
+    columns = [demand.joints.index(j) for j in joints]
+
+    def joined(name: str) -> Array:
+        return np.concatenate([getattr(part, name)[:, columns] for part in demand.segments])
+
+    time = np.concatenate([part.time for part in demand.segments])
+    series = split_at_reversals(
+        ShaftSeries.at_joint(
+            joints, time, *(joined(n) for n in ("position", "velocity", "acceleration", "torque"))
+        )
+    )
+    return RobotPart(robot, reaction, torque, series)
+
+
+def catalog_with(catalog: Catalog, values: Mapping[str, float], ratio: float) -> Catalog:
+    """The catalogue with free numbers applied; split ratios keep their product.
+
+    Args:
+        catalog: To start from.
+        values: Free numbers; those of components are applied.
+        ratio: Total ratio of every alternative.
+    """
+    applied = {key: v for key, v in values.items() if not key.startswith(ROBOT + ".")}
+    if "harmonic_drive.ratio" in applied:
+        applied["timing_belt.ratio"] = ratio / applied["harmonic_drive.ratio"]
+    if "planetary.ratio" in applied:
+        applied["hypoid.ratio"] = ratio / applied["planetary.ratio"]
+    for key, value in applied.items():
+        catalog = catalog.replaced(key, value)
+    return catalog
+
+
+def actuator_part(part: RobotPart, catalog: Catalog) -> ActuatorPart:
+    """Take a demand through every alternative."""
+    chains = catalog.chains()
+    walking = {name: chain.moving(part.series) for name, chain in chains.items()}
+    legs = {
+        leg: [part.series.joints.index(j) for j in leg_joints(part.robot.spec, leg)]
+        for leg in MIDDLE_LEGS
+    }
+    energy = {}
+    for name, result in walking.items():
+        forward = stage_energy(result, "el").forward
+        energy[name] = {leg: float(forward[columns].sum()) for leg, columns in legs.items()}
+    return ActuatorPart(
+        chains,
+        walking,
+        {name: chain.holding(part.standing_torque) for name, chain in chains.items()},
+        energy,
+    )
+
+
+def with_transfer_path(spec: RobotSpec, name: str) -> RobotSpec:
+    """The robot with another path of the foot through the air."""
+    return replace(spec, transfer_path=name)
