@@ -1,0 +1,101 @@
+"""Column names of the wide log format: `<owner>__<quantity>_<unit>`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from actuators.errors import closest, one_line
+from pipeline.gap.errors import LogFormatError
+from pipeline.gap.expected import Expected
+
+TIME: Final = "time_s"
+#: Suffix of a joint's column -> (attribute of `Log`, unit as `actuators.units` writes it).
+JOINT_COLUMNS: Final = {
+    "position_rad": ("position", "rad"),
+    "motor_position_rad": ("motor_position", "rad"),
+    "velocity_rad_s": ("velocity", "rad/s"),
+    "torque_Nm": ("torque", "N*m"),
+    "current_A": ("current", "A"),
+    "voltage_V": ("voltage", "V"),
+    "power_W": ("power", "W"),
+    "goal_position_rad": ("goal_position", "rad"),
+    "temperature_degC": ("temperature", "degC"),
+}
+FOOT_COLUMNS: Final = {
+    "force_x_N": ("force_x", "N"),
+    "force_y_N": ("force_y", "N"),
+    "force_z_N": ("force_z", "N"),
+    "contact": ("contact", "1"),
+}
+BASE_COLUMNS: Final = {"roll_rad": ("base_roll", "rad"), "pitch_rad": ("base_pitch", "rad")}
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a column's numbers go.
+
+    Attributes:
+        kind: ``"time"``, ``"joint"``, ``"foot"`` or ``"base"``.
+        owner: Joint or leg; empty for time and base.
+        quantity: Attribute of the log, or part of one.
+        unit: In which the log keeps it.
+    """
+
+    kind: str
+    owner: str
+    quantity: str
+    unit: str
+
+
+def parse_column(column: str, expected: Expected, where: str) -> Target | None:
+    """What a column of the log format means; None for a column that means nothing to us.
+
+    Args:
+        column: Its header.
+        expected: The robot's names.
+        where: File, for messages.
+
+    Raises:
+        LogFormatError: A quantity of the format in another unit, or misspelt at a known joint.
+    """
+    if column == TIME:
+        return Target("time", "", "time", "s")
+    owner, separator, quantity = column.rpartition("__")
+    if not separator:
+        if column.startswith("time_"):
+            raise LogFormatError(_unit_message(column, TIME, where))
+        return None
+    owner = expected.foot_alias.get(owner, owner)
+    # A leg and a joint may share a name; the quantity tells them apart.
+    for kind, owners, table in (
+        ("joint", expected.joints, JOINT_COLUMNS),
+        ("foot", expected.feet, FOOT_COLUMNS),
+        ("base", ("base",), BASE_COLUMNS),
+    ):
+        if owner not in owners:
+            continue
+        if quantity in table:
+            attribute, unit = table[quantity]
+            return Target(kind, "" if kind == "base" else owner, attribute, unit)
+        for known, (attribute, _) in table.items():
+            if quantity.startswith(attribute + "_") or quantity == attribute:
+                raise LogFormatError(_unit_message(column, f"{owner}__{known}", where))
+    return None
+
+
+def _unit_message(column: str, known: str, where: str) -> str:
+    return (
+        f"{where}: column '{one_line(column)}' is not in the unit of the log format, '{known}'; "
+        "rename it, or give its unit in a mapping file"
+    )
+
+
+def suggest_column(wanted: str, header: tuple[str, ...]) -> str:
+    """A hint which column of the file may be the one that is missing."""
+    hint = closest(wanted, header)
+    return (
+        hint
+        if hint.startswith("did")
+        else f"the file has {len(header)} columns: " + (one_line(", ".join(header)))
+    )
