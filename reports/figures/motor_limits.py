@@ -161,7 +161,7 @@ def _limits(
         axes.text(
             -0.03 * x_max,
             bound,
-            f"continuous {number(bound)} mN·m",
+            f"continuous: {number(bound)}",
             ha="right",
             va="bottom",
             fontsize=7.5,
