@@ -1,0 +1,245 @@
+"""The whole calibration: nearest point, ensemble, leave-one-out, readings, sensitivities."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuators.build import CATALOG
+from pipeline.calibration import search
+from pipeline.calibration.checkpoint import Checkpoint
+from pipeline.calibration.errors import CalibrationError
+from pipeline.calibration.prior import PRIOR_FILE
+from pipeline.calibration.published import PUBLISHED_FILE
+
+logger = logging.getLogger("legwatt")
+AXES_DEG = (0.0, 15.0, 30.0, 45.0, 90.0)
+COUNTS = (1, 2)  # middle legs that Fig. 21 counts as loaded
+OUTPUTS = (
+    "walking_ratio_rotor",
+    "walking_ratio_reversible",
+    "walking_ratio_irreversible",
+    "walking_extra_J",
+    "break_even_standing_fraction",
+)
+_LEAVE_OUT = (
+    *("standing_reaction_rm", "standing_torque_2", "standing_torque_3"),
+    *("ideal_current_2", "ideal_voltage_2", "ideal_voltage_3"),
+    *("rotor_motor_torque_2", "reversible_motor_torque_2"),
+    *("walking_ratio_rotor", "walking_ratio_reversible", "walking_ratio_irreversible"),
+    "walking_extra_J",
+)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How much is computed.
+
+    Attributes:
+        starts: Of the search for the nearest point, per transfer path.
+        draws: From the prior for the ensemble.
+        left_out_draws: Per target left out.
+        reading_starts: Per reading.
+        sobol: Base sample of the sensitivity analysis, a power of two.
+        workers: Processes.
+        seed: Of everything random.
+    """
+
+    starts: int = 8
+    draws: int = 320
+    left_out_draws: int = 24
+    reading_starts: int = 2
+    sobol: int = 128
+    workers: int = 2
+    seed: int = 1
+
+
+def input_hash(robot: Path, effort: Effort) -> str:
+    """Hash of what the tasks depend on: prior, printed values, robot structure, effort, code.
+
+    The calibrated values inside the robot and actuator files are overruled by the prior, but
+    everything else in them counts, so their text is part of the hash.
+    """
+    digest = hashlib.sha256(f"{effort.seed}".encode())
+    here = Path(__file__).parent
+    code = [here / f"{name}.py" for name in ("search", "problem", "machine", "quantities", "prior")]
+    for path in [PRIOR_FILE, PUBLISHED_FILE, robot, *sorted(CATALOG.glob("*.toml")), *code]:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def calibrate(
+    robot: Path,
+    effort: Effort,
+    work: Path,
+    progress: Callable[[str, int], Callable[[int], None]],
+) -> dict[str, Any]:
+    """Run everything, going on where an earlier run stopped.
+
+    Args:
+        robot: Robot file.
+        effort: How much.
+        work: Folder for finished tasks.
+        progress: Given a title and a total, returns what is called per finished task.
+
+    Returns:
+        Plain results: ``nearest``, ``starts``, ``ensemble``, ``left_out``, ``readings``,
+        ``sensitivity``.
+
+    Raises:
+        CalibrationError: No admissible point at all.
+    """
+    name = str(robot)
+    search.base_problem(name)  # bad input is an error here, before any process starts
+    store = Checkpoint(work / "tasks.jsonl", input_hash(robot, effort))
+    with ProcessPoolExecutor(effort.workers) as pool:
+        starts = store.run(
+            pool,
+            search.nearest,
+            [
+                (f"start/{path}/{i}", (name, path, 0.0, 1, effort.seed, i, 30))
+                for path in search.PATHS
+                for i in range(effort.starts)
+            ],
+            progress("nearest point", effort.starts * len(search.PATHS)),
+        )
+        good = [s for s in starts if s.get("admissible")]
+        if not good:
+            raise CalibrationError("no start reaches a point that meets every target and limit")
+        best = min(good, key=lambda s: s["prior_distance"])
+        paths = tuple(p for p in search.PATHS if any(s["path"] == p for s in good))
+        ensemble = store.run(
+            pool,
+            search.member,
+            [
+                (f"member/{'+'.join(paths)}/{i}", (name, paths, 0.0, 1, effort.seed, i))
+                for i in range(effort.draws)
+            ],
+            progress("ensemble", effort.draws),
+        )
+        unmoved = store.run(
+            pool,
+            search.prior_member,
+            [
+                (f"prior/{'+'.join(paths)}/{i}", (name, paths, effort.seed, i))
+                for i in range(effort.draws)
+            ],
+            progress("prior", effort.draws),
+        )
+        members = [m for m in ensemble if m.get("admissible")]
+        whole = store.run(
+            pool,
+            search.robot_totals,
+            [
+                (f"totals/{'+'.join(paths)}/{i}", (name, m["path"], m["z"]))
+                for i, m in enumerate(ensemble)
+                if m.get("admissible")
+            ],
+            progress("whole robot", len(members)),
+        )
+        left_out = {
+            target: store.run(
+                pool,
+                search.left_out,
+                [
+                    (f"without/{target}/{i}", (name, paths, 1, effort.seed, target, i))
+                    for i in range(effort.left_out_draws)
+                ],
+                progress(f"without {target}", effort.left_out_draws),
+            )
+            for target in _LEAVE_OUT
+        }
+        readings = store.run(
+            pool,
+            search.nearest,
+            [
+                (
+                    f"reading/{axis}/{count}/{i}",
+                    (name, best["path"], axis, count, effort.seed, i, 8),
+                )
+                for axis in AXES_DEG
+                for count in COUNTS
+                for i in range(effort.reading_starts)
+            ],
+            progress("readings", len(AXES_DEG) * len(COUNTS) * effort.reading_starts),
+        )
+        sensitivity = _sensitivity(pool, store, name, best, effort, progress)
+    grouped = []
+    for a, axis in enumerate(AXES_DEG):
+        for c, count in enumerate(COUNTS):
+            at = (a * len(COUNTS) + c) * effort.reading_starts
+            tries = [r for r in readings[at : at + effort.reading_starts] if "failed" not in r]
+            chosen = min(tries, key=_reading_cost) if tries else None
+            grouped.append({"axis_deg": axis, "legs": count, "point": chosen})
+    return {
+        "nearest": best,
+        "starts": starts,
+        "paths": paths,
+        "ensemble": [m | {"totals": t} for m, t in zip(members, whole, strict=True)],
+        "prior": [m["values"] for m in unmoved if "failed" not in m],
+        "draws": len(ensemble),
+        "left_out": left_out,
+        "readings": grouped,
+        "sensitivity": sensitivity,
+    }
+
+
+def _reading_cost(point: dict[str, Any]) -> float:
+    """Misfit first, distance from the prior second."""
+    worst = max(max(abs(e) for e in point["errors"].values()) - 1, 0.0)
+    return 1e3 * worst + 1e3 * max(max(point["excess"].values()), 0.0) + point["prior_distance"]
+
+
+def _sensitivity(
+    pool: ProcessPoolExecutor,
+    store: Checkpoint,
+    robot: str,
+    best: dict[str, Any],
+    effort: Effort,
+    progress: Callable[[str, int], Callable[[int], None]],
+) -> dict[str, Any]:
+    """Sobol indices with every free number uniform within one prior sigma of the nearest point."""
+    from SALib.analyze import sobol as analyze
+    from SALib.sample import sobol as sample
+
+    prior = search.base_problem(robot).prior
+    z = np.array(best["z"])
+    low = np.maximum(z - 1.0, prior.lower)
+    high = np.minimum(z + 1.0, prior.upper)
+    setup = {
+        "num_vars": z.size,
+        "names": list(prior.keys),
+        "bounds": np.stack([low, high], axis=1).tolist(),
+    }
+    rows = sample.sample(setup, effort.sobol, calc_second_order=False, seed=effort.seed)
+    block = z.size + 2  # rows of one base point share most of the robot's coordinates
+    blocks = [rows[i : i + block].tolist() for i in range(0, len(rows), block)]
+    outputs = store.run(
+        pool,
+        search.sensitivity_row,
+        [(f"sobol/{best['path']}/{i}", (robot, best["path"], 1, b)) for i, b in enumerate(blocks)],
+        progress("sensitivities", len(blocks)),
+    )
+    y = np.array([row for part in outputs for row in part], dtype=float)
+    missing = np.isnan(y).any(axis=1)
+    y[missing] = np.nanmean(y, axis=0)  # a robot that tips says nothing; its count is reported
+    result: dict[str, Any] = {
+        "names": list(prior.keys),
+        "base": effort.sobol,
+        "missing": int(missing.sum()),
+    }
+    for i, output in enumerate(OUTPUTS):
+        indices = analyze.analyze(
+            setup, y[:, i], calc_second_order=False, print_to_console=False, seed=effort.seed
+        )
+        result[output] = {
+            k: np.asarray(indices[k]).tolist() for k in ("S1", "S1_conf", "ST", "ST_conf")
+        }
+    return result

@@ -1,0 +1,231 @@
+"""The tasks of a calibration: each a pure function of its arguments, run in worker processes.
+
+Every random number comes from ``default_rng([seed, task])``, so the result does not depend on
+order, interruptions or the number of workers.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.build import CATALOG, load_catalog
+from pipeline.calibration.machine import catalog_with, with_transfer_path
+from pipeline.calibration.prior import PRIOR_FILE, load_prior
+from pipeline.calibration.problem import EXACT, EXTRA, Evaluation, Problem
+from pipeline.calibration.published import PUBLISHED_FILE, load_published
+from pipeline.calibration.quantities import DIMENSIONS, IDS
+from pipeline.calibration.whole_robot import totals
+from pipeline.errors import PipelineError
+from pipeline.robot_file import load_robot_file
+
+Array = NDArray[np.float64]
+#: Paths of the foot that the search may choose.
+PATHS = ("cubic", "harmonic", "quintic", "cycloid")
+_PULL = 0.3  # the nearest point: mild pull towards the printed values
+_WIDTH = 0.95  # of a half width, before the hinge rises
+
+
+@cache
+def base_problem(
+    robot: str,
+    prior: str = str(PRIOR_FILE),
+    published: str = str(PUBLISHED_FILE),
+    catalog: str = str(CATALOG),
+) -> Problem:
+    """The problem of the files; calibrated numbers in them are overruled by the prior's."""
+    return Problem(
+        load_robot_file(Path(robot)),
+        load_catalog(catalog),
+        load_prior(Path(prior)),
+        load_published(IDS, DIMENSIONS, Path(published)),
+    )
+
+
+def problem(robot: str, path: str, axis_deg: float, legs: int, without: str | None) -> Problem:
+    """One reading of the paper as a problem of its own.
+
+    Args:
+        robot: Robot file.
+        path: Transfer path.
+        axis_deg: Angle of joint 1's axis in the frontal plane [deg].
+        legs: Middle legs that Fig. 21 counts as loaded.
+        without: Target left out.
+    """
+    base = base_problem(robot)
+    spec = with_transfer_path(base.spec, path).with_parameters(
+        {"joint_1_axis_angle": math.radians(axis_deg)}
+    )
+    return replace(base, spec=spec, standing_legs=legs, without=without, _robots={})
+
+
+def nearest(
+    robot: str, path: str, axis_deg: float, legs: int, seed: int, start: int, evaluations: int
+) -> dict[str, Any]:
+    """The admissible point nearest to the prior's centre, from one start.
+
+    Args:
+        robot: Robot file.
+        path: Transfer path.
+        axis_deg: Angle of joint 1's axis [deg].
+        legs: Middle legs counted as loaded.
+        seed: Of the run.
+        start: 0 starts at the prior's centre, others at a random draw.
+        evaluations: At most so many of the full problem.
+    """
+    task = problem(robot, path, axis_deg, legs, None)
+    size = len(task.prior.free)
+    centre = np.zeros(size)
+    z = centre if start == 0 else task.prior.draw(np.random.default_rng([seed, start]))
+    z = _feasible(task, z)
+    try:
+        z = task.solve(z, centre, columns=task.actuator_columns, pull=_PULL, width=_WIDTH)
+        z = task.solve(
+            z,
+            centre,
+            columns=np.arange(size),
+            pull=_PULL,
+            width=_WIDTH,
+            evaluations=evaluations,
+        )
+        point = task.evaluate(z)
+    except PipelineError as error:
+        return {"failed": str(error), "path": path}
+    return summary(task, z, point) | {"path": path}
+
+
+def _feasible(task: Problem, z: Array) -> Array:
+    """Draw the robot's coordinates towards the centre until the robot can stand and walk."""
+    z = z.copy()
+    for _ in range(4):
+        try:
+            task.robot(z)
+        except PipelineError:
+            z[task.robot_columns] /= 2
+        else:
+            return z
+    z[task.robot_columns] = 0.0
+    return z
+
+
+def member(
+    robot: str, paths: tuple[str, ...], axis_deg: float, legs: int, seed: int, draw: int
+) -> dict[str, Any]:
+    """One draw from the prior, moved by its actuators as little as needed to be admissible."""
+    rng = np.random.default_rng([seed, 1000 + draw])
+    path = paths[int(rng.integers(len(paths)))]
+    return _moved_draw(problem(robot, path, axis_deg, legs, None), path, rng)
+
+
+def left_out(
+    robot: str, paths: tuple[str, ...], legs: int, seed: int, target: str, draw: int
+) -> dict[str, Any]:
+    """As `member`, with one target left out, so that the others predict it."""
+    rng = np.random.default_rng([seed, 5000 + draw])
+    path = paths[int(rng.integers(len(paths)))]
+    return _moved_draw(problem(robot, path, 0.0, legs, target), path, rng)
+
+
+def _moved_draw(task: Problem, path: str, rng: np.random.Generator) -> dict[str, Any]:
+    z0 = task.prior.draw(rng)
+    if task.without in EXACT:
+        # The posture number that serves this target is then free: draw it, too.
+        name = ("trunk_com_left", "joint_2_lateral", "body_height")[EXACT.index(task.without)]
+        entry = task.spec.parameters.parameter(name)
+        assert entry.interval is not None
+        low, high = entry.interval
+        task.spec = task.spec.with_parameters({name: float(rng.uniform(low, high))})
+    try:
+        z = task.solve(z0, z0, columns=task.actuator_columns, pull=0.0, width=_WIDTH)
+        point = task.evaluate(z)
+    except PipelineError as error:
+        return {"failed": str(error), "path": path}
+    return summary(task, z, point) | {"path": path}
+
+
+def summary(task: Problem, z: Array, point: Evaluation) -> dict[str, Any]:
+    """What is kept of a point: plain numbers."""
+    p = point.robot.robot.spec.parameters
+    posture = {k: p[k] for k in ("trunk_com_left", "joint_2_lateral", "body_height")}
+    ideal = point.actuators.walking["ideal"]
+    return {
+        "z": z.tolist(),
+        "posture": posture,
+        "values": dict(point.values),
+        "energy": {name: dict(legs) for name, legs in point.actuators.energy.items()},
+        "excess": dict(point.excess),
+        "errors": {t.name: (point.values[t.name] - t.centre) / t.half_width for t in task.targets},
+        "prior_distance": float(0.5 * z @ z),
+        "admissible": task.admissible(point),
+        "electrical_over_mechanical": _over(ideal.joint.joints, ideal),
+    }
+
+
+def _over(joints: tuple[str, ...], result: Any) -> dict[str, float]:
+    from actuators.energy import stage_energy
+
+    electrical, mechanical = stage_energy(result, "el").forward, stage_energy(result, "m").forward
+    return {
+        joint: float(electrical[j] / mechanical[j]) if mechanical[j] > 0 else math.inf
+        for j, joint in enumerate(joints)
+        if joint.startswith("rm_")
+    }
+
+
+def prior_member(robot: str, paths: tuple[str, ...], seed: int, draw: int) -> dict[str, Any]:
+    """The draw of `member` as it is, not moved: what the paper's sentences are without its data."""
+    rng = np.random.default_rng([seed, 1000 + draw])
+    path = paths[int(rng.integers(len(paths)))]
+    task = problem(robot, path, 0.0, 1, None)
+    try:
+        point = task.evaluate(task.prior.draw(rng))
+    except PipelineError as error:
+        return {"failed": str(error), "path": path}
+    return {"path": path, "values": dict(point.values)}
+
+
+def robot_totals(robot: str, path: str, z: list[float]) -> dict[str, Any]:
+    """Energy of the whole robot at one point: walking, standing on three feet and on all.
+
+    Returns:
+        Per alternative ``cycle_J``, ``stand_3_W`` and ``stand_6_W``.
+    """
+    task = problem(robot, path, 0.0, 1, None)
+    point = task.evaluate(np.array(z))
+    ratio = task.catalog.parameter("requirement.ratio").value
+    catalog = catalog_with(task.catalog, task.prior.values(np.array(z)), ratio)
+    return totals(point.robot.robot, catalog)
+
+
+def sensitivity_row(robot: str, path: str, legs: int, rows: list[list[float]]) -> list[list[float]]:
+    """Outputs of the sensitivity analysis at several coordinates.
+
+    Returns:
+        Per row the three walking ratios, the energy difference [J] and the break-even (0 where the
+        irreversible actuator always uses less), NaN where the robot cannot walk.
+    """
+    task = problem(robot, path, 0.0, legs, None)
+    out = []
+    for row in rows:
+        try:
+            values = task.evaluate(np.array(row)).values
+        except PipelineError:
+            out.append([math.nan] * 5)
+            continue
+        even = values["break_even_standing_fraction"]
+        out.append(
+            [
+                values["walking_ratio_rotor"],
+                values["walking_ratio_reversible"],
+                values["walking_ratio_irreversible"],
+                values[EXTRA],
+                0.0 if math.isnan(even) else even,
+            ]
+        )
+    return out
