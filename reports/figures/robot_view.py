@@ -97,7 +97,7 @@ def robot_figure(
         axes.set_axis_off()
         axes.set_title(view.name, color=QUIET)
         axes.set_anchor("N")
-        _frame_arrows(axes, view)
+        frame_arrows(axes, view)
         low, high = extent(view, scene)
         left, bottom, right, top = _ROOM[view.name]
         axes.set_xlim(low[0] - left, high[0] + right)
@@ -195,7 +195,7 @@ def _mass_centre(axes: Axes, seen: Array) -> None:
     axes.plot(seen[0], seen[1], marker="+", markersize=8, color=INK, mew=1.2, zorder=9)
 
 
-def _frame_arrows(axes: Axes, view: View) -> None:
+def frame_arrows(axes: Axes, view: View) -> None:
     """World directions as a small tripod in the panel's corner."""
     corner, length = (0.03, 0.06), 24.0
     for direction, name, color in (
