@@ -21,6 +21,7 @@ class Plan:
         feedforward: Torque at the joint [N*m], shape (N, J).
         log_from: Time from which the log is kept [s].
         base_position: Where a floating base starts [m], shape (3,); None for a fixed base.
+        cycles: Duration of every walking cycle [s]; empty where nothing walks.
     """
 
     period: float
@@ -29,6 +30,7 @@ class Plan:
     feedforward: Array
     log_from: float
     base_position: Array | None = None
+    cycles: tuple[float, ...] = ()
 
     @property
     def duration(self) -> float:

@@ -52,7 +52,7 @@ def walking_plan(
     first, second = (d.torque.copy() for d in demand.segments)
     if squeeze:
         for torque, segment in zip((first, second), motion.segments, strict=True):
-            torque += _squeeze_torque(robot, segment.configuration, segment.stance, squeeze)
+            torque += squeeze_torque(robot, segment.configuration, segment.stance, squeeze)
     phase = _phase(periods, dt)
     torque = _handed_over(first, second, phase)
     rest = np.repeat(table[:1], round(settle / dt), axis=0)
@@ -76,6 +76,7 @@ def walking_plan(
         feedforward=np.concatenate([rest_torque, torque]),
         log_from=0.7 * settle,
         base_position=np.array([0.0, 0.0, robot.spec.parameters["body_height"]]),
+        cycles=periods,
     )
 
 
@@ -134,7 +135,7 @@ def _handed_over(first: Array, second: Array, phase: Array) -> Array:
     return result
 
 
-def _squeeze_torque(
+def squeeze_torque(
     robot: Robot, configuration: Array, stance: tuple[str, ...], force: float
 ) -> Array:
     """Joint torques with which the standing feet push inward, so that the ground pushes outward.
