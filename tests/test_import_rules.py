@@ -29,7 +29,9 @@ def room_of(path: Path) -> str:
         return parts[0]
     if len(parts) > 2 and parts[1] == "gap":
         return "twin" if parts[2] == "twin" else "gap"
-    return "app" if len(parts) > 2 and parts[1] == "app" else "core"
+    if len(parts) > 2 and parts[1] in ("app", "calibration"):
+        return parts[1]
+    return "core"
 
 
 FILES = [
@@ -49,11 +51,14 @@ def allowed(room: str, module: str) -> bool:
     inside_gap = module.startswith("pipeline.gap")
     inside_twin = module.startswith("pipeline.gap.twin")
     core = top == "pipeline" and not inside_app and not inside_gap
+    core = core and (room != "core" or not module.startswith("pipeline.calibration"))
     return {
         "actuators": top == "actuators",
         "core": core or module in LEAVES,
         "gap": core or top == "actuators" or (inside_gap and not inside_twin),
         "twin": core or inside_twin or module in LEAVES,
+        # Calibration fits the chain to the robot's demand, so it knows both rooms, like the gap.
+        "calibration": core or top == "actuators",
         # Result dataclasses come from the rooms that compute them.
         "reports": top in ("reports", "actuators") or core,
         "app": True,

@@ -135,10 +135,18 @@ def robot_part(
         PipelineError: Out of reach, tipping, or no posture meets the targets.
     """
     own = {key.split(".")[1]: v for key, v in values.items() if key.startswith(ROBOT + ".")}
-    solved = solve_posture(spec.with_parameters(own), target, free)
-    robot, reaction, torque = standing_state(solved)
-    demand = motion_demand(robot, tripod_gait(robot, samples=SAMPLES))
-    joints = tuple(j for leg in MIDDLE_LEGS for j in leg_joints(solved, leg))
+    return part_of(solve_posture(spec.with_parameters(own), target, free))
+
+
+def part_of(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:
+    """The robot's part of a robot file as it stands.
+
+    Raises:
+        PipelineError: Out of reach or tipping.
+    """
+    robot, reaction, torque = standing_state(spec)
+    demand = motion_demand(robot, tripod_gait(robot, samples=samples))
+    joints = tuple(j for leg in MIDDLE_LEGS for j in leg_joints(spec, leg))
     columns = [demand.joints.index(j) for j in joints]
 
     def joined(name: str) -> Array:
