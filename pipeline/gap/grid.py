@@ -1,0 +1,144 @@
+"""Uniform time grid of a log, its pieces between gaps, and what to do with missing samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: A step this many times the usual one is a gap; the filter never runs across it.
+GAP: Final = 2.5
+#: Times that lie this near to the grid, in steps, need no interpolation.
+JITTER_IGNORED: Final = 0.05
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A uniform grid.
+
+    Attributes:
+        time: Shape (M,) [s].
+        pieces: Stretches without a gap, slices of the grid's rows.
+        nearest: Nearest row of the log, shape (M,).
+        left: Row of the log to the left of each grid time, shape (M,); None where the log's own
+            rows lie on the grid.
+        share: Weight of the row to the right, shape (M,).
+    """
+
+    time: Array
+    pieces: tuple[slice, ...]
+    nearest: NDArray[np.intp]
+    left: NDArray[np.intp] | None = None
+    share: Array | None = None
+
+    @property
+    def resampled(self) -> bool:
+        """Whether values are interpolated."""
+        return self.left is not None
+
+    def resample(self, values: Array) -> Array:
+        """Values on the grid by linear interpolation, shape (M, C); NaN stays NaN."""
+        if self.left is None or self.share is None:
+            return np.array(values)
+        weight = self.share[:, None]
+        right = np.minimum(self.left + 1, values.shape[0] - 1)
+        below, above = values[self.left], values[right]
+        # Where the weight is zero a missing neighbour does not matter.
+        return np.where(weight == 0, below, (1 - weight) * below + weight * above)
+
+    def flags(self, flag: Mask) -> Mask:
+        """A flag on the grid: set where either neighbour has it."""
+        if self.left is None or self.share is None:
+            return np.array(flag)
+        right = np.minimum(self.left + 1, flag.shape[0] - 1)
+        used = (self.share > 0)[:, None]
+        return np.asarray(flag[self.left] | (flag[right] & used))
+
+
+def split_at_gaps(time: Array, dt: float) -> list[slice]:
+    """Stretches of rows without a step longer than `GAP` usual ones."""
+    cuts = np.flatnonzero(np.diff(time) > GAP * dt) + 1
+    edges = [0, *cuts.tolist(), time.size]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def uniform_grid(time: Array, dt: float, origin: float | None = None) -> Grid:
+    """Lay a uniform grid under a log.
+
+    Args:
+        time: Strictly increasing, shape (N,) [s].
+        dt: Step [s].
+        origin: A time on the grid; the log's first by default.
+
+    Returns:
+        The log's own rows where each piece is uniform to within `JITTER_IGNORED` steps, else a grid
+        to interpolate on.
+    """
+    pieces = split_at_gaps(time, dt)
+    if all(_is_uniform(time[piece], dt) for piece in pieces):
+        return Grid(time, tuple(pieces), np.arange(time.size, dtype=np.intp))
+    start = time[0] if origin is None else origin
+    times, slices, filled = [], [], 0
+    for piece in pieces:
+        part = time[piece]
+        first = int(np.ceil((part[0] - start) / dt - 1e-9))
+        last = int(np.floor((part[-1] - start) / dt + 1e-9))
+        if last < first:
+            continue
+        grid = start + dt * np.arange(first, last + 1)
+        times.append(np.clip(grid, part[0], part[-1]))
+        slices.append(slice(filled, filled + grid.size))
+        filled += grid.size
+    all_times = np.concatenate(times)
+    left = np.clip(np.searchsorted(time, all_times, side="right") - 1, 0, time.size - 2)
+    share = (all_times - time[left]) / (time[left + 1] - time[left])
+    nearest = np.where(share > 0.5, left + 1, left)
+    return Grid(all_times, tuple(slices), nearest.astype(np.intp), left.astype(np.intp), share)
+
+
+def _is_uniform(time: Array, dt: float) -> bool:
+    ideal = time[0] + dt * np.arange(time.size)
+    # A rate that is off by a little is no jitter: compare with the piece's own step too.
+    own = np.linspace(time[0], time[-1], time.size)
+    drift_ok = time.size < 2 or abs((time[-1] - time[0]) / (time.size - 1) / dt - 1) < 1e-3
+    limit = JITTER_IGNORED * dt
+    return bool(
+        np.abs(time - ideal).max() <= limit or (drift_ok and np.abs(time - own).max() <= limit)
+    )
+
+
+def fill_gaps(time: Array, values: Array, ok: Mask) -> Array:
+    """Bad values interpolated linearly from good ones; zero where a column has no good one."""
+    out = np.array(values)
+    good = ok & np.isfinite(values)
+    for c in np.flatnonzero(~good.all(axis=0)):
+        keep = good[:, c]
+        out[:, c] = np.interp(time, time[keep], values[keep, c]) if keep.any() else 0.0
+    return out
+
+
+def long_runs(time: Array, bad: Mask, longest: float) -> Mask:
+    """Bad samples except short runs that interpolation bridges, such as held repeats.
+
+    Args:
+        time: Shape (N,) [s].
+        bad: Shape (N, C).
+        longest: Time between good samples up to which a run is bridged [s].
+    """
+    out = np.zeros_like(bad)
+    for c in np.flatnonzero(bad.any(axis=0)):
+        padded = np.concatenate([[0], bad[:, c].astype(np.int8), [0]])
+        change = np.diff(padded)
+        starts, stops = np.flatnonzero(change > 0).tolist(), np.flatnonzero(change < 0).tolist()
+        for start, stop in zip(starts, stops, strict=True):
+            left, right = max(start - 1, 0), min(stop, time.size - 1)
+            open_end = start == 0 or stop == time.size
+            if open_end or time[right] - time[left] > longest:
+                out[start:stop, c] = True
+    return out
