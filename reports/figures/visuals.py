@@ -131,14 +131,14 @@ def _shape(visual: ET.Element) -> tuple[Array, bool] | None:
         return _vector(box.get("size", "0 0 0")), False
     sphere = visual.find("geometry/sphere")
     if sphere is not None:
-        return np.full(3, 2 * float(sphere.get("radius", "0"))), True
+        return np.full(3, 2 * _vector(sphere.get("radius", "0"), 1)), True
     return None
 
 
 def _color(material: ET.Element) -> tuple[float, float, float]:
     color = material.find("color")
     text = "0.6 0.6 0.6 1" if color is None else color.get("rgba", "0.6 0.6 0.6 1")
-    red, green, blue = _vector(text)[:3]
+    red, green, blue = _vector(text, 4)[:3]
     return float(red), float(green), float(blue)
 
 
@@ -161,8 +161,11 @@ def _origin(element: ET.Element) -> Array:
     return placement
 
 
-def _vector(text: str) -> Array:
+def _vector(text: str, length: int = 3) -> Array:
     try:
-        return np.array([float(part) for part in text.split()])
+        vector = np.array([float(part) for part in text.split()])
     except ValueError:
-        raise FigureError(f"the URDF has '{text}' where numbers are expected") from None
+        vector = np.empty(0)
+    if vector.size != length or not np.isfinite(vector).all():
+        raise FigureError(f"the URDF has '{text}' where {length} numbers are expected")
+    return vector

@@ -1,0 +1,165 @@
+"""Energy in a minute against the share of time spent standing: Fig. 21 of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.errors import FigureError
+from reports.figures.style import (
+    CYCLE,
+    INK,
+    QUIET,
+    headline,
+    horizontal_grid,
+    new_figure,
+    number,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EnergyLine:
+    """One alternative.
+
+    Attributes:
+        name: Shown at the line.
+        energy: At each share of standing, shape (N,) [J].
+        low: Lower end of its spread, shape (N,) [J], or None.
+        high: Upper end, shape (N,) [J], or None.
+    """
+
+    name: str
+    energy: Array
+    low: Array | None = None
+    high: Array | None = None
+
+
+@dataclass(frozen=True)
+class BreakEven:
+    """Share of standing above which one alternative uses less energy than another.
+
+    Attributes:
+        share: From 0 to 1.
+        energy: There [J].
+        low: Lower end of its spread, or None.
+        high: Upper end, or None.
+    """
+
+    share: float
+    energy: float
+    low: float | None = None
+    high: float | None = None
+
+
+@styled
+def energy_per_minute_figure(
+    share: Array,
+    lines: Sequence[EnergyLine],
+    *,
+    title: str,
+    subtitle: str = "",
+    break_even: BreakEven | None = None,
+) -> Figure:
+    """One line per alternative, with its spread as a band; the crossing enlarged beside it.
+
+    Args:
+        share: Fraction of the time standing, increasing, shape (N,).
+        lines: The alternatives.
+        title: First line.
+        subtitle: Second line.
+        break_even: Marked and enlarged; None where there is none.
+
+    Raises:
+        FigureError: Shapes that do not fit, or nothing to draw.
+    """
+    if not lines or share.ndim != 1 or share.size < 2:
+        raise FigureError(f"'{title}': at least one line over two shares is needed")
+    for line in lines:
+        for values in (line.energy, line.low, line.high):
+            if values is not None and values.shape != share.shape:
+                raise FigureError(f"'{title}': '{line.name}' needs {share.size} values")
+    figure = new_figure(9.0, 4.8)
+    headline(figure, title, subtitle)
+    if break_even is None:
+        whole, near = figure.subplots(1, 1), None
+    else:
+        whole, near = figure.subplots(1, 2, width_ratios=[2.0, 1.0])
+    panels = [whole] if near is None else [whole, near]
+    for axes in panels:
+        _lines(axes, share, lines)
+        horizontal_grid(axes)
+        axes.set_xlabel("share of the time standing [%]")
+    whole.set_xlim(float(share[0]) * 100, float(share[-1]) * 100)
+    whole.set_ylim(bottom=0)
+    whole.set_ylabel("energy per minute [J]")
+    _names(whole, share, lines)
+    if break_even is not None and near is not None:
+        _enlarge(near, share, lines, break_even)
+    return figure
+
+
+def _lines(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
+    for k, line in enumerate(lines):
+        color = CYCLE[k % len(CYCLE)]
+        if line.low is not None and line.high is not None:
+            axes.fill_between(share * 100, line.low, line.high, color=color, alpha=0.2, lw=0)
+        axes.plot(share * 100, line.energy, color=color)
+
+
+def _names(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
+    """Names above the lines near their left end, each in its line's colour."""
+    at = 0.04
+    x = float(share[0] + at * (share[-1] - share[0]))
+    tops = [line.energy if line.high is None else line.high for line in lines]
+    heights = [float(np.interp(x, share, top)) for top in tops]
+    gap = 0.055 * max(max(heights), 1e-9)
+    taken = -np.inf
+    for k in np.argsort(heights, kind="stable"):
+        y = max(heights[k] + 0.35 * gap, taken + gap)
+        taken = y
+        axes.text(
+            x * 100,
+            y,
+            lines[k].name,
+            color=CYCLE[k % len(CYCLE)],
+            fontweight="bold",
+            va="bottom",
+        )
+
+
+def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: BreakEven) -> None:
+    at = 100 * break_even.share
+    spread = [100 * v for v in (break_even.low, break_even.high) if v is not None]
+    reach = max(4.0, *(1.3 * abs(v - at) for v in spread)) if spread else 4.0
+    low, high = max(at - reach, 100 * float(share[0])), min(at + reach, 100 * float(share[-1]))
+    axes.set_xlim(low, high)
+    window = np.linspace(low, high, 50) / 100
+    crossing = [
+        line
+        for line in lines
+        if abs(float(np.interp(break_even.share, share, line.energy)) - break_even.energy)
+        < 0.02 * max(break_even.energy, 1e-9)
+    ]
+    values = np.array([np.interp(window, share, line.energy) for line in crossing or lines])
+    axes.set_ylim(min(0.0, float(values.min())), 1.12 * float(values.max()))
+    if len(spread) == 2:
+        axes.axvspan(spread[0], spread[1], color=QUIET, alpha=0.12, linewidth=0)
+    axes.plot(
+        at, break_even.energy, marker="o", markersize=7, color="white", markeredgecolor=INK, mew=1.4
+    )
+    axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
+    text = f"break-even {number(at)} %"
+    if len(spread) == 2:
+        text += f"\n({number(spread[0])} to {number(spread[1])} %)"
+    axes.set_title(text, fontweight="bold", loc="center")

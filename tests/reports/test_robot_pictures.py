@@ -1,0 +1,143 @@
+"""The robot's pictures are measured from the robot: dimensions, directions, what hides what."""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pipeline.gait import standing_posture
+from pipeline.robot import Robot
+from reports.errors import FigureError
+from reports.figures.joint_directions import joint_directions_figure
+from reports.figures.projection import FRONT, OBLIQUE, SIDE, TOP, draw_scene, extent
+from reports.figures.robot_view import Leg, legs_of, robot_figure
+from reports.figures.style import new_figure
+from reports.figures.visuals import Primitive, joint_marks, primitives
+
+
+def placements(robot: Robot, configuration) -> dict[str, np.ndarray]:
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, configuration)
+    return {
+        frame.name: data.oMf[i].homogeneous
+        for i, frame in enumerate(robot.model.frames)
+        if frame.type == pin.FrameType.BODY
+    }
+
+
+def standing(robot: Robot) -> tuple[list[Primitive], list[Leg]]:
+    links = placements(robot, standing_posture(robot, robot.leg_names).configuration[0])
+    names = {leg.name: (leg.joints, leg.foot) for leg in robot.spec.legs}
+    return primitives(robot.urdf, links), legs_of(names, joint_marks(robot.urdf, links), links)
+
+
+def texts(figure) -> list[str]:
+    return [t.get_text() for t in figure.findobj(matplotlib.text.Text) if t.get_text()]
+
+
+def test_joint_marks_agree_with_pinocchio(hexapod: Robot) -> None:
+    """Axis and origin against the joint's own column of Pinocchio's Jacobian."""
+    configuration = standing_posture(hexapod).configuration[0]
+    links = placements(hexapod, configuration)
+    data = hexapod.model.createData()
+    pin.computeJointJacobians(hexapod.model, data, configuration)
+    for mark in joint_marks(hexapod.urdf, links):
+        index = hexapod.model.getJointId(mark.name)
+        column = hexapod.model.joints[index].idx_v
+        jacobian = pin.getJointJacobian(hexapod.model, data, index, pin.LOCAL_WORLD_ALIGNED)
+        np.testing.assert_allclose(mark.axis, jacobian[3:, column], atol=1e-12)
+        np.testing.assert_allclose(mark.position, data.oMi[index].translation, atol=1e-12)
+
+
+def test_every_visual_is_drawn(hexapod: Robot) -> None:
+    scene, legs = standing(hexapod)
+    assert len(scene) == hexapod.urdf.count("<visual>")
+    assert len(legs) == 6
+    low, high = extent(SIDE, scene)
+    assert high[0] - low[0] >= 0.6
+
+
+def test_robot_figure_states_the_dimensions_of_table_one(hexapod: Robot) -> None:
+    scene, legs = standing(hexapod)
+    figure = robot_figure(scene, legs, title="t", mass_centre=np.zeros(3))
+    words = texts(figure)
+    for expected in ("600 mm", "520 mm", "180 mm", "340 mm", "270 mm", "RM", "LF"):
+        assert expected in words
+    assert len(figure.axes) == 4
+    with pytest.raises(FigureError, match="no visual primitive"):
+        robot_figure([], legs, title="t")
+
+
+def test_joint_directions_names_the_joints(hexapod: Robot) -> None:
+    scene, legs = standing(hexapod)
+    figure = joint_directions_figure(scene, legs, "rm", title="t", zero_pose="straight")
+    words = texts(figure)
+    for expected in ("rm_joint_1", "rm_joint_2", "rm_joint_3"):
+        assert expected in words
+    assert any("Zero pose: straight" in word for word in words)
+    with pytest.raises(FigureError, match="'xx'"):
+        joint_directions_figure(scene, legs, "xx", title="t")
+
+
+def box(x: float, color: tuple[float, float, float]) -> Primitive:
+    placement = np.eye(4)
+    placement[0, 3] = x
+    return Primitive("l", color, placement, np.full(3, 0.1), False)
+
+
+def test_the_nearer_body_hides_the_farther_one() -> None:
+    red, blue = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+    for scene in ([box(0.0, red), box(0.5, blue)], [box(0.5, blue), box(0.0, red)]):
+        axes = new_figure(2, 2).subplots()
+        draw_scene(axes, FRONT, scene)
+        image = np.asarray(axes.images[0].get_array())
+        middle = image[image.shape[0] // 2, image.shape[1] // 2]
+        assert middle[2] > middle[0]  # x = 0.5 lies nearer to a viewer ahead
+        assert middle[3] == 1.0
+
+
+def test_views_are_right_handed_and_look_where_they_say() -> None:
+    for view in (FRONT, SIDE, TOP, OBLIQUE):
+        np.testing.assert_allclose(view.axes @ view.axes.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(view.axes) == pytest.approx(1.0)
+    left = np.array([0.0, 1.0, 0.0])
+    assert FRONT.project(left)[0] == pytest.approx(1)  # from ahead its left is on our right
+    assert TOP.project(left)[1] == pytest.approx(1)
+    assert SIDE.project(np.array([1.0, 0, 0]))[0] == pytest.approx(1)
+
+
+def test_sphere_cylinder_and_default_colour() -> None:
+    urdf = """<robot name="r"><link name="l">
+      <visual><geometry><sphere radius="0.2"/></geometry></visual>
+      <visual><geometry><cylinder radius="1" length="1"/></geometry></visual>
+      <visual><origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>
+        <geometry><box size="1 2 3"/></geometry></visual></link></robot>"""
+    ball, cuboid = primitives(urdf, {"l": np.eye(4)})
+    assert ball.sphere
+    np.testing.assert_allclose(ball.size, 0.4)
+    np.testing.assert_allclose(cuboid.placement[:3, 0], [0, 1, 0], atol=1e-12)
+    axes = new_figure(2, 2).subplots()
+    draw_scene(axes, TOP, [ball, cuboid])
+    assert len(axes.images) == 1
+
+
+@pytest.mark.parametrize(
+    ("urdf", "says"),
+    [
+        ("<robot", "not XML"),
+        ('<robot><link name="l"><visual><geometry><sphere radius="1"/></geometry></visual></link>'
+         "</robot>", "'l' has a visual but no placement"),
+        ('<robot><link name="k"><visual><geometry><box size="a b c"/></geometry></visual></link>'
+         "</robot>", "'a b c' where"),
+        ('<robot><link name="k"><visual><geometry><box size="1 1"/></geometry></visual></link>'
+         "</robot>", "'1 1' where"),
+        ('<robot><link name="k"><visual><geometry><sphere radius="x"/></geometry></visual></link>'
+         "</robot>", "'x' where"),
+    ],
+)  # fmt: skip
+def test_broken_visuals_are_one_clear_line(urdf: str, says: str) -> None:
+    with pytest.raises(FigureError, match=says) as caught:
+        primitives(urdf, {"k": np.eye(4)})
+    assert "\n" not in str(caught.value)
