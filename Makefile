@@ -8,7 +8,7 @@ ROBOT  ?= urdf/hexapod.toml
 ARGS   ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports test test-slow lint check bench urdf lock clean
+.PHONY: help env reports calibrate test test-slow lint check bench urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -40,6 +40,9 @@ check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
 
 bench: $(STAMP)  ## Print speed ratios measured in one run
 	$(PY) -m tests.bench
+
+calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 20 minutes, resumes)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline calibrate --robot $(ROBOT)
 
 urdf: $(STAMP)  ## Build the URDFs from their TOML
 	$(PY) -m pipeline urdf

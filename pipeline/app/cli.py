@@ -52,6 +52,14 @@ def parser() -> argparse.ArgumentParser:
         sub = verbs.add_parser(verb, help=text)
         _run_options(sub)
         sub.set_defaults(run=_run_reports)
+
+    calibrate = verbs.add_parser(
+        "calibrate", help="fit the unpublished numbers to the paper's figures and store them"
+    )
+    calibrate.add_argument("--robot", type=Path, default=DEFAULT_ROBOT, help="robot file")
+    calibrate.add_argument("--workers", type=int, default=2, help="processes")
+    calibrate.add_argument("--seed", type=int, default=1, help="of everything random")
+    calibrate.set_defaults(run=_run_calibrate)
     return root
 
 
@@ -114,6 +122,12 @@ def _run_reports(options: argparse.Namespace) -> int:
     from pipeline.app.run import run
 
     return run(options)
+
+
+def _run_calibrate(options: argparse.Namespace) -> int:
+    from pipeline.app.calibrate import run_calibrate
+
+    return run_calibrate(options)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

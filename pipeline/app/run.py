@@ -56,6 +56,16 @@ def run(options: argparse.Namespace) -> int:
         )
         tables += tables_of_walking(given, walking)
     tables.append(table_of_parameters(given))
+    judgement = None
+    if options.verb == "reports":
+        from pipeline.app import judgement as judging
+
+        if judging.applies(given):
+            logger.info("holding the run against the paper")
+            judgement, more = judging.judged(given)
+            tables += more
+        else:
+            print("changed numbers: the judgement of the paper's values is left out")
     meta = metadata(given)
     for table in tables:
         decimal = "," if options.decimal == "comma" else "."
@@ -68,6 +78,8 @@ def run(options: argparse.Namespace) -> int:
         assert walking is not None
         logger.info("drawing figures")
         files += write_figures(given, standing, walking, options.out)
+        if judgement is not None:
+            files += judging.figures(given, judgement, options.out)
     print(f"{files} tables and figures in {options.out}")
     for line in findings(walking, given) if walking else ():
         print(line)

@@ -53,7 +53,7 @@ def reproduction(rows: Sequence[ReproducedRow]) -> Table:
             "unit": ("unit of the numbers in the row", ""),
             "published": ("as printed", "see unit"),
             "half_width": (
-                "half of the last printed digit, or of the range of the words",
+                "half of the last printed digit, or of the words' range",
                 "see unit",
             ),
             "computed": ("ours, with the calibrated files", "see unit"),
