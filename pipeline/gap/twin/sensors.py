@@ -117,7 +117,7 @@ def measure(
     per_joint: dict[str, Array] = {"position_rad": position}
     if sensors.motor_encoder:
         per_joint["motor_position_rad"] = _quantised(record.motor[at] + offset, motor_step)
-    channels = {
+    channels: dict[str, tuple[str, Array, Array | float, float]] = {
         "current": ("current_A", record.current, sensors.current_offset, noise.current),
         "voltage": ("voltage_V", record.voltage, 0.0, noise.voltage),
         "torque": ("torque_Nm", record.torque, 0.0, noise.torque),
@@ -155,9 +155,9 @@ def _measure_body(
         for axis in axes[sensors.foot_force]:
             sensed = force[:, i, axis] + sensors.noise.force * rng.standard_normal(at.size)
             out[f"{leg.foot}__force_{'xyz'[axis]}_N"] = sensed
-    # Attitude towards the ground: the inertial sensor is tared while the robot stands.
-    angles = np.array([attitude(record.base[k]) for k in at])
-    angles += sensors.noise.attitude * rng.standard_normal(angles.shape)
+    # Towards the ground: the inertial sensor was tared on it and does not know of a slope.
+    angles: Array = np.array([attitude(record.base[k]) for k in at])
+    angles = angles + sensors.noise.attitude * rng.standard_normal(angles.shape)
     out["base__roll_rad"], out["base__pitch_rad"] = angles[:, 0], angles[:, 1]
 
 

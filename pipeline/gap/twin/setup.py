@@ -54,8 +54,8 @@ class Setup:
 
     @property
     def substeps(self) -> int:
-        """Simulation steps per sample of the controller: 0.5 ms, 0.25 ms with elastic joints."""
-        return 4 if bool(self.plant.elastic.any()) else 2
+        """Simulation steps per sample of the controller: 0.5 ms, 0.33 ms with elastic joints."""
+        return 3 if bool(self.plant.elastic.any()) else 2
 
     def run(self) -> Record:
         """Simulate it."""

@@ -39,7 +39,7 @@ class LinkMass(Effect):
     def draw(self, rng: np.random.Generator, ref: Reference, torque: float) -> Hidden:
         """Any link."""
         joint = _any_body(rng, ref)
-        trial = 0.2  # [kg]
+        trial = 0.05  # [kg]
         per_kg = ref.change(with_bodies(ref.setup.plant, payload={joint: trial})) / trial
         own = ref.robot.model.inertias[ref.robot.model.getJointId(joint)].mass
         # Beyond the tolerance of the link's own mass, at most doubling it.
@@ -64,7 +64,7 @@ class CenterOfMassOffset(Effect):
         joint = _any_body(rng, ref)
         direction = rng.standard_normal(3)
         direction /= np.linalg.norm(direction)
-        trial = 0.02  # [m]
+        trial = 1e-3  # [m]
         plant = with_bodies(ref.setup.plant, shift={joint: trial * direction})
         size, torque = sized(torque, ref.change(plant) / trial, 0.01, 0.08)
         x, y, z = size * direction
@@ -85,12 +85,13 @@ class BaseTilt(Effect):
     units: ClassVar[Units] = {"roll": "rad", "pitch": "rad"}
 
     def draw(self, rng: np.random.Generator, ref: Reference, torque: float) -> Hidden:
-        """In any direction, up to 10 degrees."""
+        """In any direction, up to 10 degrees on the stand, 2 degrees where it has to walk."""
         heading = rng.uniform(0, 2 * np.pi)
         roll, pitch = np.cos(heading), np.sin(heading)
-        trial = 0.03  # [rad]
+        trial = 3e-3  # [rad], small enough for a walking robot not to tip
         plant = on_slope(ref.setup.plant, trial * roll, trial * pitch)
-        size, torque = sized(torque, ref.change(plant) / trial, 0.012, 0.17)
+        steepest = 0.035 if ref.robot.floating else 0.17
+        size, torque = sized(torque, ref.change(plant) / trial, 0.012, steepest)
         return self.hidden(("ground",), torque, roll=size * roll, pitch=size * pitch)
 
     def apply(self, setup: Setup, hidden: Hidden) -> Setup:

@@ -49,7 +49,7 @@ class PositionOffset(Effect):
     def draw(self, rng: np.random.Generator, ref: Reference, torque: float) -> Hidden:
         """Any joint; 10 to 200 mrad, above the tolerance."""
         j = any_joint(rng, ref)
-        trial = 0.02  # [rad]
+        trial = 2e-3  # [rad]
         shift = raised(np.zeros(len(ref.joints)), j, trial)
         per_radian = ref.change(ref.setup.plant, shift) / trial
         size, torque = sized(torque, per_radian, 0.01, 0.2)
