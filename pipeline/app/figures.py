@@ -79,7 +79,7 @@ def _energy(given: Settings, walking: Walking, out: Path) -> int:
         )
         save_figure(figure, out, f"stage_energy_{name}")
         columns = [result.joint.joints.index(joint) for joint in joints]
-        electrical[title] = stage_energies(result)[-1].forward[columns]
+        electrical[title.split(": ")[-1]] = stage_energies(result)[-1].forward[columns]
         chain = given.catalog.chain(name)
         save_figure(
             motor_limits_figure(result.motor, chain.motor, labels, title=title),

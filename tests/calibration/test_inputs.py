@@ -1,0 +1,102 @@
+"""The calibration's inputs: the printed values and the prior, and what is wrong with bad ones."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuators.build import load_catalog
+from pipeline.calibration.errors import PriorError, TargetError
+from pipeline.calibration.prior import PRIOR_FILE, load_prior
+from pipeline.calibration.published import PUBLISHED_FILE, load_published
+from pipeline.calibration.quantities import DIMENSIONS, IDS
+from pipeline.robot_file import load_robot_file
+
+HEADER, *ROWS = PUBLISHED_FILE.read_text(encoding="utf-8").splitlines()
+
+
+def written(tmp_path: Path, lines: list[str]) -> Path:
+    path = tmp_path / "published.csv"
+    path.write_text("\n".join([HEADER, *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_every_printed_value_is_computed() -> None:
+    published = load_published(IDS, DIMENSIONS)
+    assert len(published) == 46
+    assert {p.role for p in published.values()} == {"input", "target", "check"}
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (lambda rows: rows[1:], "'body_length' is missing"),
+        (lambda rows: [*rows, rows[0]], "is there twice"),
+        (lambda rows: [rows[0].replace(",m,", ",kg,"), *rows[1:]], "unit of mass"),
+        (lambda rows: [rows[0].replace(",m,", ",furlong,"), *rows[1:]], "unknown unit"),
+        (lambda rows: [rows[0].replace("body_length", "body_lenght"), *rows[1:]], "did you mean"),
+        (lambda rows: [rows[0].replace("0.600", "nan"), *rows[1:]], "not a finite number"),
+        (lambda rows: [rows[0].replace("0.600", "x"), *rows[1:]], "not a finite number"),
+        (lambda rows: [rows[0].replace("0.0005", "-1"), *rows[1:]], "must not be negative"),
+        (lambda rows: [rows[0].replace("input", "inptu"), *rows[1:]], "role"),
+        (lambda rows: [rows[0] + ",more", *rows[1:]], "number of columns"),
+        (lambda rows: ["body_length", *rows[1:]], "number of columns"),
+    ],
+)
+def test_bad_targets_are_one_line(tmp_path: Path, edit, message: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(TargetError, match=message) as caught:
+        load_published(IDS, DIMENSIONS, written(tmp_path, edit(list(ROWS))))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_target_file_or_column_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(TargetError, match="cannot be read"):
+        load_published(IDS, DIMENSIONS, tmp_path / "none.csv")
+    path = tmp_path / "x.csv"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(TargetError):
+        load_published(IDS, DIMENSIONS, path)
+    path.write_text("id,value\n", encoding="utf-8")
+    with pytest.raises(TargetError, match="column 'where' is missing"):
+        load_published(IDS, DIMENSIONS, path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("bounds = [0, 60]", "bounds = [40, 60]", "bounds exclude the value"),
+        ("interval = [0, 60]", "interval = [40, 60]", "interval excludes the value"),
+        ('unit = "mm"', 'unit = "mmm"', "unknown unit"),
+        ('scale = "linear"', 'scale = "liner"', "'linear' or 'log'"),
+        ("value = 30", 'value = "thirty"', "must be 1, 2 and 2 numbers"),
+        ("bounds = [0, 60]", "bound = [0, 60]", "did you mean 'bounds'"),
+        ("value = 30", "", "missing key 'value'"),
+    ],
+)
+def test_bad_priors_are_one_line(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = tmp_path / "prior.toml"
+    path.write_text(PRIOR_FILE.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(PriorError, match=message) as caught:
+        load_prior(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_coordinates_are_those_of_a_unit_gaussian() -> None:
+    prior = load_prior()
+    z = np.linspace(-0.5, 0.5, len(prior.free))
+    np.testing.assert_allclose(prior.coordinates(prior.values(z)), z, atol=1e-9)
+    for free in prior.free:
+        assert free.bounds[0] <= free.centre <= free.bounds[1]
+        assert free.value(0.0) == pytest.approx(free.centre)
+    drawn = prior.draw(np.random.default_rng(0))
+    assert ((drawn >= prior.lower) & (drawn <= prior.upper)).all()
+
+
+def test_the_prior_names_numbers_that_exist(root: Path) -> None:
+    spec = load_robot_file(root / "urdf" / "hexapod.toml")
+    catalog = load_catalog()
+    known = {f"robot.{name}" for name in spec.parameters}
+    known |= {f"{component}.{p.name}" for component, p in catalog.rows()}
+    assert set(load_prior().keys) <= known
