@@ -59,20 +59,32 @@ def check_file(path: Path) -> list[Finding]:
         raise UrdfError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError):
         raise UrdfError(f"{path}: cannot be read as text") from None
-    root = _root(text, str(path))
-    findings = _inertias(root) + _limits(root)
+    findings = check_urdf(text, str(path))
     if all(finding.passed for finding in findings):
         parse_urdf(text, str(path), floating=False)  # what is left to refuse: names and topology
     return findings
 
 
+def check_urdf(text: str, where: str) -> list[Finding]:
+    """Check a URDF's inertias and limits.
+
+    Args:
+        text: The URDF.
+        where: Its file, for messages.
+
+    Raises:
+        UrdfError: Malformed XML, or numbers that are none.
+    """
+    root = _root(text, where)
+    return _inertias(root) + _limits(root)
+
+
 def check_robot(robot: Robot) -> list[Finding]:
     """Check a loaded robot: its URDF, the stated mass, the symmetry of its legs."""
-    root = _root(robot.urdf, str(robot.spec.urdf))
     spec = robot.spec
     total = float(sum(inertia.mass for inertia in robot.model.inertias))
     stated = spec.parameters["total_mass"]
-    findings = _inertias(root) + _limits(root)
+    findings = check_urdf(robot.urdf, str(spec.urdf))
     findings.append(
         Finding(
             spec.name,

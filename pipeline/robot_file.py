@@ -178,13 +178,18 @@ def load_robot_file(path: Path) -> RobotSpec:
     """Load and check a robot file.
 
     Args:
-        path: TOML file, or a bare URDF for a fixed base without legs.
+        path: TOML file.
 
     Raises:
         RobotFileError: Missing file, malformed TOML, unknown or missing key, contradiction.
         actuators.errors.ActuatorError: A parameter lacks unit, basis or source, or is out of
             bounds.
     """
+    if path.suffix.lower() in (".urdf", ".xml", ".xacro"):
+        raise RobotFileError(
+            f"{path}: a URDF says nothing of legs and gait; give a robot file (TOML) that names it "
+            "as robot.urdf, as urdf/hexapod.toml does"
+        )
     table, sources = _extended(path, ())
     where = str(path)
     _known_keys(table, _TOP_KEYS, where, "table")
@@ -200,8 +205,7 @@ def load_robot_file(path: Path) -> RobotSpec:
     parameters = parameters_from_table(
         _table(table, "parameters", where), schema, f"{where}: parameters"
     )
-    if build:
-        _check_build(parameters, where)
+    check_parameters(parameters, build, where)
     legs = _legs(_table(table, "legs", where), parameters, build, where)
     names = [leg.name for leg in legs]
     gait = _table(table, "gait", where)
@@ -211,7 +215,6 @@ def load_robot_file(path: Path) -> RobotSpec:
     tripods = tuple(
         _leg_list(group, names, f"{where}: gait.tripods") for group in gait.get("tripods", [])
     )
-    _positive(parameters, where)
     return RobotSpec(
         path=path,
         sources=sources,
@@ -332,8 +335,30 @@ def _triple(
     return (x, y, z)
 
 
-def _positive(parameters: ParameterSet, where: str) -> None:
-    for name in ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity"):
+def check_parameters(parameters: ParameterSet, build: str | None, where: str) -> None:
+    """Refuse numbers that no robot or gait can have, after loading and after a change.
+
+    Args:
+        parameters: All of a robot file's.
+        build: Which builder makes the URDF, or None for a URDF of the user's own.
+        where: For the message.
+
+    Raises:
+        RobotFileError: A mass, length or period that is not positive, or a contradiction.
+    """
+    _positive(
+        parameters,
+        ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity"),
+        where,
+    )
+    if parameters["foot_lift"] < 0:
+        raise RobotFileError(f"{where}: parameters.foot_lift must not be negative")
+    if build:
+        _check_build(parameters, where)
+
+
+def _positive(parameters: ParameterSet, names: tuple[str, ...], where: str) -> None:
+    for name in names:
         if parameters[name] <= 0:
             written = parameters.parameter(name)
             raise RobotFileError(
@@ -343,12 +368,20 @@ def _positive(parameters: ParameterSet, where: str) -> None:
 
 
 def _check_build(parameters: ParameterSet, where: str) -> None:
-    for name in (
-        *("body_length", "robot_width", "hip_spacing", "femur_length", "tibia_length"),
-        *("hip_link_mass", "femur_mass", "tibia_mass", "trunk_height", "link_width"),
-    ):
-        if parameters[name] <= 0:
-            raise RobotFileError(f"{where}: parameters.{name} must be positive")
+    _positive(
+        parameters,
+        (
+            *("body_length", "robot_width", "hip_spacing", "body_height", "femur_length"),
+            *("tibia_length", "hip_link_mass", "femur_mass", "tibia_mass", "trunk_height"),
+            *("link_width", "joint_1_range", "joint_effort_limit", "joint_velocity_limit"),
+        ),
+        where,
+    )
+    if parameters["coxa_length"] < 0:
+        raise RobotFileError(f"{where}: parameters.coxa_length must not be negative")
+    for joint in ("joint_2", "joint_3"):
+        if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]:
+            raise RobotFileError(f"{where}: parameters.{joint}_lower must be below {joint}_upper")
     for name in ("femur_com", "tibia_com"):
         if not 0 <= parameters[name] <= 1:
             raise RobotFileError(

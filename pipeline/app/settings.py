@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import argparse
+import math
 from dataclasses import dataclass, replace
 
 from actuators.build import Catalog, load_catalog
-from actuators.errors import closest
+from actuators.errors import ActuatorError, closest, one_line
 from actuators.units import to_si
 from pipeline.app.compute import Regeneration
-from pipeline.errors import RobotFileError
+from pipeline.check import check_urdf
+from pipeline.errors import GaitError, RobotFileError, UnphysicalModelError
 from pipeline.robot import Robot, load_robot
-from pipeline.robot_file import RobotSpec, load_robot_file
+from pipeline.robot_file import RobotSpec, check_parameters, load_robot_file
 from pipeline.transfer_path import transfer_path
 
 TRANSFER_PATH_KEY = "gait.transfer_path"
+#: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
+LEAST_SAMPLES = 51
 
 
 @dataclass(frozen=True)
@@ -47,13 +51,23 @@ def settings(options: argparse.Namespace) -> Settings:
     """
     spec = load_robot_file(options.robot)
     catalog = load_catalog()
+    if options.samples < LEAST_SAMPLES:
+        raise GaitError(
+            f"--samples {options.samples}: at least {LEAST_SAMPLES} samples per segment are needed "
+            "for energies within 1 %"
+        )
     for change in options.set:
-        key, equals, value = change.partition("=")
+        key, equals, value = (part.strip() for part in change.partition("="))
         if not equals or not key or not value:
-            raise RobotFileError(f"--set {change}: expected KEY=VALUE")
-        spec, catalog = _changed(spec, catalog, key.strip(), value.strip())
+            raise RobotFileError(f"--set {one_line(change)}: expected KEY=VALUE")
+        spec, catalog = _changed(spec, catalog, key, value)
+    if options.set:
+        # After all changes: two numbers that bind each other may be changed together.
+        check_parameters(spec.parameters, spec.build, "--set")
+    robot = load_robot(spec)
+    refuse_impossible(robot)
     return Settings(
-        robot=load_robot(spec),
+        robot=robot,
         catalog=catalog,
         regeneration=_regeneration(options.regeneration),
         samples=options.samples,
@@ -62,27 +76,57 @@ def settings(options: argparse.Namespace) -> Settings:
     )
 
 
+def refuse_impossible(robot: Robot) -> None:
+    """Stop before a body that cannot exist gives numbers that look like any other.
+
+    Raises:
+        UnphysicalModelError: A link's mass or inertia is impossible, or a limit missing.
+    """
+    for finding in check_urdf(robot.urdf, str(robot.spec.urdf)):
+        if not finding.passed:
+            raise UnphysicalModelError(
+                f"{robot.spec.urdf}: {finding.subject}: {finding.check} fails ({finding.detail}); "
+                "correct it, `python -m pipeline check FILE` lists every finding"
+            )
+
+
 def _changed(spec: RobotSpec, catalog: Catalog, key: str, value: str) -> tuple[RobotSpec, Catalog]:
+    """One change; numbers in the unit their file writes."""
+    place = f"--set {one_line(key)}={one_line(value)}"
     if key == TRANSFER_PATH_KEY:
-        return replace(spec, transfer_path=transfer_path(value).name), catalog
+        try:
+            return replace(spec, transfer_path=transfer_path(value).name), catalog
+        except GaitError as error:
+            raise RobotFileError(f"{place}: {error}") from None
     references = [f"{component}.{p.name}" for component, p in catalog.rows()]
-    known = [TRANSFER_PATH_KEY, *spec.parameters, *references]
-    if key in spec.parameters:
-        unit = spec.parameters.parameter(key).unit
-        return spec.with_parameters({key: to_si(_number(key, value), unit)}), catalog
-    if key in references:
-        unit = catalog.parameter(key).unit
-        return spec, catalog.replaced(key, to_si(_number(key, value), unit))
-    raise RobotFileError(f"--set {key}: there is no such number; {closest(key, known)}")
-
-
-def _number(key: str, text: str) -> float:
+    if key not in spec.parameters and key not in references:
+        known = [TRANSFER_PATH_KEY, *spec.parameters, *references]
+        raise RobotFileError(f"{place}: there is no such number; {_hint(key, known)}")
     try:
-        return float(text)
+        if key in spec.parameters:
+            unit = spec.parameters.parameter(key).unit
+            return spec.with_parameters({key: to_si(_number(place, value), unit)}), catalog
+        unit = catalog.parameter(key).unit
+        return spec, catalog.replaced(key, to_si(_number(place, value), unit))
+    except ActuatorError as error:
+        raise RobotFileError(f"{place}: {error}") from None
+
+
+def _hint(key: str, known: list[str]) -> str:
+    hint = closest(key, known)
+    # All names fill several screens; parameters.csv has them in order.
+    return hint if hint.startswith("did") else "parameters.csv of any run lists all names"
+
+
+def _number(place: str, text: str) -> float:
+    """A finite number in Python's and TOML's writing."""
+    try:
+        number = float(text)
     except ValueError:
-        raise RobotFileError(
-            f"--set {key}={text}: expected a number in the unit its file writes"
-        ) from None
+        raise RobotFileError(f"{place}: expected a number in the unit its file writes") from None
+    if not math.isfinite(number):
+        raise RobotFileError(f"{place}: expected a finite number")
+    return number
 
 
 def _regeneration(text: str) -> Regeneration:
