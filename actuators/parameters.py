@@ -90,6 +90,10 @@ class ParameterSet(Mapping[str, float]):
     def __getitem__(self, name: str) -> float:
         return self.parameter(name).value
 
+    def __contains__(self, name: object) -> bool:
+        # Mapping asks __getitem__ and expects a KeyError, which a message in one line is not.
+        return name in self._parameters
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._parameters)
 
