@@ -1,0 +1,109 @@
+"""A page as one self-contained HTML file: no script, no network, pictures inside."""
+
+from __future__ import annotations
+
+import base64
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from reports.atomic import write_text
+from reports.errors import ReportError
+from reports.page import Block, FigureBlock, Page, Points, TableBlock, Text, cell_text
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+_TEMPLATES = Path(__file__).parent / "templates"
+_MIME = {".svg": "image/svg+xml", ".png": "image/png"}
+_LINK = re.compile(r"\[([^\]]+)\]\(([^)\s]+)\)")
+_BOLD = re.compile(r"\*\*(.+?)\*\*")
+_EMPHASIS = re.compile(r"(?<!\w)\*(?=\S)(.+?)(?<=\S)\*(?!\w)")
+_CODE = re.compile(r"`([^`]+)`")
+_TARGET = re.compile(r"(?:https?://|#|(?![a-zA-Z][\w+.-]*:)(?!/))[^\s*<>]*")
+
+
+def write_html(page: Page, path: Path) -> Path:
+    """Write a page as HTML.
+
+    Raises:
+        ReportError: A figure that is missing or neither SVG nor PNG.
+        OutputError: The folder cannot be written.
+    """
+    write_text(path, html(page, path.parent))
+    return path
+
+
+def html(page: Page, folder: Path) -> str:
+    """The text of a page; `folder` is where it will lie, for links to the pictures' files."""
+    import jinja2
+
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(_TEMPLATES),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+    environment.filters.update(marked=marked, cell=cell_text)
+    return environment.get_template("page.html").render(
+        page=page,
+        sections=[
+            {
+                "id": f"s{number}",
+                "heading": section.heading,
+                "blocks": [_block(block, folder) for block in section.blocks],
+            }
+            for number, section in enumerate(page.sections, 1)
+        ],
+    )
+
+
+def _block(block: Block, folder: Path) -> dict[str, object]:
+    """A block with its kind, for the template to tell them apart."""
+    if isinstance(block, Text):
+        return {"kind": "text", "it": block}
+    if isinstance(block, Points):
+        return {"kind": "points", "it": block}
+    if isinstance(block, TableBlock):
+        return {"kind": "table", "it": block}
+    return {
+        "kind": "figure",
+        "it": block,
+        "data": _data(block),
+        "link": os.path.relpath(block.file, folder).replace(os.sep, "/"),
+    }
+
+
+def _data(block: FigureBlock) -> str:
+    mime = _MIME.get(block.file.suffix.lower())
+    if mime is None:
+        raise ReportError(f"{block.file}: a page shows SVG or PNG pictures only")
+    try:
+        content = block.file.read_bytes()
+    except OSError as error:
+        raise ReportError(
+            f"{block.file}: cannot be read ({error.strerror}); draw the figure before the page"
+        ) from None
+    return f"data:{mime};base64,{base64.b64encode(content).decode('ascii')}"
+
+
+def marked(text: str) -> Markup:
+    """Text with its four marks as HTML, all else escaped."""
+    from markupsafe import Markup, escape
+
+    def link(match: re.Match[str]) -> str:
+        label, target = match.groups()
+        # Anything but a relative or web address (a script, a machine's path) stays plain text.
+        return f'<a href="{target}">{label}</a>' if _TARGET.fullmatch(target) else label
+
+    escaped = str(escape(text))
+    pieces = _CODE.split(escaped)  # every second piece is code and keeps its other marks
+    for i in range(0, len(pieces), 2):
+        bold = _BOLD.sub(r"<strong>\1</strong>", _LINK.sub(link, pieces[i]))
+        pieces[i] = _EMPHASIS.sub(r"<em>\1</em>", bold)
+    for i in range(1, len(pieces), 2):
+        pieces[i] = f"<code>{pieces[i]}</code>"
+    return Markup("".join(pieces))

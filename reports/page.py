@@ -1,0 +1,190 @@
+"""What a page says, apart from how it looks: the source of index.html, summary.md and report.md.
+
+Texts may hold four marks of Markdown, which both forms understand: ``**bold**``, ``*emphasis*``,
+`` `code` `` and ``[text](target)``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from reports.errors import ReportError
+from reports.table import Table
+
+
+@dataclass(frozen=True)
+class Text:
+    """A paragraph."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Points:
+    """A list, numbered or not."""
+
+    items: tuple[str, ...]
+    numbered: bool = False
+
+
+@dataclass(frozen=True)
+class TableBlock:
+    """A table to read.
+
+    Attributes:
+        headers: Column titles with their units.
+        rows: Cells; numbers are aligned to the right, None and NaN shown as a dash.
+        caption: One sentence.
+        file: CSV with the full numbers, relative to the page; linked from the caption.
+        tones: Text of a cell to ``good``, ``bad`` or ``quiet``, for verdicts.
+        digits: Significant digits of numbers.
+    """
+
+    headers: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+    caption: str = ""
+    file: str = ""
+    tones: Mapping[str, str] = field(default_factory=dict)
+    digits: int = 4
+
+    def __post_init__(self) -> None:
+        """Refuse ragged rows.
+
+        Raises:
+            ReportError: A row with another number of cells than there are headers.
+        """
+        for number, row in enumerate(self.rows):
+            if len(row) != len(self.headers):
+                raise ReportError(
+                    f"table '{self.caption}', row {number}: {len(row)} cells under "
+                    f"{len(self.headers)} headers"
+                )
+
+    @property
+    def numeric(self) -> tuple[bool, ...]:
+        """For each column whether it holds numbers only."""
+        columns = zip(*self.rows, strict=True) if self.rows else ((),) * len(self.headers)
+        return tuple(
+            any(is_number(v) for v in column) and all(v is None or is_number(v) for v in column)
+            for column in columns
+        )
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """A picture that has been written before the page.
+
+    Attributes:
+        file: SVG or PNG; it must lie in the page's folder or below it.
+        caption: What to see in it.
+        alt: For those who cannot see it; the caption by default.
+    """
+
+    file: Path
+    caption: str
+    alt: str = ""
+
+
+Block = Text | Points | TableBlock | FigureBlock
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading with what stands below it."""
+
+    heading: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """A report that gives its answer first.
+
+    Attributes:
+        title: Of the page.
+        answer: Paragraphs that a reader in a hurry reads and then stops.
+        sections: The rest.
+        files: File name (relative) to what it holds, listed at the end.
+        footer: A last line, such as versions.
+    """
+
+    title: str
+    answer: tuple[str, ...]
+    sections: tuple[Section, ...] = ()
+    files: Mapping[str, str] = field(default_factory=dict)
+    footer: str = ""
+
+
+def table_block(
+    table: Table,
+    columns: Mapping[str, str] | None = None,
+    *,
+    caption: str = "",
+    keep: Sequence[bool] | None = None,
+    tones: Mapping[str, str] | None = None,
+    digits: int = 4,
+) -> TableBlock:
+    """Show a table that is also written as CSV.
+
+    Args:
+        table: The table.
+        columns: Which columns, header to title; all with header and unit by default.
+        caption: One sentence; the table's description by default.
+        keep: Which rows, one flag per row; all by default.
+        tones: See `TableBlock`.
+        digits: See `TableBlock`.
+
+    Raises:
+        ReportError: A column that the table lacks.
+    """
+    shown = columns or {h: _titled(h, table.meanings[h][1]) for h in table.columns}
+    for header in shown:
+        if header not in table.columns:
+            raise ReportError(f"table '{table.name}' has no column '{header}'")
+    rows = tuple(
+        tuple(_plain(table.columns[header][i]) for header in shown)
+        for i in range(table.rows)
+        if keep is None or keep[i]
+    )
+    return TableBlock(
+        tuple(shown.values()),
+        rows,
+        caption or table.description,
+        f"{table.name}.csv",
+        tones or {},
+        digits,
+    )
+
+
+def _titled(header: str, unit: str) -> str:
+    return f"{header} [{unit}]" if unit not in ("", "1") and not header.endswith(unit) else header
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+def is_number(value: Any) -> bool:
+    """Whether a cell holds a number, flags not counted."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def cell_text(value: Any, digits: int = 4) -> str:
+    """A cell as a reader sees it: rounded, a true minus sign, a dash for no value."""
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return "\N{EN DASH}"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        if math.isinf(value):
+            return "\N{INFINITY}" if value > 0 else "\N{MINUS SIGN}\N{INFINITY}"
+        text = f"{value:.{digits}g}"
+        if "e" in text:
+            mantissa, exponent = text.split("e")
+            text = f"{mantissa}e{int(exponent)}"
+        return ("0" if float(text) == 0 else text).replace("-", "\N{MINUS SIGN}")
+    return str(value).replace("-", "\N{MINUS SIGN}") if is_number(value) else str(value)
