@@ -45,9 +45,17 @@ def judged(given: Settings) -> tuple[Judgement, list[Table]]:
     ]
 
 
-def figures(given: Settings, judgement: Judgement, out: Path) -> int:
-    """Fig. 21 for every subject."""
+def pages(given: Settings, judgement: Judgement, every: list[Table], out: Path) -> int:
+    """Fig. 21 for every subject, then the summary that shows all figures.
+
+    Returns:
+        How many figures and pages.
+    """
     from pipeline.app.figures import write_fig_21
+    from pipeline.app.summary import write_summary
 
     titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
-    return write_fig_21(judgement, titles, out)
+    count = write_fig_21(judgement, titles, out)
+    results = load_results()
+    numbers = calibrated_numbers(results, load_prior())
+    return count + write_summary(given, judgement, numbers, every, results, out)

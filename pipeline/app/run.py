@@ -79,7 +79,7 @@ def run(options: argparse.Namespace) -> int:
         logger.info("drawing figures")
         files += write_figures(given, standing, walking, options.out)
         if judgement is not None:
-            files += judging.figures(given, judgement, options.out)
+            files += judging.pages(given, judgement, tables, options.out)
     print(f"{files} tables and figures in {options.out}")
     for line in findings(walking, given) if walking else ():
         print(line)
