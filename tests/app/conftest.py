@@ -1,0 +1,52 @@
+"""Runs of the command line, in this process, shared by the tests that read their files."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.app.cli import main
+
+Rows = list[dict[str, str]]
+#: Runs a verb on the hexapod with `--out`, and returns the exit code, argparse's own included.
+Command = Callable[..., int]
+
+
+def exit_code(arguments: Sequence[str]) -> int:
+    try:
+        return main(arguments)
+    except SystemExit as stop:  # argparse refuses by leaving
+        return int(str(stop.code))
+
+
+def rows_of(path: Path, delimiter: str = ",") -> Rows:
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        return list(csv.DictReader(file, delimiter=delimiter))
+
+
+def sidecar_of(path: Path) -> dict[str, Any]:
+    loaded = json.loads(path.with_suffix(".meta.json").read_text(encoding="utf-8"))
+    assert isinstance(loaded, dict)
+    return loaded
+
+
+@pytest.fixture(scope="session")
+def command(root: Path) -> Command:
+    def run(verb: str, out: Path, *more: str, robot: str | Path = "hexapod.toml") -> int:
+        return exit_code([verb, "--robot", str(root / "urdf" / robot), "--out", str(out), *more])
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def out(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Path:
+    """The tables of standing and walking with every option at its default."""
+    folder = tmp_path_factory.mktemp("out")
+    assert command("stand", folder) == 0
+    assert command("walk", folder) == 0
+    return folder
