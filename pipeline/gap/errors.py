@@ -25,3 +25,19 @@ class MappingError(GapError):
 
 class PreparationError(GapError):
     """The log cannot be brought to one bandwidth, or not cut into separate parts."""
+
+
+class ModelError(GapError):
+    """A model without the joint or link that is asked for, or a file that is no robot."""
+
+
+class ModelFileError(GapError):
+    """The model file is malformed, names unknown effects, or its sources have changed."""
+
+
+class EffectError(GapError):
+    """An effect that is unknown, or parameters it does not have."""
+
+
+class NamingError(GapError):
+    """Nothing is left to compare: no usable row in a part of the data."""

@@ -1,0 +1,139 @@
+"""What an effect is: a named edit of a machine, with places, parameters and a signature."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+from actuators.errors import closest
+from pipeline.gap.errors import EffectError
+from pipeline.gap.measurement import Measurement
+from pipeline.gap.model import MachineModel
+
+Place = tuple[str, ...]
+Values = Mapping[str, float]
+CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    Attributes:
+        name: In the model file.
+        unit: ``"channel"`` stands for the unit of the compared channel.
+        low: Below this the effect makes no sense.
+        high: Above this likewise.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A number in which an effect is fitted; at zero the effect is not there.
+
+    Attributes:
+        name: Of the coordinate.
+        step: For finite differences; small against what matters.
+        signed: Whether negative values make sense.
+        required: Whether the effect is this effect only while this coordinate is not zero.
+    """
+
+    name: str
+    step: float
+    signed: bool = False
+    required: bool = True
+
+
+class Effect(ABC):
+    """A kind of thing that a model may lack.
+
+    An effect is fitted in `coordinates`, in which the prediction is linear or nearly so, at given
+    `shapes` (Stribeck speed, order of a ripple), and told in `parameters`.
+
+    Attributes:
+        name: In the field's terms; key of the registry.
+        place_kind: What it acts on: joint, joint pair, link, ground, effort channels.
+        parameters: As written to results and model files.
+        coordinates: As fitted.
+        signature: Variable against which its residual shows, a key of `signature.VARIABLES`.
+        excitation: The motion that shows it, in words.
+        contains: Effects that are special cases of this one at the same place.
+    """
+
+    name: ClassVar[str]
+    place_kind: ClassVar[str] = "joint"
+    parameters: ClassVar[tuple[Parameter, ...]]
+    coordinates: ClassVar[tuple[Coordinate, ...]]
+    signature: ClassVar[str] = "velocity"
+    excitation: ClassVar[str]
+    contains: ClassVar[tuple[str, ...]] = ()
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Where in this machine and log the effect could be."""
+        return [(joint,) for joint in model.joints]
+
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+        """Values of the nonlinear parameters to try first; one empty set where there are none."""
+        return [{}]
+
+    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
+        """Shapes near one that did well; `factor` shrinks from round to round."""
+        return []
+
+    @abstractmethod
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """The machine with the effect at coordinates `x` and shape `shape`."""
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Coordinates and shape as parameters."""
+        return {**x, **shape}
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """Parameters as coordinates and shape."""
+        names = [c.name for c in self.coordinates]
+        return (
+            {n: float(v) for n, v in values.items() if n in names},
+            {n: float(v) for n, v in values.items() if n not in names},
+        )
+
+    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
+        """Standard deviation by coordinate that the machine's tolerances explain already.
+
+        Empty where the effect is no tolerance of every machine. An estimate counts only where it
+        exceeds `verdict.TOLERANCE_SIGMAS` of these.
+        """
+        return {}
+
+    def apply(self, model: MachineModel, place: Place, values: Values) -> MachineModel:
+        """The machine with the effect at the given parameters.
+
+        Raises:
+            EffectError: A parameter is missing, unknown or out of bounds.
+            ModelError: The place does not exist.
+        """
+        known = [p.name for p in self.parameters]
+        for name in values:
+            if name not in known:
+                raise EffectError(f"{self.name}: no parameter '{name}'; {closest(name, known)}")
+        for parameter in self.parameters:
+            if parameter.name not in values:
+                raise EffectError(f"{self.name}: parameter '{parameter.name}' is missing")
+            value = values[parameter.name]
+            if not parameter.low <= value <= parameter.high:
+                raise EffectError(
+                    f"{self.name}: {parameter.name} = {value:g} lies outside "
+                    f"{parameter.low:g} to {parameter.high:g} {parameter.unit}"
+                )
+        return self.edit(model, place, *self.internal(values))
+
+    def unit(self, parameter: str, channel: str) -> str:
+        """Unit of a parameter in a log whose compared channel is `channel`."""
+        unit = next(p.unit for p in self.parameters if p.name == parameter)
+        return CHANNEL_UNITS[channel] if unit == "channel" else unit

@@ -1,0 +1,30 @@
+"""Effort channels that lag behind the positions."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+from pipeline.gap.effects.base import Coordinate, Effect, Parameter, Place, Values
+from pipeline.gap.measurement import Measurement
+from pipeline.gap.model import MachineModel
+
+
+class TimeDelay(Effect):
+    """One delay between position and effort, of all joints alike."""
+
+    name = "time_delay"
+    place_kind = "effort channels"
+    parameters: ClassVar = (Parameter("delay", "s", -0.5, 0.5),)
+    coordinates: ClassVar = (Coordinate("delay", 2e-4, signed=True),)
+    signature = "effort rate"
+    excitation = "changes its torque fast: accelerates, brakes and reverses"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """All effort channels."""
+        return [("effort channels",)]
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Delay them further."""
+        changed = tuple(replace(a, delay=a.delay + x["delay"]) for a in model.actuators)
+        return replace(model, actuators=changed)

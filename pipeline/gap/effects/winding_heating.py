@@ -1,0 +1,54 @@
+"""Windings that warm up: resistance rises, torque constant falls."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+from actuators.heating import Heating
+from pipeline.gap.effects.base import Coordinate, Effect, Parameter, Place, Values
+from pipeline.gap.measurement import Measurement
+from pipeline.gap.model import MachineModel
+
+_TIMES = (1.5, 4.0, 10.0, 30.0)  # [s]
+
+
+class WindingHeating(Effect):
+    """One thermal node per motor, warmed by R I^2 and by what surrounds it."""
+
+    name = "winding_heating"
+    parameters: ClassVar = (
+        Parameter("rise", "K", -300.0, 300.0),
+        Parameter("thermal_resistance", "K/W", 0.0, 1e3),
+        Parameter("time_constant", "s", 0.01, 1e5),
+    )
+    coordinates: ClassVar = (
+        Coordinate("rise", 1.0, signed=True, required=False),
+        Coordinate("thermal_resistance", 0.5, required=False),
+    )
+    signature = "time"
+    excitation = "works hard for several thermal time constants, then repeats its first motion"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Joints with a motor, where an electrical channel is measured."""
+        if "torque" in m.channels:
+            return []
+        return [(a.name,) for a in model.actuators if a.motor is not None and a.heating is None]
+
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+        """Time constants that a log of this length can show."""
+        length = float(m.time[-1] - m.time[0])
+        return [{"time_constant": t} for t in _TIMES if t < 1.5 * length]
+
+    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
+        """Time constants to either side."""
+        return [{"time_constant": shape["time_constant"] * 2.0**e} for e in (-factor, factor)]
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Give the motor a thermal node."""
+        node = Heating(
+            thermal_resistance=x["thermal_resistance"],
+            time_constant=shape["time_constant"],
+            rise=x["rise"],
+        )
+        return model.with_actuator(replace(model.actuator(place[0]), heating=node))

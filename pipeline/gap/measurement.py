@@ -1,0 +1,88 @@
+"""What naming works on: motion and efforts of one or several prepared logs, with their parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+FIT, CHOOSE, PROVE, UNUSED = 0, 1, 2, -1
+
+
+def unfiltered(x: Array) -> Array:
+    """No filter: for series that are exact."""
+    return x
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """Samples of the machine's motion and of what it cost, at one bandwidth.
+
+    Attributes:
+        name: Of the log.
+        time: Shape (N,) [s].
+        joints: Names of the columns.
+        q: Position as measured, shape (N, J) [rad].
+        v: Velocity, shape (N, J) [rad/s].
+        a: Acceleration, shape (N, J) [rad/s^2].
+        channels: Compared channels, the log's own effort first, e.g. ``("current", "voltage")``.
+            With a measured current, voltage is predicted from that current and the speed.
+        effort: Shape (N, J, C) in the channels' units.
+        noise: Standard deviation of the noise in the bandwidth, shape (J, C).
+        mask: Samples that count, shape (N, J).
+        part: FIT, CHOOSE, PROVE or UNUSED, shape (N,).
+        block: Number of the block, shape (N,); blocks are what is resampled.
+        pieces: Stretches without a gap.
+        lowpass: Brings a series (N, ...) of this grid to the bandwidth.
+        bandwidth: Cut-off of that low-pass [Hz].
+        at_motor: Whether the encoder sits on the motor's side of the gear.
+        rest_speed: Speed within which friction passes from one sign to the other, (J,) [rad/s].
+        base_roll: Shape (N,) [rad], or None for level.
+        base_pitch: Likewise.
+        standing: Which feet stand, shape (N, F), or None.
+        foot_force: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None
+            where the ground's forces are computed.
+        sha256: Of the log.
+    """
+
+    name: str
+    time: Array
+    joints: tuple[str, ...]
+    q: Array
+    v: Array
+    a: Array
+    channels: tuple[str, ...]
+    effort: Array
+    noise: Array
+    mask: Mask
+    part: NDArray[np.int8]
+    block: NDArray[np.intp]
+    pieces: tuple[slice, ...]
+    lowpass: Callable[[Array], Array] = unfiltered
+    bandwidth: float = float("inf")
+    at_motor: bool = False
+    rest_speed: Array = field(default_factory=lambda: np.zeros(0))
+    base_roll: Array | None = None
+    base_pitch: Array | None = None
+    standing: Mask | None = None
+    foot_force: Array | None = None
+    sha256: str = ""
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return 1.0 / float(np.median(np.diff(self.time)))
+
+    def derivative(self, x: Array) -> Array:
+        """Rate of change of a series (N, ...), piece by piece."""
+        out = np.empty_like(x)
+        for piece in self.pieces:
+            out[piece] = np.gradient(x[piece], self.time[piece], axis=0)
+        return out

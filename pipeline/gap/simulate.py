@@ -1,0 +1,269 @@
+"""Predict what the sensors of a machine show along a measured motion.
+
+Measured motion -> bodies and ground (`rigid`) -> an actuator per joint -> sensors. Two predictions
+that share a part of their model share its computation: a change at one joint costs one joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.heating import warm_resistance, warm_torque_constant
+from actuators.shaft import ShaftSeries
+from pipeline.gap.errors import ModelError
+from pipeline.gap.measurement import Measurement
+from pipeline.gap.model import JointModel, MachineModel
+from pipeline.gap.rigid import rigid_torque
+
+Array = NDArray[np.float64]
+#: Torque over which backlash passes from one flank to the other, as a share of the RMS torque.
+_FLANK_SHARE = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What a model says the sensors show, before the low-pass.
+
+    Attributes:
+        model: The model.
+        q: Joint positions, link side, shape (N, J) [rad].
+        torque: Demanded of the actuators by the rigid bodies, shape (N, J) [N*m].
+        motor_torque: Of the motors brought to the joint side, shape (N, J) [N*m].
+        effort: Shape (N, J, C) in the measurement's channels.
+    """
+
+    model: MachineModel
+    q: Array
+    torque: Array
+    motor_torque: Array
+    effort: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """Change of a prediction where it changed at all.
+
+    Attributes:
+        joints: Columns that changed.
+        effort: Shape (N, len(joints), C).
+    """
+
+    joints: tuple[int, ...]
+    effort: Array
+
+
+class Simulator:
+    """Predictions of many models along one motion."""
+
+    def __init__(self, measurement: Measurement) -> None:
+        self.measurement = measurement
+
+    def predict(self, model: MachineModel, near: Prediction | None = None) -> Prediction:
+        """Predict with a model.
+
+        Args:
+            model: With the measurement's joints.
+            near: A prediction of a similar model, whose equal parts are taken over.
+
+        Raises:
+            ModelError: The model's joints are not the measurement's.
+        """
+        m = self.measurement
+        if model.joints != m.joints:
+            raise ModelError(f"{model.name}: the model's joints are not those of log '{m.name}'")
+        changed = self._changed(model, near)
+        if near is None or self._moves_bodies(model, near, changed):
+            q, torque = self._rigid(model)
+            if near is None:
+                changed = tuple(range(len(m.joints)))
+            else:
+                differs = np.abs(torque - near.torque).max(axis=0)
+                scale = 1e-12 * (1.0 + np.abs(torque).max(axis=0))
+                changed = tuple({*changed, *np.flatnonzero(differs > scale).tolist()})
+        else:
+            q, torque = near.q, near.torque
+        changed = self._with_coupled(model, near, changed)
+        n, j = m.q.shape
+        effort = np.empty((n, j, len(m.channels))) if near is None else near.effort.copy()
+        motor = np.empty((n, j)) if near is None else near.motor_torque.copy()
+        for k in self._order(model, changed):
+            motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
+        return Prediction(model, q, torque, motor, effort)
+
+    def difference(self, base: Prediction, model: MachineModel) -> Difference:
+        """Prediction of a model less that of another, at the joints where they differ."""
+        new = self.predict(model, base)
+        delta = new.effort - base.effort
+        joints = tuple(np.flatnonzero(np.abs(delta).max(axis=(0, 2)) > 0).tolist())
+        return Difference(joints, delta[:, joints])
+
+    def _changed(self, model: MachineModel, near: Prediction | None) -> tuple[int, ...]:
+        if near is None:
+            return ()
+        before = near.model.actuators
+        return tuple(k for k, a in enumerate(model.actuators) if a is not before[k])
+
+    def _moves_bodies(
+        self, model: MachineModel, near: Prediction, changed: tuple[int, ...]
+    ) -> bool:
+        if model.rigid is not near.model.rigid or model.bodies != near.model.bodies:
+            return True
+        for k in changed:
+            new, old = model.actuators[k], near.model.actuators[k]
+            if new.encoder_offset != old.encoder_offset:
+                return True
+            wound = (new.compliance, new.backlash) != (old.compliance, old.backlash)
+            if self.measurement.at_motor and wound:
+                return True
+        return False
+
+    def _with_coupled(
+        self, model: MachineModel, near: Prediction | None, changed: tuple[int, ...]
+    ) -> tuple[int, ...]:
+        """Add joints whose torque a changed joint's motor takes part in."""
+        out = set(changed)
+        for machine in (model, *((near.model,) if near else ())):
+            for k in changed:
+                other = machine.actuators[k].coupled_to
+                if other:
+                    out.add(machine.index(other))
+        return tuple(sorted(out))
+
+    def _order(self, model: MachineModel, joints: tuple[int, ...]) -> list[int]:
+        """Coupled motors first: what they supply to the other joint must be known."""
+        return sorted(joints, key=lambda k: (not model.actuators[k].coupled_to, k))
+
+    def _rigid(self, model: MachineModel) -> tuple[Array, Array]:
+        m = self.measurement
+        offset = np.array([a.encoder_offset for a in model.actuators])
+        q = m.q - offset if offset.any() else m.q
+        torque = rigid_torque(model, m, (q, m.v, m.a))
+        if not m.at_motor or not any(a.wound for a in model.actuators):
+            return q, torque
+        # The encoder sits on the motor: the link lags behind by what winds up.
+        wind = np.zeros_like(q)
+        for k, a in enumerate(model.actuators):
+            if a.wound:
+                wind[:, k] = self._wind(a, self._with_position_torque(a, q[:, k], torque[:, k]))
+        rate = m.derivative(wind)
+        bend = m.derivative(rate)
+        q = q - wind
+        return q, rigid_torque(model, m, (q, m.v - rate, m.a - bend))
+
+    def _with_position_torque(self, a: JointModel, q: Array, torque: Array) -> Array:
+        for law in a.position_torques:
+            torque = torque + law.torque(q)
+        return torque
+
+    def _wind(self, a: JointModel, torque: Array) -> Array:
+        """Motor angle less joint angle at the joint side, (N,) [rad], at the log's bandwidth."""
+        wind = a.compliance * torque
+        if a.backlash:
+            scale = _FLANK_SHARE * float(np.sqrt(np.mean(torque**2))) + 1e-9
+            wind = wind + 0.5 * a.backlash * np.tanh(torque / scale)
+        return self.measurement.lowpass(wind)
+
+    def _joint(
+        self, model: MachineModel, k: int, q: Array, torque: Array, motor: Array
+    ) -> tuple[Array, Array]:
+        """Motor torque at the joint side (N,) and effort channels (N, C) of one joint."""
+        m, a = self.measurement, model.actuators[k]
+        load = self._with_position_torque(a, q[:, k], torque[:, k])
+        carried = np.zeros_like(load)
+        for i, other in enumerate(model.actuators):
+            if other.coupled_to == a.name:
+                carried = carried + other.coupling * motor[:, i]
+        load = load - carried
+        position, velocity, acceleration = m.q[:, k], m.v[:, k], m.a[:, k]
+        if a.wound and not m.at_motor:
+            wind = self._wind(a, load)
+            rate = m.derivative(wind)
+            position, velocity = position + wind, velocity + rate
+            acceleration = acceleration + m.derivative(rate)
+        if a.coupled_to:
+            i = model.index(a.coupled_to)
+            position = position + a.coupling * m.q[:, i]
+            velocity = velocity + a.coupling * m.v[:, i]
+            acceleration = acceleration + a.coupling * m.a[:, i]
+        side = ShaftSeries(
+            joints=(a.name,),
+            time=m.time,
+            position=position[:, None],
+            velocity=velocity[:, None],
+            acceleration=acceleration[:, None],
+            torque=load[:, None],
+            direction=np.tanh(velocity / m.rest_speed[k])[:, None],
+        )
+        for element in a.elements:
+            side = element.moving(side)
+        shaft_torque, speed = side.torque[:, 0], side.velocity[:, 0]
+        at_joint = shaft_torque * a.ratio
+        return at_joint, self._channels(a, k, load, at_joint + carried, shaft_torque, speed)
+
+    def _channels(
+        self, a: JointModel, k: int, load: Array, brought: Array, torque: Array, speed: Array
+    ) -> Array:
+        """Effort channels of one joint, (N, C)."""
+        m = self.measurement
+        out = np.empty((torque.size, len(m.channels)))
+        if a.motor is None:
+            if m.channels != ("torque",):
+                raise ModelError(
+                    f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
+                    "motor; name the actuator with --actuator"
+                )
+            out[:, 0] = brought
+        elif "torque" in m.channels:
+            # A torque sensor sits at the joint: it sees nothing of the chain behind it.
+            out[:, 0] = load
+        else:
+            self._electrical(out, a, k, torque, speed)
+        if a.delay:
+            for piece in m.pieces:
+                t = m.time[piece]
+                for c in range(out.shape[1]):
+                    out[piece, c] = np.interp(t - a.delay, t, out[piece, c])
+        if "voltage" in m.channels and "current" in m.channels and a.motor is not None:
+            c, i = m.channels.index("voltage"), m.channels.index("current")
+            cold = float(np.asarray(a.motor.resistance))
+            resistance: Array | float = cold
+            current = m.effort[:, k, i] - a.effort_offset
+            if a.heating is not None:
+                rise = a.heating.temperature_rise(m.time, cold * current**2)
+                resistance = warm_resistance(cold, rise)
+            out[:, c] += resistance * current
+        out[:, 0] += a.effort_offset
+        return out
+
+    def _electrical(self, out: Array, a: JointModel, k: int, torque: Array, speed: Array) -> None:
+        """Current, voltage, power of one motor; with measured current voltage is k speed alone."""
+        assert a.motor is not None
+        m = self.measurement
+        k0, r0 = float(np.asarray(a.motor.torque_constant)), float(np.asarray(a.motor.resistance))
+        constant: Array | float = k0
+        resistance: Array | float = r0
+        if a.heating is not None:
+            measured = "current" in m.channels
+            drawn = m.effort[:, k, m.channels.index("current")] if measured else torque / k0
+            rise = a.heating.temperature_rise(m.time, r0 * drawn**2)
+            resistance = warm_resistance(r0, rise)
+            constant = warm_torque_constant(k0, rise)
+        motor = replace(a.motor, torque_constant=constant, resistance=resistance)
+        current = motor.current(torque)
+        voltage = motor.voltage(current, speed)
+        for c, channel in enumerate(m.channels):
+            if channel == "current":
+                out[:, c] = current
+            elif channel == "voltage" and "current" in m.channels:
+                out[:, c] = constant * speed
+            elif channel == "voltage":
+                out[:, c] = voltage
+            elif channel == "power":
+                out[:, c] = voltage * current
+            else:
+                raise ModelError(
+                    f"channel '{channel}' is not known; torque, current, voltage, power"
+                )
