@@ -52,9 +52,9 @@ class Effort:
         seed: Of everything random.
     """
 
-    starts: int = 8
+    starts: int = 4
     draws: int = 320
-    left_out_draws: int = 24
+    left_out_draws: int = 20
     reading_starts: int = 2
     sobol: int = 128
     workers: int = 2
@@ -162,7 +162,7 @@ def calibrate(
             [
                 (
                     f"reading/{axis}/{count}/{i}",
-                    (name, best["path"], axis, count, effort.seed, i, 8),
+                    (name, best["path"], axis, count, effort.seed, i, 15),
                 )
                 for axis in AXES_DEG
                 for count in COUNTS

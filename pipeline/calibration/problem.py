@@ -1,8 +1,8 @@
 """The calibration as a least-squares problem in the prior's coordinates.
 
 Residuals are the prior distance, the distance of every fitted row from its printed value in half
-widths, and steep hinges where a row leaves its half width or a motor its data sheet. The break-even
-is stiff near 1, so the energy difference it asks for is fitted in its place.
+widths, and a steep hinge where a motor leaves its data sheet. The break-even is stiff near 1, so
+the energy difference it asks for is fitted in its place.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 #: Rows met exactly by solving the posture.
 EXACT = ("standing_reaction_rm", "standing_torque_2", "standing_torque_3")
 EXTRA = "walking_extra_J"
-_STEEP = 40.0  # residual per half width beyond the tolerance
+_STEEP = 200.0  # residual per relative excess over a motor limit
 _STEP = 1e-4  # of a prior standard deviation, for derivatives
 
 
@@ -143,20 +143,19 @@ class Problem:
                 excess[key] = max(excess.get(key, -1.0), row.peak / row.limit - 1)
         return Evaluation(values, excess, robot, actuators)
 
-    def residuals(self, z: Array, centre: Array, *, pull: float, width: float) -> Array:
+    def residuals(self, z: Array, centre: Array, *, pull: float, goal: Array | float) -> Array:
         """Residual vector at z.
 
         Args:
             z: Coordinates (D,).
             centre: Coordinates whose neighbourhood is sought: 0 for the prior's centre.
             pull: Weight of the distance from the printed values, per half width.
-            width: Tolerance in half widths beyond which the hinge rises.
+            goal: Where to aim, in half widths from the printed values: 0, or (T,).
         """
         point = self.evaluate(z)
         error = np.array([(point.values[t.name] - t.centre) / t.half_width for t in self.targets])
-        hinge = _STEEP * np.maximum(np.abs(error) - width, 0.0)
-        limits = _STEEP * 5 * np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
-        return np.concatenate([z - centre, pull * error, hinge, limits])
+        limits = _STEEP * np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
+        return np.concatenate([z - centre, pull * (error - goal), limits])
 
     def solve(
         self,
@@ -165,7 +164,7 @@ class Problem:
         *,
         columns: NDArray[np.intp],
         pull: float,
-        width: float,
+        goal: Array | float = 0.0,
         evaluations: int = 40,
     ) -> Array:
         """Least-squares solution in some of the coordinates, the others staying at `start`.
@@ -181,7 +180,7 @@ class Problem:
 
         def residuals(x: Array) -> Array:
             try:
-                return self.residuals(full(x), centre, pull=pull, width=width)
+                return self.residuals(full(x), centre, pull=pull, goal=goal)
             except PipelineError:
                 # Out of reach or tipping: a wall, felt as a large but finite residual.
                 return np.full(self._size, 30.0)
@@ -213,7 +212,7 @@ class Problem:
 
     @property
     def _size(self) -> int:
-        return len(self.prior.free) + 2 * len(self.targets) + 4 * len(self.catalog.alternatives)
+        return len(self.prior.free) + len(self.targets) + 4 * len(self.catalog.alternatives)
 
     def admissible(self, point: Evaluation) -> bool:
         """Whether every fitted row is reproduced and every motor inside its limits."""

@@ -28,8 +28,9 @@ from pipeline.robot_file import load_robot_file
 Array = NDArray[np.float64]
 #: Paths of the foot that the search may choose.
 PATHS = ("cubic", "harmonic", "quintic", "cycloid")
-_PULL = 0.3  # the nearest point: mild pull towards the printed values
-_WIDTH = 0.95  # of a half width, before the hinge rises
+_PULL = 3.0  # the nearest point: a third of a half width counts like one prior sigma
+_FIRM = 8.0  # a member of the ensemble: close to its own goal
+_SPAN = 0.85  # goals of members spread over this part of the half widths
 
 
 @cache
@@ -85,13 +86,12 @@ def nearest(
     z = centre if start == 0 else task.prior.draw(np.random.default_rng([seed, start]))
     z = _feasible(task, z)
     try:
-        z = task.solve(z, centre, columns=task.actuator_columns, pull=_PULL, width=_WIDTH)
+        z = task.solve(z, centre, columns=task.actuator_columns, pull=_PULL)
         z = task.solve(
             z,
             centre,
             columns=np.arange(size),
             pull=_PULL,
-            width=_WIDTH,
             evaluations=evaluations,
         )
         point = task.evaluate(z)
@@ -141,8 +141,10 @@ def _moved_draw(task: Problem, path: str, rng: np.random.Generator) -> dict[str,
         assert entry.interval is not None
         low, high = entry.interval
         task.spec = task.spec.with_parameters({name: float(rng.uniform(low, high))})
+    goal = rng.uniform(-_SPAN, _SPAN, len(task.targets))
     try:
-        z = task.solve(z0, z0, columns=task.actuator_columns, pull=0.0, width=_WIDTH)
+        task.robot(z0)  # a body that cannot stand as printed is not worth a search
+        z = task.solve(z0, z0, columns=task.actuator_columns, pull=_FIRM, goal=goal)
         point = task.evaluate(z)
     except PipelineError as error:
         return {"failed": str(error), "path": path}
