@@ -10,7 +10,7 @@ import numpy as np
 
 from reports.errors import FigureError
 from reports.figures.marks import axis_line, rotation_arrow
-from reports.figures.projection import FRONT, OBLIQUE, TOP, View, draw_scene, extent
+from reports.figures.projection import FRONT, OBLIQUE, SIDE, TOP, View, draw_scene, extent
 from reports.figures.robot_view import Leg, frame_arrows
 from reports.figures.style import BLUE, GREEN, QUIET, VERMILION, headline, new_figure, styled
 from reports.figures.visuals import Primitive
@@ -52,10 +52,14 @@ def joint_directions_figure(
     oblique, ahead, above = figure.subplots(1, 3, width_ratios=[1.0, 1.25, 1.15])
     _panel(oblique, OBLIQUE, scene, f"oblique, leg {shown.upper()}")
     _panel(ahead, FRONT, scene, "from ahead")
-    _panel(above, TOP, scene, "from above")
+    # The view that shows joint 1 as a full circle: from above where its axis stands upright.
+    upright = abs(float(leg.joints[0].axis[2])) > 0.5
+    view = TOP if upright else SIDE
+    _panel(above, view, scene, view.name)
     _oblique_leg(oblique, leg)
     _flat_arrows(ahead, FRONT, _nearest_to_frontal(legs, leg))
-    _flat_arrows(above, TOP, legs)
+    near = [one for one in legs if upright or one.joints[0].position[1] < 0]
+    _flat_arrows(above, view, near, only_first=not upright)
     if zero_pose:
         figure.supxlabel(
             textwrap.fill(f"Zero pose: {zero_pose}", 140), x=0.012, ha="left", fontsize=8.5
@@ -106,10 +110,10 @@ def _nearest_to_frontal(legs: Sequence[Leg], leg: Leg) -> list[Leg]:
     return [leg, *other]
 
 
-def _flat_arrows(axes: Axes, view: View, legs: Sequence[Leg]) -> None:
+def _flat_arrows(axes: Axes, view: View, legs: Sequence[Leg], only_first: bool = False) -> None:
     """Arrows of the joints whose axis points at the viewer or away; the others would be slits."""
     for leg in legs:
-        for number, joint in enumerate(leg.joints):
+        for number, joint in enumerate(leg.joints[:1] if only_first else leg.joints):
             if abs(float(joint.axis @ view.axes[2])) < 0.5:
                 continue
             color = JOINT_COLORS[number % len(JOINT_COLORS)]

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from actuators.shaft import ShaftSeries
 
 Array = NDArray[np.float64]
+#: What the reader of the figure must know.
+SUBTITLE = "motor over one cycle; grey: beyond the supply voltage or the permitted speed"
 _RPM = 60 / (2 * np.pi)
 
 
@@ -39,7 +41,7 @@ def motor_limits_figure(
     joints: Mapping[str, str],
     *,
     title: str,
-    subtitle: str = "",
+    subtitle: str = SUBTITLE,
 ) -> Figure:
     """One panel per joint with the motor's operating path, within what the data sheet permits.
 

@@ -106,7 +106,10 @@ def robot_figure(
         low, high = extent(view, scene)
         axes.plot([low[0] - 0.05, high[0] + 0.05], [ground, ground], color=QUIET, linewidth=1.0)
     for leg in legs:
-        _write(oblique, leg.name.upper(), OBLIQUE.project(leg.foot)[:2] - [0, 0.035])
+        # The trunk may hide a far foot from this side, but not the knee above it.
+        far = leg.foot[1] > 0
+        at = OBLIQUE.project(leg.joints[-1].position if far else leg.foot)[:2]
+        _write(oblique, leg.name.upper(), at + [0, 0.06 if far else -0.035])
         reach = max(abs(float(leg.foot[1])), abs(float(leg.joints[-1].position[1]))) + 0.04
         x, y = leg.foot[0], reach * np.sign(leg.foot[1])
         _write(above, leg.name.upper(), np.array([x, y]))
@@ -121,7 +124,7 @@ def robot_figure(
 
 #: Room around the robot for annotation: left, below, right, above [m].
 _ROOM = {
-    OBLIQUE.name: (0.05, 0.07, 0.05, 0.03),
+    OBLIQUE.name: (0.05, 0.07, 0.05, 0.06),
     TOP.name: (0.14, 0.06, 0.17, 0.06),
     FRONT.name: (0.16, 0.10, 0.16, 0.12),
     SIDE.name: (0.12, 0.06, 0.06, 0.18),

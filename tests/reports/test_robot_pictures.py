@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import matplotlib
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from pipeline.gait import standing_posture
-from pipeline.robot import Robot
+from pipeline.robot import Robot, load_robot
+from pipeline.robot_file import load_robot_file
 from reports.errors import FigureError
 from reports.figures.joint_directions import joint_directions_figure
 from reports.figures.projection import FRONT, OBLIQUE, SIDE, TOP, draw_scene, extent
@@ -79,6 +82,15 @@ def test_joint_directions_names_the_joints(hexapod: Robot) -> None:
     assert any("Zero pose: straight" in word for word in words)
     with pytest.raises(FigureError, match="'xx'"):
         joint_directions_figure(scene, legs, "xx", title="t")
+
+
+def test_a_lateral_first_axis_is_shown_from_the_side(hexapod: Robot, root: Path) -> None:
+    turned = load_robot(load_robot_file(root / "urdf" / "hexapod_axis90.toml"))
+    for robot, view in ((hexapod, TOP), (turned, SIDE)):
+        scene, legs = standing(robot)
+        figure = joint_directions_figure(scene, legs, "rm", title="t")
+        assert figure.axes[2].get_title(loc="left") == view.name
+        assert "1" in [t.get_text() for t in figure.axes[2].texts]
 
 
 def box(x: float, color: tuple[float, float, float]) -> Primitive:
