@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from actuators.errors import closest, one_line
+from actuators.units import known_units
 from pipeline.gap.errors import LogFormatError
 from pipeline.gap.expected import Expected
 
@@ -29,6 +30,11 @@ FOOT_COLUMNS: Final = {
     "contact": ("contact", "1"),
 }
 BASE_COLUMNS: Final = {"roll_rad": ("base_roll", "rad"), "pitch_rad": ("base_pitch", "rad")}
+#: Units as they are written at the end of a header, and none at all.
+_UNIT_SUFFIXES: Final = frozenset(
+    {"", "degrees", "radians", "Ncm", "nm"}
+    | {unit.replace("*", "").replace("/", "_").replace("^", "") for unit in known_units()}
+)
 
 
 @dataclass(frozen=True)
@@ -79,7 +85,8 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
             attribute, unit = table[quantity]
             return Target(kind, "" if kind == "base" else owner, attribute, unit)
         for known, (attribute, _) in table.items():
-            if quantity.startswith(attribute + "_") or quantity == attribute:
+            written = quantity.removeprefix(attribute).removeprefix("_")
+            if quantity.startswith(attribute) and written in _UNIT_SUFFIXES:
                 raise LogFormatError(_unit_message(column, f"{owner}__{known}", where))
     return None
 

@@ -1,0 +1,71 @@
+"""Time shift and factor between two channels that should show the same thing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Skew:
+    """How one series lies against another: x(t) = factor * y(t - lag) + offset.
+
+    Attributes:
+        lag: Positive where x comes later [s].
+        lag_error: Standard error from the residual's spread, taken as white [s].
+        factor: Slope at that lag.
+        correlation: At that lag, -1 to 1.
+    """
+
+    lag: float
+    lag_error: float
+    factor: float
+    correlation: float
+
+
+def skew(x: Array, y: Array, dt: float, *, longest: float) -> Skew | None:
+    """Find lag and factor by correlation, refined by least squares on y and its rate.
+
+    Args:
+        x: Shape (N,), uniform.
+        y: Shape (N,), uniform; smooth, since its rate is taken.
+        dt: [s].
+        longest: Largest lag looked for [s].
+
+    Returns:
+        None where either does not vary or fewer than 50 rows are finite.
+    """
+    reach = max(1, min(int(longest / dt), x.size // 4))
+    good = np.isfinite(x) & np.isfinite(y)
+    if good.sum() < 50:
+        return None
+    x0 = np.where(good, x - x[good].mean(), 0.0)
+    y0 = np.where(good, y - y[good].mean(), 0.0)
+    sx, sy = float(np.sqrt((x0**2).sum())), float(np.sqrt((y0**2).sum()))
+    if sx <= 1e-12 * x.size or sy <= 1e-12 * x.size:
+        return None
+    size = 1 << int(np.ceil(np.log2(x.size + 2 * reach)))
+    product = np.fft.irfft(np.fft.rfft(x0, size) * np.conj(np.fft.rfft(y0, size)), size)
+    lags = np.arange(-reach, reach + 1)
+    k = int(lags[np.argmax(np.abs(product[lags]))])
+    # x[i + k] against y[i]; then a shift of a fraction of a row.
+    a = x0[max(0, k) : x.size + min(0, k)]
+    b = y0[max(0, -k) : y.size + min(0, -k)]
+    both = good[max(0, k) : x.size + min(0, k)] & good[max(0, -k) : y.size + min(0, -k)]
+    rate = np.gradient(b, dt)
+    columns = np.stack([b, rate, np.ones_like(b)], axis=1)[both]
+    if columns.shape[0] < 50:
+        return None
+    solution, *_ = np.linalg.lstsq(columns, a[both], rcond=None)
+    factor, moved = float(solution[0]), float(solution[1])
+    if factor == 0.0:
+        return None
+    rest = a[both] - columns @ solution
+    spread = float(np.sqrt((rest**2).mean() / max((columns[:, 1] ** 2).sum(), 1e-300)))
+    correlation = float(product[k]) / (sx * sy)
+    fine = float(np.clip(-moved / factor, -dt, dt))
+    return Skew(k * dt + fine, spread / abs(factor), factor, correlation)
