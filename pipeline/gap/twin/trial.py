@@ -147,10 +147,13 @@ def _facts(setup: Setup, record: Record) -> dict[str, Any]:
         "final_temperature_rise_K": record.temperature_rise[-1].tolist(),
     }
     if record.foot_force is not None:
-        force = record.foot_force
+        robot, force = setup.plant.robot, record.foot_force
         loaded = force[..., 2] > 1.0
         count = np.maximum(loaded.sum(axis=1), 1)
         share = (force[..., :2] * loaded[..., None]).sum(axis=1) / count[:, None]
         squeeze = np.where(loaded[..., None], force[..., :2] - share[:, None], 0.0)
+        # How hard the ground pushes either side's feet outward, averaged over time.
+        side = np.array([1.0 if leg.side == "left" else -1.0 for leg in robot.spec.legs])
+        facts["outward_force_N"] = float(0.5 * (force[..., 1] @ side).mean())
         facts["internal_tangential_force_N"] = float(np.sqrt(np.mean(squeeze[loaded] ** 2)))
     return facts

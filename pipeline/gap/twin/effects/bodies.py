@@ -101,10 +101,14 @@ class BaseTilt(Effect):
 
 
 class InternalFootForce(Effect):
-    """Feet that squeeze the ground, seen by sensors of normal force alone."""
+    """Feet that squeeze the ground, seen by sensors of normal force alone.
+
+    The size is what the controller is told to push with; its own position control takes up most of
+    it against the feet's rubber. The log's facts hold what reached the ground.
+    """
 
     name = "internal_foot_force"
-    units: ClassVar[Units] = {"lateral": "N"}
+    units: ClassVar[Units] = {"commanded_lateral": "N"}
     motions: ClassVar[tuple[str, ...]] = ("walk",)
 
     def draw(self, rng: np.random.Generator, ref: Reference, torque: float) -> Hidden:
@@ -112,12 +116,12 @@ class InternalFootForce(Effect):
         segment = ref.motion.segments[0]
         push = squeeze_torque(ref.robot, segment.configuration, segment.stance, 1.0)
         per_newton = float(np.sqrt(np.mean(push**2, axis=0)).max())
-        size, torque = sized(torque, per_newton, 15.0, 70.0)
-        return self.hidden(("ground",), torque, lateral=size * rng.choice([-1.0, 1.0]))
+        size, torque = sized(torque, per_newton, 60.0, 250.0)
+        return self.hidden(("ground",), torque, commanded_lateral=size * rng.choice([-1.0, 1.0]))
 
     def apply(self, setup: Setup, hidden: Hidden) -> Setup:
         """Ask the controller's feed-forward for it; measure normal forces only."""
-        force = hidden.parameters["lateral"]
+        force = hidden.parameters["commanded_lateral"]
         plan = walking_plan(setup.plant.robot, periods=setup.plan.cycles or (3.0,), squeeze=force)
         sensors = replace(setup.sensors, foot_force="normal")
         return replace(setup, plan=plan, sensors=sensors, squeeze=force)

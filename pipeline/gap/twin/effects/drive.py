@@ -59,12 +59,13 @@ class JointElasticity(Effect):
 
     def draw(self, rng: np.random.Generator, ref: Reference, torque: float) -> Hidden:
         """Any joint; felt where the motor must follow the wind-up with its inertia."""
+        softest = 2500.0 if ref.robot.floating else 800.0
         j = any_joint(rng, ref)
         bend = ref.rate_of(ref.rate_of(ref.torque))[:, j]
         # Torque rates jump with the support; the controller's bandwidth rounds them.
         bend = np.clip(bend, *np.quantile(bend, [0.02, 0.98]))
         inertia = float(ref.setup.plant.rotor_inertia[j])
-        compliance, torque = sized(torque, inertia * float(rms(bend)), 1 / 2e4, 1 / 800.0)
+        compliance, torque = sized(torque, inertia * float(rms(bend)), 1 / 2e4, 1 / softest)
         return self.hidden((ref.joints[j],), torque, stiffness=1 / compliance)
 
     def apply(self, setup: Setup, hidden: Hidden) -> Setup:
@@ -132,8 +133,13 @@ class TransmissionCoupling(Effect):
         leg = legs[rng.integers(legs.shape[0])]
         k = int(rng.integers(1, leg.size))
         j, other = int(leg[k]), int(leg[k - 1])
-        felt = ref.setup.plant.rotor_inertia[j] * ref.acceleration[:, other]
-        size, torque = sized(torque, float(rms(felt)), 0.03, 1.0)
+        trial = 0.1
+        plant, w = ref.setup.plant, ref.velocity
+        turned = np.sign(w[:, j] + trial * w[:, other]) - np.sign(w[:, j])
+        own = plant.rotor.coulomb[j] * turned
+        own = own + plant.rotor_inertia[j] * trial * ref.acceleration[:, other]
+        felt = max(float(rms(own)), float(rms(trial * ref.torque[:, j])))
+        size, torque = sized(torque, felt / trial, 0.03, 1.0)
         ratio = size * rng.choice([-1.0, 1.0])
         return self.hidden((ref.joints[j], ref.joints[other]), torque, ratio=ratio)
 
