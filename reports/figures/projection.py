@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 #: Towards the lamp, in the camera's frame: right, up, towards the viewer.
 _LAMP = np.array([-0.35, 0.75, 0.56]) / np.linalg.norm([-0.35, 0.75, 0.56])
 _CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
-_PIXELS = 900  # along the longer side of the picture
+_PIXELS = 700  # along the longer side of the picture
 _OVERSAMPLED = 2  # per pixel and direction, for smooth edges
 #: A body nearer by less than this does not cover what was drawn before: coplanar faces.
 _TOUCHING = 1e-6  # [m]
@@ -100,7 +100,7 @@ class _Canvas:
         self.low, self.step = low, step
         self.x = low[0] + step * (np.arange(n[0]) + 0.5)
         self.y = low[1] + step * (np.arange(n[1]) + 0.5)
-        self.color = np.ones((n[1], n[0], 3))
+        self.color = np.ones((n[1], n[0], 3), dtype=np.float32)
         self.depth = np.full((n[1], n[0]), -np.inf)
         self.surface = np.zeros((n[1], n[0]), dtype=int)
         self.surfaces = 0
@@ -154,13 +154,16 @@ class _Canvas:
             after: tuple[slice, ...] = (slice(1, None), slice(None))
             edge[before if axis == 0 else before[::-1]] |= change
             edge[after if axis == 0 else after[::-1]] |= change
-        color = np.where(edge[..., None], 0.35 * self.color, self.color)
-        opaque = (edge | (self.surface > 0)).astype(float)[..., None]
+        color = self.color.copy()
+        color[edge] *= np.float32(0.35)
+        opaque = (edge | (self.surface > 0)).astype(np.float32)[..., None]
         k = _OVERSAMPLED
         height, width = (n // k for n in self.surface.shape)
 
-        def averaged(values: Array) -> Array:
-            return values.reshape(height, k, width, k, -1).mean(axis=(1, 3))
+        def averaged(values: NDArray[np.float32]) -> Array:
+            parts = values.reshape(height, k, width, k, -1)
+            mean: Array = parts.mean(axis=(1, 3), dtype=np.float64)
+            return mean
 
         cover = averaged(opaque)
         mixed = averaged(color * opaque) / np.maximum(cover, 1e-9)

@@ -34,6 +34,9 @@ def save_figure(
         raise FigureError(f"figure '{name}': format '{unknown[0]}' is unknown; use png or svg")
     targets = [out_dir / f"{name}.{fmt}" for fmt in formats]
     with house_style(), replacing(*targets) as temporary:
+        # Lay out once: the layout costs more than the drawing, and both formats share it.
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
         for path, fmt in zip(temporary, formats, strict=True):
             with path.open("wb") as stream:
                 figure.savefig(stream, format=fmt, dpi=150, metadata=_METADATA[fmt])
