@@ -60,7 +60,8 @@ def least_tangential_forces(wrench: Array, feet: Array) -> Array:
 
     Returns:
         Forces on the robot [N], shape (N, F, 3). With three feet a normal force may come out
-        negative: that foot would have to pull, and it is for the caller to refuse it.
+        negative: that foot would have to pull, and it is for the caller to refuse it. Feet in one
+        line give normal forces that are not finite.
 
     Note:
         Feet at unequal heights are balanced exactly, but the tangential forces are then those of
@@ -96,9 +97,10 @@ def _normals(x: Array, y: Array, total: Array, moment_x: Array, moment_y: Array)
     xx, yy = np.einsum("nf,nf->n", x, x), np.einsum("nf,nf->n", y, y)
     xy = np.einsum("nf,nf->n", x, y)
     det = xx * yy - xy * xy
-    a = (-moment_y * yy - moment_x * xy) / det
-    b = (moment_x * xx + moment_y * xy) / det
-    return total[:, None] / x.shape[1] + a[:, None] * x + b[:, None] * y
+    with np.errstate(divide="ignore", invalid="ignore"):  # feet in one line: not finite, refused
+        a = (-moment_y * yy - moment_x * xy) / det
+        b = (moment_x * xx + moment_y * xy) / det
+        return total[:, None] / x.shape[1] + a[:, None] * x + b[:, None] * y
 
 
 def _release_pulling_feet(

@@ -116,7 +116,12 @@ def contact_forces(robot: Robot, segment: Segment, generalised: Array) -> Contac
 
 
 def _refuse_pulling(robot: Robot, segment: Segment, normal: Array) -> None:
-    lowest = float(normal.min())
+    lowest = float(normal.min())  # NaN where any force is
+    if not np.isfinite(lowest):
+        raise TippingError(
+            f"the robot tips: in '{segment.name}' the feet stand in one line and carry no moment "
+            "across it; stand on feet of both sides"
+        )
     # A foot that is exactly unloaded (a tripod at the edge of its stability) still stands.
     if lowest < -1e-9 * max(1.0, float(np.abs(normal).max())):
         sample, foot = np.unravel_index(int(normal.argmin()), normal.shape)

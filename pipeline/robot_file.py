@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from actuators.errors import closest
+from actuators.errors import closest, one_line
 from actuators.parameters import ParameterSet, parameters_from_table
 from pipeline.errors import RobotFileError
 
@@ -49,6 +49,10 @@ BUILD_SCHEMA = {
     "joint_velocity_limit": "angular velocity",
 }
 BUILDS = ("hexapod", "leg_stand")
+#: Joints of a built leg: hip, femur, tibia.
+BUILT_JOINTS = 3
+#: SI values beyond this overflow somewhere between here and the energies.
+LARGEST = 1e9
 STATIONS = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 
 _TOP_KEYS = {"extends", "robot", "parameters", "legs", "gait", "standing"}
@@ -212,9 +216,10 @@ def load_robot_file(path: Path) -> RobotSpec:
     _known_keys(gait, _GAIT_KEYS, where, "key of [gait]")
     standing = _table(table, "standing", where)
     _known_keys(standing, _STANDING_KEYS, where, "key of [standing]")
-    tripods = tuple(
-        _leg_list(group, names, f"{where}: gait.tripods") for group in gait.get("tripods", [])
-    )
+    groups = gait.get("tripods", [])
+    if not isinstance(groups, list):
+        raise RobotFileError(f"{where}: gait.tripods must be two lists of leg names")
+    tripods = tuple(_leg_list(group, names, f"{where}: gait.tripods") for group in groups)
     return RobotSpec(
         path=path,
         sources=sources,
@@ -302,9 +307,14 @@ def _legs(
             raise RobotFileError(f"{place}: side = '{side}'; expected 'left' or 'right'")
         station = entry.get("station", "")
         if build:
-            if station not in STATIONS:
+            if not isinstance(station, str) or station not in STATIONS:
                 raise RobotFileError(
-                    f"{place}: station = '{station}'; {closest(station, list(STATIONS))}"
+                    f"{place}: station = '{one_line(station)}'; "
+                    f"{closest(str(station), list(STATIONS))}"
+                )
+            if len(joints) != BUILT_JOINTS:
+                raise RobotFileError(
+                    f"{place}: names {len(joints)} joints; a built leg has {BUILT_JOINTS}"
                 )
             neutral = built_neutral_foot(parameters, side, station)
         else:
@@ -351,6 +361,9 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
         ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity"),
         where,
     )
+    for name, value in parameters.items():
+        if abs(value) > LARGEST:
+            raise RobotFileError(f"{where}: parameters.{name} is beyond any robot; check its unit")
     if parameters["foot_lift"] < 0:
         raise RobotFileError(f"{where}: parameters.foot_lift must not be negative")
     if build:

@@ -105,7 +105,7 @@ def _leg(root: ET.Element, spec: RobotSpec, leg: LegSpec) -> None:
     axis_raise = (out, 0.0, 0.0)
     width, coxa = p["link_width"], p["coxa_length"]
     femur, tibia = p["femur_length"], p["tibia_length"]
-    links = [f"{leg.name}_{part}_link" for part in ("hip", "femur", "tibia", "foot")]
+    links = [*(f"{leg.name}_{part}_link" for part in ("hip", "femur", "tibia")), leg.foot]
     _joint(
         root,
         leg.joints[0],
@@ -174,7 +174,7 @@ def _foot(root: ET.Element, leg: LegSpec, links: list[str], tibia: float) -> Non
     ET.SubElement(fixed, "origin", xyz=_numbers((0, 0, -tibia)), rpy="0 0 0")
     ET.SubElement(fixed, "parent", link=links[2])
     ET.SubElement(fixed, "child", link=links[3])
-    foot = ET.SubElement(root, "link", name=leg.foot)
+    foot = ET.SubElement(root, "link", name=links[3])
     visual = ET.SubElement(foot, "visual")
     geometry = ET.SubElement(visual, "geometry")
     ET.SubElement(geometry, "sphere", radius=_number(FOOT_RADIUS))
