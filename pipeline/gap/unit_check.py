@@ -205,8 +205,9 @@ def compare_with_prediction(
 ) -> list[Finding]:
     """Efforts against a first simulation of the same motion: unit, sign, side of the gear, skew.
 
-    A model that lacks an effect is wrong by less than ten; a factor of a hundred or a thousand
-    is a unit.
+    A factor of a hundred or a thousand is a unit where the shapes agree. A joint that carries
+    little can show it through friction alone (a wrist without load), so that there shapes must
+    agree closely.
 
     Args:
         log: The log.
@@ -219,6 +220,10 @@ def compare_with_prediction(
     """
     out = []
     agree = []
+    sizes = [
+        float(np.std(predicted[mask[:, j], j])) if mask[:, j].any() else 0.0
+        for j in range(len(log.joints))
+    ]
     for j, joint in enumerate(log.joints):
         x = np.where(mask[:, j], measured[:, j], np.nan)
         seen = skew(x, np.where(mask[:, j], predicted[:, j], 0.0), dt, longest=0.1)
@@ -228,14 +233,15 @@ def compare_with_prediction(
         column = column_name(joint, channel)
         good = np.isfinite(x)
         size = float(np.std(x[good]) / max(np.std(predicted[good, j]), 1e-300))
-        unit = _nearest(size, _WRONG[channel], near=2.0) if size > 30 or size < 0.003 else None
+        unit = _nearest(size, _WRONG[channel], near=3.0) if size > 30 or size < 0.003 else None
+        loaded = sizes[j] >= 0.3 * max(sizes) and (size > 300 or size < 0.003)
         gear = None if ratio is None or channel != "torque" else abs(1.0 / float(ratio[j]))
         strong = abs(seen.correlation) > 0.7
         if gear is not None and strong and gear / 1.5 < size < 1.5 * gear and gear < 0.2:
             detail = f"is {size:.3g} times the simulated: torque at the motor side? scale it by "
             detail += f"{1 / gear:.4g} in a mapping file"
             out.append(_finding(log, column, "factor", size, "1", "refused", detail))
-        elif unit is not None and (abs(seen.correlation) > 0.5 or size > 300):
+        elif unit is not None and abs(seen.correlation) > (0.5 if loaded else 0.9):
             detail = f"is {size:.3g} times the simulated: looks like {unit}; give its unit in a "
             detail += "mapping file"
             out.append(_finding(log, column, "factor", size, "1", "refused", detail))

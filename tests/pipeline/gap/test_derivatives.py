@@ -1,0 +1,104 @@
+"""The zero-phase filter against closed forms, finite differences and its own memory."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.gap.derivatives import LowPass, choose_cutoff
+from pipeline.gap.errors import PreparationError
+
+RATE = 1000.0
+MIDDLE = slice(300, -300)
+
+
+@pytest.fixture
+def lowpass() -> LowPass:
+    return LowPass(RATE, 20.0)
+
+
+def test_constants_ramps_and_parabolas_are_exact(lowpass: LowPass) -> None:
+    t = np.arange(2000) / RATE
+    x = np.stack([np.full(t.size, 3.0), 2 * t, t**2], axis=1)
+    q, v, a = lowpass.derivatives(x)
+    assert v[MIDDLE] == pytest.approx(np.stack([0 * t, 0 * t + 2, 2 * t], 1)[MIDDLE], abs=1e-9)
+    assert a[MIDDLE] == pytest.approx(np.stack([0 * t, 0 * t, 0 * t + 2], 1)[MIDDLE], abs=1e-7)
+    assert q[MIDDLE, :2] == pytest.approx(x[MIDDLE, :2], abs=1e-12)
+
+
+@pytest.mark.parametrize(("frequency", "low", "high"), [(4, 0.998, 1.002), (20, 0.49, 0.51)])
+def test_amplitude_is_kept_below_and_halved_at_the_cutoff(
+    lowpass: LowPass, frequency: float, low: float, high: float
+) -> None:
+    t = np.arange(4000) / RATE
+    w = 2 * np.pi * frequency
+    x = np.sin(w * t)
+    q, v, a = lowpass.derivatives(x)
+    gain = np.abs(q[MIDDLE]).max()
+    assert low < gain < high
+    # Zero phase: value and acceleration stay in step with the sine, velocity with the cosine.
+    assert q[MIDDLE] == pytest.approx(gain * x[MIDDLE], abs=1e-3)
+    assert v[MIDDLE] / w == pytest.approx(gain * np.cos(w * t)[MIDDLE], abs=2e-3)
+    assert -a[MIDDLE] / w**2 == pytest.approx(gain * x[MIDDLE], abs=2e-3)
+
+
+def test_what_lies_above_is_gone(lowpass: LowPass) -> None:
+    t = np.arange(4000) / RATE
+    assert np.abs(lowpass.smooth(np.sin(2 * np.pi * 40 * t))[MIDDLE]).max() < 2e-3
+
+
+def test_derivatives_match_finite_differences_of_the_smoothed_curve(lowpass: LowPass) -> None:
+    rng = np.random.default_rng(0)
+    q, v, a = lowpass.derivatives(rng.normal(size=3000))
+    dv, da = np.gradient(q, 1 / RATE), np.gradient(v, 1 / RATE)
+    assert v[MIDDLE] == pytest.approx(dv[MIDDLE], abs=0.02 * np.abs(dv).max())
+    assert a[MIDDLE] == pytest.approx(da[MIDDLE], abs=0.02 * np.abs(da).max())
+
+
+def test_memory_is_finite_and_stated(lowpass: LowPass) -> None:
+    x = np.zeros(2001)
+    x[1000] = 1.0
+    for y in lowpass.derivatives(x):
+        reach = np.flatnonzero(np.abs(y) > 1e-9 * np.abs(y).max())
+        assert (reach[-1] - 1000) / RATE <= lowpass.memory
+        assert (1000 - reach[0]) / RATE <= lowpass.memory
+
+
+def test_noise_gain(lowpass: LowPass) -> None:
+    y = lowpass.smooth(np.random.default_rng(1).normal(size=200_000))
+    assert y.std() == pytest.approx(lowpass.noise_gain, rel=0.02)
+
+
+def test_share_of_missing_weight(lowpass: LowPass) -> None:
+    bad = np.zeros((1000, 2), dtype=np.bool_)
+    bad[500:, 1] = True
+    share = lowpass.share(bad)
+    assert share[500, 0] == pytest.approx(0.0, abs=1e-12)
+    assert share[0, 0] == pytest.approx(0.5, abs=0.02)
+    assert share[499, 1] == pytest.approx(0.5, abs=0.02)
+    assert share[700, 1] == pytest.approx(1.0, abs=1e-9)
+
+
+def test_a_column_shorter_than_the_kernel_is_filtered_too(lowpass: LowPass) -> None:
+    assert lowpass.smooth(np.full(30, 2.0)) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("cutoff", [0.0, -1.0, 251.0, np.nan])
+def test_cutoffs_that_do_not_fit_are_refused(cutoff: float) -> None:
+    with pytest.raises(PreparationError, match="cut-off"):
+        LowPass(RATE, cutoff)
+
+
+def test_the_chosen_cutoff_follows_the_noise() -> None:
+    t = np.arange(20_000) / RATE
+    rng = np.random.default_rng(2)
+    # A spectrum that falls smoothly: noise through a one-pole filter.
+    drive = rng.normal(size=t.size)
+    x = np.zeros(t.size)
+    for k in range(1, t.size):
+        x[k] = 0.98 * x[k - 1] + 0.02 * drive[k]
+    x = np.convolve(x, np.ones(20) / 20, mode="same")
+    noise = rng.normal(size=t.size)
+    chosen = [float(choose_cutoff((x + s * noise)[:, None], RATE)[0]) for s in (1e-4, 1e-3, 1e-2)]
+    assert chosen[0] > chosen[1] > chosen[2] > 0.5
+    assert np.isnan(choose_cutoff(np.ones((1000, 1)), RATE)[0])

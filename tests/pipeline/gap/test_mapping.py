@@ -1,0 +1,216 @@
+"""The mapping file: what it does to foreign columns, and the one line a bad one gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.gap.errors import GapError
+from pipeline.gap.expected import Expected
+from pipeline.gap.mapping import Mapping, load_mapping
+from pipeline.gap.read import read_log
+
+Array = NDArray[np.float64]
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def mapping(tmp_path: Path) -> Callable[[str], Mapping]:
+    def _load(text: str) -> Mapping:
+        path = tmp_path / "mapping.toml"
+        path.write_text(text, encoding="utf-8")
+        return load_mapping(path)
+
+    return _load
+
+
+def test_rename_scale_flip_zero_and_unit(
+    two_joints: Expected,
+    columns: dict[str, Array],
+    write: Write,
+    mapping: Callable[[str], Mapping],
+) -> None:
+    foreign = {"t": 1e3 * columns["time_s"]}
+    foreign["enc_shoulder"] = 90.0 - np.degrees(columns["a__position_rad"])
+    foreign["enc_elbow"] = 90.0 - np.degrees(columns["b__position_rad"])
+    foreign["mA_shoulder"] = 1e3 * columns["a__torque_Nm"]
+    foreign["mA_elbow"] = 2e3 * columns["b__torque_Nm"]
+    rules = mapping(
+        """
+        [time]
+        column = "t"
+        unit = "ms"
+        [columns."enc_*"]
+        as = "*__position_rad"
+        unit = "deg"
+        zero = 90
+        flip = true
+        [columns."mA_*"]
+        as = "*__current_A"
+        unit = "mA"
+        [columns.mA_elbow]
+        as = "elbow__current_A"
+        unit = "mA"
+        scale = 0.5
+        [joints]
+        shoulder = "a"
+        elbow = "b"
+        """
+    )
+    log = read_log(write(foreign), two_joints, rules)
+    assert log.time == pytest.approx(columns["time_s"])
+    assert log.position[:, 0] == pytest.approx(columns["a__position_rad"], abs=1e-12)
+    assert log.effort.channel == "current"
+    assert log.effort.values[:, 0] == pytest.approx(columns["a__torque_Nm"])
+    assert log.effort.values[:, 1] == pytest.approx(columns["b__torque_Nm"])
+
+
+def test_sample_rate_constants_and_temperature(
+    two_joints: Expected,
+    columns: dict[str, Array],
+    write: Write,
+    mapping: Callable[[str], Mapping],
+) -> None:
+    del columns["time_s"]
+    rules = mapping(
+        """
+        [time]
+        sample_rate = {value = 500, unit = "Hz"}
+        [constants]
+        payload = {value = 500, unit = "g"}
+        a__temperature_degC = {value = 40, unit = "degC"}
+        base__pitch_rad = {value = 3, unit = "deg"}
+        """
+    )
+    log = read_log(write(columns), two_joints, rules)
+    assert np.diff(log.time) == pytest.approx(0.002)
+    assert log.constants["payload"] == pytest.approx(0.5)
+    assert log.temperature is not None
+    assert log.temperature[0, 0] == pytest.approx(40.0)
+    assert log.base_pitch is not None
+    assert log.base_pitch[0] == pytest.approx(np.radians(3.0))
+
+
+def test_voltage_by_the_servos_law(
+    two_joints: Expected,
+    columns: dict[str, Array],
+    write: Write,
+    mapping: Callable[[str], Mapping],
+) -> None:
+    for joint in "ab":
+        del columns[f"{joint}__torque_Nm"]
+        columns[f"{joint}__goal_position_rad"] = columns[f"{joint}__position_rad"] + 0.1
+    columns["b__goal_position_rad"] += 10.0
+    columns["on"] = np.where(columns["time_s"] < 2.0, 1.0, 0.0)
+    rules = mapping(
+        """
+        [controller]
+        gain_per_rad = 2
+        law = "duty"
+        [supply]
+        voltage = {value = 7.4, unit = "V"}
+        [torque_enabled]
+        a = "on"
+        [[logs]]
+        match = "log*"
+        gain_per_rad = 3
+        condition = {gain = 3, load = "none"}
+        """
+    )
+    log = read_log(write(columns), two_joints, rules)
+    assert log.voltage is not None
+    assert log.voltage[0] == pytest.approx([7.4 * 0.3, 7.4])
+    assert np.isnan(log.voltage[-1, 0])
+    assert log.torque_off is not None
+    assert log.torque_off[-1].tolist() == [True, False]
+    assert not log.valid[-1, 0]
+    assert log.gain == 3.0
+    assert log.condition == {"gain": 3.0, "load": "none"}
+    assert "voltage" in log.derived
+
+
+def test_decimal_commas_with_a_dialect(
+    two_joints: Expected, columns: dict[str, Array], tmp_path: Path
+) -> None:
+    lines = [";".join(columns)]
+    for row in zip(*columns.values(), strict=True):
+        lines.append(";".join(repr(float(x)).replace(".", ",") for x in row))
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (tmp_path / "m.toml").write_text('[csv]\ndelimiter = ";"\ndecimal = ","\n', encoding="utf-8")
+    log = read_log(path, two_joints, load_mapping(tmp_path / "m.toml"))
+    assert np.array_equal(log.position[:, 0], columns["a__position_rad"])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("efort = 'torque'", ("efort", "did you mean 'effort'")),
+        ("effort = 'tork'", ("tork",)),
+        ("effort = 3", ("effort", "text")),
+        ("[columns.x]\nunit = 'degrees'", ("degrees", "unknown unit")),
+        ("[columns.x]\nas = '*__position_rad'", ("star",)),
+        ("[columns.'*x*']\nas = '*'", ("star",)),
+        ("[columns.x]\nscale = 0", ("scale", "zero")),
+        ("[columns.x]\nscale = nan", ("scale", "finite")),
+        ("[columns.x]\nscale = '2'", ("scale", "number")),
+        ("[columns.x]\nflip = 1", ("flip", "true or false")),
+        ("[time]\nsample_rate = 500", ("sample_rate",)),
+        ("[time]\nsample_rate = {value = -5, unit = 'Hz'}", ("sample_rate", "positive")),
+        ("[time]\nsample_rate = {value = 5, unit = 's'}", ("frequency",)),
+        ("[time]\ncolumn = 't'\nsample_rate = {value = 5, unit = 'Hz'}", ("not both",)),
+        ("[csv]\ndelimiter = 'x'", ("delimiter",)),
+        ("[csv]\ndecimal = ','", ("both",)),
+        ("[controller]\nlaw = 'pid'", ("pid", "duty")),
+        ("[controller]\ntorque_off_bridge = 'opn'", ("did you mean 'open'",)),
+        ("[[log]]\nmatch = 'x'", ("did you mean 'logs'",)),
+        ("[logs]\nmatch = 'x'", ("two brackets",)),
+        ("[[logs]]\ngain_per_rad = 1", ("match",)),
+        ("a = [", ("malformed",)),
+        ("[constants]\nx = 3", ("constants", "table")),
+    ],
+)
+def test_a_bad_mapping_gives_one_clear_line(
+    text: str, words: tuple[str, ...], mapping: Callable[[str], Mapping]
+) -> None:
+    with pytest.raises(GapError) as error:
+        mapping(text)
+    message = str(error.value)
+    assert "\n" not in message
+    assert message.startswith("mapping.toml")
+    for word in words:
+        assert word in message, message
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[columns.nothing]\nas = 'a__power_W'", ("nothing", "log.csv")),
+        ("[columns.a__torque_Nm]\nas = 'a__torq_Nm'", ("did you mean 'a__torque_Nm'",)),
+        ("[columns.a__torque_Nm]\nunit = 'A'", ("current", "torque")),
+        ("[columns.a__torque_Nm]\nas = 'b__torque_Nm'", ("same channel",)),
+        ("[torque_enabled]\nc = 'a__torque_Nm'", ("'c'", "no joint of two")),
+        ("[torque_enabled]\na = 'on'", ("'on'",)),
+        ("locked = ['x']", ("'x'",)),
+        ("[keep]\ncolumns = ['y']", ("'y'",)),
+        ("effort = 'voltage'", ("voltage",)),
+        ("[time]\nsample_rate = {value = 5, unit = 'Hz'}", ("drop one",)),
+    ],
+)
+def test_a_mapping_that_does_not_fit_the_log(
+    text: str,
+    words: tuple[str, ...],
+    two_joints: Expected,
+    columns: dict[str, Array],
+    write: Write,
+    mapping: Callable[[str], Mapping],
+) -> None:
+    rules = mapping(text)
+    with pytest.raises(GapError) as error:
+        read_log(write(columns), two_joints, rules)
+    for word in words:
+        assert word in str(error.value), str(error.value)

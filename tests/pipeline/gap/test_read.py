@@ -1,0 +1,222 @@
+"""Reading logs: what comes out of a good file, and the one line a bad one gives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.gap.errors import GapError
+from pipeline.gap.expected import Expected
+from pipeline.gap.read import read_log, stream_log
+
+Array = NDArray[np.float64]
+Columns = dict[str, Array]
+Write = Callable[..., Path]
+
+
+def test_a_good_log_round_trips(two_joints: Expected, columns: Columns, write: Write) -> None:
+    log = read_log(write(columns), two_joints)
+    assert log.joints == ("a", "b")
+    assert np.array_equal(log.time, columns["time_s"])
+    assert np.array_equal(log.position[:, 1], columns["b__position_rad"])
+    assert log.effort.channel == "torque"
+    assert log.effort.unit == "N*m"
+    assert log.position_source == "joint"
+    assert log.valid.all()
+    assert len(log.sha256) == 64
+
+
+def test_parquet_and_csv_agree(
+    two_joints: Expected, columns: Columns, write: Write, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table(columns), path, row_group_size=300)
+    a, b = read_log(write(columns), two_joints), read_log(path, two_joints)
+    assert np.array_equal(a.torque, b.torque)
+    pieces = list(stream_log(path, two_joints, rows=700))
+    assert np.array_equal(np.concatenate([p.position for p in pieces]), b.position)
+
+
+def test_columns_come_in_the_robots_order(
+    two_joints: Expected, columns: Columns, write: Write
+) -> None:
+    turned = {"time_s": columns["time_s"]} | dict(reversed(list(columns.items())))
+    assert np.array_equal(
+        read_log(write(turned), two_joints).position[:, 0], columns["a__position_rad"]
+    )
+
+
+def test_motor_side_positions_are_divided_by_the_signed_ratio(
+    two_joints: Expected, columns: Columns, write: Write
+) -> None:
+    for joint, ratio in (("a", 100.0), ("b", -100.0)):
+        columns[f"{joint}__motor_position_rad"] = ratio * columns.pop(f"{joint}__position_rad")
+    log = read_log(write(columns), two_joints)
+    assert log.position_source == "motor"
+    assert np.ptp(log.position, axis=0) == pytest.approx([2.4, 2.0], abs=0.3)
+
+
+def test_feet_go_by_leg_or_frame(two_joints: Expected, columns: Columns, write: Write) -> None:
+    n = columns["time_s"].size
+    for k, axis in enumerate("xyz"):
+        columns[f"lf_foot_link__force_{axis}_N"] = np.full(n, float(k))
+    columns["lf__contact"] = np.array([True] * n)
+    log = read_log(write(columns), two_joints)
+    assert log.feet == ("lf",)
+    assert log.foot_force is not None
+    assert np.array_equal(log.foot_force[0, 0], [0.0, 1.0, 2.0])
+    assert log.contact is not None
+    assert log.contact.all()
+
+
+def test_empty_effort_cells_are_masked_not_invented(
+    two_joints: Expected, columns: Columns, write: Write
+) -> None:
+    columns["b__torque_Nm"][100:200] = np.nan
+    log = read_log(write(columns), two_joints)
+    assert not log.valid[100:200, 1].any()
+    assert log.valid[:, 0].all()
+
+
+def unsorted(c: Columns) -> Columns:
+    c["time_s"][[50, 51]] = c["time_s"][[51, 50]]
+    return c
+
+
+def repeated(c: Columns) -> Columns:
+    c["time_s"][51] = c["time_s"][50]
+    return c
+
+
+def no_time(c: Columns) -> Columns:
+    return {k: v for k, v in c.items() if k != "time_s"}
+
+
+def one_joint_missing(c: Columns) -> Columns:
+    return {k: v for k, v in c.items() if not k.startswith("b__")}
+
+
+def misspelt_joint(c: Columns) -> Columns:
+    return {k.replace("b__position_rad", "b__postion_rad"): v for k, v in c.items()}
+
+
+def another_robot(c: Columns) -> Columns:
+    return {k.replace("a__", "wheel_1__").replace("b__", "wheel_2__"): v for k, v in c.items()}
+
+
+def other_unit(c: Columns) -> Columns:
+    return {k.replace("a__position_rad", "a__position_deg"): v for k, v in c.items()}
+
+
+def no_effort(c: Columns) -> Columns:
+    return {k: v for k, v in c.items() if "torque" not in k}
+
+
+def effort_of_one(c: Columns) -> Columns:
+    return {k: v for k, v in c.items() if k != "b__torque_Nm"}
+
+
+def both_sides(c: Columns) -> Columns:
+    return c | {"a__motor_position_rad": c["a__position_rad"]}
+
+
+def huge(c: Columns) -> Columns:
+    c["a__torque_Nm"][3] = 1e300
+    return c
+
+
+def infinite_time(c: Columns) -> Columns:
+    c["time_s"][-1] = np.inf
+    return c
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (unsorted, ("row 53", "sort")),
+        (repeated, ("row 53", "repeats")),
+        (no_time, ("time_s",)),
+        (one_joint_missing, ("'b'", "b__position_rad")),
+        (misspelt_joint, ("'b'", "did you mean 'b__postion_rad'")),
+        (another_robot, ("another robot", "wheel_1")),
+        (other_unit, ("a__position_deg", "a__position_rad", "mapping")),
+        (no_effort, ("no effort", "a__torque_Nm")),
+        (effort_of_one, ("'b'", "torque")),
+        (both_sides, ("'a'", "motor-side")),
+        (huge, ("row 5", "a__torque_Nm", "1e+300")),
+        (infinite_time, ("row 2001", "time")),
+    ],
+)
+def test_bad_columns_give_one_clear_line(
+    spoil: Callable[[Columns], Columns],
+    words: tuple[str, ...],
+    two_joints: Expected,
+    columns: Columns,
+    write: Write,
+) -> None:
+    with pytest.raises(GapError) as error:
+        read_log(write(spoil(columns)), two_joints)
+    message = str(error.value)
+    assert "\n" not in message
+    assert len(message) < 500
+    assert message.startswith("log.csv")
+    for word in words:
+        assert word in message, message
+
+
+HEAD = b"time_s,a__position_rad,b__position_rad,a__torque_Nm,b__torque_Nm\n"
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        (b"", ("empty",)),
+        (b"\n\n", ("empty",)),
+        (HEAD, ("no rows",)),
+        (HEAD + b"0,1,2,3,4\n1,2,3\n", ("row 3", "has 3 cells", "header 5")),
+        (HEAD + b"0,1,2,3,4,5\n", ("row 2", "has 6 cells")),
+        (HEAD + b"0,0,1,0,2,0,3,0,4,0\n", ("decimal commas",)),
+        (HEAD + b'0,"1,5",2,3,4\n', ("a__position_rad", "decimal comma")),
+        (HEAD.replace(b",", b";") + b"0;1,5;2;3;4\n", ("separated by ';'", "[csv]")),
+        (HEAD + b"0,x1,2,3,4\n", ("row 2", "a__position_rad", "'x1'", "number")),
+        (HEAD + b"0,\xff\xfe,2,3,4\n", ("a__position_rad",)),
+        (HEAD.decode().encode("utf-16"), ("UTF-8",)),
+        (b"0,1,2,3,4\n0,1,2,3,4\n", ("header",)),
+        (HEAD[:-1] + b",time_s\n0,1,2,3,4,5\n", ("'time_s' occurs twice",)),
+        (HEAD[:-1] + b",\n0,1,2,3,4,5\n", ("column 6 has no name",)),
+        (b"PAR1" + bytes(100), ("Parquet",)),
+        (b"\x89PNG\r\n\x1a\n" + bytes(100), ("UTF-8",)),
+    ],
+)
+def test_bad_bytes_give_one_clear_line(
+    data: bytes, words: tuple[str, ...], two_joints: Expected, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(data)
+    with pytest.raises(GapError) as error:
+        read_log(path, two_joints)
+    message = str(error.value)
+    assert "\n" not in message
+    for word in words:
+        assert word in message, message
+
+
+def test_a_missing_file_is_named(two_joints: Expected, tmp_path: Path) -> None:
+    with pytest.raises(GapError, match="nothing_here"):
+        read_log(tmp_path / "nothing_here.csv", two_joints)
+
+
+def test_streamed_time_is_checked_across_pieces(
+    two_joints: Expected, columns: Columns, tmp_path: Path
+) -> None:
+    columns["time_s"][700:] -= columns["time_s"][700] - columns["time_s"][600]
+    path = tmp_path / "log.parquet"
+    pq.write_table(pa.table(columns), path)
+    with pytest.raises(GapError, match="row 702"):
+        list(stream_log(path, two_joints, rows=700))
