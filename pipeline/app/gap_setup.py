@@ -1,0 +1,214 @@
+"""From the options of `gap` to a machine, what its logs must look like, and the logs themselves."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from actuators.build import Catalog, load_catalog
+from actuators.chain import Chain
+from pipeline.errors import PipelineError
+from pipeline.gap.contact import Contact, find_contact
+from pipeline.gap.errors import GapError, LogContentError, MappingError
+from pipeline.gap.expected import Expected, expected_of_model, expected_of_robot
+from pipeline.gap.intake import Intake, prepare_logs
+from pipeline.gap.log import EFFORTS, Log
+from pipeline.gap.mapping import Mapping, load_mapping
+from pipeline.gap.model import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.gap.parts import Parts, split
+from pipeline.gap.read import read_log
+from pipeline.robot import Robot, load_robot
+from pipeline.robot_file import load_robot_file
+
+#: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
+DEFAULT_ALTERNATIVE = "rotor"
+BASES = ("fixed", "level", "measured")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The machine as its files describe it.
+
+    Attributes:
+        path: Robot file or URDF.
+        sources: Every file that was read, for hashes.
+        robot: None for a bare URDF.
+        model: As the workflow computes it.
+        expected: What a log of it looks like.
+        catalog: Actuator components and alternatives.
+        alternative: Name of the actuator chain; empty without one.
+    """
+
+    path: Path
+    sources: tuple[Path, ...]
+    robot: Robot | None
+    model: MachineModel
+    expected: Expected
+    catalog: Catalog
+    alternative: str
+
+    @property
+    def legged(self) -> bool:
+        """Whether the machine walks, so that its energy per gait cycle can be told."""
+        return self.robot is not None and self.robot.floating
+
+
+def setup(options: argparse.Namespace) -> Setup:
+    """Load the robot and its actuator.
+
+    Raises:
+        PipelineError: The robot file or URDF cannot be used.
+        ActuatorError: The catalogue cannot be used, or has no such alternative.
+        GapError: `--base` does not fit the robot.
+    """
+    folder = options.actuators
+    catalog = load_catalog(folder) if folder else load_catalog()
+    path: Path = options.robot
+    if path.suffix.lower() != ".toml":
+        return _of_urdf(path, catalog, options)
+    spec = load_robot_file(path)
+    if options.base == "fixed" and spec.floating:
+        spec = replace(spec, floating=False)
+    if options.base in ("level", "measured") and not spec.floating:
+        raise GapError(f"{path}: its base is fixed; leave --base {options.base} out")
+    robot = load_robot(spec)
+    alternative = options.alternative or DEFAULT_ALTERNATIVE
+    chain = catalog.chain(alternative)
+    return Setup(
+        path=path,
+        sources=(*spec.sources, *(() if spec.build else (spec.urdf,)), *_catalog_files(folder)),
+        robot=robot,
+        model=machine_of_robot(robot, chain),
+        expected=expected_of_robot(robot, ratio=_ratio(chain, len(robot.joints))),
+        catalog=catalog,
+        alternative=alternative,
+    )
+
+
+def _of_urdf(path: Path, catalog: Catalog, options: argparse.Namespace) -> Setup:
+    if options.base in ("level", "measured"):
+        raise GapError(
+            f"{path}: a bare URDF stands on a fixed base; write a robot file for --base "
+            f"{options.base}"
+        )
+    chain = catalog.chain(options.alternative) if options.alternative else None
+    model = machine_of_urdf(path, chain=chain)
+    ratio = _ratio(chain, len(model.joints)) if chain else None
+    return Setup(
+        path=path,
+        sources=(path, *(_catalog_files(options.actuators) if chain else ())),
+        robot=None,
+        model=model,
+        expected=expected_of_model(model.rigid, model.name, joints=model.joints, ratio=ratio),
+        catalog=catalog,
+        alternative=options.alternative or "",
+    )
+
+
+def _catalog_files(folder: Path | None) -> tuple[Path, ...]:
+    from actuators.build import CATALOG
+
+    return tuple(sorted((folder or Path(CATALOG)).glob("*.toml")))
+
+
+def _ratio(chain: Chain, joints: int) -> np.ndarray:
+    return np.full(joints, float(np.asarray(chain.ratio)))
+
+
+def read_logs(given: Setup, options: argparse.Namespace) -> tuple[list[Log], list[Log]]:
+    """Read the logs that may be fitted and those that only prove.
+
+    Raises:
+        GapError: A log or the mapping cannot be used.
+    """
+    mapping = load_mapping(options.mapping) if options.mapping else None
+    fitted = [_read(path, given, mapping, options) for path in options.logs]
+    proving = [_read(path, given, mapping, options) for path in options.holdout]
+    if given.model.actuators and given.model.actuators[0].motor is None:
+        for log in (*fitted, *proving):
+            if log.effort.channel != "torque":
+                raise LogContentError(
+                    f"{log.name}: measures {log.effort.channel} and a bare URDF has no motor; name "
+                    "the actuator with --alternative"
+                )
+    return fitted, proving
+
+
+def _read(path: Path, given: Setup, mapping: Mapping | None, options: argparse.Namespace) -> Log:
+    log = read_log(path, given.expected, mapping)
+    if options.effort:
+        log = log.with_changes(chosen_effort=options.effort)
+        _ = log.effort  # refuses a channel that is not there
+    if options.base == "measured" and log.base_roll is None and log.base_pitch is None:
+        raise LogContentError(
+            f"{log.name}: --base measured needs base__roll_rad and base__pitch_rad; log them or "
+            "use --base level"
+        )
+    if options.base in ("level", "fixed"):
+        log = log.with_changes(base_roll=None, base_pitch=None)
+    return log
+
+
+def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, int]:
+    """Step 1: read, judge and prepare all logs, and cut them into fit, choose and prove.
+
+    Returns:
+        The logs, their parts, and how many of them may be fitted (the first ones).
+
+    Raises:
+        GapError: Unusable input; one line.
+    """
+    fitted, proving = read_logs(given, options)
+    intake = prepare_logs(
+        [*fitted, *proving],
+        given.expected,
+        cutoff=options.cutoff,
+        largest=_largest(given),
+        contact=_contact(given),
+    )
+    count = len(fitted)
+    parts = split(
+        intake.prepared[:count], holdout=intake.prepared[count:], prove_last=options.prove_last
+    )
+    return intake, parts, count
+
+
+def _contact(given: Setup) -> Callable[[Log], Contact | None] | None:
+    robot = given.robot
+    if robot is None or not robot.floating:
+        return None
+    return lambda log: find_contact(log, robot)
+
+
+def _largest(given: Setup) -> dict[str, np.ndarray]:
+    """What the drives can give at most, by channel; empty where no motor is known."""
+    motors = [a.motor for a in given.model.actuators if a.motor is not None]
+    if len(motors) < len(given.model.joints):
+        return {}
+    return {
+        "current": np.array([m.peak_current for m in motors]),
+        "voltage": np.array([m.supply_voltage for m in motors]),
+        "power": np.array([m.peak_current * m.supply_voltage for m in motors]),
+    }
+
+
+def check_options(options: argparse.Namespace) -> None:
+    """Refuse options that cannot be, before anything is read.
+
+    Raises:
+        PipelineError: A robot file that does not exist.
+        GapError: A file that does not exist.
+    """
+    if not options.robot.is_file():
+        raise PipelineError(f"{options.robot}: no such robot file; name it with --robot")
+    for path in (*options.logs, *options.holdout):
+        if not path.is_file():
+            raise LogContentError(f"{path}: no such log; name a CSV or Parquet file")
+    if options.mapping and not options.mapping.is_file():
+        raise MappingError(f"{options.mapping}: no such mapping file")
+    if options.effort and options.effort not in EFFORTS:
+        raise GapError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")

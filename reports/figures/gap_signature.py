@@ -1,0 +1,108 @@
+"""An effect's signature: the gap against the variable on which the effect depends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.errors import FigureError
+from reports.figures.style import (
+    BLUE,
+    INK,
+    ORANGE,
+    QUIET,
+    SHADE,
+    headline,
+    new_figure,
+    styled,
+    zero_line,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+_MOST_POINTS = 3000
+_BINS = 40
+_FEWEST = 8  # rows in a bin that is drawn
+
+
+@dataclass(frozen=True)
+class Signature:
+    """The gap of one joint against one variable.
+
+    Attributes:
+        variable: Name with unit, for the axis.
+        x: Shape (N,).
+        before: Measured less predicted without the effect, shape (N,).
+        after: The same with it, shape (N,).
+        noise_floor: Standard deviation of the noise.
+        unit: Of the gap.
+    """
+
+    variable: str
+    x: Array
+    before: Array
+    after: Array
+    noise_floor: float
+    unit: str
+
+
+@styled
+def gap_signature_figure(signature: Signature, *, title: str, subtitle: str = "") -> Figure:
+    """Draw it without (left) and with the effect (right), on one scale.
+
+    Raises:
+        FigureError: No rows.
+    """
+    s = signature
+    keep = np.isfinite(s.x) & np.isfinite(s.before) & np.isfinite(s.after)
+    if not keep.any():
+        raise FigureError(f"signature against {s.variable}: no rows; give at least 1")
+    x, before, after = s.x[keep], s.before[keep], s.after[keep]
+    figure = new_figure(8.2, 3.9)
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    _half(left, x, before, s, "without the effect", ORANGE)
+    _half(right, x, after, s, "with the effect", BLUE)
+    limit = 1.1 * float(np.quantile(np.abs(np.concatenate([before, after])), 0.998))
+    left.set_ylim(-limit, limit)
+    left.set_ylabel(f"measured less predicted [{s.unit}]")
+    headline(figure, title, subtitle)
+    return figure
+
+
+def _half(ax: Axes, x: Array, y: Array, s: Signature, title: str, color: str) -> None:
+    every = max(1, int(np.ceil(x.size / _MOST_POINTS)))
+    ax.axhspan(-2 * s.noise_floor, 2 * s.noise_floor, color=SHADE, zorder=0)
+    zero_line(ax)
+    ax.plot(
+        x[::every],
+        y[::every],
+        linestyle="none",
+        marker=".",
+        markersize=2.0,
+        color=color,
+        alpha=0.45,
+        rasterized=True,
+    )
+    centre, mean = binned(x, y)
+    ax.plot(centre, mean, color=INK, linewidth=1.6)
+    ax.set_title(title, color=QUIET, fontsize=9)
+    ax.set_xlabel(s.variable)
+
+
+def binned(x: Array, y: Array, bins: int = _BINS) -> tuple[Array, Array]:
+    """Mean of y by bins of x; NaN, a break in the line, where a bin is nearly empty."""
+    low, high = np.quantile(x, [0.002, 0.998])
+    if high <= low:
+        return np.array([float(low)]), np.array([float(y.mean())])
+    edges = np.linspace(low, high, bins + 1)
+    index = np.clip(np.searchsorted(edges, x, side="right") - 1, 0, bins - 1)
+    count = np.bincount(index, minlength=bins)
+    total = np.bincount(index, weights=y, minlength=bins)
+    mean = np.where(count >= _FEWEST, total / np.maximum(count, 1), np.nan)
+    return 0.5 * (edges[1:] + edges[:-1]), mean

@@ -1,0 +1,116 @@
+"""The gap in time: measured against predicted, before and after, with what is left below."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.errors import FigureError
+from reports.figures.style import (
+    BLUE,
+    INK,
+    ORANGE,
+    QUIET,
+    SHADE,
+    headline,
+    new_figure,
+    number,
+    styled,
+    zero_line,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+#: More points than a picture can show.
+_MOST_POINTS = 2500
+
+
+@dataclass(frozen=True)
+class GapTrace:
+    """One joint over a stretch of time; all series at the same bandwidth.
+
+    Attributes:
+        joint: Name.
+        time: Shape (N,) [s].
+        measured: Shape (N,); NaN where it does not count.
+        before: Predicted by the model as it was, shape (N,).
+        after: Predicted with everything found, shape (N,).
+        noise_floor: Standard deviation of the noise.
+        unit: Of the channel.
+    """
+
+    joint: str
+    time: Array
+    measured: Array
+    before: Array
+    after: Array
+    noise_floor: float
+    unit: str
+
+
+@styled
+def gap_time_figure(
+    traces: Sequence[GapTrace], *, title: str, subtitle: str = "", channel: str = "effort"
+) -> Figure:
+    """Draw joints side by side: above the channel, below what is left of it.
+
+    Args:
+        traces: One to three joints.
+        title: Headline.
+        subtitle: Second line.
+        channel: Name of the compared channel.
+
+    Raises:
+        FigureError: No trace, or too many to read.
+    """
+    if not 1 <= len(traces) <= 3:
+        raise FigureError(f"gap in time: {len(traces)} joints; give 1 to 3")
+    figure = new_figure(3.6 * len(traces) + 2.2, 5.0)
+    axes = figure.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.0))
+    for k, trace in enumerate(traces):
+        _trace(axes[0, k], axes[1, k], _thinned(trace), channel, first=k == 0)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    axes[0, -1].legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    headline(figure, title, subtitle)
+    return figure
+
+
+def _thinned(trace: GapTrace) -> GapTrace:
+    every = max(1, int(np.ceil(trace.time.size / _MOST_POINTS)))
+    return replace(
+        trace,
+        time=trace.time[::every],
+        measured=trace.measured[::every],
+        before=trace.before[::every],
+        after=trace.after[::every],
+    )
+
+
+def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: bool) -> None:
+    t = trace.time
+    top.plot(t, trace.measured, color=INK, linewidth=1.6, label="measured")
+    top.plot(t, trace.before, color=ORANGE, linewidth=1.1, label="before")
+    top.plot(t, trace.after, color=BLUE, linewidth=1.1, label="after")
+    top.set_title(trace.joint)
+    bottom.axhspan(-2 * trace.noise_floor, 2 * trace.noise_floor, color=SHADE, zorder=0)
+    zero_line(bottom)
+    left_before, left_after = trace.measured - trace.before, trace.measured - trace.after
+    bottom.plot(t, left_before, color=ORANGE, linewidth=1.0)
+    bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
+    rms = [float(np.sqrt(np.nanmean(x**2))) for x in (left_before, left_after)]
+    bottom.set_title(
+        f"gap {number(rms[0])} before, {number(rms[1])} after; band: noise, 2 sigma",
+        fontsize=8,
+        color=QUIET,
+    )
+    bottom.set_xlabel("time [s]")
+    if first:
+        top.set_ylabel(f"{channel} [{trace.unit}]")
+        bottom.set_ylabel(f"measured less predicted [{trace.unit}]")

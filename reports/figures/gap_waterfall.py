@@ -1,0 +1,98 @@
+"""Waterfall: how the gap shrinks effect by effect, down to the noise floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+from reports.errors import FigureError
+from reports.figures.style import (
+    BLUE,
+    GREEN,
+    INK,
+    ORANGE,
+    QUIET,
+    headline,
+    new_figure,
+    number,
+    styled,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class GapStep:
+    """The gap once an effect is in the model.
+
+    Attributes:
+        label: The effect and its place.
+        gap: After it, in the figure's unit.
+    """
+
+    label: str
+    gap: float
+
+
+@styled
+def gap_waterfall_figure(
+    before: float,
+    steps: Sequence[GapStep],
+    noise_floor: float,
+    unit: str,
+    *,
+    title: str,
+    subtitle: str = "",
+) -> Figure:
+    """Draw it from top to bottom.
+
+    Args:
+        before: Gap of the model as it was.
+        steps: Effects in the order of acceptance.
+        noise_floor: What no model can explain.
+        unit: Of all.
+        title: Headline.
+        subtitle: Second line.
+
+    Raises:
+        FigureError: A negative gap.
+    """
+    if min([before, noise_floor, *(s.gap for s in steps)]) < 0:
+        raise FigureError("waterfall: a gap is negative; give root mean squares")
+    labels = ["model as it was", *(s.label for s in steps), "what is left"]
+    figure = new_figure(7.5, 0.42 * len(labels) + 1.5)
+    ax = figure.subplots()
+    gaps = [before, *(s.gap for s in steps)]
+    ax.barh(0, before, color=ORANGE, height=0.62)
+    ax.text(before, 0, f" {number(before)}", va="center", fontsize=8.5)
+    for k, (old, new) in enumerate(pairwise(gaps), start=1):
+        ax.barh(k, old - new, left=new, color=GREEN if new < old else ORANGE, height=0.62)
+        ax.plot([old, old], [k - 1 + 0.31, k - 0.31], color=QUIET, linewidth=0.8)
+        sign = "\N{MINUS SIGN}" if new <= old else "+"
+        ax.text(max(old, new), k, f" {sign}{number(abs(old - new))}", va="center", fontsize=8.5)
+    last = len(labels) - 1
+    ax.barh(last, gaps[-1], color=BLUE, height=0.62)
+    if last > 1:
+        ax.plot([gaps[-1]] * 2, [last - 1 + 0.31, last - 0.31], color=QUIET, linewidth=0.8)
+    ax.text(gaps[-1], last, f" {number(gaps[-1])}", va="center", fontsize=8.5)
+    ax.axvline(noise_floor, color=INK, linewidth=1.0, linestyle=(0, (4, 2)))
+    ax.text(
+        noise_floor,
+        -0.62,
+        f" noise floor {number(noise_floor)}",
+        va="bottom",
+        fontsize=8,
+        color=QUIET,
+    )
+    ax.set_yticks(range(len(labels)), labels)
+    ax.invert_yaxis()
+    ax.set_xlim(0, 1.14 * max([*gaps, noise_floor]))
+    ax.set_ylim(last + 0.55, -1.05)
+    ax.tick_params(axis="y", length=0)
+    ax.spines["left"].set_visible(False)
+    ax.set_xlabel(f"gap on data that had no say, root mean square [{unit}]")
+    headline(figure, title, subtitle)
+    return figure

@@ -1,0 +1,107 @@
+"""Tables of the gap workflow: quality, where, candidates, found, and the motion that decides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.table import Table, table_from_rows
+
+Rows = Sequence[Mapping[str, Any]]
+Array = NDArray[np.float64]
+
+QUALITY = {
+    "log": ("name of the log", ""),
+    "column": ("header in the log format; empty for the log as a whole", ""),
+    "check": ("what was looked at", ""),
+    "value": ("what was found", "see unit"),
+    "unit": ("unit of value", ""),
+    "verdict": ("ok, masked (rows left out), warning or refused", ""),
+    "detail": ("in words, with the remedy where there is one", ""),
+}
+WHERE = {
+    "rank": ("1 is the largest part of the gap above the noise floor", "1"),
+    "joint": ("name of the joint", ""),
+    "by": ("what the rows are sorted by", ""),
+    "band": ("which of them", ""),
+    "rows": ("rows compared", "1"),
+    "gap": ("root mean square of measured less predicted", "see unit"),
+    "mean": ("mean of measured less predicted", "see unit"),
+    "noise_floor": ("standard deviation of the sensor's noise in the same bandwidth", "see unit"),
+    "unit": ("unit of gap, mean and noise_floor", ""),
+    "share_of_total": ("share of the squared gap of all joints", "1"),
+    "share_above_noise": ("share of it beyond the squared noise floor", "1"),
+}
+CANDIDATES = {
+    "effect": ("name in the catalogue of effects", ""),
+    "joint": ("joint it acts at; empty where it acts on all", ""),
+    "place": ("joints, link or ground it acts on", ""),
+    "heldout_before": ("gap without it on data that did not fit it", "see unit"),
+    "heldout_after": ("the same with it", "see unit"),
+    "unit": ("unit of both", ""),
+    "identifiable": ("whether this motion could show it", ""),
+    "verdict": ("accepted, rejected, not identifiable on this motion, indistinguishable from", ""),
+    "reason": ("in words", ""),
+}
+FOUND = {
+    "order": ("in which it was accepted; one row per parameter", "1"),
+    "effect": ("name in the catalogue of effects", ""),
+    "joint": ("joint it acts at; empty where it acts on all", ""),
+    "parameter": ("of the effect", ""),
+    "value": ("best estimate", "see unit"),
+    "ci_low": ("lower end of the 95 % interval", "see unit"),
+    "ci_high": ("upper end of the 95 % interval", "see unit"),
+    "unit": ("unit of value and interval", ""),
+    "gap_before": ("gap without it, on data that had no say, root mean square", "see gap_unit"),
+    "gap_after": ("the same with it", "see gap_unit"),
+    "gap_unit": ("unit of both gaps and the noise floor", ""),
+    "noise_floor": ("of the joints it acts on", "see gap_unit"),
+}
+
+
+def quality(rows: Rows) -> Table:
+    """The judgement on the logs."""
+    return table_from_rows("quality", rows, QUALITY, "What the logs are worth, check by check.")
+
+
+def where(rows: Rows) -> Table:
+    """Where model and machine disagree, ranked."""
+    return table_from_rows(
+        "where", rows, WHERE, "Measured less predicted, by joint and circumstance; ranked."
+    )
+
+
+def candidates(rows: Rows) -> Table:
+    """Every candidate once."""
+    return table_from_rows(
+        "candidates", rows, CANDIDATES, "Every effect at every place that was tried."
+    )
+
+
+def found(rows: Rows) -> Table:
+    """Accepted effects."""
+    return table_from_rows("found", rows, FOUND, "What the model lacked.")
+
+
+def deciding_motion(time: Array, joints: Sequence[str], position: Array) -> Table:
+    """A trajectory in the columns of a log.
+
+    Args:
+        time: Shape (N,) [s].
+        joints: Names of the columns.
+        position: Shape (N, J) [rad].
+    """
+    columns: dict[str, Any] = {"time_s": time}
+    meanings = {"time_s": ("time", "s")}
+    for k, joint in enumerate(joints):
+        columns[f"{joint}__position_rad"] = position[:, k]
+        meanings[f"{joint}__position_rad"] = (f"target of {joint}", "rad")
+    return Table(
+        "deciding_motion",
+        columns,
+        meanings,
+        "Motion inside the robot's limits that tells the indistinguishable effects apart.",
+    )
