@@ -63,6 +63,7 @@ def tripod_gait(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     phase = np.linspace(0.0, 1.0, samples)
     neutral = np.array([leg.neutral_foot for leg in spec.legs])  # (L, 3)
     start = np.array([leg.start_posture for leg in spec.legs])
+    start = solve_positions(robot.chains, neutral[None], start, np.zeros(1))[0]
     segments = []
     for k, stance in enumerate(spec.tripods):
         position = np.repeat(neutral[None], samples, axis=0)

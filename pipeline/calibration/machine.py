@@ -6,12 +6,12 @@ as the actuators' part, which takes a given demand. Only the two middle legs are
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize
 
 from actuators.build import Catalog
 from actuators.chain import Chain, ChainResult, HoldingResult
@@ -91,7 +91,15 @@ def leg_joints(spec: RobotSpec, leg: str) -> tuple[str, ...]:
 
 
 def solve_posture(spec: RobotSpec, target: Array, free: tuple[str, ...] = POSTURE) -> RobotSpec:
-    """Place the trunk's mass, joint 2 and the body's height so that standing comes out as printed.
+    """Place joint 2, the body's height and the trunk's mass so that standing comes out as printed.
+
+    Statics of the loaded leg in its frontal plane, x outboard, R the reaction, phi the tibia's tilt
+    outboard, q2 the femur's rise (moments about joint 3, then about joint 2):
+
+        G3 = (m_t g c_t - R) L_t sin(phi)
+        G2 = m_f g c_f L_f cos(q2) + (m_t g - R) L_f cos(q2) + G3
+
+    The trunk's lateral shift then follows from the reaction, which is linear in it.
 
     Args:
         spec: The robot.
@@ -101,23 +109,26 @@ def solve_posture(spec: RobotSpec, target: Array, free: tuple[str, ...] = POSTUR
     Raises:
         CalibrationError: No posture meets the targets.
     """
-    chosen = [POSTURE.index(name) for name in free]
-    if not chosen:
-        return spec
-    scale = np.array([196.0, 30.0, 30.0])[chosen]
-
-    def placed(x: Array) -> RobotSpec:
-        return spec.with_parameters(dict(zip(free, map(float, x), strict=True)))
-
-    def error(x: Array) -> Array:
-        _, reaction, torque = standing_state(placed(x))
-        return (np.array([reaction, torque[1], torque[2]]) - target)[chosen] / scale
-
-    start = np.array([spec.parameters[name] for name in free])
-    found = optimize.root(error, start, method="hybr", options={"xtol": 1e-10, "eps": 1e-7})
-    if not found.success and np.abs(found.fun).max() > 1e-6:
+    p = spec.parameters
+    reaction, torque_2, torque_3 = (float(x) for x in target)
+    weight_f, weight_t = p["femur_mass"] * p["gravity"], p["tibia_mass"] * p["gravity"]
+    femur, tibia = p["femur_length"], p["tibia_length"]
+    sine = torque_3 / ((weight_t * p["tibia_com"] - reaction) * tibia)
+    cosine = (torque_2 - torque_3) / ((weight_f * p["femur_com"] + weight_t - reaction) * femur)
+    if not (abs(sine) < 1 and 0 < cosine < 1):
         raise CalibrationError("no posture of the robot gives the torques of Table III")
-    return placed(found.x)
+    solved = {
+        "joint_2_lateral": p["robot_width"] / 2 - femur * cosine - tibia * sine,
+        "body_height": tibia * math.sqrt(1 - sine**2) - femur * math.sqrt(1 - cosine**2),
+    }
+    spec = spec.with_parameters({k: v for k, v in solved.items() if k in free})
+    if "trunk_com_left" in free:
+        shifts = (0.0, 0.01)
+        found = [standing_state(spec.with_parameters({"trunk_com_left": x}))[1] for x in shifts]
+        slope = (found[1] - found[0]) / (shifts[1] - shifts[0])
+        shift = (reaction - found[0]) / slope
+        spec = spec.with_parameters({"trunk_com_left": shift})
+    return spec
 
 
 def robot_part(
