@@ -41,8 +41,13 @@ def smoother_noise(
     middle = slice(inner.half - outer.half, inner.half + outer.half + 1)
     band = -narrow
     band[middle] += wide
-    gain = float(np.sqrt((band**2).sum()))
-    rest = np.concatenate([outer.smooth(x[p]) - inner.smooth(x[p]) for p in pieces])
+    # Passed twice: what little of the motion the first pass lets through is gone after the second.
+    gain = float(np.sqrt((np.convolve(band, band) ** 2).sum()))
+
+    def band_passed(part: Array) -> Array:
+        return outer.smooth(part) - inner.smooth(part)
+
+    rest = np.concatenate([band_passed(band_passed(x[piece])) for piece in pieces])
     good = np.concatenate([ok[p] for p in pieces])
     sigma = np.full(x.shape[1], np.nan)
     for c in range(x.shape[1]):

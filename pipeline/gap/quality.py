@@ -240,7 +240,8 @@ def _efforts(log: Log, still: Mask, found: _Findings) -> Mask:
                 f"value in {1 / max(1 - share, 1e-3):.1f} rows; repeats are bridged "
                 f"({int(repeats.sum())} rows)",
             )
-        limit = saturated(x, ~still[:, j] & ~repeats, step)
+        fresh = ~repeats if share > HELD else np.ones_like(repeats)
+        limit = saturated(x, ~still[:, j] & fresh, step)
         if limit.any():
             # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
             hard = effort.channel != "voltage"

@@ -109,8 +109,9 @@ def held(x: Array, step: float) -> tuple[float, Mask]:
 def saturated(x: Array, moving: Mask, step: float) -> Mask:
     """Rows at the channel's largest or smallest value where it sticks there while moving.
 
-    A peak passes through its neighbourhood; a limit collects rows at one value and leaves hardly
-    any just inside it.
+    A peak passes through its neighbourhood; a limit collects rows at one value. Where the channel
+    is quantised, more must lie at the limit than just inside it; where it is not, no value comes
+    back by chance.
 
     Args:
         x: Shape (N,).
@@ -125,13 +126,13 @@ def saturated(x: Array, moving: Mask, step: float) -> Mask:
     if good.sum() < 50:
         return out
     low, high = float(x[good].min()), float(x[good].max())
-    near = max(4.0 * step, 0.01 * (high - low))
     for limit in (low, high):
         at = good & (np.abs(x - limit) <= 0.5 * step)
-        inside = good & ~at & (np.abs(x - limit) < near)
+        inside = good & ~at & (np.abs(x - limit) < 4.5 * step)
         runs = at[2:] & at[1:-1] & at[:-2]
-        if at.sum() >= 20 and at.sum() > 5 * inside.sum() and runs.any():
-            out |= at
+        if at.sum() >= 20 and runs.any() and (step == 0 or at.sum() > 2 * inside.sum()):
+            # Known to be a limit, it counts at standstill, too.
+            out |= np.abs(x - limit) <= 0.5 * step
     return out
 
 

@@ -52,20 +52,28 @@ def skew(x: Array, y: Array, dt: float, *, longest: float) -> Skew | None:
     product = np.fft.irfft(np.fft.rfft(x0, size) * np.conj(np.fft.rfft(y0, size)), size)
     lags = np.arange(-reach, reach + 1)
     k = int(lags[np.argmax(np.abs(product[lags]))])
-    # x[i + k] against y[i]; then a shift of a fraction of a row.
-    a = x0[max(0, k) : x.size + min(0, k)]
-    b = y0[max(0, -k) : y.size + min(0, -k)]
-    both = good[max(0, k) : x.size + min(0, k)] & good[max(0, -k) : y.size + min(0, -k)]
-    rate = np.gradient(b, dt)
-    columns = np.stack([b, rate, np.ones_like(b)], axis=1)[both]
-    if columns.shape[0] < 50:
-        return None
-    solution, *_ = np.linalg.lstsq(columns, a[both], rcond=None)
-    factor, moved = float(solution[0]), float(solution[1])
-    if factor == 0.0:
-        return None
+    # Where a neighbour is missing the rate of y is meaningless.
+    rated = good.copy()
+    rated[1:] &= np.isfinite(y[:-1])
+    rated[:-1] &= np.isfinite(y[1:])
+    # The peak of a slow signal's correlation is flat: the shift is refined by least squares, row
+    # by row until less than half a row is left.
+    for _ in range(20):
+        a = x0[max(0, k) : x.size + min(0, k)]
+        b = y0[max(0, -k) : y.size + min(0, -k)]
+        both = good[max(0, k) : x.size + min(0, k)] & rated[max(0, -k) : y.size + min(0, -k)]
+        columns = np.stack([b, np.gradient(b, dt), np.ones_like(b)], axis=1)[both]
+        if columns.shape[0] < 50:
+            return None
+        solution, *_ = np.linalg.lstsq(columns, a[both], rcond=None)
+        factor = float(solution[0])
+        if factor == 0.0:
+            return None
+        fine = -float(solution[1]) / factor
+        if abs(fine) <= 0.5 * dt or abs(k) >= reach:
+            break
+        k = int(np.clip(k + np.clip(round(fine / dt), -reach, reach), -reach, reach))
     rest = a[both] - columns @ solution
     spread = float(np.sqrt((rest**2).mean() / max((columns[:, 1] ** 2).sum(), 1e-300)))
     correlation = float(product[k]) / (sx * sy)
-    fine = float(np.clip(-moved / factor, -dt, dt))
-    return Skew(k * dt + fine, spread / abs(factor), factor, correlation)
+    return Skew(k * dt + float(np.clip(fine, -dt, dt)), spread / abs(factor), factor, correlation)

@@ -107,7 +107,7 @@ def velocity_units(log: Log, expected: Expected, ok: Mask, dt: float) -> list[Fi
         out += _speed_limit(log, expected, j, rate)
         if log.velocity is None:
             continue
-        seen = skew(log.velocity[rows, j], np.nan_to_num(rate), dt, longest=0.25)
+        seen = skew(log.velocity[rows, j], rate, dt, longest=0.25)
         if seen is None or abs(seen.correlation) < 0.7:
             continue
         out += _velocity_findings(log, column_name(joint, "velocity"), seen, dt)
@@ -226,7 +226,7 @@ def compare_with_prediction(
     ]
     for j, joint in enumerate(log.joints):
         x = np.where(mask[:, j], measured[:, j], np.nan)
-        seen = skew(x, np.where(mask[:, j], predicted[:, j], 0.0), dt, longest=0.1)
+        seen = skew(x, np.where(mask[:, j], predicted[:, j], np.nan), dt, longest=0.1)
         if seen is None:
             continue
         agree.append(seen.correlation)
