@@ -1,0 +1,66 @@
+"""Rates with their uncertainty: Wilson's interval for a share of independent trials."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Final
+
+_Z: Final = 1.959963984540054  # 97.5 % point of the normal distribution
+
+
+@dataclass(frozen=True)
+class Rate:
+    """How often something came out as it should, or should not.
+
+    Attributes:
+        name: Key, e.g. ``"right_name_and_place"``.
+        meaning: In words.
+        hits: How often.
+        trials: Out of how many.
+        aim: What is aimed at, e.g. ``(0.95, 1.0)``.
+    """
+
+    name: str
+    meaning: str
+    hits: int
+    trials: int
+    aim: tuple[float, float]
+
+    @property
+    def value(self) -> float:
+        """Share; NaN without trials."""
+        return self.hits / self.trials if self.trials else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval."""
+        return wilson(self.hits, self.trials)
+
+    @property
+    def reached(self) -> bool:
+        """Whether the share lies inside the aim."""
+        return bool(self.trials) and self.aim[0] <= self.value <= self.aim[1]
+
+
+def wilson(hits: int, trials: int) -> tuple[float, float]:
+    """95 % interval of a share, by Wilson's score.
+
+    E. B. Wilson, "Probable inference, the law of succession, and statistical inference", Journal of
+    the American Statistical Association 22, 1927:
+
+        (p + z^2 / 2n +- z sqrt(p (1 - p) / n + z^2 / 4n^2)) / (1 + z^2 / n)
+
+    Args:
+        hits: How often.
+        trials: Out of how many; without any the interval is all there is, (0, 1).
+    """
+    if trials <= 0:
+        return 0.0, 1.0
+    p, z2 = hits / trials, _Z**2
+    middle = p + z2 / (2 * trials)
+    half = _Z * sqrt(p * (1 - p) / trials + z2 / (4 * trials**2))
+    scale = 1 + z2 / trials
+    # Rounding must not push an end past what was seen.
+    low, high = (middle - half) / scale, (middle + half) / scale
+    return max(0.0, min(low, p)), min(1.0, max(high, p))
