@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
+from pipeline.app.gap_options import add_gap_options
 from pipeline.errors import PipelineError, TippingError
 
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
@@ -52,6 +53,12 @@ def parser() -> argparse.ArgumentParser:
         sub = verbs.add_parser(verb, help=text)
         _run_options(sub)
         sub.set_defaults(run=_run_reports)
+
+    gap = verbs.add_parser(
+        "gap", help="find what the model lacks: from a measured log to a named effect"
+    )
+    add_gap_options(gap)
+    gap.set_defaults(run=_run_gap)
 
     calibrate = verbs.add_parser(
         "calibrate", help="fit the unpublished numbers to the paper's figures and store them"
@@ -124,6 +131,12 @@ def _run_reports(options: argparse.Namespace) -> int:
     return run(options)
 
 
+def _run_gap(options: argparse.Namespace) -> int:
+    from pipeline.app.gap import run_gap
+
+    return run_gap(options)
+
+
 def _run_calibrate(options: argparse.Namespace) -> int:
     from pipeline.app.calibrate import run_calibrate
 
@@ -146,6 +159,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     run: Callable[[argparse.Namespace], int] = options.run
     from actuators.errors import ActuatorError
+    from pipeline.gap.errors import GapError
     from reports.errors import ReportError
 
     try:
@@ -153,7 +167,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except TippingError as error:
         print(error, file=sys.stderr)
         return EXIT_NEGATIVE
-    except (PipelineError, ActuatorError, ReportError) as error:
+    except (PipelineError, ActuatorError, GapError, ReportError) as error:
         print(error, file=sys.stderr)
         return EXIT_UNUSABLE
     except KeyboardInterrupt:

@@ -1,0 +1,95 @@
+"""Everything one run of `gap` computes, before anything is written."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any
+
+from pipeline.app.gap_setup import Setup
+from pipeline.gap.circumstances import Where, where
+from pipeline.gap.intake import Intake
+from pipeline.gap.measurement import Measurement
+from pipeline.gap.model import MachineModel
+from pipeline.gap.observe import observe
+from pipeline.gap.parts import Parts
+from pipeline.gap.simulate import Prediction, Simulator
+
+
+class Progress:
+    """Steps of a run as a bar; on a terminal only."""
+
+    def __init__(self, steps: int) -> None:
+        self._bar: Any = None
+        if sys.stderr.isatty():
+            from tqdm import tqdm
+
+            self._bar = tqdm(total=steps, bar_format="{desc:<32}|{bar}| {elapsed}", leave=False)
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def step(self, text: str) -> None:
+        """Say what comes next."""
+        if self._bar is not None:
+            self._bar.set_description_str(text)
+            self._bar.update()
+
+
+@dataclass(frozen=True, eq=False)
+class Whereabouts:
+    """Steps 1 and 2.
+
+    Attributes:
+        intake: The logs.
+        parts: Of the logs.
+        fitted: How many of them may be fitted, the first ones.
+        measurements: One per log.
+        predictions: By the model as it is.
+        rows: Of `where.csv`.
+    """
+
+    intake: Intake
+    parts: Parts
+    fitted: int
+    measurements: tuple[Measurement, ...]
+    predictions: tuple[Prediction, ...]
+    rows: tuple[Where, ...]
+
+
+def find_where(
+    given: Setup, model: MachineModel, intake: Intake, parts: Parts, fitted: int
+) -> Whereabouts:
+    """Simulate every log's own motion and table the gap.
+
+    Raises:
+        GapError: The model does not predict what the log measures.
+    """
+    measurements = observe(model, intake.prepared, parts)
+    predictions = predict(model, measurements)
+    rows = where(measurements, predictions, legs_of(given))
+    return Whereabouts(intake, parts, fitted, measurements, predictions, rows)
+
+
+def predict(model: MachineModel, measurements: Sequence[Measurement]) -> tuple[Prediction, ...]:
+    """What a model says the sensors of every log show."""
+    return tuple(Simulator(m).predict(model) for m in measurements)
+
+
+def legs_of(given: Setup) -> dict[str, int] | None:
+    """Joint to its leg's column; None without legs on the ground."""
+    if given.robot is None or not given.robot.floating:
+        return None
+    legs = given.robot.spec.legs
+    return {joint: k for k, leg in enumerate(legs) for joint in leg.joints}

@@ -1,0 +1,84 @@
+"""From the workflow's results to the rows of its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from pipeline.gap.circumstances import Where
+from pipeline.gap.effects.registry import effect_named
+from pipeline.gap.errors import EffectError
+from pipeline.gap.finding import Finding
+from pipeline.gap.model import MachineModel
+from pipeline.gap.verdict import Candidate, Found
+from reports.table import Table
+from reports.tables import gap as tables
+
+JOINED = "+"
+
+
+def quality_table(findings: Sequence[Finding]) -> Table:
+    """Rows of `quality.csv`."""
+    return tables.quality([asdict(finding) for finding in findings])
+
+
+def where_table(rows: Sequence[Where]) -> Table:
+    """Rows of `where.csv`."""
+    return tables.where([asdict(row) for row in rows])
+
+
+def candidates_table(candidates: Sequence[Candidate], model: MachineModel) -> Table:
+    """Rows of `candidates.csv`."""
+    rows = [
+        {
+            "effect": c.effect,
+            "joint": joint_of(model, c.effect, c.place),
+            "place": JOINED.join(c.place),
+            "heldout_before": c.before,
+            "heldout_after": c.after,
+            "unit": c.unit,
+            "identifiable": c.identifiable,
+            "verdict": c.verdict,
+            "reason": c.reason,
+        }
+        for c in candidates
+    ]
+    return tables.candidates(rows)
+
+
+def found_table(found: Sequence[Found], model: MachineModel) -> Table:
+    """Rows of `found.csv`, one per parameter."""
+    rows: list[dict[str, Any]] = []
+    for f in found:
+        for p in f.parameters:
+            rows.append(
+                {
+                    "order": f.order,
+                    "effect": f.effect,
+                    "joint": joint_of(model, f.effect, f.place),
+                    "parameter": p.name,
+                    "value": p.value,
+                    "ci_low": p.low,
+                    "ci_high": p.high,
+                    "unit": p.unit,
+                    "gap_before": f.gap_before,
+                    "gap_after": f.gap_after,
+                    "gap_unit": f.unit,
+                    "noise_floor": f.noise_floor,
+                }
+            )
+    return tables.found(rows)
+
+
+def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
+    """The joint at which an effect acts: that carries its link; empty where it acts on all."""
+    if not place:
+        return ""
+    try:
+        kind = effect_named(effect).place_kind
+    except EffectError:
+        kind = "joint"
+    if kind == "link":
+        return model.links.get(place[0], "")
+    return JOINED.join(name for name in place if name in model.joints)
