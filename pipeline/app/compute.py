@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from pipeline.robot import Robot
 from pipeline.stability import stability_margins
 
 Array = NDArray[np.float64]
+#: From the demand of bodies and ground to that on the actuators.
+Adjust = Callable[[Segment, JointDemand], JointDemand]
 
 
 @dataclass(frozen=True)
@@ -86,7 +88,10 @@ def joint_series(demand: MotionDemand) -> ShaftSeries:
 
 
 def stand(
-    robot: Robot, chains: Mapping[str, Chain], feet: tuple[str, ...] | None = None
+    robot: Robot,
+    chains: Mapping[str, Chain],
+    feet: tuple[str, ...] | None = None,
+    adjust: Adjust | None = None,
 ) -> Standing:
     """Stand still and hold.
 
@@ -94,6 +99,7 @@ def stand(
         robot: With a floating base.
         chains: By alternative.
         feet: Legs that stand; the robot file's by default.
+        adjust: Changes the demand on the actuators; see `pipeline.app.effects`.
 
     Raises:
         TippingError: A foot would have to pull.
@@ -101,6 +107,8 @@ def stand(
     segment = standing_posture(robot, feet)
     demand, contacts = segment_demand(robot, segment)
     assert contacts is not None
+    if adjust is not None:
+        demand = adjust(segment, demand)
     torque = demand.torque[0]
     return Standing(
         segment, demand, contacts, {name: chain.holding(torque) for name, chain in chains.items()}
@@ -114,6 +122,7 @@ def walk(
     samples: int,
     quasi_static: bool = False,
     regeneration: Regeneration | None = None,
+    adjust: Adjust | None = None,
 ) -> Walking:
     """Walk one cycle.
 
@@ -123,6 +132,7 @@ def walk(
         samples: Per segment.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy; none by default.
+        adjust: Changes the demand on the actuators; see `pipeline.app.effects`.
 
     Raises:
         TippingError: A foot would have to pull.
@@ -130,6 +140,9 @@ def walk(
     policy = regeneration or Regeneration()
     motion = tripod_gait(robot, samples=samples)
     demand = motion_demand(robot, motion, quasi_static=quasi_static)
+    if adjust is not None:
+        pairs = zip(motion.segments, demand.segments, strict=True)
+        demand = replace(demand, segments=tuple(adjust(segment, part) for segment, part in pairs))
     series = joint_series(demand)
     results = {name: chain.moving(series) for name, chain in chains.items()}
     return Walking(
