@@ -1,0 +1,96 @@
+"""What effects cost: electrical energy per gait cycle and the break-even, with and without them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from actuators.chain import Chain
+from pipeline.app.compute import Adjust, stand, walk
+from pipeline.app.effects import Effects
+from pipeline.robot import Robot
+
+#: Samples per segment of the gait: energies within 1 % and a fraction of a second.
+SAMPLES = 151
+PAIR = ("reversible", "irreversible")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Energies of the whole robot with one alternative.
+
+    Attributes:
+        cycle: Electrical energy of one gait cycle [J].
+        standing: Electrical power, standing as the robot file says [W].
+    """
+
+    cycle: float
+    standing: float
+
+
+@dataclass(frozen=True)
+class EnergyChange:
+    """Before and after effects.
+
+    Attributes:
+        before: By alternative.
+        after: By alternative.
+        break_even_before: Fraction of time standing above which the irreversible actuator uses
+            less; NaN where there is none.
+        break_even_after: The same with the effects.
+    """
+
+    before: Mapping[str, Cost]
+    after: Mapping[str, Cost]
+    break_even_before: float
+    break_even_after: float
+
+
+def energy_change(robot: Robot, chains: Mapping[str, Chain], effects: Effects) -> EnergyChange:
+    """Walk and stand with and without effects.
+
+    Args:
+        robot: With a floating base and a gait.
+        chains: By alternative.
+        effects: Of a model file.
+
+    Raises:
+        TippingError: With the effects a foot would have to pull.
+    """
+    period = robot.spec.parameters["gait_period"]
+    before = _costs(robot, chains, None)
+    after = _costs(effects.robot, effects.chains(chains), effects.demand)
+    return EnergyChange(before, after, break_even(before, period), break_even(after, period))
+
+
+def _costs(robot: Robot, chains: Mapping[str, Chain], adjust: Adjust | None) -> dict[str, Cost]:
+    walking = walk(robot, chains, samples=SAMPLES, adjust=adjust)
+    standing = stand(robot, chains, adjust=adjust)
+    return {
+        name: Cost(
+            float(walking.supplies[name].supplied_energy.sum()),
+            float(standing.holding[name].power.sum()),
+        )
+        for name in chains
+    }
+
+
+def break_even(costs: Mapping[str, Cost], period: float) -> float:
+    """Fraction of time standing at which both alternatives of `PAIR` cost the same.
+
+    (1 - f) dW / T = f dP with dW the extra walking energy of the irreversible actuator and dP the
+    power it saves standing. NaN where it never costs more walking, or saves nothing standing.
+
+    Args:
+        costs: By alternative.
+        period: Of the gait [s].
+    """
+    if any(name not in costs for name in PAIR):
+        return math.nan
+    reversible, irreversible = (costs[name] for name in PAIR)
+    extra = (irreversible.cycle - reversible.cycle) / period  # [W]
+    saved = reversible.standing - irreversible.standing  # [W]
+    if extra <= 0 or saved <= 0:
+        return math.nan
+    return extra / (extra + saved)
