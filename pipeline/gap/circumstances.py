@@ -117,13 +117,13 @@ def _bands(
     """Every way of sorting one joint's rows: (by, band) to rows, each (N,)."""
     v, q, load = m.v[:, j], m.q[:, j], prediction.torque[:, j]
     rest = m.rest_speed[j] if m.rest_speed.size else 0.0
-    everything = np.ones(len(m), dtype=np.bool_)
+    everything = m.mask[:, j]
     out: dict[tuple[str, str], Mask] = {(WHOLE, "all"): everything}
     if m.standing is not None and legs is not None and m.joints[j] in legs:
         stands = m.standing[:, legs[m.joints[j]]]
         out["phase", "support"], out["phase", "transfer"] = stands, ~stands
     out["direction", "positive"], out["direction", "negative"] = v > rest, v < -rest
-    moving = np.abs(v) > rest
+    moving = everything & (np.abs(v) > rest)
     out |= _thirds("speed", ("slow", "middle", "fast"), np.abs(v), moving)
     out |= _thirds("load", ("light", "middle", "heavy"), np.abs(load), everything)
     out["power", "driving"] = moving & (v * load > 0)

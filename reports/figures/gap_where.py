@@ -62,7 +62,7 @@ def where_map_figure(
         raise FigureError("where-map: no group; give at least 1")
     widths = [len(g.bands) for g in groups]
     figure = new_figure(
-        max(6.5, 0.52 * sum(widths) + 0.2 * len(groups) + 2.4), 0.3 * len(joints) + 2.3
+        max(6.5, 0.44 * sum(widths) + 0.2 * len(groups) + 2.4), 0.3 * len(joints) + 2.3
     )
     axes = figure.subplots(1, len(groups), sharey=True, width_ratios=widths, squeeze=False)[0]
     finite = np.concatenate([g.ratio[np.isfinite(g.ratio)] for g in groups])

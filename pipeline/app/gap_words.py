@@ -1,0 +1,188 @@
+"""The answer of a run of `gap` in words."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Sequence
+
+from pipeline.app.gap_energy import PAIR, EnergyChange
+from pipeline.gap.circumstances import WHOLE, Where
+from pipeline.gap.effects.registry import effect_named
+from pipeline.gap.errors import EffectError
+from pipeline.gap.verdict import Estimate, Found, Naming, Remainder
+from reports.page import cell_text
+
+#: A band is worth a word when its gap is this many times the joint's.
+STANDS_OUT = 1.25
+#: A change of energy below this is none, as a share.
+NO_CHANGE = 5e-4
+
+
+def place_text(place: Sequence[str]) -> str:
+    """A place as a reader sees it."""
+    return " with ".join(place) if place else "the whole machine"
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A rounded number."""
+    return cell_text(float(value), digits)
+
+
+def where_words(rows: Sequence[Where]) -> str:
+    """Where the model as it was misses most."""
+    whole = [row for row in rows if row.by == WHOLE]
+    if not whole:
+        return "No joint has enough rows to compare."
+    worst = whole[0]
+    ratio = worst.gap / worst.noise_floor if worst.noise_floor > 0 else math.inf
+    text = (
+        f"**Where:** model and machine disagree most at **{worst.joint}**: {number(worst.gap)} "
+        f"{worst.unit} root mean square, {number(ratio, 2)} times the noise floor and "
+        f"{worst.share_of_total:.0%} of the squared gap of all joints"
+    )
+    bands = [
+        row
+        for row in rows
+        if row.joint == worst.joint and row.by != WHOLE and row.gap > STANDS_OUT * worst.gap
+    ]
+    if bands:
+        top = max(bands, key=lambda row: row.gap)
+        text += f"; it is largest sorted by {top.by}: {top.band} ({number(top.gap)} {worst.unit})"
+    return text + "."
+
+
+def what_words(naming: Naming) -> str:
+    """What is missing."""
+    if not naming.found:
+        if naming.unexplained:
+            return "**What:** no effect of the catalogue explains it."
+        return (
+            f"**What:** nothing is missing. {naming.tried} candidates were tried and none is "
+            "needed beyond the stated tolerances of the machine's parts."
+        )
+    parts = [
+        f"**{f.effect} at {place_text(f.place)}** ({parameters_text(f.parameters)})"
+        for f in naming.found
+    ]
+    text = f"**What:** the model lacks {_listed(parts)}."
+    first = naming.found[0]
+    return f"{text} {meaning(first.effect)}" if len(naming.found) == 1 else text
+
+
+def meaning(effect: str) -> str:
+    """One sentence on what an effect is."""
+    try:
+        doc = inspect.getdoc(type(effect_named(effect))) or ""
+    except EffectError:
+        return ""
+    line = doc.split("\n", 1)[0]
+    return f"`{effect}`: {line[0].lower()}{line[1:]}" if line else ""
+
+
+def parameters_text(parameters: Sequence[Estimate]) -> str:
+    """Values with their intervals."""
+    return "; ".join(
+        f"{p.name} {number(p.value)}{_unit(p.unit)}, 95 % interval {number(p.low)} to "
+        f"{number(p.high)}"
+        for p in parameters
+    )
+
+
+def shrink_words(found: Sequence[Found]) -> str:
+    """How much smaller the gap is on data that had no say."""
+    parts = []
+    for f in found:
+        share = removed(f.gap_before, f.gap_after, f.noise_floor)
+        closed = "" if share is None else f", {share:.0%} of what could be removed"
+        parts.append(
+            f"with {f.effect} at {place_text(f.place)} it falls from {number(f.gap_before)} to "
+            f"{number(f.gap_after)} {f.unit}{closed} (noise floor {number(f.noise_floor)} {f.unit})"
+        )
+    return (
+        "**How much smaller:** on data that had no say in the choice the gap shrinks: "
+        f"{'; '.join(parts)}."
+    )
+
+
+def removed(before: float, after: float, noise: float) -> float | None:
+    """Share of the gap above the noise floor that an effect removes; None where there is none."""
+    above = before**2 - noise**2
+    if above <= 0:
+        return None
+    left = max(after**2 - noise**2, 0.0)
+    return 1.0 - math.sqrt(min(left / above, 1.0))
+
+
+def energy_words(change: EnergyChange, alternative: str) -> str:
+    """What it costs in joules, and the break-even."""
+    names = list(dict.fromkeys((*PAIR, alternative)))
+    parts = []
+    for name in names:
+        if name not in change.before:
+            continue
+        old, new = change.before[name].cycle, change.after[name].cycle
+        if abs(new - old) <= NO_CHANGE * old:
+            parts.append(f"{name} stays at {number(old, 4)} J")
+        else:
+            parts.append(f"{name} {number(old, 4)} to {number(new, 4)} J ({new - old:+.2g} J)")
+    text = f"**What it costs:** one gait cycle of the whole robot, electrical: {'; '.join(parts)}."
+    before, after = change.break_even_before, change.break_even_after
+    if math.isnan(before) and math.isnan(after):
+        return text + " There is no break-even with or without it."
+    return text + (
+        " The irreversible actuator pays above "
+        f"{_share(before)} of the time standing without it and above {_share(after)} with it."
+    )
+
+
+def left_words(remainders: Sequence[Remainder]) -> str:
+    """What stays unexplained and what it looks like."""
+    left = [r for r in remainders if r.significant]
+    if not left:
+        return "**What is left** is noise: nothing significant stays unexplained."
+    parts = [
+        f"{r.joint}: {number(r.error)} {r.unit}, {number(r.error / r.noise_floor, 2)} times the "
+        f"noise floor{'; ' + r.description if r.description else ''}"
+        for r in sorted(left, key=lambda r: -r.error / max(r.noise_floor, 1e-300))
+    ]
+    more = f" and {len(parts) - 3} more joints" if len(parts) > 3 else ""
+    return f"**What stays unexplained:** {'. '.join(parts[:3])}{more}."
+
+
+def rival_words(found: Sequence[Found], decides: bool) -> str:
+    """Effects that cannot be told apart, and what would decide; empty without any."""
+    parts = []
+    for f in found:
+        if f.rivals:
+            others = _listed([f"{name} at {place_text(place)}" for name, place in f.rivals])
+            parts.append(
+                f"{f.effect} at {place_text(f.place)} cannot be told from {others} on this motion"
+            )
+        if f.doubtful:
+            parts.append(f"{f.effect} at {place_text(f.place)} is doubtful: {f.doubtful}")
+    if not parts:
+        return ""
+    text = f"**Not decided:** {'; '.join(parts)}."
+    if any(f.rivals for f in found):
+        text += (
+            " Log the motion of [deciding_motion.csv](deciding_motion.csv), which stays inside the "
+            "robot's limits, and give it with `--holdout`."
+            if decides
+            else " A motion that would decide: "
+            + "; ".join(dict.fromkeys(f.excitation for f in found if f.rivals))
+            + "."
+        )
+    return text
+
+
+def _listed(items: Sequence[str]) -> str:
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def _unit(unit: str) -> str:
+    return "" if unit in ("", "1") else f" {unit}"
+
+
+def _share(value: float) -> str:
+    return "no share" if math.isnan(value) else f"{value:.1%}"
