@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.gap.effects.base import Effect, Place
+from pipeline.gap.effects.base import Coordinate, Place
 from pipeline.gap.errors import NamingError
 from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement
 from pipeline.gap.model import MachineModel
@@ -21,6 +22,21 @@ from pipeline.gap.simulate import Prediction, Simulator
 
 Array = NDArray[np.float64]
 Column = Mapping[int, Array]
+
+
+class Editing(Protocol):
+    """What has coordinates and changes a model: an effect."""
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """As fitted."""
+
+    def edit(
+        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
+    ) -> MachineModel:
+        """The changed model."""
+
+
 #: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
 ROWS_PER_PERIOD = 4.0
 #: Most informative rows of all logs together.
@@ -61,7 +77,7 @@ class Bench:
             sigma: Shape (J, C).
         """
         m = self.measurement
-        smooth = m.lowpass(values)[self.rows]
+        smooth = m.smooth(values)[self.rows]
         out = {}
         for k, j in enumerate(joints):
             part = smooth[:, k] * (self.weight / sigma[j])
@@ -127,7 +143,7 @@ def make_benches(measurements: Sequence[Measurement]) -> tuple[Bench, ...]:
 def effect_columns(
     bench: Bench,
     base: Prediction,
-    effect: Effect,
+    effect: Editing,
     place: Place,
     shape: Mapping[str, float],
     sigma: Array,
@@ -158,7 +174,7 @@ def effect_columns(
 
 
 def _edit(
-    effect: Effect,
+    effect: Editing,
     base: Prediction,
     place: Place,
     x: Mapping[str, float],
@@ -170,7 +186,7 @@ def _edit(
 def residual(bench: Bench, prediction: Prediction, sigma: Array) -> dict[int, Array]:
     """Measured less predicted effort, whitened, of every joint."""
     m = bench.measurement
-    predicted = m.lowpass(prediction.effort)
+    predicted = m.smooth(prediction.effort)
     rows = bench.rows
     out = {}
     for j in range(len(m.joints)):

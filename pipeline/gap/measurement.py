@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+_SHORT = 300  # samples of a kernel up to which summing is quicker than transforming
 FIT, CHOOSE, PROVE, UNUSED = 0, 1, 2, -1
 
 
@@ -22,31 +23,33 @@ def unfiltered(x: Array) -> Array:
 class Measurement:
     """Samples of the machine's motion and of what it cost, at one bandwidth.
 
-    Attributes:
-        name: Of the log.
-        time: Shape (N,) [s].
-        joints: Names of the columns.
-        q: Position as measured, shape (N, J) [rad].
-        v: Velocity, shape (N, J) [rad/s].
-        a: Acceleration, shape (N, J) [rad/s^2].
-        channels: Compared channels, the log's own effort first, e.g. ``("current", "voltage")``.
-            With a measured current, voltage is predicted from that current and the speed.
-        effort: Shape (N, J, C) in the channels' units.
-        noise: Standard deviation of the noise in the bandwidth, shape (J, C).
-        mask: Samples that count, shape (N, J).
-        part: FIT, CHOOSE, PROVE or UNUSED, shape (N,).
-        block: Number of the block, shape (N,); blocks are what is resampled.
-        pieces: Stretches without a gap.
-        lowpass: Brings a series (N, ...) of this grid to the bandwidth.
-        bandwidth: Cut-off of that low-pass [Hz].
-        at_motor: Whether the encoder sits on the motor's side of the gear.
-        rest_speed: Speed within which friction passes from one sign to the other, (J,) [rad/s].
-        base_roll: Shape (N,) [rad], or None for level.
-        base_pitch: Likewise.
-        standing: Which feet stand, shape (N, F), or None.
-        foot_force: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None
-            where the ground's forces are computed.
-        sha256: Of the log.
+        Attributes:
+            name: Of the log.
+            time: Shape (N,) [s].
+            joints: Names of the columns.
+            q: Position as measured, shape (N, J) [rad].
+            v: Velocity, shape (N, J) [rad/s].
+            a: Acceleration, shape (N, J) [rad/s^2].
+            channels: Compared channels, the log's own effort first, e.g. ``("current", "voltage")``.
+                With a measured current, voltage is predicted from that current and the speed.
+            effort: Shape (N, J, C) in the channels' units.
+            noise: Standard deviation of the noise in the bandwidth, shape (J, C).
+            mask: Samples that count, shape (N, J).
+            part: _SHORT = 300  # samples of a kernel up to which summing is quicker than transforming
+    FIT, CHOOSE, PROVE or UNUSED, shape (N,).
+            block: Number of the block, shape (N,); blocks are what is resampled.
+            pieces: Stretches without a gap.
+            lowpass: Brings a series (N, ...) of this grid to the bandwidth.
+            kernel: The same as weights of neighbouring samples, shape (odd,), or None.
+            bandwidth: Cut-off of that low-pass [Hz].
+            at_motor: Whether the encoder sits on the motor's side of the gear.
+            rest_speed: Speed within which friction passes from one sign to the other, (J,) [rad/s].
+            base_roll: Shape (N,) [rad], or None for level.
+            base_pitch: Likewise.
+            standing: Which feet stand, shape (N, F), or None.
+            foot_force: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None
+                where the ground's forces are computed.
+            sha256: Of the log.
     """
 
     name: str
@@ -63,6 +66,7 @@ class Measurement:
     block: NDArray[np.intp]
     pieces: tuple[slice, ...]
     lowpass: Callable[[Array], Array] = unfiltered
+    kernel: Array | None = None
     bandwidth: float = float("inf")
     at_motor: bool = False
     rest_speed: Array = field(default_factory=lambda: np.zeros(0))
@@ -79,6 +83,17 @@ class Measurement:
     def rate(self) -> float:
         """Samples per second [Hz]."""
         return 1.0 / float(np.median(np.diff(self.time)))
+
+    def smooth(self, x: Array) -> Array:
+        """A series (N, ...) at the bandwidth; quick for short kernels, the same but at the ends."""
+        if self.kernel is None or self.kernel.size > _SHORT:
+            return self.lowpass(x)
+        from scipy.ndimage import convolve1d
+
+        out = np.empty_like(x)
+        for piece in self.pieces:
+            out[piece] = convolve1d(x[piece], self.kernel, axis=0, mode="nearest")
+        return out
 
     def derivative(self, x: Array) -> Array:
         """Rate of change of a series (N, ...), piece by piece."""

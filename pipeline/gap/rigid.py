@@ -50,35 +50,70 @@ def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
     return model
 
 
-def rigid_torque(
-    machine: MachineModel, m: Measurement, motion: tuple[Array, Array, Array]
-) -> Array:
-    """Joint torques, shape (N, J) [N*m].
+class RigidBodies:
+    """Inverse dynamics of many models along one measured motion.
 
-    Args:
-        machine: Its bodies, ground and legs.
-        m: Base, contact and forces.
-        motion: Position, velocity and acceleration of the joints, each (N, J).
+    What depends on the motion and the measured forces alone is computed once.
     """
-    model = changed_model(machine.rigid, machine.bodies)
-    n = motion[0].shape[0]
-    index_q = np.array([model.joints[model.getJointId(j)].idx_q for j in machine.joints])
-    index_v = np.array([model.joints[model.getJointId(j)].idx_v for j in machine.joints])
-    q = np.tile(pin.neutral(model), (n, 1))
-    v, a = np.zeros((n, model.nv)), np.zeros((n, model.nv))
-    _place_joints(model, q, index_q, motion[0])
-    v[:, index_v], a[:, index_v] = motion[1], motion[2]
-    rotation: Array | None = None
-    if machine.floating:
-        rotation = _base_rotation(m, n)
-        q[:, 3:7] = _quaternions(m, n)
-        v[:, :3], a[:, :3] = _base_motion(machine.legs, m, motion)
-    pool = pin.ModelPool(model, 1)
-    generalised = np.asarray(pin.rneaInParallel(1, pool, q.T, v.T, a.T)).T.reshape(v.shape)
-    torque: Array = generalised[:, index_v]
-    if machine.floating and machine.legs is not None:
-        torque = torque - _ground_torque(machine, m, motion[0], generalised[:, :6], rotation)
-    return torque
+
+    def __init__(self, measurement: Measurement) -> None:
+        self.measurement = measurement
+        self._base: tuple[Array, tuple[Array, Array]] | None = None
+        self._ground: tuple[Array, object, Array] | None = None
+
+    def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
+        """Joint torques, shape (N, J) [N*m].
+
+        Args:
+            machine: Its bodies, ground and legs.
+            motion: Position, velocity and acceleration of the joints, each (N, J).
+        """
+        m = self.measurement
+        model = changed_model(machine.rigid, machine.bodies)
+        n = motion[0].shape[0]
+        index_q = np.array([model.joints[model.getJointId(j)].idx_q for j in machine.joints])
+        index_v = np.array([model.joints[model.getJointId(j)].idx_v for j in machine.joints])
+        q = np.tile(pin.neutral(model), (n, 1))
+        v, a = np.zeros((n, model.nv)), np.zeros((n, model.nv))
+        _place_joints(model, q, index_q, motion[0])
+        v[:, index_v], a[:, index_v] = motion[1], motion[2]
+        if machine.floating:
+            q[:, 3:7] = _quaternions(m, n)
+            v[:, :3], a[:, :3] = self._base_motion(machine, motion)
+        pool = pin.ModelPool(model, 1)
+        generalised = np.asarray(pin.rneaInParallel(1, pool, q.T, v.T, a.T)).T.reshape(v.shape)
+        torque: Array = generalised[:, index_v]
+        if machine.floating and machine.legs is not None:
+            torque = torque - self._ground_torque(machine, motion[0], generalised[:, :6])
+        return torque
+
+    def _base_motion(
+        self, machine: MachineModel, motion: tuple[Array, Array, Array]
+    ) -> tuple[Array, Array]:
+        if self._base is None or self._base[0] is not motion[0]:
+            computed = _base_motion(machine.legs, self.measurement, motion)
+            if motion[0] is not self.measurement.q:
+                return computed
+            self._base = (motion[0], computed)
+        return self._base[1]
+
+    def _ground_torque(self, machine: MachineModel, q: Array, wrench: Array) -> Array:
+        m = self.measurement
+        rotation = _base_rotation(m, q.shape[0])
+        if legs_are_separate(machine, m) and q is m.q:
+            # Measured forces ask for nothing of the bodies.
+            if self._ground is None or self._ground[1] != machine.bodies.squeeze:
+                torque = _ground_torque(machine, m, q, wrench, rotation)
+                self._ground = (q, machine.bodies.squeeze, torque)
+            return self._ground[2]
+        return _ground_torque(machine, m, q, wrench, rotation)
+
+
+def legs_are_separate(machine: MachineModel, m: Measurement) -> bool:
+    """Whether a body of one leg leaves the torques of all other legs as they are."""
+    if not machine.floating:
+        return machine.legs is not None
+    return m.foot_force is not None and not bool(np.isnan(m.foot_force[0]).any())
 
 
 def _place_joints(model: pin.Model, q: Array, index_q: NDArray[np.intp], position: Array) -> None:

@@ -16,7 +16,7 @@ from actuators.shaft import ShaftSeries
 from pipeline.gap.errors import ModelError
 from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import JointModel, MachineModel
-from pipeline.gap.rigid import rigid_torque
+from pipeline.gap.rigid import RigidBodies
 
 Array = NDArray[np.float64]
 #: Torque over which backlash passes from one flank to the other, as a share of the RMS torque.
@@ -33,6 +33,7 @@ class Prediction:
         torque: Demanded of the actuators by the rigid bodies, shape (N, J) [N*m].
         motor_torque: Of the motors brought to the joint side, shape (N, J) [N*m].
         effort: Shape (N, J, C) in the measurement's channels.
+        computed: Joints computed for it; the others were taken over.
     """
 
     model: MachineModel
@@ -40,6 +41,7 @@ class Prediction:
     torque: Array
     motor_torque: Array
     effort: Array
+    computed: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +62,7 @@ class Simulator:
 
     def __init__(self, measurement: Measurement) -> None:
         self.measurement = measurement
+        self._bodies = RigidBodies(measurement)
 
     def predict(self, model: MachineModel, near: Prediction | None = None) -> Prediction:
         """Predict with a model.
@@ -91,14 +94,15 @@ class Simulator:
         motor = np.empty((n, j)) if near is None else near.motor_torque.copy()
         for k in self._order(model, changed):
             motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
-        return Prediction(model, q, torque, motor, effort)
+        return Prediction(model, q, torque, motor, effort, changed)
 
     def difference(self, base: Prediction, model: MachineModel) -> Difference:
         """Prediction of a model less that of another, at the joints where they differ."""
         new = self.predict(model, base)
-        delta = new.effort - base.effort
-        joints = tuple(np.flatnonzero(np.abs(delta).max(axis=(0, 2)) > 0).tolist())
-        return Difference(joints, delta[:, joints])
+        joints = list(new.computed)
+        delta = new.effort[:, joints] - base.effort[:, joints]
+        live = [k for k in range(len(joints)) if delta[:, k].any()]
+        return Difference(tuple(joints[k] for k in live), delta[:, live])
 
     def _changed(self, model: MachineModel, near: Prediction | None) -> tuple[int, ...]:
         if near is None:
@@ -140,7 +144,7 @@ class Simulator:
         m = self.measurement
         offset = np.array([a.encoder_offset for a in model.actuators])
         q = m.q - offset if offset.any() else m.q
-        torque = rigid_torque(model, m, (q, m.v, m.a))
+        torque = self._bodies.torque(model, (q, m.v, m.a))
         if not m.at_motor or not any(a.wound for a in model.actuators):
             return q, torque
         # The encoder sits on the motor: the link lags behind by what winds up.
@@ -151,7 +155,7 @@ class Simulator:
         rate = m.derivative(wind)
         bend = m.derivative(rate)
         q = q - wind
-        return q, rigid_torque(model, m, (q, m.v - rate, m.a - bend))
+        return q, self._bodies.torque(model, (q, m.v - rate, m.a - bend))
 
     def _with_position_torque(self, a: JointModel, q: Array, torque: Array) -> Array:
         for law in a.position_torques:

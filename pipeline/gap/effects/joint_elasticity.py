@@ -9,6 +9,10 @@ from pipeline.gap.effects.base import Coordinate, Effect, Parameter, Place, Valu
 from pipeline.gap.model import MachineModel
 
 
+#: Wind-up of what a robot file calls rigid, one standard deviation [rad/(N*m)].
+COMPLIANCE_TOLERANCE = 1.2e-5
+
+
 class JointElasticity(Effect):
     """A spring between motor and joint: one turns ahead of the other by torque / stiffness.
 
@@ -27,6 +31,10 @@ class JointElasticity(Effect):
         actuator = model.actuator(place[0])
         compliance = actuator.compliance + x["compliance"]
         return model.with_actuator(replace(actuator, compliance=compliance))
+
+    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
+        """What a transmission that counts as rigid may wind up."""
+        return {"compliance": COMPLIANCE_TOLERANCE}
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Stiffness."""

@@ -1,0 +1,219 @@
+"""Naming: effects compete, the best is added, the rest compete again for what is left.
+
+Each round screens all candidates, tries the best few on *fit* and *choose*, and accepts at most
+one. `verdict` holds every threshold. *prove* has no say: it is looked at when all is decided.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.gap import verdict as limits
+from pipeline.gap.effects.base import Effect, Place
+from pipeline.gap.effects.registry import catalogue
+from pipeline.gap.measurement import CHOOSE, FIT
+from pipeline.gap.problem import Accepted, Problem
+from pipeline.gap.screen import Score, Screen, refine, score_all
+from pipeline.gap.trial import Trial, joint_gain, try_candidate
+
+Array = NDArray[np.float64]
+Key = tuple[str, Place]
+_TRIED = 8  # candidates tried in earnest per round
+_NEWTON = 3  # refits after an acceptance
+
+
+@dataclass(frozen=True)
+class Round:
+    """One acceptance.
+
+    Attributes:
+        winner: The effect.
+        trial: How it did.
+        rivals: Effects at places that explain the log as well.
+    """
+
+    winner: Key
+    trial: Trial
+    rivals: tuple[Key, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Effects accepted one after another.
+
+    Attributes:
+        problem: With all accepted effects.
+        rounds: One per effect that is still accepted, in order of acceptance.
+        first: Scores of the first round, by effect and place: every candidate once.
+        last: Scores of the last round.
+        trials: Best trial of each candidate tried in earnest.
+        tried: Candidates screened, shapes not counted.
+    """
+
+    problem: Problem
+    rounds: tuple[Round, ...]
+    first: tuple[Score, ...]
+    last: tuple[Score, ...]
+    trials: dict[Key, Trial]
+    tried: int
+
+
+def select(problem: Problem) -> Selection:
+    """Accept effects until none is needed any more.
+
+    Args:
+        problem: Without effects, its noise level decided.
+    """
+    rounds: list[Round] = []
+    trials: dict[Key, Trial] = {}
+    first: tuple[Score, ...] = ()
+    refused: set[Key] = set()
+    while True:
+        screen = Screen(problem)
+        held = [(a.effect.name, a.place) for a in problem.accepted]
+        scores = score_all(screen, catalogue(problem.current()), skip=held)
+        if not first:
+            first = tuple(scores)
+        tried = len(first)
+        if len(problem.accepted) >= limits.MOST_EFFECTS:
+            break
+        promising = [s for s in scores if (s.effect.name, s.place) not in refused][:_TRIED]
+        best = [refine(screen, s) for s in promising if s.gain > 0.5 * limits.LEAST_GAIN]
+        made = [try_candidate(problem, s) for s in best]
+        for t in made:
+            trials.setdefault(t.key, t)
+        good = [t for t in made if acceptable(problem, t, tried)]
+        if not good:
+            break
+        winner = _preferred(problem, good)
+        rivals = _rivals(problem, winner, made)
+        added = Accepted(
+            winner.score.effect, winner.score.place, winner.score.x, winner.score.shape
+        )
+        candidate = refit(problem.with_accepted([*problem.accepted, added]))
+        candidate = _pruned(candidate)
+        if not any(a.effect is added.effect and a.place == added.place for a in candidate.accepted):
+            refused.add(winner.key)
+            continue
+        rounds.append(Round(winner.key, winner, rivals))
+        problem = candidate
+    kept = {(a.effect.name, a.place) for a in problem.accepted}
+    rounds = [r for r in rounds if r.winner in kept]
+    return Selection(problem, tuple(rounds), first, tuple(scores), trials, tried)
+
+
+def acceptable(problem: Problem, t: Trial, tried: int) -> bool:
+    """Whether a candidate's case stands by itself."""
+    from scipy.stats import chi2
+
+    tolerance = t.score.effect.tolerance(problem.model, t.score.place)
+    alarm = float(chi2.isf(limits.FALSE_ALARM / max(tried, 1), max(t.freedom, 1)))
+    if tolerance:
+        # Tolerances explain a part already: the rest has to exceed them, and by its own size.
+        size = sum((t.score.x[k] / s) ** 2 for k, s in tolerance.items())
+        least = limits.TOLERANCE_SIGMAS**2 * max(t.freedom, 1)
+        return t.gain > least and size > least and t.significance > alarm
+    least = max(limits.LEAST_GAIN * t.scale, limits.LEAST_SHARE * t.expected)
+    return t.gain > least and t.held_out > 0.0 and t.significance > alarm
+
+
+def _threshold(gain: float) -> float:
+    """Difference of gains below which two explanations count as equally good."""
+    return max(limits.RIVAL_GAIN, limits.RIVAL_SHARE * gain)
+
+
+def _preferred(problem: Problem, good: Sequence[Trial]) -> Trial:
+    """The best candidate; of a family the most specific member that does as well."""
+    winner = max(good, key=lambda t: t.gain)
+    accepted = {(a.effect.name, a.place) for a in problem.accepted}
+    near = [t for t in good if winner.gain - t.gain < _threshold(winner.gain)]
+
+    def cost(t: Trial) -> tuple[int, float]:
+        # What takes the place of an accepted special case costs one effect less.
+        absorbs = any((name, t.score.place) in accepted for name in t.score.effect.contains)
+        return t.freedom - (2 if absorbs else 0), -t.gain
+
+    return min(near, key=cost)
+
+
+def _rivals(problem: Problem, winner: Trial, made: Sequence[Trial]) -> tuple[Key, ...]:
+    """Candidates that explain the same part of the log as well as the winner."""
+    out = []
+    for t in made:
+        if t is winner or winner.gain - t.gain >= _threshold(winner.gain):
+            continue
+        if _related(winner.score.effect, t.score.effect) and winner.score.place == t.score.place:
+            continue
+        together = joint_gain(problem, [winner.score, t.score])
+        # What still gains much beside the winner explains something else.
+        if together - winner.gain < max(_threshold(winner.gain), 0.5 * t.gain):
+            out.append(t.key)
+    return tuple(out)
+
+
+def _related(a: Effect, b: Effect) -> bool:
+    """Whether one is a special case of the other."""
+    return a.name in b.contains or b.name in a.contains
+
+
+def refit(problem: Problem) -> Problem:
+    """Re-estimate all accepted effects together with the tolerances on *fit* and *choose*."""
+    for _ in range(_NEWTON):
+        sums = problem.sums()
+        theta = sums.solve(sums.blocks(FIT, CHOOSE))
+        moved, largest = [], 0.0
+        for number, a in enumerate(problem.accepted):
+            step = theta[problem.span(number)]
+            x = {}
+            for c, d in zip(a.effect.coordinates, step, strict=True):
+                value = a.x[c.name] + float(d)
+                value = value if c.signed else max(value, 0.0)
+                largest = max(largest, abs(value - a.x[c.name]) / (abs(value) + c.step))
+                x[c.name] = value
+            moved.append(replace(a, x=x))
+        problem = problem.with_accepted(moved)
+        if largest < 1e-3:
+            break
+    return problem
+
+
+def _pruned(problem: Problem) -> Problem:
+    """Without effects that the others have made superfluous, one after another."""
+    while len(problem.accepted) > 1:
+        losses = [_needed(problem, number) for number in range(len(problem.accepted))]
+        weakest = int(np.argmin([loss / least for loss, least in losses]))
+        if losses[weakest][0] > losses[weakest][1]:
+            break
+        kept = [a for k, a in enumerate(problem.accepted) if k != weakest]
+        problem = refit(problem.with_accepted(kept))
+    return problem
+
+
+def _needed(problem: Problem, number: int) -> tuple[float, float]:
+    """Rise of the penalised misfit without one effect, and the least that keeps it."""
+    sums = problem.sums()
+    both = sums.blocks(FIT, CHOOSE)
+    a, span = problem.accepted[number], problem.span(number)
+    x0 = np.array([a.x[c.name] for c in a.effect.coordinates])
+    theta = sums.solve(both)
+    # At the estimate the residual contains the effect: without it, its step is minus its size.
+    rest = np.setdiff1d(np.arange(problem.names), np.arange(span.start, span.stop))
+    A = sums.H[both].sum(axis=0) + np.diag(sums.precision)
+    b = sums.h[both].sum(axis=0)
+    fixed = np.zeros(problem.names)
+    fixed[span] = -x0
+    from pipeline.gap.block_sums import solve_spd
+
+    fixed[rest] = solve_spd(
+        A[np.ix_(rest, rest)], b[rest] - A[np.ix_(rest, np.arange(problem.names))] @ fixed
+    )
+    rise = sums.objective(fixed, both) - sums.objective(theta, both)
+    tolerance = a.effect.tolerance(problem.model, a.place)
+    if tolerance:
+        return rise, limits.TOLERANCE_SIGMAS**2
+    scale = float(sums.loss(theta, both).sum()) / max(float(sums.count[both].sum()), 1.0)
+    return rise, limits.LEAST_GAIN * scale

@@ -1,0 +1,146 @@
+"""From prepared logs to what naming works on: channels, masks, speeds at which friction turns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.gap.measurement import Measurement
+from pipeline.gap.model import MachineModel
+from pipeline.gap.noise import smoother_noise
+from pipeline.gap.parts import Parts
+from pipeline.gap.prepare import Prepared
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Speed over which friction changes sign, as a share of the joint's fast speed.
+REST_SHARE: Final = 0.003
+#: ... and at least this many standard deviations of the velocity's noise.
+REST_SIGMAS: Final = 3.0
+#: Below this many rest speeds a joint counts as standing: friction may take any value there.
+STANDING: Final = 2.5
+#: How far to either side the filter sees with weight, in periods of its cut-off.
+SEEN: Final = 1.0
+
+
+def observe(
+    model: MachineModel, prepared: Sequence[Prepared], parts: Parts
+) -> tuple[Measurement, ...]:
+    """Measurements of several logs, in their order.
+
+    Args:
+        model: Whose joints and legs the columns are.
+        prepared: Logs at one bandwidth.
+        parts: Of the same logs.
+    """
+    rest = _rest_speed(prepared)
+    return tuple(
+        _observe(model, one, parts.part[k], parts.block[k].astype(np.intp), rest)
+        for k, one in enumerate(prepared)
+    )
+
+
+def _observe(
+    model: MachineModel,
+    one: Prepared,
+    part: NDArray[np.int8],
+    block: NDArray[np.intp],
+    rest: Array,
+) -> Measurement:
+    channels, effort, noise = _channels(model, one)
+    mask = one.mask & np.isfinite(effort).all(axis=2) & ~_standing(one, rest)
+    if one.torque_off is not None:
+        mask &= ~one.torque_off
+    standing, force = _contact(model, one)
+    if standing is not None:
+        mask &= ~one.near_event()[:, None]
+    return Measurement(
+        name=one.log.name,
+        time=one.time,
+        joints=one.joints,
+        q=one.q,
+        v=one.v,
+        a=one.a,
+        channels=channels,
+        effort=np.nan_to_num(effort),
+        noise=noise,
+        mask=mask,
+        part=part,
+        block=block,
+        pieces=one.pieces,
+        lowpass=one.lowpass,
+        kernel=one.settings.lowpass.kernels[0],
+        bandwidth=one.cutoff,
+        at_motor=one.log.position_source == "motor",
+        rest_speed=rest,
+        base_roll=one.base_roll,
+        base_pitch=one.base_pitch,
+        standing=standing,
+        foot_force=force,
+        sha256=one.log.sha256,
+    )
+
+
+def _channels(model: MachineModel, one: Prepared) -> tuple[tuple[str, ...], Array, Array]:
+    """Compared channel, and voltage beside a current: it tells speed and resistance apart."""
+    efforts, noise, names = [one.effort], [one.noise], [one.channel]
+    motors = all(a.motor is not None for a in model.actuators)
+    if one.channel == "current" and "voltage" in one.other and motors:
+        raw = one.other["voltage"]
+        good = np.isfinite(raw)
+        filled = np.where(good, raw, 0.0)
+        names.append("voltage")
+        efforts.append(np.where(good, one.lowpass(filled), np.nan))
+        noise.append(smoother_noise(filled, good, one.pieces, one.settings.lowpass, in_band=True))
+    floor = np.stack(noise, axis=1)
+    # A joint without enough good samples has no floor of its own; it is masked anyway.
+    usual = np.nanmedian(floor, axis=0)
+    return tuple(names), np.stack(efforts, axis=2), np.where(np.isfinite(floor), floor, usual)
+
+
+def _rest_speed(prepared: Sequence[Prepared]) -> Array:
+    """Shape (J,) [rad/s]."""
+    fast = np.max([np.quantile(np.abs(one.v), 0.95, axis=0) for one in prepared], axis=0)
+    slope = prepared[0].settings.lowpass.kernels[1]
+    gain = float(np.sqrt((slope**2).sum()))
+    noise = gain * np.nanmax([one.position_noise for one in prepared], axis=0)
+    return np.maximum(np.maximum(REST_SHARE * fast, REST_SIGMAS * np.nan_to_num(noise)), 1e-6)
+
+
+def _standing(one: Prepared, rest: Array) -> Mask:
+    """Rows whose filter sees a joint stop or turn back, shape (N, J).
+
+    There friction takes any value up to its level, and the filtered speed does not tell which: a
+    law of friction says nothing about such rows, and no name may rest on them.
+    """
+    still = np.abs(one.v) < STANDING * rest
+    reach = int(np.ceil(SEEN * one.rate / one.cutoff))
+    out = np.zeros_like(still)
+    for piece in one.pieces:
+        count = np.cumsum(np.pad(still[piece], ((reach + 1, reach), (0, 0))), axis=0)
+        out[piece] = count[2 * reach + 1 :] > count[: -2 * reach - 1]
+    return out
+
+
+def _contact(model: MachineModel, one: Prepared) -> tuple[Mask | None, Array | None]:
+    """Which feet stand, and forces; in the model's order of legs."""
+    if not model.floating or model.legs is None or one.contact is None:
+        return None, None
+    order = [one.contact.feet.index(leg) for leg in model.legs.names]
+    standing = one.contact.standing[:, order]
+    if one.foot_force is None:
+        return standing, None
+    feet = [one.log.feet.index(leg) for leg in model.legs.names]
+    force = one.foot_force[:, feet]
+    raw = one.log.foot_force
+    assert raw is not None
+    # A component that no column gives is NaN from end to end.
+    absent = np.asarray(np.isnan(raw).all(axis=0))[feet]
+    force = np.where(absent[None], np.nan, np.nan_to_num(force))
+    # Sensors of feet in the air show noise alone.
+    force = np.where(standing[..., None] | absent[None], force, 0.0)
+    return standing, np.where(standing[..., None], force, 0.0)

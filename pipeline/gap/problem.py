@@ -1,0 +1,277 @@
+"""The least-squares problem of naming: model so far, tolerances, accepted effects, columns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.gap.block_sums import BlockSums, Stack, block_sums, make_stack
+from pipeline.gap.columns import Bench, effect_columns, residual
+from pipeline.gap.effects.base import Effect, Place
+from pipeline.gap.measurement import CHOOSE, FIT
+from pipeline.gap.model import MachineModel
+from pipeline.gap.nuisance import Nuisance, grouped, nuisance_columns, nuisances
+from pipeline.gap.rigid import legs_are_separate
+from pipeline.gap.simulate import Prediction
+
+Array = NDArray[np.float64]
+Columns = Sequence[Mapping[int, Array]]
+
+
+#: Effects whose like at another leg leaves this leg alone, where legs are separate.
+_OF_ONE_LEG = ("link_mass", "center_of_mass_offset", "position_offset")
+
+
+class _Everywhere:
+    """An effect at several places at once, for their columns alone."""
+
+    def __init__(self, effect: Effect, places: Sequence[Place]) -> None:
+        self.coordinates = effect.coordinates
+        self._effect, self._places = effect, places
+
+    def edit(
+        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
+    ) -> MachineModel:
+        """The effect everywhere."""
+        for other in self._places:
+            model = self._effect.edit(model, other, x, shape)
+        return model
+
+
+def _joint_of(model: MachineModel, place: str) -> int:
+    """Column of the joint that a link or joint hangs on; -1 for the base."""
+    joint = place if place in model.joints else model.carrier(place)
+    return model.index(joint) if joint in model.joints else -1
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """An effect in the model.
+
+    Attributes:
+        effect: The effect.
+        place: Where.
+        x: Its coordinates.
+        shape: Its nonlinear parameters.
+    """
+
+    effect: Effect
+    place: Place
+    x: Mapping[str, float]
+    shape: Mapping[str, float]
+
+    def apply(self, model: MachineModel) -> MachineModel:
+        """The model with the effect."""
+        return self.effect.edit(model, self.place, self.x, self.shape)
+
+
+@dataclass(eq=False)
+class Problem:
+    """Everything linear about the machine at its present estimate.
+
+    Attributes:
+        model: Before any effect.
+        benches: One per log.
+        sigma: Standard deviation of the noise, shape (J, C).
+        accepted: Effects in the model, in order.
+    """
+
+    model: MachineModel
+    benches: tuple[Bench, ...]
+    sigma: Array
+    accepted: tuple[Accepted, ...] = ()
+    tolerances: tuple[Nuisance, ...] = ()
+    _columns: dict[object, list[dict[int, Array]]] = field(default_factory=dict)
+    _cache: dict[str, object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if not self.tolerances:
+            self.tolerances = nuisances(self.model, [b.measurement for b in self.benches])
+
+    @property
+    def names(self) -> int:
+        """Number of unknowns: tolerances, then the coordinates of accepted effects."""
+        return len(self.tolerances) + sum(len(a.effect.coordinates) for a in self.accepted)
+
+    def span(self, number: int) -> slice:
+        """Unknowns of one accepted effect."""
+        start = len(self.tolerances)
+        for a in self.accepted[:number]:
+            start += len(a.effect.coordinates)
+        return slice(start, start + len(self.accepted[number].effect.coordinates))
+
+    def current(self) -> MachineModel:
+        """The model with all accepted effects."""
+        model = self.model
+        for a in self.accepted:
+            model = a.apply(model)
+        return model
+
+    def predictions(self) -> list[Prediction]:
+        """Of the present model, one per log."""
+        if "predictions" not in self._cache:
+            model = self.current()
+            near = self._cache.get("near")
+            starts = near if isinstance(near, list) else [None] * len(self.benches)
+            self._cache["predictions"] = [
+                b.simulator.predict(model, start)
+                for b, start in zip(self.benches, starts, strict=True)
+            ]
+        result = self._cache["predictions"]
+        assert isinstance(result, list)
+        return result
+
+    def with_accepted(self, accepted: Sequence[Accepted]) -> Problem:
+        """The problem at other effects; columns at untouched joints are kept."""
+        other = replace(self, accepted=tuple(accepted), _columns=dict(self._columns), _cache={})
+        other._cache["near"] = self.predictions()
+        before = {id(a) for a in self.accepted}
+        after = {id(a) for a in other.accepted}
+        moved = [a for a in (*self.accepted, *other.accepted) if id(a) not in (before & after)]
+        touched = {joint for a in moved for joint in self._touched(a)}
+        for key, per_log in self._columns.items():
+            joints = {j for column in per_log for j in column}
+            if joints & touched and not _is_body(key):
+                del other._columns[key]
+        return other
+
+    def _touched(self, a: Accepted) -> set[int]:
+        if a.place and all(p in self.model.joints for p in a.place):
+            return {self.model.index(p) for p in a.place}
+        return set(range(len(self.model.joints)))
+
+    def columns(
+        self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
+    ) -> list[dict[int, Array]]:
+        """Columns of a candidate in one log, kept until a joint they touch changes."""
+        key = (log, effect.name, place, tuple(sorted(shape.items())))
+        if key not in self._columns:
+            for sibling, columns in self._computed(log, effect, place, shape):
+                self._columns[(log, effect.name, sibling, key[3])] = columns
+        return self._columns[key]
+
+    def _computed(
+        self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
+    ) -> list[tuple[Place, list[dict[int, Array]]]]:
+        """Columns of a candidate; of the like ones of all legs where one prediction serves all."""
+        bench, base = self.benches[log], self.predictions()[log]
+        if effect.name not in _OF_ONE_LEG or not legs_are_separate(self.model, bench.measurement):
+            return [(place, effect_columns(bench, base, effect, place, shape, self.sigma))]
+        places = effect.places(base.model, bench.measurement)
+        joint = {p: _joint_of(self.model, p[0]) for p in places}
+        at = joint[place] % 3
+        group = [p for p in places if joint[p] >= 0 and joint[p] % 3 == at and joint[place] >= 0]
+        if len(group) < 2:
+            return [(place, effect_columns(bench, base, effect, place, shape, self.sigma))]
+        whole = effect_columns(bench, base, _Everywhere(effect, group), place, shape, self.sigma)
+        return [
+            (p, [{j: c for j, c in column.items() if j // 3 == joint[p] // 3} for column in whole])
+            for p in group
+        ]
+
+    def _tolerance_columns(self, log: int) -> list[dict[int, Array]]:
+        bench = self.benches[log]
+        keys = {id(n): (log, "tolerance", n.kind, n.place) for n in self.tolerances}
+        for group in grouped(self.model, bench.measurement, self.tolerances):
+            if any(keys[id(n)] not in self._columns for n in group):
+                base = self.predictions()[log]
+                columns = nuisance_columns(bench, base, group, self.sigma)
+                for n, column in zip(group, columns, strict=True):
+                    self._columns[keys[id(n)]] = [column]
+        return [self._columns[keys[id(n)]][0] for n in self.tolerances]
+
+    def _accepted_columns(self, log: int) -> list[dict[int, Array]]:
+        """Columns of the accepted effects at their estimates, without the effect applied twice."""
+        out: list[dict[int, Array]] = []
+        bench, predictions = self.benches[log], self.predictions()
+        for number, a in enumerate(self.accepted):
+            for c in a.effect.coordinates:
+                moved = replace(a, x={**a.x, c.name: a.x[c.name] + c.step})
+                model = self.model
+                for k, other in enumerate(self.accepted):
+                    model = (moved if k == number else other).apply(model)
+                change = bench.simulator.difference(predictions[log], model)
+                out.append(bench.whitened(change.effort / c.step, change.joints, self.sigma))
+        return out
+
+    def stacks(self) -> list[Stack]:
+        """Columns of all unknowns and the residual of the present model."""
+        if "stacks" not in self._cache:
+            self._cache["stacks"] = [
+                make_stack(
+                    bench,
+                    [*self._tolerance_columns(k), *self._accepted_columns(k)],
+                    residual(bench, self.predictions()[k], self.sigma),
+                )
+                for k, bench in enumerate(self.benches)
+            ]
+        result = self._cache["stacks"]
+        assert isinstance(result, list)
+        return result
+
+    @property
+    def precision(self) -> Array:
+        """Prior precision of the unknowns: one for tolerances in units of their sigma, else none."""
+        out = np.zeros(self.names)
+        out[: len(self.tolerances)] = 1.0
+        return out
+
+    def sums(self) -> BlockSums:
+        """Normal equations of the present problem."""
+        if "sums" not in self._cache:
+            self._cache["sums"] = block_sums(self.stacks(), self.precision)
+        result = self._cache["sums"]
+        assert isinstance(result, BlockSums)
+        return result
+
+    def extended(self, candidate: Sequence[Columns]) -> BlockSums:
+        """Normal equations with the columns of a candidate appended.
+
+        Args:
+            candidate: Per log, its columns.
+        """
+        base = self.sums()
+        n, p = base.precision.size, len(candidate[0])
+        B = base.s.size
+        H, h = np.zeros((B, n + p, n + p)), np.zeros((B, n + p))
+        H[:, :n, :n], h[:, :n] = base.H, base.h
+        at = 0
+        for stack, columns in zip(self.stacks(), candidate, strict=True):
+            bench = stack.bench
+            for j in sorted({j for column in columns for j in column}):
+                mine = [k for k, column in enumerate(columns) if j in column]
+                X = np.stack([columns[k][j] for k in mine])
+                target = n + np.array(mine)
+                ids = stack.ids[j]
+                for b in range(bench.block_part.size):
+                    rows = slice(int(bench.edges[b]), int(bench.edges[b + 1]))
+                    part = X[:, rows].reshape(len(mine), -1)
+                    old = stack.X[j][:, rows].reshape(ids.size, -1)
+                    cross = part @ old.T
+                    H[at + b][np.ix_(target, ids)] += cross
+                    H[at + b][np.ix_(ids, target)] += cross.T
+                    H[at + b][np.ix_(target, target)] += part @ part.T
+                    h[at + b, target] += part @ stack.r[j][rows].ravel()
+            at += bench.block_part.size
+        precision = np.concatenate([base.precision, np.zeros(p)])
+        return BlockSums(H, h, base.s, base.count, base.part, precision)
+
+    def rescaled(self, sigma: Array) -> Problem:
+        """The problem with another noise level; columns are computed anew."""
+        return replace(self, sigma=sigma, _columns={}, _cache={})
+
+    def head(self, log: int) -> slice:
+        """Rows of *fit* and *choose* of one log's bench."""
+        parts = self.benches[log].parts
+        return slice(parts[FIT].start, parts[CHOOSE].stop)
+
+
+def _is_body(key: object) -> bool:
+    """Whether a column belongs to a body or a sensor that effects of a joint hardly change."""
+    return isinstance(key, tuple) and (
+        (key[1] == "tolerance" and key[2] in ("mass", "com_x", "com_y", "com_z", "inertia"))
+        or key[1] in ("link_mass", "center_of_mass_offset", "base_tilt")
+    )

@@ -1,0 +1,236 @@
+"""Screening: how much each candidate could explain, all tolerances and accepted effects free.
+
+With the unknowns B of the present problem (prior precision L) and a candidate's columns X,
+
+    S = X^T X - X^T B (B^T B + L)^-1 B^T X,   g = X^T r - X^T B (B^T B + L)^-1 B^T r
+
+and the fall of the penalised misfit is g^T S^-1 g: exact for the linearised problem, and cheap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.gap.block_sums import solve_spd
+from pipeline.gap.effects.base import Effect, Place
+from pipeline.gap.effects.torque_ripple import TorqueRipple
+from pipeline.gap.measurement import CHOOSE, FIT
+from pipeline.gap.problem import Problem
+
+Array = NDArray[np.float64]
+_PEAKS = 3  # orders of a ripple that are looked at closely
+_SCAN_ROWS = 2500
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a candidate could explain on *fit* and *choose*.
+
+    Attributes:
+        effect: The effect.
+        place: Where.
+        shape: Its nonlinear parameters.
+        gain: Fall of the penalised misfit.
+        x: Coordinates, inside their signs.
+        alone: Share of the columns that nothing else explains, the smallest direction [1].
+        information: Inverse variance of the coordinates times their squared estimates.
+    """
+
+    effect: Effect
+    place: Place
+    shape: Mapping[str, float]
+    gain: float
+    x: Mapping[str, float]
+    alone: float
+    curvature: Array
+
+
+class Screen:
+    """Scores of candidates against one problem."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+        sums = problem.sums()
+        blocks = sums.blocks(FIT, CHOOSE)
+        self._A = sums.H[blocks].sum(axis=0) + np.diag(sums.precision)
+        self._b = sums.h[blocks].sum(axis=0)
+        # Inverse of the scaled normal matrix's factor: applied many times to few columns.
+        self._inverse = np.linalg.inv(np.linalg.cholesky(_regular(self._A)))
+        self._scale = np.sqrt(np.maximum(np.diag(self._A), 1e-300))
+        self.theta = solve_spd(self._A, self._b)
+
+    def _half(self, b: Array) -> Array:
+        """L^-1 b with the factor of the normal matrix."""
+        scaled = b / (self._scale if b.ndim == 1 else self._scale[:, None])
+        return np.asarray(self._inverse @ scaled)
+
+    def reduced(
+        self, columns: Sequence[Sequence[Mapping[int, Array]]]
+    ) -> tuple[Array, Array, Array]:
+        """S (p, p), g (p,) and the raw X^T X (p, p) of a candidate, columns per log."""
+        p, n = len(columns[0]), self._A.shape[0]
+        XX, XB, Xr = np.zeros((p, p)), np.zeros((p, n)), np.zeros(p)
+        for log, (stack, own) in enumerate(zip(self.problem.stacks(), columns, strict=True)):
+            head = self.problem.head(log)
+            for j in {j for column in own for j in column}:
+                mine = [k for k, column in enumerate(own) if j in column]
+                X = np.stack([own[k][j][head] for k in mine]).reshape(len(mine), -1)
+                old = stack.X[j][:, head]
+                XX[np.ix_(mine, mine)] += X @ X.T
+                XB[np.ix_(mine, stack.ids[j])] += X @ old.reshape(old.shape[0], -1).T
+                Xr[mine] += X @ stack.r[j][head].ravel()
+        half = self._half(XB.T)
+        S = XX - half.T @ half
+        g = Xr - half.T @ self._half(self._b)
+        return S, g, XX
+
+    def score(self, effect: Effect, place: Place, shape: Mapping[str, float]) -> Score | None:
+        """Score of one candidate; None where it does not change the prediction at all."""
+        p = self.problem
+        columns = [p.columns(k, effect, place, shape) for k in range(len(p.benches))]
+        if not any(column for per_log in columns for column in per_log):
+            return None
+        S, g, XX = self.reduced(columns)
+        gain, x = bounded_gain(S, g, XX, [c.signed for c in effect.coordinates])
+        names = [c.name for c in effect.coordinates]
+        alone = _alone(S, XX)
+        for k, c in enumerate(effect.coordinates):
+            if c.required and x[k] == 0.0:
+                gain = 0.0
+        return Score(effect, place, shape, gain, dict(zip(names, x, strict=True)), alone, S)
+
+    def ripple_orders(self, effect: TorqueRipple, joint: int) -> list[dict[str, float]]:
+        """Orders at which the residual of a joint is periodic in its angle, the strongest ones."""
+        p = self.problem
+        power: Array | None = None
+        orders = np.empty(0)
+        for log, stack in enumerate(p.stacks()):
+            bench = stack.bench
+            if orders.size == 0:
+                orders = effect.orders(bench.measurement, joint)
+                if orders.size == 0:
+                    return []
+                power = np.zeros(orders.size)
+            head = p.head(log)
+            old = stack.X[joint][:, head, 0]
+            rest = stack.r[joint][head, 0] - self.theta[stack.ids[joint]] @ old
+            q = bench.measurement.q[bench.rows[head], joint]
+            skip = max(1, rest.size // _SCAN_ROWS)
+            rest, q = rest[::skip], q[::skip]
+            assert power is not None
+            power += np.abs(_fourier(rest, q, orders)) ** 2
+        assert power is not None
+        out: list[dict[str, float]] = []
+        spacing = orders[1] - orders[0] if orders.size > 1 else 1.0
+        for k in np.argsort(power)[::-1]:
+            if all(abs(orders[k] - o["order"]) > 3 * spacing for o in out):
+                out.append({"order": float(orders[k])})
+            if len(out) == _PEAKS:
+                break
+        return out
+
+
+def _fourier(rest: Array, q: Array, orders: Array) -> NDArray[np.complex128]:
+    """sum_n rest exp(-i order q) for evenly spaced orders, by repeated rotation."""
+    step = float(orders[1] - orders[0]) if orders.size > 1 else 1.0
+    turn = np.exp(-1j * step * q)
+    now = rest * np.exp(-1j * orders[0] * q)
+    out = np.empty(orders.size, dtype=np.complex128)
+    for k in range(orders.size):
+        out[k] = now.sum()
+        now = now * turn
+    return out
+
+
+def _alone(S: Array, XX: Array) -> float:
+    """Smallest share of a combination of columns that nothing else explains."""
+    raw = np.diag(XX)
+    live = np.flatnonzero(raw > 1e-20 * raw.max(initial=1e-300))
+    if live.size == 0:
+        return 0.0
+    scale = np.sqrt(raw[live])
+    share = np.linalg.eigvalsh(S[np.ix_(live, live)] / np.outer(scale, scale))[0]
+    return float(np.clip(share, 0.0, 1.0))
+
+
+def _regular(A: Array) -> Array:
+    d = np.sqrt(np.maximum(np.diag(A), 1e-300))
+    scaled = A / np.outer(d, d)
+    scaled[np.diag_indices_from(scaled)] += 1e-10
+    return np.asarray(scaled)
+
+
+def bounded_gain(
+    S: Array, g: Array, XX: Array, signed: Sequence[bool]
+) -> tuple[float, NDArray[np.float64]]:
+    """Largest fall of g^T x - ... with unsigned coordinates at least zero.
+
+    Args:
+        S: Reduced normal matrix, shape (p, p).
+        g: Reduced gradient, shape (p,).
+        XX: Normal matrix before reduction; directions of S below 1e-6 of it count as none.
+        signed: Which coordinates may be negative.
+
+    Returns:
+        The gain and the coordinates, shape (p,).
+    """
+    n = g.size
+    raw = np.diag(XX)
+    scale = np.sqrt(np.maximum(raw, 1e-300))
+    live = raw > 1e-20 * raw.max(initial=1e-300)
+    best, where = 0.0, np.zeros(n)
+    for code in range(1, 2**n):
+        free = [k for k in range(n) if code >> k & 1]
+        if not live[free].all():
+            continue
+        M = S[np.ix_(free, free)] / np.outer(scale[free], scale[free])
+        rhs = g[free] / scale[free]
+        values, vectors = np.linalg.eigh(M)
+        kept = values > 1e-6
+        y = vectors[:, kept] @ ((vectors[:, kept].T @ rhs) / values[kept])
+        x = y / scale[free]
+        if any(not signed[k] and value < 0 for k, value in zip(free, x, strict=True)):
+            continue
+        gain = float(rhs @ y)
+        if gain > best * (1 + 1e-12):
+            best, where = gain, np.zeros(n)
+            where[free] = x
+    return best, where
+
+
+def score_all(
+    screen: Screen, effects: Sequence[Effect], skip: Sequence[tuple[str, Place]] = ()
+) -> list[Score]:
+    """Best score of every effect at every place, the highest gain first."""
+    p = screen.problem
+    model = p.current()
+    m = p.benches[0].measurement
+    out = []
+    for effect in effects:
+        for place in effect.places(model, m):
+            if (effect.name, place) in skip:
+                continue
+            if isinstance(effect, TorqueRipple):
+                shapes = screen.ripple_orders(effect, model.index(place[0]))
+            else:
+                shapes = effect.shapes(model, m, place)
+            scores = [s for shape in shapes if (s := screen.score(effect, place, shape))]
+            if scores:
+                out.append(max(scores, key=lambda s: s.gain))
+    return sorted(out, key=lambda s: -s.gain)
+
+
+def refine(screen: Screen, score: Score, rounds: int = 4) -> Score:
+    """Improve a candidate's shape by a shrinking search."""
+    factor = 0.5
+    for _ in range(rounds):
+        for shape in score.effect.refined(score.shape, factor):
+            other = screen.score(score.effect, score.place, shape)
+            if other and other.gain > score.gain:
+                score = other
+        factor *= 0.5
+    return score

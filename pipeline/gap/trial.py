@@ -1,0 +1,101 @@
+"""One candidate tried in earnest: estimated on *fit*, judged on *choose*, tested over blocks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.gap.block_sums import BlockSums
+from pipeline.gap.measurement import CHOOSE, FIT
+from pipeline.gap.problem import Problem
+from pipeline.gap.screen import Score
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """What trying a candidate gave.
+
+    Attributes:
+        score: What was tried.
+        gain: Fall of the penalised misfit on *fit* and *choose* together.
+        held_out: Fall of the misfit on *choose* at estimates from *fit*, penalties included.
+        significance: Wald statistic of the coordinates with the scatter over blocks.
+        freedom: Number of coordinates in use.
+        scale: Misfit per independent sample that is left with the candidate.
+        expected: Misfit of noise alone at the joints it touches, on *fit* and *choose*.
+    """
+
+    score: Score
+    gain: float
+    held_out: float
+    significance: float
+    freedom: int
+    scale: float
+    expected: float
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...]]:
+        """Effect and place."""
+        return self.score.effect.name, self.score.place
+
+
+def try_candidate(problem: Problem, score: Score) -> Trial:
+    """Try a candidate.
+
+    Args:
+        problem: The present problem.
+        score: From screening, with its best shape.
+    """
+    columns = [
+        problem.columns(k, score.effect, score.place, score.shape)
+        for k in range(len(problem.benches))
+    ]
+    sums = problem.extended(columns)
+    n = problem.names
+    used = [k for k, c in enumerate(score.effect.coordinates) if score.x[c.name] != 0.0]
+    free = np.concatenate([np.arange(n), n + np.array(used, dtype=np.intp)])
+    old = np.arange(n)
+    fit, choose, both = sums.blocks(FIT), sums.blocks(CHOOSE), sums.blocks(FIT, CHOOSE)
+
+    gain = _objective(sums, both, old) - _objective(sums, both, free)
+    before, after = sums.solve(fit, old), sums.solve(fit, free)
+    held_out = (float(sums.loss(before, choose).sum()) + sums.penalty(before)) - (
+        float(sums.loss(after, choose).sum()) + sums.penalty(after)
+    )
+    theta = sums.solve(both, free)
+    covariance = sums.covariance(theta, both, free)
+    tail = slice(n, None)
+    x = theta[free][tail]
+    significance = float(x @ np.linalg.pinv(covariance[tail, tail]) @ x)
+    count = float(sums.count[both].sum())
+    touched = {j for per_log in columns for column in per_log for j in column}
+    share = len(touched) / len(problem.model.joints)
+    scale = float(sums.loss(theta, both).sum()) / max(count, 1.0)
+    return Trial(score, gain, held_out, significance, len(used), scale, count * share)
+
+
+def _objective(sums: BlockSums, blocks: NDArray[np.intp], free: NDArray[np.intp]) -> float:
+    return sums.objective(sums.solve(blocks, free), blocks)
+
+
+def joint_gain(problem: Problem, scores: list[Score]) -> float:
+    """Fall of the penalised misfit with several candidates at once."""
+    columns = [
+        [column for s in scores for column in problem.columns(k, s.effect, s.place, s.shape)]
+        for k in range(len(problem.benches))
+    ]
+    sums = problem.extended(columns)
+    both = sums.blocks(FIT, CHOOSE)
+    n = problem.names
+    used, at = list(range(n)), n
+    for s in scores:
+        for c in s.effect.coordinates:
+            if s.x[c.name] != 0.0:
+                used.append(at)
+            at += 1
+    free = np.array(used, dtype=np.intp)
+    return _objective(sums, both, np.arange(n)) - _objective(sums, both, free)

@@ -1,0 +1,174 @@
+"""Thresholds and results of naming, in one place.
+
+The thresholds were set on simulated logs with nothing hidden (see `README`): there they let pass
+fewer than two in a hundred logs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+ACCEPTED: Final = "accepted"
+REJECTED: Final = "rejected"
+NOT_IDENTIFIABLE: Final = "not identifiable on this motion"
+INDISTINGUISHABLE: Final = "indistinguishable from "
+
+#: Chance that any of the candidates tried is accepted by noise alone.
+FALSE_ALARM: Final = 0.002
+#: Least fall of the penalised misfit, in units of the noise's variance of one independent sample.
+LEAST_GAIN: Final = 30.0
+#: ... and as a share of the affected joints' misfit at noise level.
+LEAST_SHARE: Final = 0.02
+#: A tolerance is exceeded beyond this many of its standard deviations.
+TOLERANCE_SIGMAS: Final = 2.5
+#: Rivals whose misfit on held-out blocks differs by fewer standard deviations are one class.
+RIVAL_SIGMAS: Final = 3.0
+#: ... or by less than this, in the unit of `LEAST_GAIN`.
+RIVAL_GAIN: Final = 9.0
+#: ... or by less than this share of what the better one explains.
+RIVAL_SHARE: Final = 0.01
+#: A column whose share after projecting out everything else lies below this is not identifiable:
+#: standard deviation of the estimate over what would be worth naming.
+LEAST_INFORMATION: Final = 10.0
+#: Remaining error over the noise floor, in the naming channel, that counts as unexplained.
+UNEXPLAINED: Final = 1.6
+#: Effects that one log may be found to lack.
+MOST_EFFECTS: Final = 12
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter of an accepted effect.
+
+    Attributes:
+        name: Of the parameter.
+        value: Best estimate.
+        low: Of the 95 % interval.
+        high: Of the 95 % interval.
+        unit: Unit.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One effect at one place and what became of it.
+
+    Attributes:
+        effect: Name.
+        place: Joints, link, ground or effort channels.
+        before: Held-out error (*choose*) of the joints it touches without it, in `unit`.
+        after: The same with it.
+        unit: Of the compared channel.
+        identifiable: Whether this motion could show it.
+        verdict: `ACCEPTED`, `REJECTED`, `NOT_IDENTIFIABLE` or `INDISTINGUISHABLE` + names.
+        reason: In words.
+        gain: Fall of the penalised misfit on *fit* and *choose*, in noise variances.
+    """
+
+    effect: str
+    place: tuple[str, ...]
+    before: float
+    after: float
+    unit: str
+    identifiable: bool
+    verdict: str
+    reason: str
+    gain: float = 0.0
+
+
+@dataclass(frozen=True)
+class Found:
+    """An accepted effect.
+
+    Attributes:
+        order: From 1.
+        effect: Name.
+        place: Where.
+        parameters: Estimates.
+        rivals: Effects at places that explain the log as well.
+        gap_before: Error on *prove* without it (with those before it), RMS of the joints it
+            touches, in `unit`.
+        gap_after: The same with it.
+        unit: Of the compared channel.
+        noise_floor: Of the same joints, in `unit`.
+        excitation: The motion that would tell it from its rivals.
+        doubtful: Why the name is not trusted, or empty.
+    """
+
+    order: int
+    effect: str
+    place: tuple[str, ...]
+    parameters: tuple[Estimate, ...]
+    rivals: tuple[tuple[str, tuple[str, ...]], ...]
+    gap_before: float
+    gap_after: float
+    unit: str
+    noise_floor: float
+    excitation: str
+    doubtful: str = ""
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters by name."""
+        return {p.name: p.value for p in self.parameters}
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is left at one joint on *prove* after everything accepted.
+
+    Attributes:
+        joint: Name.
+        channel: Channel.
+        error: RMS, in `unit`.
+        noise_floor: In `unit`.
+        unit: Unit.
+        significant: Whether it is more than noise.
+        description: What it depends on, in words; empty where it is noise.
+    """
+
+    joint: str
+    channel: str
+    error: float
+    noise_floor: float
+    unit: str
+    significant: bool
+    description: str
+
+
+@dataclass(frozen=True)
+class Naming:
+    """The result of naming.
+
+    Attributes:
+        found: Accepted effects in the order of acceptance.
+        candidates: Every candidate once.
+        tolerances: Nuisances with estimate and prior sigma: (kind, place) to (value, sigma).
+        remainders: Per joint and channel.
+        tried: Number of candidates tried.
+        channel: The compared channel.
+        unit: Its unit.
+        notes: Remarks for the report, in words.
+    """
+
+    found: tuple[Found, ...]
+    candidates: tuple[Candidate, ...]
+    tolerances: Mapping[tuple[str, str], tuple[float, float]]
+    remainders: tuple[Remainder, ...]
+    tried: int
+    channel: str
+    unit: str
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether a significant part of the gap has no name."""
+        return any(r.significant for r in self.remainders) or any(f.doubtful for f in self.found)
