@@ -1,0 +1,287 @@
+"""The page of a run of `gap`: the answer first, then what it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.app import gap_words as words
+from pipeline.app.gap_energy import EnergyChange
+from pipeline.app.gap_run import Whereabouts
+from pipeline.app.gap_setup import Setup
+from pipeline.app.gap_stages import Stage, noise_floor
+from pipeline.gap.circumstances import WHOLE
+from pipeline.gap.verdict import ACCEPTED, REJECTED, Naming
+from reports.html import write_html
+from reports.markdown import write_markdown
+from reports.page import (
+    Block,
+    FigureBlock,
+    Page,
+    Points,
+    Section,
+    TableBlock,
+    Text,
+    table_block,
+)
+from reports.table import Table
+
+TONES = {
+    "accepted": "good",
+    "rejected": "quiet",
+    "not identifiable on this motion": "quiet",
+    "noise": "good",
+    "unexplained": "bad",
+    "ok": "good",
+    "warning": "bad",
+    "refused": "bad",
+    "masked": "quiet",
+}
+#: Candidates that the page lists; `candidates.csv` has all.
+SHOWN_CANDIDATES = 15
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """Everything a page tells.
+
+    Attributes:
+        given: Robot and actuators.
+        where: Steps 1 and 2.
+        naming: Step 3; None where a model file was checked without naming.
+        stages: The gap effect by effect; the first without effects.
+        energy: With and without the effects; None for a robot that does not walk.
+        signatures: File name to caption, one per effect.
+        decides: What the deciding motion is, in words; empty without one.
+        remarks: What else a reader should know.
+    """
+
+    given: Setup
+    where: Whereabouts
+    naming: Naming
+    stages: tuple[Stage, ...]
+    energy: EnergyChange | None
+    signatures: dict[str, str]
+    decides: str
+    remarks: tuple[str, ...]
+
+
+def write_report(story: Story, tables: Sequence[Table], folder: Path, footer: str) -> None:
+    """Write ``report.md`` and ``index.html``; the figures must be there already."""
+    page = report(story, {t.name: t for t in tables}, folder, footer)
+    write_markdown(page, folder / "report.md")
+    write_html(page, folder / "index.html")
+
+
+def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) -> Page:
+    """The page; see `write_report`."""
+    names = ", ".join(m.name for m in story.where.measurements)
+    files = {f"{t.name}.csv": t.description for t in tables.values()}
+    if story.naming.found:
+        files["model.toml"] = "Model file with the effects found; give it to any command as --model"
+    return Page(
+        title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
+        answer=answer(story),
+        sections=(
+            _where(story, tables, folder),
+            _what(story, tables, folder),
+            _smaller(story, folder),
+            *_energy(story),
+            _left(story),
+            _data(story, tables),
+        ),
+        files=files,
+        footer=footer,
+    )
+
+
+def answer(story: Story) -> tuple[str, ...]:
+    """The first lines: where, what, how much smaller, what it costs, what is left."""
+    naming = story.naming
+    out = [words.where_words(story.where.rows), words.what_words(naming)]
+    if naming.found:
+        out.append(words.shrink_words(naming.found))
+    if story.energy is not None:
+        out.append(words.energy_words(story.energy, story.given.alternative))
+    out.append(words.left_words(naming.remainders))
+    undecided = words.rival_words(naming.found, bool(story.decides))
+    return (*out, undecided) if undecided else tuple(out)
+
+
+def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
+    by = tables["where"].columns["by"]
+    whole = [value == WHOLE for value in by]
+    shown = {
+        "joint": "joint",
+        "gap": "gap",
+        "mean": "mean",
+        "noise_floor": "noise floor",
+        "unit": "unit",
+        "share_of_total": "share of all",
+        "share_above_noise": "of it above noise",
+    }
+    return Section(
+        "Where model and machine disagree",
+        (
+            FigureBlock(
+                folder / "where_map.svg",
+                "Gap of the model as it was, by joint and circumstance. A cause shows as a band "
+                "that stands out.",
+            ),
+            table_block(
+                tables["where"],
+                shown,
+                keep=whole,
+                caption="Measured less predicted before anything is added, all compared rows.",
+                digits=3,
+            ),
+        ),
+    )
+
+
+def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
+    blocks: list[Block] = []
+    if story.naming.found:
+        blocks.append(
+            table_block(
+                tables["found"],
+                {
+                    "order": "no.",
+                    "effect": "effect",
+                    "joint": "joint",
+                    "parameter": "parameter",
+                    "value": "value",
+                    "ci_low": "95 % from",
+                    "ci_high": "to",
+                    "unit": "unit",
+                },
+                caption="What the model lacked.",
+                digits=3,
+            )
+        )
+    blocks += [FigureBlock(folder / name, caption) for name, caption in story.signatures.items()]
+    blocks.append(_candidates(story))
+    return Section("What is missing", tuple(blocks))
+
+
+def _candidates(story: Story) -> TableBlock:
+    every = sorted(
+        story.naming.candidates,
+        key=lambda c: (c.verdict != ACCEPTED, c.verdict == REJECTED, -c.gain),
+    )
+    rows = tuple(
+        (c.effect, words.place_text(c.place), c.before, c.after, c.unit, c.verdict, c.reason)
+        for c in every[:SHOWN_CANDIDATES]
+    )
+    return TableBlock(
+        ("effect", "place", "held out without", "with", "unit", "verdict", "why"),
+        rows,
+        f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried.",
+        "candidates.csv",
+        TONES,
+        3,
+    )
+
+
+def _smaller(story: Story, folder: Path) -> Section:
+    first, last = story.stages[0], story.stages[-1]
+    floor = noise_floor(story.where.measurements)
+    joints = story.given.model.joints
+    unit = story.naming.unit
+    order = np.argsort(-np.nan_to_num(first.gap - last.gap))
+    rows = tuple(
+        (joints[j], float(first.gap[j]), float(last.gap[j]), float(floor[j]), unit)
+        for j in order.tolist()
+    )
+    blocks: list[Block] = [
+        FigureBlock(folder / "waterfall.svg", "The gap of all joints, effect by effect."),
+        FigureBlock(
+            folder / "in_time.svg", "Measured and predicted, and what is left, before and after."
+        ),
+        TableBlock(
+            ("joint", "gap before", "after", "noise floor", "unit"),
+            rows,
+            "Root mean square on data that had no say; `before` is the model with the tolerances "
+            "of its parts (masses, torque constants, encoder zeros) already estimated.",
+            digits=3,
+        ),
+    ]
+    return Section("How much smaller the gap is", tuple(blocks))
+
+
+def _energy(story: Story) -> tuple[Section, ...]:
+    change = story.energy
+    if change is None:
+        return ()
+    rows = tuple(
+        (
+            name,
+            change.before[name].cycle,
+            change.after[name].cycle,
+            change.before[name].standing,
+            change.after[name].standing,
+        )
+        for name in change.before
+    )
+    block = TableBlock(
+        ("alternative", "cycle before [J]", "after [J]", "standing before [W]", "after [W]"),
+        rows,
+        "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
+        "energy lost; power to stand as the robot file says.",
+    )
+    return (Section("What it costs", (block, *map(Text, story.remarks))),)
+
+
+def _left(story: Story) -> Section:
+    rows = tuple(
+        (
+            r.joint,
+            r.channel,
+            r.error,
+            r.noise_floor,
+            r.unit,
+            "unexplained" if r.significant else "noise",
+            r.description or None,
+        )
+        for r in story.naming.remainders
+    )
+    block = TableBlock(
+        ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like"),
+        rows,
+        "What is left on data that had no say.",
+        "",
+        TONES,
+        3,
+    )
+    blocks: list[Block] = [block]
+    if story.decides:
+        blocks.append(Text(f"The motion that decides: {story.decides}."))
+    if story.naming.notes:
+        blocks.append(Points(story.naming.notes))
+    return Section("What is left", tuple(blocks))
+
+
+def _data(story: Story, tables: dict[str, Table]) -> Section:
+    parts = story.where.parts
+    settings = story.where.intake.settings
+    texts = [
+        f"Compared at a bandwidth of {settings.cutoff:.3g} Hz ({settings.reason}); "
+        f"parts fit, choose and prove: {parts.rule}, blocks {parts.guard:.2g} s apart."
+    ]
+    if parts.warning:
+        texts.append(f"**Note:** {parts.warning}.")
+    verdicts: Sequence[Any] = tables["quality"].columns["verdict"]
+    odd = [value != "ok" for value in verdicts]
+    block = table_block(
+        tables["quality"],
+        keep=odd,
+        tones=TONES,
+        caption="Checks with a remark; `quality.csv` lists all."
+        if any(odd)
+        else "Every check passed.",
+    )
+    return Section("What the data are worth", (*map(Text, texts), block))
