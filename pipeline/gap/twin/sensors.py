@@ -45,6 +45,8 @@ NOISE_LEVELS = {
     "low": NoiseLevel(0.005, 0.005, 0.05, 0.3, 3e-4, 20),
     "high": NoiseLevel(0.020, 0.020, 0.20, 1.0, 1e-3, 18),
 }
+#: What no sensor is: for telling what a log could show at best.
+NO_NOISE = NoiseLevel(0.0, 0.0, 0.0, 0.0, 0.0, 48)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from pipeline.gap.twin.effects import EFFECTS, Hidden, draw, effect_named
 from pipeline.gap.twin.errors import TwinError
 from pipeline.gap.twin.machine import ALTERNATIVE, load_machine
 from pipeline.gap.twin.reference import reference
-from pipeline.gap.twin.sensors import NOISE_LEVELS, measure
+from pipeline.gap.twin.sensors import NO_NOISE, NOISE_LEVELS, measure
 from pipeline.gap.twin.setup import Setup, nominal_setup, stream, with_tolerances
 from pipeline.gap.twin.simulator import Record
 from pipeline.gap.twin.trajectories import leg_plan
@@ -37,11 +37,13 @@ class Trial:
     Attributes:
         robot: The nominal robot's file.
         logs: Name to columns of the measured log, each (N,); all of one machine.
+        exact: The same logs by sensors without noise and rounding; never written.
         truth: What was hidden and everything else that was drawn; for the sealed file.
     """
 
     robot: RobotSpec
     logs: dict[str, dict[str, Array]]
+    exact: dict[str, dict[str, Array]]
     truth: dict[str, Any]
 
 
@@ -102,6 +104,7 @@ def make_trial(
         )
     machine, tolerances = with_tolerances(setup, seed)
     columns: dict[str, dict[str, Array]] = {}
+    exact: dict[str, dict[str, Array]] = {}
     facts: dict[str, Any] = {}
     for i in range(logs):
         name = "log" if i == 0 else f"log_{i + 1}"
@@ -112,6 +115,8 @@ def make_trial(
         rng = stream(seed, f"noise {i}")
         quantum = 2 * np.pi / (run.controller.counts * run.plant.machine.ratio)
         columns[name] = measure(robot, record, run.sensors, run.plan.log_from, quantum, rng)
+        flawless = replace(run.sensors, noise=NO_NOISE)
+        exact[name] = measure(robot, record, flawless, run.plan.log_from, 1e-15, rng)
         facts[name] = _facts(run, record)
     truth = {
         "seed": seed,
@@ -123,7 +128,7 @@ def make_trial(
         "tolerances": tolerances,
         "logs": facts,
     }
-    return Trial(robot.spec, columns, truth)
+    return Trial(robot.spec, columns, exact, truth)
 
 
 def plan_of(robot: Robot, seed: int, index: int) -> Plan:

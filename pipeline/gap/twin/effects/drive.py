@@ -24,7 +24,7 @@ from pipeline.gap.twin.setup import Setup
 #: Loss time of an elastic transmission: damping over stiffness [s].
 _LOSS_TIME = 5e-4
 #: Stiffness of the flanks that bound a backlash, a Harmonic Drive of size 17 [N*m/rad].
-_FLANKS = 1e4
+FLANKS = 1e4
 #: Periods per turn of the joint: wave generator once and twice a turn, motor once a turn.
 _ORDERS = (50.0, 100.0, 200.0, 400.0)
 
@@ -87,7 +87,7 @@ class Backlash(Effect):
 
     def apply(self, setup: Setup, hidden: Hidden) -> Setup:
         """Part motor and link by flanks with a gap."""
-        return _parted(setup, hidden.place[0], _FLANKS, hidden.parameters["width"])
+        return _parted(setup, hidden.place[0], FLANKS, hidden.parameters["width"])
 
 
 def _parted(setup: Setup, joint: str, stiffness: float, gap: float) -> Setup:

@@ -1,0 +1,96 @@
+"""What was hidden, in the words of the workflow's catalogue, for judging its answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pipeline.gap.effects.base import Place
+from pipeline.gap.effects.link_mass import own_mass
+from pipeline.gap.model import MachineModel
+from pipeline.gap.twin.effects.drive import FLANKS
+
+#: Parameter of the twin to parameter of the workflow, where the names differ.
+_NAMES: Final = {
+    ("effort_offset", "current"): "offset",
+    ("internal_foot_force", "commanded_lateral"): "lateral",
+}
+
+
+@dataclass(frozen=True)
+class HiddenTruth:
+    """One effect that was hidden.
+
+    Attributes:
+        effect: Name.
+        place: Where.
+        values: Parameters as the workflow calls them, of the effect alone.
+        total: The same with the machine's own tolerance of the same kind, which no log can tell
+            from the effect: what an interval has to cover.
+        in_catalogue: Whether the workflow has a name for it.
+        strength: RMS torque over noise.
+    """
+
+    effect: str
+    place: Place
+    values: Mapping[str, float]
+    total: Mapping[str, float]
+    in_catalogue: bool
+    strength: float
+
+
+def hidden_truths(truth: Mapping[str, Any], model: MachineModel) -> list[HiddenTruth]:
+    """Read the truth of a trial.
+
+    Args:
+        truth: As the twin seals it.
+        model: The nominal machine.
+    """
+    return [_hidden(item, truth, model) for item in truth["hidden"]]
+
+
+def _hidden(item: Mapping[str, Any], truth: Mapping[str, Any], model: MachineModel) -> HiddenTruth:
+    effect, place = item["effect"], tuple(item["place"])
+    values = {
+        _NAMES.get((effect, name), name): float(entry["value"])
+        for name, entry in item["parameters"].items()
+    }
+    if effect == "internal_foot_force":
+        # Inward or outward, what reached the ground counts, not what was commanded.
+        values["lateral"] = float(truth["logs"]["log"]["outward_force_N"])
+    if effect == "backlash":
+        values["stiffness"] = FLANKS
+    strength = item.get("strength")
+    return HiddenTruth(
+        effect=effect,
+        place=place,
+        values=values,
+        total=_total(effect, place, values, truth["tolerances"], model),
+        in_catalogue=bool(item["in_catalogue"]),
+        strength=float("nan") if strength is None else float(strength),
+    )
+
+
+def _total(
+    effect: str,
+    place: Place,
+    values: Mapping[str, float],
+    tolerances: Mapping[str, Mapping[str, float]],
+    model: MachineModel,
+) -> dict[str, float]:
+    total = dict(values)
+    if effect == "torque_constant_error":
+        factor = tolerances["torque_constant_factor"][place[0]]
+        total["relative"] = (1 + values["relative"]) * factor - 1
+    elif effect == "position_offset":
+        total["angle"] = values["angle"] + tolerances["encoder_zero_rad"][place[0]]
+    elif effect == "link_mass":
+        factor = tolerances["mass_factor"][model.carrier(place[0])]
+        total["mass"] = values["mass"] + (factor - 1) * own_mass(model, place[0])
+    return total
+
+
+def place_text(place: Sequence[str]) -> str:
+    """A place in one cell."""
+    return " + ".join(place)
