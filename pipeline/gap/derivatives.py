@@ -175,7 +175,7 @@ def _convolve(padded: Array, kernels: Sequence[Array]) -> list[Array]:
     return outs
 
 
-def choose_cutoff(x: Array, rate: float, *, smallest: float = 0.0) -> Array:
+def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 0.0) -> Array:
     """Cut-off at which the spectrum of the signal meets that of its noise, per column.
 
     Below it the signal outweighs the noise, above it the noise the signal: there the sum of lost
@@ -184,31 +184,38 @@ def choose_cutoff(x: Array, rate: float, *, smallest: float = 0.0) -> Array:
     of the band.
 
     Args:
-        x: Shape (N, C), without gaps.
+        stretches: Each without gaps, shape (N, C); their spectra are averaged by length.
         rate: [Hz].
         smallest: Lower bound [Hz].
 
     Returns:
         Shape (C,) [Hz], at most `LARGEST_SHARE` of the rate; NaN for a column that never changes.
     """
-    from scipy.signal import detrend, welch
+    from scipy.signal import welch
 
     largest = LARGEST_SHARE * rate
-    n = x.shape[0]
-    out = np.full(x.shape[1], np.nan)
-    moves = np.ptp(x, axis=0) > 0
+    out = np.full(stretches[0].shape[1], np.nan)
+    moves = np.any([np.ptp(x, axis=0) > 0 for x in stretches], axis=0)
     if not moves.any():
         return out
-    segment = int(min(n, max(256, 2 ** np.ceil(np.log2(2.0 * rate)))))
-    f, power = welch(x[:, moves], fs=rate, nperseg=segment, axis=0, detrend=detrend)
-    noise = np.median(power[f >= 0.6 * rate / 2], axis=0)
+    length = max(x.shape[0] for x in stretches)
+    segment = int(min(length, max(256, 2 ** np.ceil(np.log2(2.0 * rate)))))
+    spectra, weights = [], []
+    for x in stretches:
+        if x.shape[0] < segment:
+            continue
+        # Without its trend a stretch leaks less into high frequencies.
+        trend = np.linspace(x[0], x[-1], x.shape[0])
+        f, power = welch((x - trend)[:, moves], fs=rate, nperseg=segment, axis=0)
+        spectra.append(power)
+        weights.append(x.shape[0])
+    mean = np.average(spectra, axis=0, weights=weights)
+    noise = np.median(mean[f >= 0.6 * rate / 2], axis=0)
     # Medians over a third of an octave, three bins at least: a lone peak or dip decides nothing.
     bins = np.unique(np.round(2.0 ** (np.arange(0, 12 * np.log2(f.size - 1)) / 12)).astype(int))
+    bins = bins[bins < f.size]
     level = np.stack(
-        [
-            np.median(power[max(1, k - 1 - k // 8) : k + 2 + k // 8], axis=0)
-            for k in bins[bins < f.size]
-        ]
+        [np.median(mean[max(1, k - 1 - k // 8) : k + 2 + k // 8], axis=0) for k in bins]
     )
     above = level > 2.0 * noise
     first_below = np.where(above.all(axis=0), -1, np.argmin(above, axis=0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
@@ -16,6 +17,9 @@ Mask = NDArray[np.bool_]
 GAP: Final = 2.5
 #: Times that lie this near to the grid, in steps, need no interpolation.
 JITTER_IGNORED: Final = 0.05
+#: Spectra and noise are taken from at most this many stretches of this many rows.
+STRETCHES: Final = 8
+STRETCH_ROWS: Final = 16_384
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,33 @@ def fill_gaps(time: Array, values: Array, ok: Mask) -> Array:
         keep = good[:, c]
         out[:, c] = np.interp(time, time[keep], values[keep, c]) if keep.any() else 0.0
     return out
+
+
+def busiest(x: Array, pieces: Sequence[slice]) -> list[slice]:
+    """Stretches in which a long log changes most: enough to know its spectrum and noise.
+
+    Args:
+        x: Shape (N, C).
+        pieces: Stretches without a gap.
+
+    Returns:
+        The pieces themselves where they are short, else up to `STRETCHES` of `STRETCH_ROWS` rows,
+        in order of time.
+    """
+    if sum(p.stop - p.start for p in pieces) <= STRETCHES * STRETCH_ROWS:
+        return list(pieces)
+    parts = [
+        slice(start, start + STRETCH_ROWS)
+        for p in pieces
+        for start in range(p.start, p.stop - STRETCH_ROWS + 1, STRETCH_ROWS)
+    ]
+    if not parts:
+        return sorted(pieces, key=lambda p: p.stop - p.start)[-STRETCHES:]
+    # Mean square step of each column per its largest: every joint counts alike.
+    change = np.stack([np.nanmean((x[p][::8][1:] - x[p][::8][:-1]) ** 2, axis=0) for p in parts])
+    busy = (change / np.maximum(change.max(axis=0), 1e-300)).sum(axis=1)
+    best = np.sort(np.argsort(-busy, kind="stable")[:STRETCHES])
+    return [parts[k] for k in best]
 
 
 def long_runs(time: Array, bad: Mask, longest: float) -> Mask:

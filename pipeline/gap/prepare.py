@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.gap.contact import Contact, Stance, log_contact, stances
 from pipeline.gap.derivatives import LARGEST_SHARE, LowPass, choose_cutoff
 from pipeline.gap.errors import PreparationError
-from pipeline.gap.grid import Grid, fill_gaps, long_runs, uniform_grid
+from pipeline.gap.grid import Grid, busiest, fill_gaps, long_runs, uniform_grid
 from pipeline.gap.log import Log
 from pipeline.gap.noise import smoother_noise
 
@@ -194,11 +194,10 @@ def choose_settings(
     for k, log in enumerate(logs):
         position_ok = usable[k][0] if usable is not None else np.isfinite(log.position)
         grid = uniform_grid(log.time, dt)
-        piece = max(grid.pieces, key=lambda p: p.stop - p.start)
-        if piece.stop - piece.start < 64:
-            continue
-        q = grid.resample(fill_gaps(log.time, log.position, position_ok))[piece]
-        asked.append(choose_cutoff(q, rate, smallest=smallest))
+        q = grid.resample(fill_gaps(log.time, log.position, position_ok))
+        stretches = [q[part] for part in busiest(q, grid.pieces) if part.stop - part.start >= 64]
+        if stretches:
+            asked.append(choose_cutoff(stretches, rate, smallest=smallest))
     table = np.array(asked) if asked else np.full((1, len(logs[0].joints)), np.nan)
     if np.isnan(table).all():
         raise PreparationError(f"{logs[0].name}: no joint moves; nothing can be compared")
@@ -259,10 +258,13 @@ def prepare(
         motion_ok[piece] = lowpass.share(no_motion[piece]) <= TOLERATED_SHARE
         effort_good[piece] = lowpass.share(no_effort[piece]) <= TOLERATED_SHARE
     effort[no_effort] = np.nan
-    floor, position_noise = noise or (
-        smoother_noise(effort_raw, effort_good, grid.pieces, lowpass, in_band=True),
-        smoother_noise(q_raw, motion_ok, grid.pieces, lowpass, in_band=False),
-    )
+    if noise is None:
+        stretches = busiest(q_raw, grid.pieces)
+        noise = (
+            smoother_noise(effort_raw, effort_good, stretches, lowpass, in_band=True),
+            smoother_noise(q_raw, motion_ok, stretches, lowpass, in_band=False),
+        )
+    floor, position_noise = noise
     contact = contact or log_contact(log)
     on_grid = contact.rows(grid.nearest) if contact is not None else None
     rows = slice(0, n)

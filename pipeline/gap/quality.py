@@ -186,8 +186,9 @@ def _presence(log: Log, still: Mask, found: _Findings) -> bool:
 
 
 def _is_constant(x: Array) -> bool:
-    finite = x[np.isfinite(x)]
-    return bool(finite.size > 0 and np.ptp(finite) == 0.0)
+    if not np.isfinite(x[0]) or not np.isfinite(x[-1]):
+        x = x[np.isfinite(x)]
+    return x.size > 0 and not np.any(np.isfinite(x) & (x != x[0]))
 
 
 def _positions(log: Log, ok: Mask, still: Mask, found: _Findings) -> Mask:

@@ -238,6 +238,8 @@ def _numbers(column: Any, name: str, where: str) -> Array:
             lower = pc.if_else(pc.equal(lower, "true"), "1", lower)
             lower = pc.if_else(pc.equal(lower, "false"), "0", lower)
             column = pc.cast(lower, pa.float64())
+        elif pa.types.is_null(kind):
+            return np.full(len(column), np.nan)
         elif pa.types.is_boolean(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind):
             column = pc.cast(column, pa.float64(), safe=False)
         else:

@@ -99,6 +99,6 @@ def test_the_chosen_cutoff_follows_the_noise() -> None:
         x[k] = 0.98 * x[k - 1] + 0.02 * drive[k]
     x = np.convolve(x, np.ones(20) / 20, mode="same")
     noise = rng.normal(size=t.size)
-    chosen = [float(choose_cutoff((x + s * noise)[:, None], RATE)[0]) for s in (1e-4, 1e-3, 1e-2)]
+    chosen = [float(choose_cutoff([(x + s * noise)[:, None]], RATE)[0]) for s in (1e-4, 1e-3, 1e-2)]
     assert chosen[0] > chosen[1] > chosen[2] > 0.5
-    assert np.isnan(choose_cutoff(np.ones((1000, 1)), RATE)[0])
+    assert np.isnan(choose_cutoff([np.ones((1000, 1))], RATE)[0])

@@ -1,0 +1,291 @@
+"""Whatever the bytes: a clear line or a usable log, never a traceback."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from numpy.typing import NDArray
+
+from actuators.errors import ActuatorError
+from pipeline.gap.errors import GapError
+from pipeline.gap.expected import Expected
+from pipeline.gap.intake import take_in
+from pipeline.gap.mapping import load_mapping
+
+Array = NDArray[np.float64]
+ROWS = 400
+TOKENS = (
+    *(b",", b";", b"\n", b"\r\n", b'"', b"nan", b"inf", b"-inf", b"1e308", b"-1e-320", b"\x00"),
+    *(b"\xff\xfe", b"\xef\xbb\xbf", b"true", b"abc", b"0,5", b"-", b"1e999", b"=1+1", b"#", b"''"),
+    *(b"time_s", b"a__position_rad", b"__", b"a__position_deg", b"9" * 400, b"\t", b" ", b"\xc3"),
+)
+TOML_TOKENS = (
+    *(b"[", b"]", b"[[", b"]]", b"{", b"}", b"=", b'"', b"'", b"\n", b"*", b"nan", b"inf", b"-1"),
+    *(b"1e400", b"0x10", b"true", b"[columns]", b"[logs]", b"unit", b'"deg"', b'"xyz"', b"1e20"),
+    *(b"2020-01-01", b"[[logs]]", b"\x00", b"\xff", b"as", b".", b"99999999999999999999", b"[]"),
+)
+MAPPING = b"""effort = "torque"
+locked = []
+[time]
+column = "time_s"
+unit = "s"
+[columns."a__*_Nm"]
+as = "a__*_Nm"
+unit = "mN*m"
+scale = 1000.0
+flip = true
+zero = 0.5
+[joints]
+a = "a"
+[controller]
+gain_per_rad = 2.0
+law = "duty"
+torque_off_bridge = "open"
+[supply]
+voltage = {value = 24, unit = "V"}
+[constants]
+load = {value = 3, unit = "kg"}
+[keep]
+columns = ["a__torque_Nm"]
+[[logs]]
+match = "*"
+gain_per_rad = 3
+condition = {gain = 3}
+"""
+
+
+def valid_columns() -> dict[str, Array]:
+    t = np.arange(ROWS) / 100.0
+    rng = np.random.default_rng(0)
+    out = {"time_s": t}
+    for k, joint in enumerate("ab"):
+        out[f"{joint}__position_rad"] = np.round(np.sin((3 + k) * t), 5)
+        out[f"{joint}__torque_Nm"] = np.round(np.cos((3 + k) * t) + rng.normal(0, 0.1, ROWS), 4)
+    return out
+
+
+def valid_csv() -> bytes:
+    columns = valid_columns()
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join(columns), *(",".join(f"{x:.6g}" for x in row) for row in rows)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def mutated(data: bytes, rng: np.random.Generator, tokens: tuple[bytes, ...]) -> bytes:
+    """A few cuts, insertions, doublings and flipped bytes; rarely nothing but noise."""
+    kind = rng.integers(20)
+    if kind == 0:
+        return rng.bytes(int(rng.integers(0, 2000)))
+    out = bytearray(data)
+    for _ in range(int(rng.integers(1, 5))):
+        at = int(rng.integers(0, len(out) + 1))
+        end = min(len(out), at + int(rng.integers(1, 40)))
+        action = int(rng.integers(6))
+        if action == 0:
+            del out[at:end]
+        elif action == 1:
+            out[at:at] = tokens[int(rng.integers(len(tokens)))]
+        elif action == 2:
+            out[at:end] = tokens[int(rng.integers(len(tokens)))]
+        elif action == 3:
+            out[at:at] = out[at:end]
+        elif action == 4 and at < len(out):
+            out[at] = int(rng.integers(256))
+        elif action == 5 and rng.integers(8) == 0:
+            del out[at:]
+    return bytes(out)
+
+
+CELLS = ("", "nan", "inf", "1e300", "-1e8", "0", "1", "0,5", "x", "1e-310", "true", "57.3", "-3")
+HEADERS = (
+    *("time_s", "a__position_rad", "b__motor_position_rad", "a__velocity_rad_s", "a__voltage_V"),
+    *("lf__force_z_N", "lf__contact", "base__roll_rad", "a__position_deg", "", "x", "a__"),
+)
+
+
+TOML_VALUES = (
+    *(
+        '"deg"',
+        '"N*m"',
+        '"mN*m"',
+        '"Hz"',
+        '"xyz"',
+        '""',
+        "0",
+        "1",
+        "-1",
+        "2.5",
+        "1e20",
+        "nan",
+        "inf",
+    ),
+    *("true", "false", "[]", '["a"]', '["c"]', "{}", "{value = 2, unit = 'V'}", "{value = 2}"),
+    *('"a__torque_Nm"', '"*"', '"a"', '"open"', '"time_s"', "2020-01-01", "[[1]]", '"a__*_rad"'),
+)
+
+
+def rewritten(text: bytes, rng: np.random.Generator) -> bytes:
+    """Well-formed TOML with another value, key or table somewhere."""
+    lines = text.decode().splitlines()
+    for _ in range(int(rng.integers(1, 3))):
+        at = int(rng.integers(len(lines)))
+        if "=" in lines[at] and not lines[at].startswith("["):
+            key = lines[at].split("=")[0]
+            lines[at] = f"{key}= {TOML_VALUES[int(rng.integers(len(TOML_VALUES)))]}"
+        elif rng.integers(2):
+            del lines[at]
+        else:
+            lines[at] = ("[time]", "[columns.x]", "[joints]", "[more]")[int(rng.integers(4))]
+    return "\n".join(lines).encode()
+
+
+def respelt(columns: dict[str, Array], rng: np.random.Generator) -> dict[str, list[str]]:
+    """Defects that a real logger makes: cells, columns, rows and headers, well-formed as CSV."""
+    table = {name: [f"{x:.6g}" for x in values] for name, values in columns.items()}
+    for _ in range(int(rng.integers(1, 4))):
+        names = list(table)
+        name = names[int(rng.integers(len(names)))]
+        rows = len(table[name])
+        first = int(rng.integers(0, rows))
+        part = slice(first, first + int(rng.integers(1, rows)))
+        action = int(rng.integers(9))
+        if action == 0:
+            table[name][first] = CELLS[int(rng.integers(len(CELLS)))]
+        elif action == 1:
+            filler = CELLS[int(rng.integers(len(CELLS)))]
+            table[name][part] = [filler] * len(table[name][part])
+        elif action == 2:
+            factor = (57.3, 1e3, -1.0, 0.0, 1e-3, 1e7)[int(rng.integers(6))]
+            table[name] = [f"{factor * x:.9g}" for x in columns.get(name, np.zeros(rows))]
+            table[name] += ["0"] * (rows - len(table[name]))
+            del table[name][rows:]
+        elif action == 3 and rows > 2:
+            for cells in table.values():
+                del cells[part]
+            if not table[name]:
+                return table
+        elif action == 4:
+            new = HEADERS[int(rng.integers(len(HEADERS)))]
+            table = {new if k == name else k: v for k, v in table.items()}
+        elif action == 5:
+            order = rng.permutation(rows) if rng.integers(2) else np.arange(rows)[::-1]
+            table[name] = [table[name][i] for i in order]
+        elif action == 6:
+            table[name] = [table[name][i // 7 * 7] for i in range(rows)]
+        elif action == 7 and len(table) > 1:
+            del table[name]
+        elif action == 8:
+            new = HEADERS[int(rng.integers(len(HEADERS)))]
+            table.setdefault(new, [str(i % 2) for i in range(rows)])
+    return table
+
+
+def as_csv(table: dict[str, list[str]]) -> bytes:
+    rows = zip(*table.values(), strict=True)
+    lines = [",".join(table), *(",".join(f'"{c}"' if "," in c else c for c in r) for r in rows)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def as_arrow(table: dict[str, list[str]], rng: np.random.Generator) -> pa.Table:
+    """The same defects with Parquet's types: text, integers, booleans, nulls, lists, single."""
+    out = {}
+    for name, cells in table.items():
+        numbers = np.array([_number(cell) for cell in cells])
+        kind = int(rng.integers(16))
+        if kind == 0:
+            out[name] = pa.array(cells)
+        elif kind == 1:
+            whole = np.clip(np.nan_to_num(numbers), -1e15, 1e15)
+            out[name] = pa.array(whole.astype(np.int64))
+        elif kind == 2:
+            out[name] = pa.array(numbers > 0)
+        elif kind == 3:
+            out[name] = pa.nulls(len(cells))
+        elif kind == 4:
+            out[name] = pa.array([[x] for x in numbers])
+        elif kind == 5:
+            out[name] = pa.array(np.clip(numbers, -1e30, 1e30).astype(np.float32))
+        elif kind == 6:
+            out[name] = pa.array(np.arange(len(cells)), type=pa.timestamp("us"))
+        else:
+            out[name] = pa.array([None if cell == "" else _number(cell) for cell in cells])
+    return pa.table(out)
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return float("nan")
+
+
+def check(path: Path, expected: Expected, mapping: Path | None) -> bool:
+    """Read, judge and prepare. Returns whether the input was accepted."""
+    try:
+        rules = load_mapping(mapping) if mapping is not None else None
+        intake = take_in([path], expected, rules)
+    except (GapError, ActuatorError) as error:
+        message = str(error)
+        assert message
+        assert "\n" not in message
+        assert len(message) < 700, message
+        return False
+    (ready,) = intake.prepared
+    assert np.isfinite(ready.q).all()
+    assert np.isfinite(ready.a).all()
+    assert np.isfinite(ready.effort[ready.mask]).all()
+    assert (np.diff(ready.time) > 0).all()
+    return True
+
+
+def fuzz(expected: Expected, folder: Path, count: int, seed: int) -> dict[str, int]:
+    rng = np.random.default_rng(seed)
+    csv = valid_csv()
+    good = folder / "good.csv"
+    good.write_bytes(csv)
+    parquet = folder / "good.parquet"
+    pq.write_table(pa.table(valid_columns()), parquet)
+    whole = parquet.read_bytes()
+    accepted = {"csv": 0, "mapping": 0, "parquet": 0}
+    for k in range(count):
+        kind = ("csv", "mapping", "csv", "parquet")[k % 4]
+        rough = bool(rng.integers(3) == 0)
+        if kind == "csv":
+            bad = folder / "bad.csv"
+            table = respelt(valid_columns(), rng)
+            bad.write_bytes(mutated(csv, rng, TOKENS) if rough else as_csv(table))
+            accepted[kind] += check(bad, expected, None)
+        elif kind == "parquet":
+            bad = folder / "bad.parquet"
+            if rough:
+                bad.write_bytes(mutated(whole, rng, TOKENS))
+            else:
+                pq.write_table(as_arrow(respelt(valid_columns(), rng), rng), bad)
+            accepted[kind] += check(bad, expected, None)
+        else:
+            bad = folder / "bad.toml"
+            text = mutated(MAPPING, rng, TOML_TOKENS) if rough else rewritten(MAPPING, rng)
+            bad.write_bytes(text)
+            accepted[kind] += check(good, expected, bad)
+    return accepted
+
+
+def test_the_unmutated_inputs_are_accepted(two_joints: Expected, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_bytes(valid_csv())
+    (tmp_path / "m.toml").write_bytes(MAPPING)
+    assert check(tmp_path / "log.csv", two_joints, None)
+    assert check(tmp_path / "log.csv", two_joints, tmp_path / "m.toml")
+
+
+def test_three_hundred_inputs(two_joints: Expected, tmp_path: Path) -> None:
+    accepted = fuzz(two_joints, tmp_path, 300, seed=1)
+    assert sum(accepted.values()) < 250  # most mutations must matter, else nothing was tested
+
+
+@pytest.mark.slow
+def test_ten_thousand_inputs(two_joints: Expected, tmp_path: Path) -> None:
+    fuzz(two_joints, tmp_path, 10_000, seed=2)
