@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -274,8 +273,7 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
     ]
     if parts.warning:
         texts.append(f"**Note:** {parts.warning}.")
-    verdicts: Sequence[Any] = tables["quality"].columns["verdict"]
-    odd = [value != "ok" for value in verdicts]
+    odd = [value != "ok" for value in tables["quality"].columns["verdict"]]
     block = table_block(
         tables["quality"],
         keep=odd,
