@@ -13,7 +13,7 @@ from actuators.build import Catalog, load_catalog
 from actuators.chain import Chain
 from pipeline.errors import PipelineError
 from pipeline.gap.contact import Contact, find_contact
-from pipeline.gap.errors import GapError, LogContentError, MappingError
+from pipeline.gap.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.gap.expected import Expected, expected_of_model, expected_of_robot
 from pipeline.gap.intake import Intake, prepare_logs
 from pipeline.gap.log import EFFORTS, Log
@@ -205,10 +205,16 @@ def check_options(options: argparse.Namespace) -> None:
     """
     if not options.robot.is_file():
         raise PipelineError(f"{options.robot}: no such robot file; name it with --robot")
+    if not options.logs:
+        raise LogContentError(f"gap {options.step}: no log given; name a CSV or Parquet file")
     for path in (*options.logs, *options.holdout):
         if not path.is_file():
             raise LogContentError(f"{path}: no such log; name a CSV or Parquet file")
     if options.mapping and not options.mapping.is_file():
         raise MappingError(f"{options.mapping}: no such mapping file")
+    if options.model and not options.model.is_file():
+        raise ModelFileError(f"{options.model}: no such model file")
+    if options.step == "shrink" and not options.model:
+        raise ModelFileError("gap shrink: name the model file to check with --model")
     if options.effort and options.effort not in EFFORTS:
         raise GapError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")
