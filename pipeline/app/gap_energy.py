@@ -18,15 +18,19 @@ PAIR = ("reversible", "irreversible")
 
 @dataclass(frozen=True)
 class Cost:
-    """Energies of the whole robot with one alternative.
+    """Energies with one alternative.
 
     Attributes:
-        cycle: Electrical energy of one gait cycle [J].
-        standing: Electrical power, standing as the robot file says [W].
+        cycle: Electrical energy of one gait cycle, whole robot [J].
+        standing: Electrical power, standing as the robot file says, whole robot [W].
+        middle_cycle: Of the middle legs alone, on which the paper's break-even rests [J].
+        middle_standing: Likewise [W].
     """
 
     cycle: float
     standing: float
+    middle_cycle: float
+    middle_standing: float
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,7 @@ class EnergyChange:
         before: By alternative.
         after: By alternative.
         break_even_before: Fraction of time standing above which the irreversible actuator uses
-            less; NaN where there is none.
+            less in the middle legs (Fig. 21 of the paper); NaN where there is none.
         break_even_after: The same with the effects.
     """
 
@@ -67,13 +71,13 @@ def energy_change(robot: Robot, chains: Mapping[str, Chain], effects: Effects) -
 def _costs(robot: Robot, chains: Mapping[str, Chain], adjust: Adjust | None) -> dict[str, Cost]:
     walking = walk(robot, chains, samples=SAMPLES, adjust=adjust)
     standing = stand(robot, chains, adjust=adjust)
-    return {
-        name: Cost(
-            float(walking.supplies[name].supplied_energy.sum()),
-            float(standing.holding[name].power.sum()),
-        )
-        for name in chains
-    }
+    legs = [leg for leg in robot.spec.legs if leg.station == "middle"] or robot.spec.legs
+    middle = [robot.joints.index(joint) for leg in legs for joint in leg.joints]
+    out = {}
+    for name in chains:
+        energy, power = walking.supplies[name].supplied_energy, standing.holding[name].power
+        out[name] = Cost(*(float(x.sum()) for x in (energy, power, energy[middle], power[middle])))
+    return out
 
 
 def break_even(costs: Mapping[str, Cost], period: float) -> float:
@@ -89,8 +93,8 @@ def break_even(costs: Mapping[str, Cost], period: float) -> float:
     if any(name not in costs for name in PAIR):
         return math.nan
     reversible, irreversible = (costs[name] for name in PAIR)
-    extra = (irreversible.cycle - reversible.cycle) / period  # [W]
-    saved = reversible.standing - irreversible.standing  # [W]
+    extra = (irreversible.middle_cycle - reversible.middle_cycle) / period  # [W]
+    saved = reversible.middle_standing - irreversible.middle_standing  # [W]
     if extra <= 0 or saved <= 0:
         return math.nan
     return extra / (extra + saved)

@@ -129,9 +129,12 @@ def energy_words(change: EnergyChange, alternative: str) -> str:
     text = f"**What it costs:** one gait cycle of the whole robot, electrical: {'; '.join(parts)}."
     before, after = change.break_even_before, change.break_even_after
     if math.isnan(before) and math.isnan(after):
-        return text + " There is no break-even with or without it."
+        return text + (
+            " Reversible and irreversible actuators have no break-even in the middle legs, with or "
+            "without it."
+        )
     return text + (
-        " The irreversible actuator pays above "
+        " In the middle legs the irreversible actuator pays above "
         f"{_share(before)} of the time standing without it and above {_share(after)} with it."
     )
 

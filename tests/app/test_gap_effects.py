@@ -1,0 +1,139 @@
+"""Effects in standing and walking, held against closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from actuators.build import Catalog, load_catalog
+from pipeline.app.compute import stand, walk
+from pipeline.app.edited_chain import EditedChain, edited_chain
+from pipeline.app.effects import Effects, effects
+from pipeline.app.gap_energy import Cost, break_even, energy_change
+from pipeline.gap.effects.registry import effect_named
+from pipeline.gap.model import MachineModel, machine_of_robot
+from pipeline.robot import Robot
+
+JOINT = "rm_joint_2"
+SAMPLES = 151
+
+
+@pytest.fixture(scope="module")
+def catalog() -> Catalog:
+    return load_catalog()
+
+
+def with_effect(
+    robot: Robot, catalog: Catalog, name: str, place: str, values: Mapping[str, float]
+) -> Effects:
+    def apply(model: MachineModel) -> MachineModel:
+        return effect_named(name).apply(model, (place,), values)
+
+    return effects(robot, catalog.chain("rotor"), apply, (name,), "model.toml")
+
+
+def test_a_friction_of_nothing_changes_nothing(hexapod: Robot, catalog: Catalog) -> None:
+    chain = catalog.chain("irreversible")
+    edit = with_effect(hexapod, catalog, "coulomb_friction", JOINT, {"torque": 0.0})
+    edited = edit.chain(chain)
+    assert isinstance(edited, EditedChain)
+    walking = walk(hexapod, {"as it was": chain, "edited": edited}, samples=SAMPLES)
+    before, after = (walking.results[k] for k in ("as it was", "edited"))
+    assert list(after.shafts) == list(before.shafts)
+    assert list(after.losses)[-1] == list(before.losses)[-1]
+    for stage, shaft in before.shafts.items():
+        np.testing.assert_array_equal(after.shafts[stage].torque, shaft.torque)
+    np.testing.assert_array_equal(after.electrical_power, before.electrical_power)
+
+
+def test_without_effects_the_chain_is_itself(hexapod: Robot, catalog: Catalog) -> None:
+    chain = catalog.chain("reversible")
+    assert edited_chain(chain, machine_of_robot(hexapod, chain).actuators) is chain
+
+
+def test_coulomb_friction_loses_torque_times_travel(hexapod: Robot, catalog: Catalog) -> None:
+    edit = with_effect(hexapod, catalog, "coulomb_friction", JOINT, {"torque": 2.0})
+    chain = edit.chain(catalog.chain("reversible"))
+    result = walk(hexapod, {"x": chain}, samples=SAMPLES).results["x"]
+    column = hexapod.joints.index(JOINT)
+    loss = result.losses["coulomb_friction"]
+    assert not loss[:, [k for k in range(18) if k != column]].any()
+    energy = np.trapezoid(loss[:, column], result.joint.time)
+    travel = np.abs(np.diff(result.joint.position[:, column])).sum()
+    assert energy == pytest.approx(2.0 * travel, rel=1e-3)
+
+
+def test_friction_helps_to_hold(hexapod: Robot, catalog: Catalog) -> None:
+    edit = with_effect(hexapod, catalog, "coulomb_friction", JOINT, {"torque": 3.0})
+    chain = catalog.chain("reversible")
+    standing = stand(hexapod, {"before": chain, "after": edit.chain(chain)})
+    column = hexapod.joints.index(JOINT)
+    before, after = (np.abs(standing.holding[k].motor_torque) for k in ("before", "after"))
+    assert after[column] < before[column]
+    np.testing.assert_array_equal(np.delete(after, column), np.delete(before, column))
+
+
+def test_the_ideal_actuator_stays_ideal(hexapod: Robot, catalog: Catalog) -> None:
+    edit = with_effect(hexapod, catalog, "coulomb_friction", JOINT, {"torque": 3.0})
+    ideal = catalog.chain("ideal")
+    assert edit.chain(ideal) is ideal
+
+
+def test_a_payload_weighs_on_the_feet(hexapod: Robot, catalog: Catalog) -> None:
+    edit = with_effect(hexapod, catalog, "link_mass", "base_link", {"mass": 5.0})
+    weight = [
+        stand(robot, {}, adjust=adjust).contacts.force[0, :, 2].sum()
+        for robot, adjust in ((hexapod, None), (edit.robot, edit.demand))
+    ]
+    assert weight[1] - weight[0] == pytest.approx(5.0 * 9.81, rel=1e-3)
+
+
+def test_a_spring_adds_to_the_demand(hexapod: Robot, catalog: Catalog) -> None:
+    edit = with_effect(hexapod, catalog, "parallel_spring", JOINT, {"stiffness": 4.0, "rest": 0.1})
+    before, after = stand(hexapod, {}), stand(edit.robot, {}, adjust=edit.demand)
+    column = hexapod.joints.index(JOINT)
+    added = after.demand.torque[0] - before.demand.torque[0]
+    assert added[column] == pytest.approx(4.0 * (before.demand.position[0, column] - 0.1))
+    assert not np.delete(added, column).any()
+
+
+def test_feet_that_squeeze_the_ground_load_the_legs_alike(hexapod: Robot, catalog: Catalog) -> None:
+    edit = with_effect(hexapod, catalog, "internal_foot_force", "ground", {"lateral": 30.0})
+    legs = hexapod.leg_names
+    before = stand(hexapod, {}, feet=legs)
+    after = stand(edit.robot, {}, feet=legs, adjust=edit.demand)
+    added = (after.demand.torque - before.demand.torque)[0].reshape(6, 3)
+    left, right = added[:3], added[3:]
+    # Mirrored legs at mirrored poses: equal coordinates are mirrored poses.
+    np.testing.assert_allclose(np.abs(left), np.abs(right), atol=1e-9)
+    assert np.abs(added).max() > 0.5
+
+
+def test_sensors_cost_nothing_and_say_so(hexapod: Robot, catalog: Catalog) -> None:
+    edit = with_effect(hexapod, catalog, "position_offset", JOINT, {"angle": 0.02})
+    chain = catalog.chain("reversible")
+    assert edit.chain(chain) is chain
+    assert "sensor" in edit.remarks[0]
+
+
+def test_energy_changes_by_what_the_friction_asks(hexapod: Robot, catalog: Catalog) -> None:
+    edit = with_effect(hexapod, catalog, "coulomb_friction", JOINT, {"torque": 4.0})
+    change = energy_change(hexapod, catalog.chains(), edit)
+    assert change.after["ideal"].cycle == change.before["ideal"].cycle
+    assert change.after["reversible"].cycle > change.before["reversible"].cycle
+    assert change.after["reversible"].standing < change.before["reversible"].standing
+    assert change.after["reversible"].middle_cycle > change.before["reversible"].middle_cycle
+
+
+def test_at_the_break_even_both_cost_the_same() -> None:
+    costs = {
+        "reversible": Cost(300.0, 20.0, 120.0, 9.0),
+        "irreversible": Cost(400.0, 3.0, 200.0, 1.0),
+    }
+    f = break_even(costs, 3.0)
+    power = [(1 - f) * c.middle_cycle / 3.0 + f * c.middle_standing for c in costs.values()]
+    assert power[0] == pytest.approx(power[1])
+    swapped = {"reversible": costs["irreversible"], "irreversible": costs["reversible"]}
+    assert np.isnan(break_even(swapped, 3.0))
