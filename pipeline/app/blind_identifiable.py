@@ -46,6 +46,8 @@ Column = Mapping[int, Array]
 #: deviations: 4.2 keep chance from passing for any of some 400 candidates in 99 of 100 logs, and
 #: 1.7 more let the truth be seen in 95 of 100.
 THRESHOLD: Final = 6.0
+#: A rival stands for the truth only where it leaves less than this share of nothing's misfit.
+EXPLAINS: Final = 0.5
 #: Joints that feel less than this share of d are left out.
 _LEAST_SHARE: Final = 1e-3
 _ORDERS = 3  # ripples of the rivals, the strongest ones
@@ -86,7 +88,8 @@ class Identifiability:
     @property
     def like(self) -> tuple[Rival, ...]:
         """Rivals of the same class: to name one of them is right."""
-        return tuple(r for r in self.rivals if r.misfit < THRESHOLD)
+        limit = min(THRESHOLD, EXPLAINS * self.nothing)
+        return tuple(r for r in self.rivals if r.misfit < limit)
 
     @property
     def alone(self) -> bool:
@@ -158,8 +161,8 @@ def _judge(
         if not other.in_catalogue:
             continue
         effect = EFFECTS[other.effect]
-        _, shape = effect.internal(other.values)
-        free += effect_columns(bench, base, effect, other.place, shape, sigma)
+        _, known = effect.internal(other.values)
+        free += effect_columns(bench, base, effect, other.place, known, sigma)
     columns: list[Column] = [*free, d]
     tried: list[tuple[Effect, Place, slice]] = []
     hidden = {(one.effect, one.place) for one in (truth, *others)}
@@ -174,7 +177,7 @@ def _judge(
     precision = np.zeros(len(columns))
     precision[:priors] = 1.0
     only = {j: r for j, r in rest.items() if j in felt}
-    sums = block_sums([make_stack(bench, columns, only)], precision)
+    sums = block_sums([make_stack(bench, columns, only)], precision, np.zeros(len(columns)))
     return _compare(sums, len(free), tried)
 
 

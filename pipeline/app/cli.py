@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 
+from pipeline.app.blind_options import add_blind_options, add_twin_options
 from pipeline.app.gap_options import add_gap_options
 from pipeline.errors import PipelineError, TippingError
 
@@ -59,6 +60,14 @@ def parser() -> argparse.ArgumentParser:
     )
     add_gap_options(gap)
     gap.set_defaults(run=_run_gap)
+
+    twin = verbs.add_parser("twin", help="make one blind trial: a log with something hidden")
+    add_twin_options(twin)
+    twin.set_defaults(run=_run_twin)
+
+    blind = verbs.add_parser("blind", help="make many blind trials and judge what gap says of them")
+    add_blind_options(blind)
+    blind.set_defaults(run=_run_blind)
 
     calibrate = verbs.add_parser(
         "calibrate", help="fit the unpublished numbers to the paper's figures and store them"
@@ -135,6 +144,18 @@ def _run_gap(options: argparse.Namespace) -> int:
     from pipeline.app.gap import run_gap
 
     return run_gap(options)
+
+
+def _run_twin(options: argparse.Namespace) -> int:
+    from pipeline.app.twin import run_twin
+
+    return run_twin(options)
+
+
+def _run_blind(options: argparse.Namespace) -> int:
+    from pipeline.app.blind import run_blind
+
+    return run_blind(options)
 
 
 def _run_calibrate(options: argparse.Namespace) -> int:

@@ -1,0 +1,150 @@
+"""How an answer compares with the truth: one row of `blind_trials.csv`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from pipeline.app.blind_answer import Answer, Named
+from pipeline.app.blind_identifiable import Identifiability
+from pipeline.app.blind_truth import HiddenTruth
+
+Key = tuple[str, tuple[str, ...]]
+#: Pairs that are one effect by definition: its two halves at the same joint name it, too.
+SAME_AS: Final[Mapping[str, frozenset[str]]] = {
+    "direction_dependent_friction": frozenset({"coulomb_friction", "effort_offset"}),
+}
+#: Parameters that are compared only up to conventions (a phase) or drawn beside the size.
+NOT_COVERED: Final = frozenset({"phase", "rest", "velocity", "order", "time_constant"})
+OUTCOMES: Final = {
+    "right": "name and place first, or a member of its class",
+    "wrong place": "the right name at another place first",
+    "wrong name": "another name first, without calling the truth indistinguishable from it",
+    "unexplained": "no name; the gap called unexplained",
+    "nothing": "nothing found",
+    "failed": "no answer",
+}
+
+
+@dataclass(frozen=True)
+class Score:
+    """One trial, judged.
+
+    Attributes:
+        number: Of the trial.
+        hidden: What was in it.
+        judged: What its log could tell of each.
+        answer: Of the workflow.
+        outcome: Key of `OUTCOMES`; by the first name.
+        wrong: Names given with confidence that are neither hidden nor of a hidden one's class.
+        right: Hidden effects that were named, or whose class was.
+        intervals: Parameters of rightly named effects with an interval.
+        covered: Of them, those whose interval holds the truth.
+        closed: Share of the removable gap on *prove* that is closed; NaN without a name.
+    """
+
+    number: int
+    hidden: tuple[HiddenTruth, ...]
+    judged: tuple[Identifiability, ...]
+    answer: Answer
+    outcome: str
+    wrong: tuple[Key, ...]
+    right: tuple[Key, ...]
+    intervals: int
+    covered: int
+    closed: float
+
+    @property
+    def visible(self) -> bool:
+        """Whether the log could show every hidden effect."""
+        return bool(self.judged) and all(one.visible for one in self.judged)
+
+    @property
+    def alone(self) -> bool:
+        """Whether the log could tell every hidden effect from all others."""
+        return bool(self.judged) and all(one.alone for one in self.judged)
+
+
+def score(
+    number: int,
+    hidden: Sequence[HiddenTruth],
+    judged: Sequence[Identifiability],
+    answer: Answer,
+) -> Score:
+    """Judge one answer."""
+    classes = [
+        {(one.effect, one.place), *((r.effect, r.place) for r in j.like)}
+        for one, j in zip(hidden, judged, strict=True)
+    ]
+    given = {(n.effect, n.place) for n in answer.named}
+    for one, members in zip(hidden, classes, strict=True):
+        halves = {(name, one.place) for name in SAME_AS.get(one.effect, ())}
+        if halves and halves <= given:
+            members |= halves
+    wrong, right = [], set()
+    for n in answer.named:
+        hits = [k for k, members in enumerate(classes) if _meets(n, members)]
+        right |= {(hidden[k].effect, hidden[k].place) for k in hits}
+        if not hits and n.confident:
+            wrong.append((n.effect, n.place))
+    intervals, covered = _coverage(hidden, answer.named)
+    return Score(
+        number=number,
+        hidden=tuple(hidden),
+        judged=tuple(judged),
+        answer=answer,
+        outcome=_outcome(hidden, classes, answer),
+        wrong=tuple(wrong),
+        right=tuple(sorted(right)),
+        intervals=intervals,
+        covered=covered,
+        closed=_closed(answer.named),
+    )
+
+
+def _meets(named: Named, members: set[Key]) -> bool:
+    """Whether a name, or one it calls indistinguishable, is in a class."""
+    if (named.effect, named.place) in members:
+        return True
+    return any(
+        effect in named.rivals and all(part in named.rivals for part in place)
+        for effect, place in members
+    )
+
+
+def _outcome(hidden: Sequence[HiddenTruth], classes: Sequence[set[Key]], answer: Answer) -> str:
+    if answer.code not in (0, 1):
+        return "failed"
+    if not answer.named:
+        return "unexplained" if answer.code == 1 else "nothing"
+    first = answer.named[0]
+    if any(_meets(first, members) for members in classes):
+        return "right"
+    return "wrong place" if first.effect in {one.effect for one in hidden} else "wrong name"
+
+
+def _coverage(hidden: Sequence[HiddenTruth], named: Sequence[Named]) -> tuple[int, int]:
+    count = covered = 0
+    truths = {(one.effect, one.place): one for one in hidden}
+    for n in named:
+        truth = truths.get((n.effect, n.place))
+        if truth is None:
+            continue
+        for parameter, (_, low, high) in n.intervals.items():
+            if parameter not in truth.total or parameter in NOT_COVERED or not low < high:
+                continue
+            count += 1
+            covered += low <= truth.total[parameter] <= high
+    return count, covered
+
+
+def _closed(named: Sequence[Named]) -> float:
+    """Of what lies above the noise floor in squares, before the first name and after the last."""
+    before: dict[tuple[str, ...], float] = {}
+    after: dict[tuple[str, ...], float] = {}
+    for n in named:
+        before.setdefault(n.place, max(n.gap_before**2 - n.noise_floor**2, 0.0))
+        after[n.place] = max(n.gap_after**2 - n.noise_floor**2, 0.0)
+    total = sum(before.values())
+    return 1.0 - sum(after.values()) / total if total > 0 else float("nan")

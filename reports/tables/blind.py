@@ -1,0 +1,85 @@
+"""Tables of the blind trials: every trial, the rates, the confusion matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.table import Table, table_from_rows
+
+TRIALS = {
+    "trial": ("number in the matrix", "1"),
+    "seed": ("of everything drawn", "1"),
+    "motion": ("leg on its stand, or walk of the hexapod", ""),
+    "noise": ("level of the sensors' noise", ""),
+    "hidden": ("effects hidden, empty for none; several by semicolons", ""),
+    "hidden_place": ("where", ""),
+    "hidden_values": ("parameters in SI units", ""),
+    "in_catalogue": ("whether the workflow has names for all of them", ""),
+    "strength": ("expected RMS torque over the noise within 20 Hz, of the weakest", "1"),
+    "misfit_of_nothing": ("what tolerances alone leave of the effect, of the weakest", "sd"),
+    "nearest_rival": ("effect that could best pass for it", ""),
+    "nearest_rival_place": ("where", ""),
+    "misfit_of_rival": ("what that rival leaves of it", "sd"),
+    "visible": ("whether the log could show all that is hidden", ""),
+    "tellable": ("whether it could tell it from every rival", ""),
+    "same_class": ("rivals that this log cannot tell from it", ""),
+    "sealed_sha256": ("hash of the sealed truth", ""),
+    "exit_code": ("of gap: 0 explained, 1 a part unexplained; -1 no answer", "1"),
+    "named": ("effects found, in order", ""),
+    "named_place": ("where", ""),
+    "named_rivals": ("what the answer calls indistinguishable from them", ""),
+    "named_values": ("parameters with 95 % intervals", ""),
+    "outcome": ("of the first name: right, wrong place, wrong name, unexplained, nothing", ""),
+    "wrong_names": ("given with confidence, neither hidden nor of a hidden one's class", ""),
+    "intervals": ("parameters of rightly named effects", "1"),
+    "intervals_that_cover": ("of them, those whose interval holds the truth", "1"),
+    "gap_closed": ("share of the gap above the noise floor, in squares, closed on prove", "1"),
+    "message": ("of gap, where it gave no answer", ""),
+}
+RATES = {
+    "rate": ("name", ""),
+    "meaning": ("of which trials which share", ""),
+    "hits": ("how many", "1"),
+    "trials": ("out of how many", "1"),
+    "share": ("hits over trials", "1"),
+    "low": ("lower end of Wilson's 95 % interval", "1"),
+    "high": ("upper end", "1"),
+    "aim_low": ("what is aimed at: at least", "1"),
+    "aim_high": ("at most", "1"),
+    "reached": ("whether the share lies inside the aim", ""),
+}
+
+
+def blind_trials(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One row per trial."""
+    return table_from_rows("blind_trials", rows, TRIALS, "Every blind trial, judged.")
+
+
+def blind_rates(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One row per rate."""
+    return table_from_rows(
+        "blind_rates", rows, RATES, "How often the workflow was right, with Wilson's intervals."
+    )
+
+
+def confusion(hidden: Sequence[str], named: Sequence[str], counts: NDArray[np.int_]) -> Table:
+    """Hidden effect against the first name.
+
+    Args:
+        hidden: Rows.
+        named: Columns.
+        counts: Shape (rows, columns).
+    """
+    columns: dict[str, Any] = {"hidden": list(hidden)}
+    meanings = {"hidden": ("what was in the log, where the log could show it", "")}
+    for k, name in enumerate(named):
+        header = "named_" + name.strip("()").replace(" ", "_").replace(",", "")
+        columns[header] = counts[:, k]
+        meanings[header] = (f"trials in which the first answer was {name}", "1")
+    return Table(
+        "blind_confusion", columns, meanings, "Hidden effect against the first name given."
+    )
