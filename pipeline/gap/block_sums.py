@@ -30,6 +30,7 @@ class BlockSums:
         count: Independent samples, shape (B,).
         part: Part of the data of each block, shape (B,).
         precision: Prior precision of the unknowns, shape (n,).
+        mean: Where the prior is centred: minus what the model holds already, shape (n,).
     """
 
     H: Array
@@ -38,6 +39,7 @@ class BlockSums:
     count: Array
     part: NDArray[np.int8]
     precision: Array
+    mean: Array
 
     def blocks(self, *parts: int) -> NDArray[np.intp]:
         """Numbers of the blocks of some parts of the data."""
@@ -49,7 +51,8 @@ class BlockSums:
         index = np.arange(n) if free is None else free
         A = self.H[np.ix_(blocks, index, index)].sum(axis=0) + np.diag(self.precision[index])
         out = np.zeros(n)
-        out[index] = solve_spd(A, self.h[np.ix_(blocks, index)].sum(axis=0))
+        pull = self.precision[index] * self.mean[index]
+        out[index] = solve_spd(A, self.h[np.ix_(blocks, index)].sum(axis=0) + pull)
         return out
 
     def loss(self, theta: Array, blocks: NDArray[np.intp]) -> Array:
@@ -60,7 +63,7 @@ class BlockSums:
 
     def penalty(self, theta: Array) -> float:
         """What the prior says against an estimate."""
-        return float(np.sum(self.precision * theta**2))
+        return float(np.sum(self.precision * (theta - self.mean) ** 2))
 
     def objective(self, theta: Array, blocks: NDArray[np.intp]) -> float:
         """Loss and penalty together."""
@@ -135,12 +138,13 @@ def make_stack(
     return Stack(bench, ids, X, r)
 
 
-def block_sums(stacks: Sequence[Stack], precision: Array) -> BlockSums:
+def block_sums(stacks: Sequence[Stack], precision: Array, mean: Array) -> BlockSums:
     """Sum up the columns of several logs by block.
 
     Args:
         stacks: One per log, the same unknowns in each.
         precision: Prior precision, shape (n,).
+        mean: Where the prior is centred, shape (n,).
     """
     n = precision.size
     total = sum(stack.bench.block_part.size for stack in stacks)
@@ -162,4 +166,4 @@ def block_sums(stacks: Sequence[Stack], precision: Array) -> BlockSums:
                 s[at] += float(flat_r @ flat_r)
             count[at] = mask[rows].sum() * channels * bench.weight**2
             at += 1
-    return BlockSums(H, h, s, count, part, precision)
+    return BlockSums(H, h, s, count, part, precision, mean)

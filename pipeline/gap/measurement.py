@@ -23,33 +23,32 @@ def unfiltered(x: Array) -> Array:
 class Measurement:
     """Samples of the machine's motion and of what it cost, at one bandwidth.
 
-        Attributes:
-            name: Of the log.
-            time: Shape (N,) [s].
-            joints: Names of the columns.
-            q: Position as measured, shape (N, J) [rad].
-            v: Velocity, shape (N, J) [rad/s].
-            a: Acceleration, shape (N, J) [rad/s^2].
-            channels: Compared channels, the log's own effort first, e.g. ``("current", "voltage")``.
-                With a measured current, voltage is predicted from that current and the speed.
-            effort: Shape (N, J, C) in the channels' units.
-            noise: Standard deviation of the noise in the bandwidth, shape (J, C).
-            mask: Samples that count, shape (N, J).
-            part: _SHORT = 300  # samples of a kernel up to which summing is quicker than transforming
-    FIT, CHOOSE, PROVE or UNUSED, shape (N,).
-            block: Number of the block, shape (N,); blocks are what is resampled.
-            pieces: Stretches without a gap.
-            lowpass: Brings a series (N, ...) of this grid to the bandwidth.
-            kernel: The same as weights of neighbouring samples, shape (odd,), or None.
-            bandwidth: Cut-off of that low-pass [Hz].
-            at_motor: Whether the encoder sits on the motor's side of the gear.
-            rest_speed: Speed within which friction passes from one sign to the other, (J,) [rad/s].
-            base_roll: Shape (N,) [rad], or None for level.
-            base_pitch: Likewise.
-            standing: Which feet stand, shape (N, F), or None.
-            foot_force: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None
-                where the ground's forces are computed.
-            sha256: Of the log.
+    Attributes:
+        name: Of the log.
+        time: Shape (N,) [s].
+        joints: Names of the columns.
+        q: Position as measured, shape (N, J) [rad].
+        v: Velocity, shape (N, J) [rad/s].
+        a: Acceleration, shape (N, J) [rad/s^2].
+        channels: Compared channels, the log's own effort first, e.g. ``("current", "voltage")``.
+            With a measured current, voltage is predicted from that current and the speed.
+        effort: Shape (N, J, C) in the channels' units.
+        noise: Standard deviation of the noise in the bandwidth, shape (J, C).
+        mask: Samples that count, shape (N, J).
+        part: FIT, CHOOSE, PROVE or UNUSED, shape (N,).
+        block: Number of the block, shape (N,); blocks are what is resampled.
+        pieces: Stretches without a gap.
+        lowpass: Brings a series (N, ...) of this grid to the bandwidth.
+        kernel: The same as weights of neighbouring samples, shape (odd,), or None.
+        bandwidth: Cut-off of that low-pass [Hz].
+        at_motor: Whether the encoder sits on the motor's side of the gear.
+        rest_speed: Speed within which friction passes from one sign to the other, (J,) [rad/s].
+        base_roll: Shape (N,) [rad], or None for level.
+        base_pitch: Likewise.
+        standing: Which feet stand, shape (N, F), or None.
+        foot_force: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None
+            where the ground's forces are computed.
+        sha256: Of the log.
     """
 
     name: str

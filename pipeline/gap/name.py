@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 Key = tuple[str, Place]
 _TRIED = 8  # candidates tried in earnest per round
 _NEWTON = 3  # refits after an acceptance
+_HELD = 3.0  # sigmas
+#: Tolerances in which the prediction bends enough to be taken up into the model.
+_RELINEARISED = ("torque_constant", "resistance", "encoder", "mass", "inertia", "skew")
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,7 @@ def select(problem: Problem) -> Selection:
     trials: dict[Key, Trial] = {}
     first: tuple[Score, ...] = ()
     refused: set[Key] = set()
+    problem = refit(problem)
     while True:
         screen = Screen(problem)
         held = [(a.effect.name, a.place) for a in problem.accepted]
@@ -81,8 +85,9 @@ def select(problem: Problem) -> Selection:
         tried = len(first)
         if len(problem.accepted) >= limits.MOST_EFFECTS:
             break
-        promising = [s for s in scores if (s.effect.name, s.place) not in refused][:_TRIED]
-        best = [refine(screen, s) for s in promising if s.gain > 0.5 * limits.LEAST_GAIN]
+        open_ = [s for s in scores if (s.effect.name, s.place) not in refused]
+        open_ = [s for s in open_ if s.gain > 0.7 * least_gain(problem, s)]
+        best = [refine(screen, s) for s in open_[:_TRIED]]
         made = [try_candidate(problem, s) for s in best]
         for t in made:
             trials.setdefault(t.key, t)
@@ -104,6 +109,13 @@ def select(problem: Problem) -> Selection:
     kept = {(a.effect.name, a.place) for a in problem.accepted}
     rounds = [r for r in rounds if r.winner in kept]
     return Selection(problem, tuple(rounds), first, tuple(scores), trials, tried)
+
+
+def least_gain(problem: Problem, score: Score) -> float:
+    """Gain that a candidate needs, before the noise's scale is looked at."""
+    if score.effect.tolerance(problem.model, score.place):
+        return limits.TOLERANCE_SIGMAS**2
+    return limits.LEAST_GAIN
 
 
 def acceptable(problem: Problem, t: Trial, tried: int) -> bool:
@@ -175,8 +187,13 @@ def refit(problem: Problem) -> Problem:
                 largest = max(largest, abs(value - a.x[c.name]) / (abs(value) + c.step))
                 x[c.name] = value
             moved.append(replace(a, x=x))
-        problem = problem.with_accepted(moved)
-        if largest < 1e-3:
+        count = len(problem.tolerances)
+        # Beyond a few sigmas a tolerance only stands in for an effect not yet found.
+        reach = np.array([_HELD if n.kind in _RELINEARISED else 0.0 for n in problem.tolerances])
+        held = np.clip(problem.held + theta[:count], -reach, reach)
+        largest = max(largest, 0.02 * float(np.abs(held - problem.held).max(initial=0.0)))
+        problem = problem.with_accepted(moved, held)
+        if largest < 2e-3:
             break
     return problem
 
@@ -203,7 +220,7 @@ def _needed(problem: Problem, number: int) -> tuple[float, float]:
     # At the estimate the residual contains the effect: without it, its step is minus its size.
     rest = np.setdiff1d(np.arange(problem.names), np.arange(span.start, span.stop))
     A = sums.H[both].sum(axis=0) + np.diag(sums.precision)
-    b = sums.h[both].sum(axis=0)
+    b = sums.h[both].sum(axis=0) + sums.precision * sums.mean
     fixed = np.zeros(problem.names)
     fixed[span] = -x0
     from pipeline.gap.block_sums import solve_spd

@@ -18,6 +18,7 @@ from pipeline.gap.effects.center_of_mass_offset import CenterOfMassOffset
 from pipeline.gap.effects.joint_elasticity import COMPLIANCE_TOLERANCE
 from pipeline.gap.effects.link_mass import MASS_TOLERANCE, felt
 from pipeline.gap.effects.position_offset import ENCODER_TOLERANCE
+from pipeline.gap.effects.time_delay import SKEW_TOLERANCE
 from pipeline.gap.effects.torque_constant_error import CONSTANT_TOLERANCE
 from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import MachineModel
@@ -28,8 +29,6 @@ Array = NDArray[np.float64]
 
 INERTIA_TOLERANCE: Final = 0.10  # of a link's rotational inertia [1]
 RESISTANCE_TOLERANCE: Final = 0.02  # of a winding [1]
-#: Skew between channels that sampling leaves, in steps of the log.
-SKEW_STEPS: Final = 0.15
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
 OFFSET_SIGMAS: Final = 0.5
 
@@ -39,8 +38,9 @@ class Nuisance:
     """One tolerance of one part of the machine.
 
     Attributes:
-        kind: ``"mass"``, ``"com_x"``, ``"inertia"``, ``"torque_constant"``, ``"resistance"``,
-            ``"encoder"``, ``"effort_zero"``, ``"compliance"`` or ``"skew"`` (of all effort channels).
+        kind: ``"mass"``, ``"com_x"`` (y, z), ``"inertia"``, ``"torque_constant"``,
+            ``"resistance"``, ``"encoder"``, ``"effort_zero"``, ``"compliance"`` or ``"skew"`` (of
+            all effort channels).
         place: Link or joint.
         sigma: Standard deviation before the log was seen.
         unit: Of it.
@@ -124,8 +124,7 @@ def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple
             out.append(Nuisance("torque_constant", actuator.name, CONSTANT_TOLERANCE, "1"))
             if "voltage" in m.channels or "power" in m.channels:
                 out.append(Nuisance("resistance", actuator.name, RESISTANCE_TOLERANCE, "1"))
-    skew = SKEW_STEPS / max(one.rate for one in measurements)
-    out.append(Nuisance("skew", model.joints[0], skew, "s"))
+    out.append(Nuisance("skew", "", SKEW_TOLERANCE, "s"))
     return tuple(out)
 
 
@@ -166,6 +165,9 @@ def grouped(model: MachineModel, m: Measurement, every: Sequence[Nuisance]) -> l
         return [[n] for n in every]
     groups: dict[tuple[str, int], list[Nuisance]] = {}
     for n in every:
+        if not n.place:
+            groups[(n.kind, -2)] = [n]
+            continue
         joint = n.place if n.place in model.joints else model.carrier(n.place)
         at = model.index(joint) % 3 if joint in model.joints else -1
         groups.setdefault((n.kind, at), []).append(n)

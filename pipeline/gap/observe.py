@@ -23,6 +23,8 @@ REST_SHARE: Final = 0.003
 REST_SIGMAS: Final = 3.0
 #: Below this many rest speeds a joint counts as standing: friction may take any value there.
 STANDING: Final = 2.5
+#: Shortest piece over which scatter is taken, in reaches of the filter to one side.
+PIECE: Final = 3.0
 #: How far to either side the filter sees with weight, in periods of its cut-off.
 SEEN: Final = 1.0
 
@@ -42,6 +44,28 @@ def observe(
         _observe(model, one, parts.part[k], parts.block[k].astype(np.intp), rest)
         for k, one in enumerate(prepared)
     )
+
+
+def observe_all(model: MachineModel, prepared: Sequence[Prepared]) -> tuple[Measurement, ...]:
+    """Measurements whose rows all belong to *fit* and to one block: to look, not to judge."""
+    rest = _rest_speed(prepared)
+    return tuple(
+        _observe(model, one, np.zeros(len(one), np.int8), np.zeros(len(one), np.intp), rest)
+        for one in prepared
+    )
+
+
+def _subdivided(block: NDArray[np.intp], one: Prepared) -> NDArray[np.intp]:
+    """Blocks cut into pieces of a few reaches of the filter: enough of them to see scatter."""
+    length = max(2, int(np.ceil(PIECE * one.memory * one.rate)))
+    out = np.full_like(block, -1)
+    number = 0
+    for b in np.unique(block[block >= 0]):
+        rows = np.flatnonzero(block == b)
+        pieces = max(1, rows.size // length)
+        out[rows] = number + (np.arange(rows.size) * pieces) // rows.size
+        number += pieces
+    return out
 
 
 def _observe(
@@ -70,7 +94,7 @@ def _observe(
         noise=noise,
         mask=mask,
         part=part,
-        block=block,
+        block=_subdivided(block, one),
         pieces=one.pieces,
         lowpass=one.lowpass,
         kernel=one.settings.lowpass.kernels[0],
@@ -90,7 +114,7 @@ def _channels(model: MachineModel, one: Prepared) -> tuple[tuple[str, ...], Arra
     efforts, noise, names = [one.effort], [one.noise], [one.channel]
     motors = all(a.motor is not None for a in model.actuators)
     if one.channel == "current" and "voltage" in one.other and motors:
-        raw = one.other["voltage"]
+        raw = one.other["voltage"]  # at the log's own bandwidth or above this one
         good = np.isfinite(raw)
         filled = np.where(good, raw, 0.0)
         names.append("voltage")

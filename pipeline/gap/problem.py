@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 Columns = Sequence[Mapping[int, Array]]
 
 
+#: Prior precision of what is not free.
+FIXED = 1e9
 #: Effects whose like at another leg leaves this leg alone, where legs are separate.
 _OF_ONE_LEG = ("link_mass", "center_of_mass_offset", "position_offset")
 
@@ -77,6 +79,8 @@ class Problem:
         benches: One per log.
         sigma: Standard deviation of the noise, shape (J, C).
         accepted: Effects in the model, in order.
+        tolerances: Always free within their priors.
+        held: What the present model holds of each tolerance, in its sigmas.
     """
 
     model: MachineModel
@@ -84,12 +88,15 @@ class Problem:
     sigma: Array
     accepted: tuple[Accepted, ...] = ()
     tolerances: tuple[Nuisance, ...] = ()
+    held: Array = field(default_factory=lambda: np.zeros(0))
     _columns: dict[object, list[dict[int, Array]]] = field(default_factory=dict)
     _cache: dict[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.tolerances:
             self.tolerances = nuisances(self.model, [b.measurement for b in self.benches])
+        if self.held.size == 0:
+            self.held = np.zeros(len(self.tolerances))
 
     @property
     def names(self) -> int:
@@ -104,11 +111,23 @@ class Problem:
         return slice(start, start + len(self.accepted[number].effect.coordinates))
 
     def current(self) -> MachineModel:
-        """The model with all accepted effects."""
-        model = self.model
+        """The model with tolerances as they are held and all accepted effects."""
+        model = self._start()
         for a in self.accepted:
             model = a.apply(model)
         return model
+
+    def _start(self) -> MachineModel:
+        """The model with tolerances as they are held."""
+        if "start" not in self._cache:
+            model = self.model
+            for n, value in zip(self.tolerances, self.held, strict=True):
+                if value:
+                    model = n.edit(model, float(value) * n.sigma)
+            self._cache["start"] = model
+        result = self._cache["start"]
+        assert isinstance(result, MachineModel)
+        return result
 
     def predictions(self) -> list[Prediction]:
         """Of the present model, one per log."""
@@ -124,9 +143,22 @@ class Problem:
         assert isinstance(result, list)
         return result
 
-    def with_accepted(self, accepted: Sequence[Accepted]) -> Problem:
-        """The problem at other effects; columns at untouched joints are kept."""
-        other = replace(self, accepted=tuple(accepted), _columns=dict(self._columns), _cache={})
+    def with_accepted(self, accepted: Sequence[Accepted], held: Array | None = None) -> Problem:
+        """The problem at other effects; columns at untouched joints are kept.
+
+        Args:
+            accepted: Effects in the model.
+            held: What the model holds of each tolerance, in its sigmas; as before by default.
+        """
+        other = replace(
+            self,
+            accepted=tuple(accepted),
+            held=self.held if held is None else held,
+            _columns=dict(self._columns),
+            _cache={},
+        )
+        if held is None:
+            other._cache["start"] = self._start()
         other._cache["near"] = self.predictions()
         before = {id(a) for a in self.accepted}
         after = {id(a) for a in other.accepted}
@@ -190,7 +222,7 @@ class Problem:
         for number, a in enumerate(self.accepted):
             for c in a.effect.coordinates:
                 moved = replace(a, x={**a.x, c.name: a.x[c.name] + c.step})
-                model = self.model
+                model = self._start()
                 for k, other in enumerate(self.accepted):
                     model = (moved if k == number else other).apply(model)
                 change = bench.simulator.difference(predictions[log], model)
@@ -214,24 +246,39 @@ class Problem:
 
     @property
     def precision(self) -> Array:
-        """Prior precision of the unknowns: one for tolerances in units of their sigma, else none."""
+        """Prior precision of the unknowns: one for tolerances, which count in sigmas; else none."""
         out = np.zeros(self.names)
         out[: len(self.tolerances)] = 1.0
+        for a in self.accepted:
+            out[self.absorbed(a.effect, a.place)] = FIXED
+        return out
+
+    def absorbed(self, effect: Effect, place: Place) -> list[int]:
+        """Numbers of the tolerances that stand back where an effect is."""
+        keys = effect.absorbs(place)
+        return [k for k, n in enumerate(self.tolerances) if (n.kind, n.place) in keys]
+
+    @property
+    def mean(self) -> Array:
+        """Where the prior is centred: the tolerances' step that leads back to nothing held."""
+        out = np.zeros(self.names)
+        out[: len(self.tolerances)] = -self.held
         return out
 
     def sums(self) -> BlockSums:
         """Normal equations of the present problem."""
         if "sums" not in self._cache:
-            self._cache["sums"] = block_sums(self.stacks(), self.precision)
+            self._cache["sums"] = block_sums(self.stacks(), self.precision, self.mean)
         result = self._cache["sums"]
         assert isinstance(result, BlockSums)
         return result
 
-    def extended(self, candidate: Sequence[Columns]) -> BlockSums:
+    def extended(self, candidate: Sequence[Columns], absorbed: Sequence[int] = ()) -> BlockSums:
         """Normal equations with the columns of a candidate appended.
 
         Args:
             candidate: Per log, its columns.
+            absorbed: Tolerances that stand back for it.
         """
         base = self.sums()
         n, p = base.precision.size, len(candidate[0])
@@ -257,7 +304,9 @@ class Problem:
                     h[at + b, target] += part @ stack.r[j][rows].ravel()
             at += bench.block_part.size
         precision = np.concatenate([base.precision, np.zeros(p)])
-        return BlockSums(H, h, base.s, base.count, base.part, precision)
+        precision[list(absorbed)] = FIXED
+        mean = np.concatenate([base.mean, np.zeros(p)])
+        return BlockSums(H, h, base.s, base.count, base.part, precision, mean)
 
     def rescaled(self, sigma: Array) -> Problem:
         """The problem with another noise level; columns are computed anew."""

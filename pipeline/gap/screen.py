@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.gap.block_sums import solve_spd
+from pipeline.gap.block_sums import inverse_spd
 from pipeline.gap.effects.base import Effect, Place
 from pipeline.gap.effects.torque_ripple import TorqueRipple
 from pipeline.gap.measurement import CHOOSE, FIT
@@ -56,37 +56,48 @@ class Screen:
         self.problem = problem
         sums = problem.sums()
         blocks = sums.blocks(FIT, CHOOSE)
-        self._A = sums.H[blocks].sum(axis=0) + np.diag(sums.precision)
-        self._b = sums.h[blocks].sum(axis=0)
-        # Inverse of the scaled normal matrix's factor: applied many times to few columns.
-        self._inverse = np.linalg.inv(np.linalg.cholesky(_regular(self._A)))
-        self._scale = np.sqrt(np.maximum(np.diag(self._A), 1e-300))
-        self.theta = solve_spd(self._A, self._b)
+        H, h = sums.H[blocks].sum(axis=0), sums.h[blocks].sum(axis=0)
+        self._mean = sums.mean
+        self._inverse = inverse_spd(H + np.diag(sums.precision))
+        self.theta = self._inverse @ (h + sums.precision * sums.mean)
 
-    def _half(self, b: Array) -> Array:
-        """L^-1 b with the factor of the normal matrix."""
-        scaled = b / (self._scale if b.ndim == 1 else self._scale[:, None])
-        return np.asarray(self._inverse @ scaled)
+    def _fixed(self, absorbed: Sequence[int]) -> tuple[Array, Array, Array]:
+        """What holding some unknowns T at nothing changes.
+
+        With P = A^-1 the inverse becomes P - V Q V^T, V = P[:, T], Q = P[T, T]^-1, the estimate
+        moves by -V Q d, d = theta_T - mean_T, and the penalised misfit rises by d^T Q d.
+
+        Returns:
+            V (n, t), Q (t, t) and d (t,).
+        """
+        T = np.array(absorbed, dtype=np.intp)
+        V = self._inverse[:, T]
+        Q: Array = np.asarray(np.linalg.inv(V[T]) if T.size else np.empty((0, 0)))
+        return V, Q, np.asarray(self.theta[T] - self._mean[T])
 
     def reduced(
-        self, columns: Sequence[Sequence[Mapping[int, Array]]]
-    ) -> tuple[Array, Array, Array]:
-        """S (p, p), g (p,) and the raw X^T X (p, p) of a candidate, columns per log."""
-        p, n = len(columns[0]), self._A.shape[0]
+        self, columns: Sequence[Sequence[Mapping[int, Array]]], absorbed: Sequence[int] = ()
+    ) -> tuple[Array, Array, Array, float]:
+        """S (p, p), g (p,), the raw X^T X (p, p) of a candidate, columns per log, and a loss.
+
+        The loss is what holding the absorbed tolerances at nothing costs.
+        """
+        V, Q, d = self._fixed(absorbed)
+        p, n = len(columns[0]), self.theta.size
         XX, XB, Xr = np.zeros((p, p)), np.zeros((p, n)), np.zeros(p)
         for log, (stack, own) in enumerate(zip(self.problem.stacks(), columns, strict=True)):
             head = self.problem.head(log)
             for j in {j for column in own for j in column}:
-                mine = [k for k, column in enumerate(own) if j in column]
+                mine = np.array([k for k, column in enumerate(own) if j in column], dtype=np.intp)
                 X = np.stack([own[k][j][head] for k in mine]).reshape(len(mine), -1)
                 old = stack.X[j][:, head]
                 XX[np.ix_(mine, mine)] += X @ X.T
                 XB[np.ix_(mine, stack.ids[j])] += X @ old.reshape(old.shape[0], -1).T
                 Xr[mine] += X @ stack.r[j][head].ravel()
-        half = self._half(XB.T)
-        S = XX - half.T @ half
-        g = Xr - half.T @ self._half(self._b)
-        return S, g, XX
+        XV = XB @ V
+        S = XX - XB @ self._inverse @ XB.T + XV @ Q @ XV.T
+        g = Xr - XB @ self.theta + XV @ Q @ d
+        return S, g, XX, float(d @ Q @ d)
 
     def score(self, effect: Effect, place: Place, shape: Mapping[str, float]) -> Score | None:
         """Score of one candidate; None where it does not change the prediction at all."""
@@ -94,13 +105,17 @@ class Screen:
         columns = [p.columns(k, effect, place, shape) for k in range(len(p.benches))]
         if not any(column for per_log in columns for column in per_log):
             return None
-        S, g, XX = self.reduced(columns)
+        S, g, XX, lost = self.reduced(columns, p.absorbed(effect, place))
         gain, x = bounded_gain(S, g, XX, [c.signed for c in effect.coordinates])
+        # What the tolerances that stand back had explained counts against the candidate.
+        gain -= lost
         names = [c.name for c in effect.coordinates]
         alone = _alone(S, XX)
         for k, c in enumerate(effect.coordinates):
             if c.required and x[k] == 0.0:
                 gain = 0.0
+        if not effect.plausible(p.model, place, dict(zip(names, x, strict=True)), shape):
+            gain = 0.0
         return Score(effect, place, shape, gain, dict(zip(names, x, strict=True)), alone, S)
 
     def ripple_orders(self, effect: TorqueRipple, joint: int) -> list[dict[str, float]]:
@@ -157,13 +172,6 @@ def _alone(S: Array, XX: Array) -> float:
     return float(np.clip(share, 0.0, 1.0))
 
 
-def _regular(A: Array) -> Array:
-    d = np.sqrt(np.maximum(np.diag(A), 1e-300))
-    scaled = A / np.outer(d, d)
-    scaled[np.diag_indices_from(scaled)] += 1e-10
-    return np.asarray(scaled)
-
-
 def bounded_gain(
     S: Array, g: Array, XX: Array, signed: Sequence[bool]
 ) -> tuple[float, NDArray[np.float64]]:
@@ -172,13 +180,15 @@ def bounded_gain(
     Args:
         S: Reduced normal matrix, shape (p, p).
         g: Reduced gradient, shape (p,).
-        XX: Normal matrix before reduction; directions of S below 1e-6 of it count as none.
+        XX: Normal matrix before reduction; directions of S below 1e-8 of it count as none.
         signed: Which coordinates may be negative.
 
     Returns:
         The gain and the coordinates, shape (p,).
     """
     n = g.size
+    if not (np.isfinite(S).all() and np.isfinite(g).all()):
+        return 0.0, np.zeros(n)
     raw = np.diag(XX)
     scale = np.sqrt(np.maximum(raw, 1e-300))
     live = raw > 1e-20 * raw.max(initial=1e-300)
@@ -190,7 +200,7 @@ def bounded_gain(
         M = S[np.ix_(free, free)] / np.outer(scale[free], scale[free])
         rhs = g[free] / scale[free]
         values, vectors = np.linalg.eigh(M)
-        kept = values > 1e-6
+        kept = values > 1e-8
         y = vectors[:, kept] @ ((vectors[:, kept].T @ rhs) / values[kept])
         x = y / scale[free]
         if any(not signed[k] and value < 0 for k, value in zip(free, x, strict=True)):

@@ -229,7 +229,7 @@ class Simulator:
             for piece in m.pieces:
                 t = m.time[piece]
                 for c in range(out.shape[1]):
-                    out[piece, c] = np.interp(t - a.delay, t, out[piece, c])
+                    out[piece, c] = _delayed(t, out[piece, c], a.delay)
         if "voltage" in m.channels and "current" in m.channels and a.motor is not None:
             c, i = m.channels.index("voltage"), m.channels.index("current")
             cold = float(np.asarray(a.motor.resistance))
@@ -271,3 +271,13 @@ class Simulator:
                 raise ModelError(
                     f"channel '{channel}' is not known; torque, current, voltage, power"
                 )
+
+
+def _delayed(time: Array, x: Array, delay: float) -> Array:
+    """A series (N,) as a channel shows it that lags by `delay` [s]; the ends keep their value."""
+    from scipy.interpolate import CubicSpline
+
+    if time.size < 4:
+        return x
+    at = np.clip(time - delay, time[0], time[-1])
+    return np.asarray(CubicSpline(time, x)(at))

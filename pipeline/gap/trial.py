@@ -54,16 +54,18 @@ def try_candidate(problem: Problem, score: Score) -> Trial:
         problem.columns(k, score.effect, score.place, score.shape)
         for k in range(len(problem.benches))
     ]
-    sums = problem.extended(columns)
+    absorbed = problem.absorbed(score.effect, score.place)
+    sums = problem.extended(columns, absorbed)
+    plain = problem.sums()
     n = problem.names
     used = [k for k, c in enumerate(score.effect.coordinates) if score.x[c.name] != 0.0]
     free = np.concatenate([np.arange(n), n + np.array(used, dtype=np.intp)])
     old = np.arange(n)
     fit, choose, both = sums.blocks(FIT), sums.blocks(CHOOSE), sums.blocks(FIT, CHOOSE)
 
-    gain = _objective(sums, both, old) - _objective(sums, both, free)
-    before, after = sums.solve(fit, old), sums.solve(fit, free)
-    held_out = (float(sums.loss(before, choose).sum()) + sums.penalty(before)) - (
+    gain = _objective(plain, both, old) - _objective(sums, both, free)
+    before, after = plain.solve(fit, old), sums.solve(fit, free)
+    held_out = (float(plain.loss(before, choose).sum()) + plain.penalty(before)) - (
         float(sums.loss(after, choose).sum()) + sums.penalty(after)
     )
     theta = sums.solve(both, free)
@@ -88,7 +90,9 @@ def joint_gain(problem: Problem, scores: list[Score]) -> float:
         [column for s in scores for column in problem.columns(k, s.effect, s.place, s.shape)]
         for k in range(len(problem.benches))
     ]
-    sums = problem.extended(columns)
+    absorbed = [k for s in scores for k in problem.absorbed(s.effect, s.place)]
+    sums = problem.extended(columns, absorbed)
+    plain = problem.sums()
     both = sums.blocks(FIT, CHOOSE)
     n = problem.names
     used, at = list(range(n)), n
@@ -98,4 +102,4 @@ def joint_gain(problem: Problem, scores: list[Score]) -> float:
                 used.append(at)
             at += 1
     free = np.array(used, dtype=np.intp)
-    return _objective(sums, both, np.arange(n)) - _objective(sums, both, free)
+    return _objective(plain, both, np.arange(n)) - _objective(sums, both, free)

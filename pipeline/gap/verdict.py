@@ -28,7 +28,7 @@ RIVAL_SIGMAS: Final = 3.0
 #: ... or by less than this, in the unit of `LEAST_GAIN`.
 RIVAL_GAIN: Final = 9.0
 #: ... or by less than this share of what the better one explains.
-RIVAL_SHARE: Final = 0.01
+RIVAL_SHARE: Final = 0.002
 #: A column whose share after projecting out everything else lies below this is not identifiable:
 #: standard deviation of the estimate over what would be worth naming.
 LEAST_INFORMATION: Final = 10.0

@@ -8,6 +8,9 @@ from typing import ClassVar
 from pipeline.gap.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.gap.model import MachineModel
 
+#: Play of a gear that counts as free of it, one standard deviation [rad].
+PLAY_TOLERANCE = 1e-4
+
 
 class Backlash(Effect):
     """Motor and joint lie half the width apart, on the side of the flank that carries.
@@ -37,6 +40,14 @@ class Backlash(Effect):
             compliance=actuator.compliance + x["compliance"],
         )
         return model.with_actuator(changed)
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """What counts as rigid."""
+        return (("compliance", place[0]),)
+
+    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
+        """What a gear without play has."""
+        return {"width": PLAY_TOLERANCE}
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Width and stiffness."""

@@ -111,6 +111,15 @@ class Effect(ABC):
         """
         return {}
 
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """Tolerances (kind, place) that are this effect in small: they stand back where it is."""
+        return ()
+
+    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
+        """Whether an estimate lies inside the bounds of what can be."""
+        values = self.physical(x, shape)
+        return all(p.low <= values[p.name] <= p.high for p in self.parameters)
+
     def apply(self, model: MachineModel, place: Place, values: Values) -> MachineModel:
         """The machine with the effect at the given parameters.
 

@@ -18,8 +18,8 @@ class BaseTilt(Effect):
     name = "base_tilt"
     place_kind = "ground"
     parameters: ClassVar = (
-        Parameter("roll", "rad", -1.5, 1.5),
-        Parameter("pitch", "rad", -1.5, 1.5),
+        Parameter("roll", "rad", -0.6, 0.6),
+        Parameter("pitch", "rad", -0.6, 0.6),
     )
     coordinates: ClassVar = tuple(
         Coordinate(axis, 1e-3, signed=True, required=False) for axis in ("roll", "pitch")

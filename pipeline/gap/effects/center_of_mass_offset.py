@@ -21,7 +21,7 @@ class CenterOfMassOffset(Effect):
 
     name = "center_of_mass_offset"
     place_kind = "link"
-    parameters: ClassVar = tuple(Parameter(axis, "m", -10.0, 10.0) for axis in "xyz")
+    parameters: ClassVar = tuple(Parameter(axis, "m", -0.5, 0.5) for axis in "xyz")
     coordinates: ClassVar = tuple(
         Coordinate(axis, 1e-3, signed=True, required=False) for axis in "xyz"
     )
@@ -39,6 +39,10 @@ class CenterOfMassOffset(Effect):
         moved = tuple(s + x[axis] for s, axis in zip(body.shift, "xyz", strict=True))
         changed = replace(body, shift=(moved[0], moved[1], moved[2]))
         return model.with_bodies(model.bodies.with_body(joint, changed))
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The centre's tolerances."""
+        return tuple((f"com_{axis}", place[0]) for axis in "xyz")
 
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
         """Three per cent of the lever."""

@@ -18,6 +18,10 @@ class EffortOffset(Effect):
     signature = "time"
     excitation = "stands still without load, then moves both ways"
 
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The sensor's tolerance."""
+        return (("effort_zero", place[0]),)
+
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Shift the sensor's zero."""
         actuator = model.actuator(place[0])

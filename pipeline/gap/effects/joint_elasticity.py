@@ -8,7 +8,6 @@ from typing import ClassVar
 from pipeline.gap.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.gap.model import MachineModel
 
-
 #: Wind-up of what a robot file calls rigid, one standard deviation [rad/(N*m)].
 COMPLIANCE_TOLERANCE = 1.2e-5
 
@@ -31,6 +30,10 @@ class JointElasticity(Effect):
         actuator = model.actuator(place[0])
         compliance = actuator.compliance + x["compliance"]
         return model.with_actuator(replace(actuator, compliance=compliance))
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """What counts as rigid."""
+        return (("compliance", place[0]),)
 
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
         """What a transmission that counts as rigid may wind up."""

@@ -35,6 +35,15 @@ class LinkMass(Effect):
         changed = replace(body, payload=body.payload + x["mass"])
         return model.with_bodies(model.bodies.with_body(joint, changed))
 
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The link's own mass."""
+        return (("mass", place[0]),)
+
+    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
+        """Something of the link is left, and the payload is no multiple of the robot."""
+        total = sum(i.mass for i in model.rigid.inertias)
+        return bool(-0.9 * own_mass(model, place[0]) < x["mass"] < 2.0 * total)
+
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
         """Three per cent of the link's mass."""
         return {"mass": MASS_TOLERANCE * own_mass(model, place[0])}

@@ -15,7 +15,7 @@ class PositionOffset(Effect):
     """A constant added by the position sensor."""
 
     name = "position_offset"
-    parameters: ClassVar = (Parameter("angle", "rad", -7.0, 7.0),)
+    parameters: ClassVar = (Parameter("angle", "rad", -1.6, 1.6),)
     coordinates: ClassVar = (Coordinate("angle", 1e-3, signed=True),)
     signature = "position"
     excitation = "holds the link in postures all around its axis"
@@ -25,6 +25,10 @@ class PositionOffset(Effect):
         actuator = model.actuator(place[0])
         offset = actuator.encoder_offset + x["angle"]
         return model.with_actuator(replace(actuator, encoder_offset=offset))
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The encoder's tolerance."""
+        return (("encoder", place[0]),)
 
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
         """What mounting leaves."""

@@ -15,6 +15,9 @@ from pipeline.gap.model import MachineModel
 _SPEEDS = (0.012, 0.025, 0.05, 0.1, 0.2, 0.4)  # [rad/s]
 
 
+_LARGEST = 0.5  # [rad/s]
+
+
 class StribeckFriction(Effect):
     """Coulomb friction with an excess near standstill."""
 
@@ -38,6 +41,10 @@ class StribeckFriction(Effect):
         slowest = 1.5 * float(m.rest_speed[k])
         speeds = [s for s in _SPEEDS if slowest <= s <= 0.6 * fastest]
         return [{"velocity": s} for s in speeds]
+
+    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
+        """Slow enough to be a Stribeck speed."""
+        return super().plausible(model, place, x, shape) and shape["velocity"] < _LARGEST
 
     def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
         """Speeds to either side."""

@@ -9,6 +9,9 @@ from pipeline.gap.effects.base import Coordinate, Effect, Parameter, Place, Valu
 from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import MachineModel
 
+#: Skew between channels that sampling leaves, one standard deviation [s].
+SKEW_TOLERANCE = 3e-4
+
 
 class TimeDelay(Effect):
     """One delay between position and effort, of all joints alike."""
@@ -24,7 +27,15 @@ class TimeDelay(Effect):
         """All effort channels."""
         return [("effort channels",)]
 
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The skew of the channels."""
+        return (("skew", ""),)
+
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Delay them further."""
         changed = tuple(replace(a, delay=a.delay + x["delay"]) for a in model.actuators)
         return replace(model, actuators=changed)
+
+    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
+        """What sampling leaves of all channels."""
+        return {"delay": SKEW_TOLERANCE}

@@ -19,7 +19,7 @@ class TorqueConstantError(Effect):
     """Torque per current, and voltage per speed, off by a factor."""
 
     name = "torque_constant_error"
-    parameters: ClassVar = (Parameter("relative", "1", -0.95, 100.0),)
+    parameters: ClassVar = (Parameter("relative", "1", -0.8, 2.0),)
     coordinates: ClassVar = (Coordinate("relative", 1e-3, signed=True),)
     signature = "load"
     excitation = "carries clearly different known loads"
@@ -38,6 +38,10 @@ class TorqueConstantError(Effect):
         constant = np.asarray(actuator.motor.torque_constant) * (1.0 + x["relative"])
         motor = replace(actuator.motor, torque_constant=float(constant))
         return model.with_actuator(replace(actuator, motor=motor))
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The constant's tolerance."""
+        return (("torque_constant", place[0]),)
 
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
         """Two per cent."""

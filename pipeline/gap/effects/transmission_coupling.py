@@ -24,7 +24,7 @@ class TransmissionCoupling(Effect):
     name = "transmission_coupling"
     place_kind = "joint pair"
     parameters: ClassVar = (
-        Parameter("ratio", "1", -100.0, 100.0),
+        Parameter("ratio", "1", -5.0, 5.0),
         Parameter("inertia", "kg*m^2", 0.0, 1e3),
         Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
         Parameter("coulomb", "N*m", 0.0, 1e3),
