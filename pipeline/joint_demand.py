@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.contact_forces import ContactForces, least_tangential_forces
 from pipeline.errors import GaitError, TippingError
-from pipeline.kinematics import foot_force_torques, foot_positions
+from pipeline.kinematics import leg_posture
 from pipeline.motion import Motion, Segment
 from pipeline.robot import Robot
 from pipeline.stability import stability_margins
@@ -79,40 +79,50 @@ def contact_forces(robot: Robot, segment: Segment, generalised: Array) -> Contac
         TippingError: A foot would have to pull; names foot, instant, force and margin.
         GaitError: Fewer than three feet stand.
     """
+    return _ground(robot, segment, generalised)[0]
+
+
+def _ground(robot: Robot, segment: Segment, generalised: Array) -> tuple[ContactForces, Array]:
+    """Ground forces, and the torques (N, K, 3) they put into the joints of the K standing legs."""
     if len(segment.stance) < 3:
         raise GaitError(
             f"segment '{segment.name}' stands on {len(segment.stance)} feet; a statically stable "
             "stance needs at least 3"
         )
     legs = robot.leg_names
-    q = robot.leg_positions(segment.configuration)
-    n = q.shape[0]
-    feet = np.concatenate([foot_positions(robot.chains, q[s]) for s in _blocks(n)])
     stance = [legs.index(leg) for leg in segment.stance]
+    # Standing legs first: forces and torques are then worked out on a leading part of the arrays.
+    order = stance + [i for i in range(len(legs)) if i not in stance]
+    chains = robot.chains.of(order)
+    q = robot.leg_positions(segment.configuration)
     rotation = robot.base_rotation(segment.configuration)  # base -> world, (N, 3, 3) or None
-    wrench = generalised[:, :6]
-    standing = feet[:, stance]
-    if rotation is None:
-        force_world_stance = least_tangential_forces(wrench, standing)
-        force_stance = force_world_stance
-    else:
-        turned = np.concatenate(
-            [
-                np.einsum("nij,nj->ni", rotation, wrench[:, :3]),
-                np.einsum("nij,nj->ni", rotation, wrench[:, 3:]),
-            ],
-            axis=1,
-        )
-        world_feet = np.einsum("nij,nfj->nfi", rotation, standing)
-        force_world_stance = least_tangential_forces(turned, world_feet)
-        force_stance = np.einsum("nji,nfj->nfi", rotation, force_world_stance)
-    _refuse_pulling(robot, segment, force_world_stance[..., 2])
+    n, k = q.shape[0], len(stance)
+    feet = np.empty((n, len(legs), 3))
+    force = np.zeros_like(feet)
+    force_world = force if rotation is None else np.zeros_like(feet)
+    torque = np.empty((n, k, q.shape[2]))
+    for s in _blocks(n):
+        posture = leg_posture(chains, q[s][:, order])
+        feet[s, order] = posture.feet
+        turn = None if rotation is None else rotation[s]
+        in_base, in_world = _supplied(generalised[s, :6], posture.feet[:, :k], turn)
+        force_world[s, stance] = in_world
+        force[s, stance] = in_base
+        torque[s] = posture.force_torques(in_base)
+    _refuse_pulling(robot, segment, force_world[:, stance, 2])
+    contacts = ContactForces(legs, segment.stance, segment.time, feet, force, force_world)
+    return contacts, torque
 
-    force = np.zeros((n, len(legs), 3))
-    force_world = np.zeros_like(force)
-    force[:, stance] = force_stance
-    force_world[:, stance] = force_world_stance
-    return ContactForces(legs, segment.stance, segment.time, feet, force, force_world)
+
+def _supplied(wrench: Array, feet: Array, rotation: Array | None) -> tuple[Array, Array]:
+    """Forces on the standing feet in the base and in the world frame, for a wrench on the base."""
+    if rotation is None:
+        force = least_tangential_forces(wrench, feet)
+        return force, force
+    parts = [np.einsum("nij,nj->ni", rotation, part) for part in (wrench[:, :3], wrench[:, 3:])]
+    world_feet = np.einsum("nij,nfj->nfi", rotation, feet)
+    force = least_tangential_forces(np.concatenate(parts, axis=1), world_feet)
+    return np.einsum("nji,nfj->nfi", rotation, force), force
 
 
 def _refuse_pulling(robot: Robot, segment: Segment, normal: Array) -> None:
@@ -137,6 +147,14 @@ def _blocks(n: int) -> list[slice]:
     return [slice(i, min(i + _BLOCK, n)) for i in range(0, n, _BLOCK)]
 
 
+def _columns(values: Array, index: NDArray[np.intp]) -> Array:
+    """Columns of an array, without a copy where they lie side by side."""
+    first, count = int(index[0]), index.size
+    if np.array_equal(index, np.arange(first, first + count)):
+        return values[:, first : first + count]
+    return values[:, index]
+
+
 def segment_demand(
     robot: Robot, segment: Segment, *, quasi_static: bool = False, threads: int = 1
 ) -> tuple[JointDemand, ContactForces | None]:
@@ -155,20 +173,19 @@ def segment_demand(
         TippingError: A foot would have to pull.
     """
     generalised = inverse_dynamics(robot, segment, quasi_static=quasi_static, threads=threads)
-    torque = generalised[:, robot.velocity_index]
+    torque = _columns(generalised, robot.velocity_index)
     contacts = None
     if robot.floating:
-        contacts = contact_forces(robot, segment, generalised)
-        q = robot.leg_positions(segment.configuration)
-        for s in _blocks(q.shape[0]):
-            part = foot_force_torques(robot.chains, q[s], contacts.force[s])
-            torque[s, robot.leg_columns.ravel()] -= part.reshape(part.shape[0], -1)
+        contacts, from_ground = _ground(robot, segment, generalised)
+        for i, leg in enumerate(segment.stance):
+            columns = robot.leg_columns[robot.leg_names.index(leg)]
+            torque[:, columns] -= from_ground[:, i]
     demand = JointDemand(
         joints=robot.joints,
         time=segment.time,
-        position=segment.configuration[:, robot.position_index],
-        velocity=segment.velocity[:, robot.velocity_index],
-        acceleration=segment.acceleration[:, robot.velocity_index],
+        position=_columns(segment.configuration, robot.position_index),
+        velocity=_columns(segment.velocity, robot.velocity_index),
+        acceleration=_columns(segment.acceleration, robot.velocity_index),
         torque=torque,
         segment=segment.name,
     )

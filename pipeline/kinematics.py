@@ -8,105 +8,32 @@ samples with Pinocchio's Jacobians. The public functions take and return samples
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
-from actuators.errors import closest
-from pipeline.errors import UrdfError
+from pipeline.leg_chains import JOINTS_PER_LEG, LegChains
 
 Array = NDArray[np.float64]
-JOINTS_PER_LEG = 3
 
 
-@dataclass(frozen=True)
-class LegChains:
-    """Constant geometry of L legs with three joints each, read from a Pinocchio model.
-
-    Attributes:
-        names: Leg names.
-        rotation: Placement of each joint in its parent, shape (3 joints, L, 3, 3).
-        offset: Origin of each joint in its parent [m], shape (3 joints, L, 3).
-        axis: Unit axis of each joint in its own frame, shape (3 joints, L, 3).
-        foot: Foot point in the frame of the last joint [m], shape (L, 3).
-    """
-
-    names: tuple[str, ...]
-    rotation: Array
-    offset: Array
-    axis: Array
-    foot: Array
+def _turn(chains: LegChains, j: int, v: Array, cos: Array, sin: Array) -> Array:
+    """Rotate v (3, L, N) about the axis of joint j by the angle whose cos, sin (L, N) are given."""
+    along = chains.along[j]
+    if along is None:
+        return _rodrigues(v, chains.axis[j], cos, sin)
+    c, sign = along
+    a, b = (c + 1) % 3, (c + 2) % 3
+    signed = sign * sin
+    out = np.empty(np.broadcast_shapes(v.shape, (3, *cos.shape)))
+    out[a] = cos * v[a] - signed * v[b]
+    out[b] = signed * v[a] + cos * v[b]
+    out[c] = v[c]
+    return out
 
 
-def leg_chains(
-    model: pin.Model, legs: Sequence[tuple[str, Sequence[str], str]], base_joint: int
-) -> LegChains:
-    """Read the legs' geometry out of a model.
-
-    Args:
-        model: Pinocchio model.
-        legs: For each leg its name, its three joint names from the base outward and the foot frame.
-        base_joint: Index of the joint that carries the base (0 for a fixed base).
-
-    Raises:
-        UrdfError: A joint or frame is missing, not revolute, or not the child of the one before.
-    """
-    n_legs = len(legs)
-    rotation = np.empty((JOINTS_PER_LEG, n_legs, 3, 3))
-    offset = np.empty((JOINTS_PER_LEG, n_legs, 3))
-    axis = np.empty((JOINTS_PER_LEG, n_legs, 3))
-    foot = np.empty((n_legs, 3))
-    for i, (leg, joints, frame_name) in enumerate(legs):
-        if len(joints) != JOINTS_PER_LEG:
-            raise UrdfError(f"leg '{leg}' names {len(joints)} joints; a leg has {JOINTS_PER_LEG}")
-        parent = base_joint
-        for j, joint in enumerate(joints):
-            if not model.existJointName(joint):
-                raise UrdfError(
-                    f"leg '{leg}': joint '{joint}' is not in the URDF; "
-                    f"{closest(joint, list(model.names)[1:])}"
-                )
-            index = model.getJointId(joint)
-            if model.parents[index] != parent:
-                raise UrdfError(
-                    f"leg '{leg}': joint '{joint}' hangs on '{model.names[model.parents[index]]}', "
-                    f"not on '{model.names[parent]}'; list the joints from the base outward"
-                )
-            if model.joints[index].nq != 1 or model.joints[index].nv != 1:
-                raise UrdfError(f"leg '{leg}': joint '{joint}' is not a revolute joint")
-            placement = model.jointPlacements[index]
-            rotation[j, i] = placement.rotation
-            offset[j, i] = placement.translation
-            axis[j, i] = _axis(model, index, leg, joint)
-            parent = index
-        if not model.existFrame(frame_name):
-            known = [frame.name for frame in model.frames]
-            raise UrdfError(
-                f"leg '{leg}': foot '{frame_name}' is not a frame of the URDF; "
-                f"{closest(frame_name, known)}"
-            )
-        frame = model.frames[model.getFrameId(frame_name)]
-        if frame.parentJoint != parent:
-            raise UrdfError(f"leg '{leg}': foot '{frame_name}' is not carried by '{joints[-1]}'")
-        foot[i] = frame.placement.translation
-    return LegChains(tuple(leg for leg, _, _ in legs), rotation, offset, axis, foot)
-
-
-def _axis(model: pin.Model, index: int, leg: str, joint: str) -> Array:
-    # The motion subspace of a revolute joint is (0, axis): ask Pinocchio rather than parse names.
-    data = model.joints[index].createData()
-    q = pin.neutral(model)
-    model.joints[index].calc(data, q[model.joints[index].idx_q :][:1])
-    subspace = np.asarray(data.S).reshape(6)
-    if np.any(np.abs(subspace[:3]) > 0) or abs(np.linalg.norm(subspace[3:]) - 1) > 1e-9:
-        raise UrdfError(f"leg '{leg}': joint '{joint}' is not a revolute joint")
-    return subspace[3:]
-
-
-def _turn(v: Array, axis: Array, cos: Array, sin: Array) -> Array:
+def _rodrigues(v: Array, axis: Array, cos: Array, sin: Array) -> Array:
     """Rodrigues' rotation of v (3, L, N) about axis (L, 3) by the angle whose cos, sin (L, N)."""
     kx, ky, kz = axis[:, 0, None], axis[:, 1, None], axis[:, 2, None]
     along = (kx * v[0] + ky * v[1] + kz * v[2]) * (1 - cos)
@@ -117,11 +44,30 @@ def _turn(v: Array, axis: Array, cos: Array, sin: Array) -> Array:
     return out
 
 
-def _apply(rotation: Array, v: Array) -> Array:
-    """Rotate v (3, L, N) by a constant matrix per leg (L, 3, 3); identity costs nothing."""
-    if np.array_equal(rotation, np.broadcast_to(np.eye(3), rotation.shape)):
+def _moment(chains: LegChains, j: int, arm: Array, f: Array) -> Array:
+    """Moment of f (3, L, N) at arm (3, L, N or 1) about the axis of joint j, (L, N)."""
+    along = chains.along[j]
+    if along is None:
+        k, moment = chains.axis[j], _cross(arm, f)
+        return k[:, 0, None] * moment[0] + k[:, 1, None] * moment[1] + k[:, 2, None] * moment[2]
+    c, sign = along
+    a, b = (c + 1) % 3, (c + 2) % 3
+    own: Array = sign * (arm[a] * f[b] - arm[b] * f[a])
+    return own
+
+
+def _to_parent(chains: LegChains, j: int, v: Array) -> Array:
+    """From joint j's frame before its own rotation to its parent's axes; often nothing to do."""
+    if not chains.turned[j]:
         return v
-    return np.einsum("lij,jln->iln", rotation, v)
+    return np.einsum("lij,jln->iln", chains.rotation[j], v)
+
+
+def _from_parent(chains: LegChains, j: int, v: Array) -> Array:
+    """The inverse of `_to_parent`."""
+    if not chains.turned[j]:
+        return v
+    return np.einsum("lji,jln->iln", chains.rotation[j], v)
 
 
 def _cross(a: Array, b: Array) -> Array:
@@ -133,7 +79,64 @@ def _cross(a: Array, b: Array) -> Array:
 
 
 def _samples_last(q: Array) -> Array:
-    return np.ascontiguousarray(np.moveaxis(q, 0, -1))  # (N, L, 3) -> (L, 3, N)
+    return np.array(np.moveaxis(q, 0, -1), order="C")  # (N, L, 3) -> (L, 3, N), always a copy
+
+
+@dataclass(frozen=True)
+class LegPosture:
+    """Sines, lever arms and feet of the legs: what forces and positions share.
+
+    Attributes:
+        chains: The legs.
+        cos: Of the joint positions, shape (L, 3, N).
+        sin: Likewise.
+        arm: By joint, from its origin to the foot in its own frame [m], shape (3, L, N), or
+            (3, L, 1) for the last one.
+        foot: Foot points in the base frame [m], shape (3, L, N).
+    """
+
+    chains: LegChains
+    cos: Array
+    sin: Array
+    arm: tuple[Array, ...]
+    foot: Array
+
+    @property
+    def feet(self) -> Array:
+        """Foot points in the base frame [m], shape (N, L, 3)."""
+        return self.foot.transpose(2, 1, 0)
+
+    def force_torques(self, force: Array) -> Array:
+        """Joint torques J^T f that forces on the first K of the feet put into their joints.
+
+        Args:
+            force: In the base frame [N], shape (N, K, 3).
+
+        Returns:
+            Torques [N*m], shape (N, K, 3), positive in the joints' positive directions.
+        """
+        n, k, _ = force.shape
+        chains = self.chains if k == len(self.chains.names) else self.chains.of(range(k))
+        f = np.ascontiguousarray(force.transpose(2, 1, 0))
+        torque = np.empty((n, k, JOINTS_PER_LEG))
+        for j in range(JOINTS_PER_LEG):
+            f = _from_parent(chains, j, f)
+            f = _turn(chains, j, f, self.cos[:k, j], -self.sin[:k, j])
+            torque[:, :, j] = _moment(chains, j, self.arm[j][:, :k], f).T
+        return torque
+
+
+def leg_posture(chains: LegChains, q: Array) -> LegPosture:
+    """Work out the legs at joint positions q [rad], shape (N, L, 3)."""
+    angle = _samples_last(q)
+    cos, sin = np.cos(angle), np.sin(angle, out=angle)  # angle is a copy of our own
+    arm: list[Array] = []
+    r = chains.foot.T[:, :, None]
+    for j in reversed(range(JOINTS_PER_LEG)):
+        arm.insert(0, r)
+        r = _to_parent(chains, j, _turn(chains, j, r, cos[:, j], sin[:, j]))
+        r += chains.offset[j].T[:, :, None]
+    return LegPosture(chains, cos, sin, tuple(arm), r)
 
 
 def foot_positions(chains: LegChains, q: Array) -> Array:
@@ -146,13 +149,7 @@ def foot_positions(chains: LegChains, q: Array) -> Array:
     Returns:
         Positions [m], shape (N, L, 3).
     """
-    angle = _samples_last(q)
-    cos, sin = np.cos(angle), np.sin(angle)
-    r = np.broadcast_to(chains.foot.T[:, :, None], (3, angle.shape[0], angle.shape[2]))
-    for j in reversed(range(JOINTS_PER_LEG)):
-        r = _apply(chains.rotation[j], _turn(r, chains.axis[j], cos[:, j], sin[:, j]))
-        r = r + chains.offset[j].T[:, :, None]
-    return np.moveaxis(r, -1, 0).swapaxes(1, 2)
+    return leg_posture(chains, q).feet
 
 
 def foot_force_torques(chains: LegChains, q: Array, force: Array) -> Array:
@@ -166,26 +163,7 @@ def foot_force_torques(chains: LegChains, q: Array, force: Array) -> Array:
     Returns:
         Torques [N*m], shape (N, L, 3), positive in the joints' positive directions.
     """
-    angle = _samples_last(q)
-    cos, sin = np.cos(angle), np.sin(angle)
-    arm: list[Array] = [np.empty(0)] * JOINTS_PER_LEG  # joint j to foot, in frame j
-    r = np.broadcast_to(chains.foot.T[:, :, None], (3, angle.shape[0], angle.shape[2]))
-    for j in reversed(range(JOINTS_PER_LEG)):
-        arm[j] = r
-        if j:
-            r = _apply(chains.rotation[j], _turn(r, chains.axis[j], cos[:, j], sin[:, j]))
-            r = r + chains.offset[j].T[:, :, None]
-    f = np.ascontiguousarray(np.moveaxis(force, 0, -1).swapaxes(0, 1))  # (3, L, N)
-    torque = np.empty((q.shape[0], q.shape[1], JOINTS_PER_LEG))
-    for j in range(JOINTS_PER_LEG):
-        f = _apply(chains.rotation[j].swapaxes(1, 2), f)
-        f = _turn(f, chains.axis[j], cos[:, j], -sin[:, j])
-        moment = _cross(arm[j], f)
-        k = chains.axis[j]
-        torque[:, :, j] = (
-            k[:, 0, None] * moment[0] + k[:, 1, None] * moment[1] + k[:, 2, None] * moment[2]
-        ).T
-    return torque
+    return leg_posture(chains, q).force_torques(force)
 
 
 def _frames(chains: LegChains, q: Array) -> tuple[Array, Array, Array]:
@@ -197,7 +175,7 @@ def _frames(chains: LegChains, q: Array) -> tuple[Array, Array, Array]:
     def to_base(v: Array, joint: int, *, point: bool) -> Array:
         # v is given in the frame of `joint`, after that joint's own rotation.
         for j in reversed(range(joint + 1)):
-            v = _apply(chains.rotation[j], _turn(v, chains.axis[j], cos[:, j], sin[:, j]))
+            v = _to_parent(chains, j, _turn(chains, j, v, cos[:, j], sin[:, j]))
             if point:
                 v = v + chains.offset[j].T[:, :, None]
         return v

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from actuators.errors import closest
 from pipeline.errors import UrdfError
-from pipeline.kinematics import LegChains, leg_chains
+from pipeline.leg_chains import LegChains, leg_chains
 from pipeline.robot_file import RobotSpec
 from pipeline.urdf_builder import build_urdf
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +15,9 @@ from pipeline.kinematics import (
     foot_jacobian_rates,
     foot_jacobians,
     foot_positions,
+    leg_posture,
 )
-from pipeline.robot import Robot, load_robot
+from pipeline.robot import Robot, load_robot, parse_urdf
 from pipeline.robot_file import load_robot_file
 
 N = 20
@@ -77,6 +79,50 @@ def test_force_torques_are_the_jacobian_transposed(robot: Robot) -> None:
     _, jacobian = foot_jacobians(robot.chains, q)
     expected = np.einsum("nlij,nli->nlj", jacobian, force)
     np.testing.assert_allclose(foot_force_torques(robot.chains, q, force), expected, atol=1e-12)
+
+
+def test_force_torques_of_a_tilted_axis_are_the_jacobian_transposed(tilted: Robot) -> None:
+    q = random_positions(tilted)
+    force = np.random.default_rng(6).normal(size=q.shape)
+    _, jacobian = pinocchio_feet(tilted, q)
+    expected = np.einsum("nlij,nli->nlj", jacobian, force)
+    np.testing.assert_allclose(foot_force_torques(tilted.chains, q, force), expected, atol=1e-12)
+
+
+def test_posture_of_some_legs_in_another_order(robot: Robot) -> None:
+    """Torques of the leading legs are those of all legs; the given positions are left alone."""
+    q = random_positions(robot)
+    kept = q.copy()
+    order = list(reversed(range(q.shape[1])))
+    posture = leg_posture(robot.chains.of(order), q[:, order])
+    np.testing.assert_allclose(posture.feet[:, order], foot_positions(robot.chains, q), atol=1e-15)
+    force = np.random.default_rng(7).normal(size=q.shape)
+    some = order[: max(1, len(order) // 2)]
+    np.testing.assert_allclose(
+        posture.force_torques(force[:, some]),
+        foot_force_torques(robot.chains, q, force)[:, some],
+        atol=1e-14,
+    )
+    leg_posture(robot.chains, q[:1])
+    np.testing.assert_array_equal(q, kept)
+
+
+def test_rotated_joint_placements_agree_with_pinocchio(root: Path) -> None:
+    """A URDF whose joint frames are turned against their parents, as CAD exports are."""
+    spec = load_robot_file(root / "urdf" / "leg.toml")
+    text = re.sub(
+        r'(<joint name="rm_joint_[23]" type="revolute">\s*<origin xyz="[^"]*" rpy=)"0 0 0"',
+        r'\1"0.3 -0.4 1.1"',
+        load_robot(spec).urdf,
+    )
+    turned = Robot(spec, text, parse_urdf(text, "turned", floating=False))
+    assert turned.chains.turned == (False, True, True)
+    q = random_positions(turned)
+    feet, jacobian = pinocchio_feet(turned, q)
+    np.testing.assert_allclose(foot_positions(turned.chains, q), feet, atol=1e-12)
+    force = np.random.default_rng(8).normal(size=q.shape)
+    expected = np.einsum("nlij,nli->nlj", jacobian, force)
+    np.testing.assert_allclose(foot_force_torques(turned.chains, q, force), expected, atol=1e-12)
 
 
 def test_jacobian_rate_is_a_finite_difference(robot: Robot) -> None:
