@@ -1,0 +1,86 @@
+"""Figures and tables of the gap workflow."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from reports.errors import FigureError
+from reports.figures.gap_signature import Signature, binned, gap_signature_figure
+from reports.figures.gap_time import GapTrace, gap_time_figure
+from reports.figures.gap_waterfall import GapStep, gap_waterfall_figure
+from reports.figures.gap_where import WhereGroup, where_map_figure
+from reports.figures.save import save_figure
+from reports.tables.gap import deciding_motion, found
+
+
+def trace(rows: int = 400) -> GapTrace:
+    t = np.linspace(0.0, 2.0, rows)
+    truth = np.sin(3 * t)
+    noise = 0.02 * np.random.default_rng(3).standard_normal(rows)
+    measured = truth + 0.2 * np.sign(np.cos(3 * t)) + noise
+    measured[100:120] = np.nan
+    after = truth + 0.2 * np.sign(np.cos(3 * t))
+    return GapTrace("rm_joint_2", t, measured, truth, after, 0.02, "A")
+
+
+def test_gap_in_time_tells_what_is_left() -> None:
+    figure = gap_time_figure([trace()], title="t", channel="current")
+    bottom = figure.axes[1]
+    assert "after" in bottom.get_title(loc="left")
+    gap = np.asarray(bottom.lines[2].get_ydata(), dtype=float)
+    assert np.sqrt(np.nanmean(gap**2)) == pytest.approx(0.02, rel=0.2)
+    with pytest.raises(FigureError, match="1 to 3"):
+        gap_time_figure([], title="t")
+
+
+def test_signature_means_are_those_of_the_bins() -> None:
+    rng = np.random.default_rng(0)
+    x = rng.uniform(-1, 1, 4000)
+    centre, mean = binned(x, np.sign(x))
+    assert np.all(mean[centre < -0.1] == -1)
+    assert np.all(mean[centre > 0.1] == 1)
+    signature = Signature("velocity [rad/s]", x, np.sign(x), 0 * x, 0.1, "A")
+    figure = gap_signature_figure(signature, title="t")
+    assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
+    empty = Signature("velocity [rad/s]", x, np.full_like(x, np.nan), 0 * x, 0.1, "A")
+    with pytest.raises(FigureError, match="no rows"):
+        gap_signature_figure(empty, title="t")
+
+
+def test_waterfall_bars_join_up() -> None:
+    steps = [GapStep("friction at a", 0.6), GapStep("mass at b", 0.2)]
+    figure = gap_waterfall_figure(1.0, steps, 0.1, "A", title="t")
+    bars = figure.axes[0].patches
+    assert [round(b.get_width(), 6) for b in bars] == [1.0, 0.4, 0.4, 0.2]
+    assert [round(b.get_x(), 6) for b in bars] == [0.0, 0.6, 0.2, 0.0]
+    with pytest.raises(FigureError, match="negative"):
+        gap_waterfall_figure(-1.0, steps, 0.1, "A", title="t")
+
+
+def test_where_map_shows_every_known_cell() -> None:
+    table = np.array([[1.0, 5.0], [np.nan, 30.0]])
+    figure = where_map_figure(
+        ["a", "b"], [WhereGroup("phase", ("support", "transfer"), table)], title="t"
+    )
+    assert sorted(text.get_text() for text in figure.axes[0].texts) == ["1.0", "30", "5.0"]
+    with pytest.raises(FigureError, match="shape"):
+        where_map_figure(["a"], [WhereGroup("x", ("y",), table)], title="t")
+
+
+def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
+    for folder in ("one", "two"):
+        save_figure(gap_time_figure([trace()], title="t"), tmp_path / folder, "f")
+    for end in ("png", "svg"):
+        assert (tmp_path / "one" / f"f.{end}").read_bytes() == (
+            tmp_path / "two" / f"f.{end}"
+        ).read_bytes()
+
+
+def test_tables_have_the_promised_columns() -> None:
+    header = "order effect joint parameter value ci_low ci_high unit gap_before gap_after gap_unit"
+    assert list(found([]).columns) == [*header.split(), "noise_floor"]
+    table = deciding_motion(np.arange(3.0), ["a", "b"], np.zeros((3, 2)))
+    assert list(table.columns) == ["time_s", "a__position_rad", "b__position_rad"]
