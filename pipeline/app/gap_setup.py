@@ -12,6 +12,7 @@ import numpy as np
 from actuators.build import Catalog, load_catalog
 from actuators.chain import Chain
 from pipeline.errors import PipelineError
+from pipeline.gap.bandwidth import lowered, naming_cutoff
 from pipeline.gap.contact import Contact, find_contact
 from pipeline.gap.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.gap.expected import Expected, expected_of_model, expected_of_robot
@@ -156,6 +157,8 @@ def _read(path: Path, given: Setup, mapping: Mapping | None, options: argparse.N
 def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, int]:
     """Step 1: read, judge and prepare all logs, and cut them into fit, choose and prove.
 
+    All scores are taken at one bandwidth: `--cutoff`, else where the encoders' noise is silent.
+
     Returns:
         The logs, their parts, and how many of them may be fitted (the first ones).
 
@@ -170,6 +173,10 @@ def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, i
         largest=_largest(given),
         contact=_contact(given),
     )
+    if options.cutoff is None and options.step != "read":
+        cutoff = naming_cutoff(given.model, intake.prepared)
+        prepared = lowered(intake.prepared, cutoff)
+        intake = replace(intake, prepared=prepared, settings=prepared[0].settings)
     count = len(fitted)
     parts = split(
         intake.prepared[:count], holdout=intake.prepared[count:], prove_last=options.prove_last
