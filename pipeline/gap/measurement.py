@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,39 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _SHORT = 300  # samples of a kernel up to which summing is quicker than transforming
 FIT, CHOOSE, PROVE, UNUSED = 0, 1, 2, -1
+
+
+#: Below this many rest speeds a joint counts as standing: friction may take any value there.
+STANDING: Final = 2.5
+#: How far to either side a filter sees with weight, in periods of its cut-off.
+SEEN: Final = 1.0
+
+
+def near_rest(
+    v: Array, rest: Array, pieces: Sequence[slice], rate: float, bandwidth: float
+) -> Mask:
+    """Rows whose filter sees a shaft stop or turn back.
+
+    There friction takes any value up to its level, and the filtered speed does not tell which: a
+    law of friction says nothing about such rows, and no name may rest on them.
+
+    Args:
+        v: Speed, shape (N, J) [rad/s].
+        rest: Rest speed, shape (J,) [rad/s].
+        pieces: Stretches without a gap.
+        rate: [Hz].
+        bandwidth: Of the filter [Hz].
+
+    Returns:
+        Shape (N, J).
+    """
+    still = np.abs(v) < STANDING * rest
+    reach = int(np.ceil(SEEN * rate / bandwidth)) if np.isfinite(bandwidth) else 0
+    out = np.zeros_like(still)
+    for piece in pieces:
+        count = np.cumsum(np.pad(still[piece], ((reach + 1, reach), (0, 0))), axis=0)
+        out[piece] = count[2 * reach + 1 :] > count[: -2 * reach - 1]
+    return out
 
 
 def unfiltered(x: Array) -> Array:

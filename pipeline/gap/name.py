@@ -99,7 +99,7 @@ def select(problem: Problem) -> Selection:
         added = Accepted(
             winner.score.effect, winner.score.place, winner.score.x, winner.score.shape
         )
-        candidate = refit(problem.with_accepted([*problem.accepted, added]))
+        candidate = refit(problem.with_accepted([*problem.accepted, added]).remasked())
         candidate = _pruned(candidate)
         if not any(a.effect is added.effect and a.place == added.place for a in candidate.accepted):
             refused.add(winner.key)
@@ -113,9 +113,17 @@ def select(problem: Problem) -> Selection:
 
 def least_gain(problem: Problem, score: Score) -> float:
     """Gain that a candidate needs, before the noise's scale is looked at."""
-    if score.effect.tolerance(problem.model, score.place):
-        return limits.TOLERANCE_SIGMAS**2
+    if score.effect.is_tolerance:
+        return tolerance_gain(1)
     return limits.LEAST_GAIN
+
+
+def tolerance_gain(freedom: int) -> float:
+    """Gain beyond which a tolerance counts as exceeded."""
+    from scipy.stats import chi2
+
+    chance = chi2.sf(limits.TOLERANCE_SIGMAS**2, 1)
+    return float(chi2.isf(chance, freedom))
 
 
 def acceptable(problem: Problem, t: Trial, tried: int) -> bool:
@@ -123,12 +131,14 @@ def acceptable(problem: Problem, t: Trial, tried: int) -> bool:
     from scipy.stats import chi2
 
     tolerance = t.score.effect.tolerance(problem.model, t.score.place)
+    size = sum((t.score.x[k] / s) ** 2 for k, s in tolerance.items())
     alarm = float(chi2.isf(limits.FALSE_ALARM / max(tried, 1), max(t.freedom, 1)))
-    if tolerance:
+    if tolerance and size < tolerance_gain(len(tolerance)):
+        return False
+    if t.score.effect.is_tolerance:
         # Tolerances explain a part already: the rest has to exceed them, and by its own size.
-        size = sum((t.score.x[k] / s) ** 2 for k, s in tolerance.items())
-        least = limits.TOLERANCE_SIGMAS**2 * max(t.freedom, 1)
-        return t.gain > least and size > least and t.significance > alarm
+        least = tolerance_gain(max(t.freedom, 1))
+        return t.gain > least and t.significance > least
     least = max(limits.LEAST_GAIN * t.scale, limits.LEAST_SHARE * t.expected)
     return t.gain > least and t.held_out > 0.0 and t.significance > alarm
 
@@ -160,9 +170,9 @@ def _rivals(problem: Problem, winner: Trial, made: Sequence[Trial]) -> tuple[Key
             continue
         if _related(winner.score.effect, t.score.effect) and winner.score.place == t.score.place:
             continue
-        together = joint_gain(problem, [winner.score, t.score])
-        # What still gains much beside the winner explains something else.
-        if together - winner.gain < max(_threshold(winner.gain), 0.5 * t.gain):
+        shared = winner.gain + t.gain - joint_gain(problem, [winner.score, t.score])
+        # What gains much beside the winner explains something else.
+        if t.gain > 0.5 * winner.gain and shared > 0.5 * t.gain:
             out.append(t.key)
     return tuple(out)
 
@@ -229,8 +239,7 @@ def _needed(problem: Problem, number: int) -> tuple[float, float]:
         A[np.ix_(rest, rest)], b[rest] - A[np.ix_(rest, np.arange(problem.names))] @ fixed
     )
     rise = sums.objective(fixed, both) - sums.objective(theta, both)
-    tolerance = a.effect.tolerance(problem.model, a.place)
-    if tolerance:
+    if a.effect.is_tolerance:
         return rise, limits.TOLERANCE_SIGMAS**2
     scale = float(sums.loss(theta, both).sum()) / max(float(sums.count[both].sum()), 1.0)
     return rise, limits.LEAST_GAIN * scale

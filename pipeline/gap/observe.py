@@ -8,7 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.gap.measurement import Measurement
+from pipeline.gap.measurement import Measurement, near_rest
 from pipeline.gap.model import MachineModel
 from pipeline.gap.noise import smoother_noise
 from pipeline.gap.parts import Parts
@@ -21,12 +21,8 @@ Mask = NDArray[np.bool_]
 REST_SHARE: Final = 0.003
 #: ... and at least this many standard deviations of the velocity's noise.
 REST_SIGMAS: Final = 3.0
-#: Below this many rest speeds a joint counts as standing: friction may take any value there.
-STANDING: Final = 2.5
 #: Shortest piece over which scatter is taken, in reaches of the filter to one side.
 PIECE: Final = 3.0
-#: How far to either side the filter sees with weight, in periods of its cut-off.
-SEEN: Final = 1.0
 
 
 def observe(
@@ -136,18 +132,8 @@ def _rest_speed(prepared: Sequence[Prepared]) -> Array:
 
 
 def _standing(one: Prepared, rest: Array) -> Mask:
-    """Rows whose filter sees a joint stop or turn back, shape (N, J).
-
-    There friction takes any value up to its level, and the filtered speed does not tell which: a
-    law of friction says nothing about such rows, and no name may rest on them.
-    """
-    still = np.abs(one.v) < STANDING * rest
-    reach = int(np.ceil(SEEN * one.rate / one.cutoff))
-    out = np.zeros_like(still)
-    for piece in one.pieces:
-        count = np.cumsum(np.pad(still[piece], ((reach + 1, reach), (0, 0))), axis=0)
-        out[piece] = count[2 * reach + 1 :] > count[: -2 * reach - 1]
-    return out
+    """Rows whose filter sees a joint stop or turn back, shape (N, J); see `near_rest`."""
+    return near_rest(one.v, rest, one.pieces, one.rate, one.cutoff)
 
 
 def _contact(model: MachineModel, one: Prepared) -> tuple[Mask | None, Array | None]:

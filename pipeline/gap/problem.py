@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.gap.block_sums import BlockSums, Stack, block_sums, make_stack
-from pipeline.gap.columns import Bench, effect_columns, residual
+from pipeline.gap.columns import Bench, effect_columns, make_bench, residual
 from pipeline.gap.effects.base import Effect, Place
-from pipeline.gap.measurement import CHOOSE, FIT
+from pipeline.gap.measurement import CHOOSE, FIT, near_rest
 from pipeline.gap.model import MachineModel
 from pipeline.gap.nuisance import Nuisance, grouped, nuisance_columns, nuisances
 from pipeline.gap.rigid import legs_are_separate
@@ -21,6 +21,8 @@ Array = NDArray[np.float64]
 Columns = Sequence[Mapping[int, Array]]
 
 
+#: Change of a tolerance, in sigmas, after which columns at its joint are computed anew.
+_STALE = 0.1
 #: Prior precision of what is not free.
 FIXED = 1e9
 #: Effects whose like at another leg leaves this leg alone, where legs are separate.
@@ -164,6 +166,9 @@ class Problem:
         after = {id(a) for a in other.accepted}
         moved = [a for a in (*self.accepted, *other.accepted) if id(a) not in (before & after)]
         touched = {joint for a in moved for joint in self._touched(a)}
+        for n, old, new in zip(self.tolerances, self.held, other.held, strict=True):
+            if n.kind in ("torque_constant", "resistance") and abs(new - old) > _STALE:
+                touched.add(self.model.index(n.place))
         for key, per_log in self._columns.items():
             joints = {j for column in per_log for j in column}
             if joints & touched and not _is_body(key):
@@ -311,6 +316,30 @@ class Problem:
     def rescaled(self, sigma: Array) -> Problem:
         """The problem with another noise level; columns are computed anew."""
         return replace(self, sigma=sigma, _columns={}, _cache={})
+
+    def remasked(self) -> Problem:
+        """Without rows in which a coupled motor turns back, where its joint does not."""
+        model = self.current()
+        benches, changed = [], False
+        for bench in self.benches:
+            m = bench.measurement
+            mask = m.mask.copy()
+            for k, a in enumerate(model.actuators):
+                if a.coupled_to:
+                    speed = m.v[:, k] + a.coupling * m.v[:, model.index(a.coupled_to)]
+                    turning = near_rest(
+                        speed[:, None], m.rest_speed[k : k + 1], m.pieces, m.rate, m.bandwidth
+                    )[:, 0]
+                    mask[turning, k] = False
+                    mask[turning, model.index(a.coupled_to)] = False
+            if (mask != m.mask).any():
+                changed = True
+                benches.append(make_bench(replace(m, mask=mask)))
+            else:
+                benches.append(bench)
+        if not changed:
+            return self
+        return replace(self, benches=tuple(benches), _columns={}, _cache={})
 
     def head(self, log: int) -> slice:
         """Rows of *fit* and *choose* of one log's bench."""

@@ -170,17 +170,29 @@ class Simulator:
             wind = wind + 0.5 * a.backlash * np.tanh(torque / scale)
         return self.measurement.lowpass(wind)
 
+    def _load(self, model: MachineModel, k: int, q: Array, torque: Array) -> Array:
+        """What one motor's transmission has to supply, at the joint side, (N,) [N*m].
+
+        With motor angles theta = C q the joints' torques are C^T times the motors': a motor that
+        also turns with another joint carries a part of that joint's torque.
+        """
+        a = model.actuators[k]
+        load = self._with_position_torque(a, q[:, k], torque[:, k])
+        for i, other in enumerate(model.actuators):
+            if other.coupled_to == a.name:
+                load = load - other.coupling * self._load(model, i, q, torque)
+        return load
+
     def _joint(
         self, model: MachineModel, k: int, q: Array, torque: Array, motor: Array
     ) -> tuple[Array, Array]:
         """Motor torque at the joint side (N,) and effort channels (N, C) of one joint."""
         m, a = self.measurement, model.actuators[k]
-        load = self._with_position_torque(a, q[:, k], torque[:, k])
+        load = self._load(model, k, q, torque)
         carried = np.zeros_like(load)
         for i, other in enumerate(model.actuators):
             if other.coupled_to == a.name:
                 carried = carried + other.coupling * motor[:, i]
-        load = load - carried
         position, velocity, acceleration = m.q[:, k], m.v[:, k], m.a[:, k]
         if a.wound and not m.at_motor:
             wind = self._wind(a, load)

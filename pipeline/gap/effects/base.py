@@ -64,6 +64,7 @@ class Effect(ABC):
         coordinates: As fitted.
         signature: Variable against which its residual shows, a key of `signature.VARIABLES`.
         excitation: The motion that shows it, in words.
+        is_tolerance: Whether every machine has it in small, as a tolerance that is always free.
         contains: Effects that are special cases of this one at the same place.
     """
 
@@ -73,6 +74,7 @@ class Effect(ABC):
     coordinates: ClassVar[tuple[Coordinate, ...]]
     signature: ClassVar[str] = "velocity"
     excitation: ClassVar[str]
+    is_tolerance: ClassVar[bool] = False
     contains: ClassVar[tuple[str, ...]] = ()
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

@@ -26,6 +26,7 @@ class CenterOfMassOffset(Effect):
         Coordinate(axis, 1e-3, signed=True, required=False) for axis in "xyz"
     )
     signature = "position"
+    is_tolerance = True
     excitation = "holds the link in postures all around its axis"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

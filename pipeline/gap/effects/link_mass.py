@@ -22,6 +22,7 @@ class LinkMass(Effect):
     parameters: ClassVar = (Parameter("mass", "kg", -1e4, 1e4),)
     coordinates: ClassVar = (Coordinate("mass", 1e-2, signed=True),)
     signature = "position"
+    is_tolerance = True
     excitation = "holds and moves the link in clearly different postures"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

@@ -21,6 +21,7 @@ class TimeDelay(Effect):
     parameters: ClassVar = (Parameter("delay", "s", -0.5, 0.5),)
     coordinates: ClassVar = (Coordinate("delay", 2e-4, signed=True),)
     signature = "effort rate"
+    is_tolerance = True
     excitation = "changes its torque fast: accelerates, brakes and reverses"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

@@ -22,6 +22,7 @@ class TorqueConstantError(Effect):
     parameters: ClassVar = (Parameter("relative", "1", -0.8, 2.0),)
     coordinates: ClassVar = (Coordinate("relative", 1e-3, signed=True),)
     signature = "load"
+    is_tolerance = True
     excitation = "carries clearly different known loads"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
