@@ -8,6 +8,7 @@ from typing import ClassVar
 from actuators.friction import Friction
 from actuators.inertia import Inertia
 from pipeline.gap.effects.base import Coordinate, Effect, Parameter, Place, Values
+from pipeline.gap.errors import EffectError
 from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import JointModel, MachineModel
 
@@ -39,11 +40,12 @@ class TransmissionCoupling(Effect):
         for a in model.actuators:
             if a.coupled_to or not _carries(a):
                 continue
-            out += [(a.name, other) for other in neighbours(model, a.name)]
+            out += [(a.name, other) for other in free_neighbours(model, a.name)]
         return out
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Couple them."""
+        _refuse_circle(model, place)
         actuator = replace(model.actuator(place[0]), coupled_to=place[1], coupling=x["ratio"])
         if shape:
             actuator = with_shaft(actuator, shape)
@@ -69,7 +71,7 @@ class BareCoupling(TransmissionCoupling):
             (a.name, other)
             for a in model.actuators
             if a.motor is None and not a.coupled_to
-            for other in neighbours(model, a.name)
+            for other in free_neighbours(model, a.name)
         ]
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
@@ -86,6 +88,19 @@ class BareCoupling(TransmissionCoupling):
         return model.with_actuator(with_shaft(actuator, x))
 
 
+def _refuse_circle(model: MachineModel, place: Place) -> None:
+    if len(place) != 2 or place[0] == place[1]:
+        raise EffectError(f"transmission_coupling: place {place} must name two joints")
+    joint, seen = place[1], {place[0]}
+    while joint:
+        if joint in seen:
+            raise EffectError(
+                f"transmission_coupling: {place[0]} and {place[1]} are coupled the other way already"
+            )
+        seen.add(joint)
+        joint = model.actuator(joint).coupled_to
+
+
 def with_shaft(actuator: JointModel, values: Values) -> JointModel:
     """An actuator with inertia and friction at its shaft."""
     name = TransmissionCoupling.name
@@ -97,6 +112,11 @@ def with_shaft(actuator: JointModel, values: Values) -> JointModel:
 
 def _carries(actuator: JointModel) -> bool:
     return actuator.motor is not None
+
+
+def free_neighbours(model: MachineModel, joint: str) -> list[str]:
+    """Neighbours whose own motors do not turn with other joints."""
+    return [n for n in neighbours(model, joint) if not model.actuator(n).coupled_to]
 
 
 def neighbours(model: MachineModel, joint: str) -> list[str]:
