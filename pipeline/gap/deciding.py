@@ -34,6 +34,9 @@ FREE_TRAVEL: Final = 1.0  # [rad]
 FREE_SPEED: Final = 2.0  # [rad/s]
 
 
+_SHRINKINGS: Final = 12
+
+
 @dataclass(frozen=True)
 class Rival:
     """An effect at a place, at the parameters that explain the log.
@@ -75,6 +78,8 @@ def deciding_motion(
     *,
     posture: Array | None = None,
     movable: Sequence[int] | None = None,
+    stance: Sequence[str] | None = None,
+    allowed: Callable[[Array], bool] | None = None,
 ) -> Deciding | None:
     """The motion on which the named effect and its rivals differ most.
 
@@ -86,6 +91,9 @@ def deciding_motion(
         others: Its rivals.
         posture: About which to move, shape (J,) [rad]; the log's middle by default.
         movable: Columns that may move; all by default.
+        stance: Legs that stand meanwhile; those that stand most often in the log by default.
+        allowed: Whether positions (N, J) keep clear of ground and neighbours; strokes shrink until
+            they do.
 
     Returns:
         None where no motion tells them apart by as much as the noise.
@@ -96,7 +104,13 @@ def deciding_motion(
     best: Deciding | None = None
     for name, shape in MOTIONS.items():
         time, q = _motion(shape, middle, columns, expected)
-        trial = _measurement(m, time, q)
+        for _ in range(_SHRINKINGS):
+            if allowed is None or allowed(q):
+                break
+            q = middle + 0.75 * (q - middle)
+        else:
+            continue
+        trial = _measurement(m, time, q, _stance(model, m, stance))
         misfit = min(_misfit(model, trial, named, other) for other in others)
         if misfit > 1.0 and (best is None or misfit > best.misfit):
             best = Deciding(name, time, q, misfit)
@@ -136,7 +150,9 @@ def _whitened(simulator: Simulator, base: Prediction, model: MachineModel) -> Ar
     return np.asarray(change / simulator.measurement.noise)
 
 
-def _measurement(like: Measurement, time: Array, q: Array) -> Measurement:
+def _measurement(
+    like: Measurement, time: Array, q: Array, stance: NDArray[np.bool_] | None
+) -> Measurement:
     """A motion as if it had been measured: the efforts are not used."""
     n, j = q.shape
     v = np.gradient(q, time, axis=0)
@@ -155,7 +171,7 @@ def _measurement(like: Measurement, time: Array, q: Array) -> Measurement:
         lowpass=_same,
         base_roll=None,
         base_pitch=None,
-        standing=None if like.standing is None else np.repeat(_stance(like), n, axis=0),
+        standing=None if stance is None else np.repeat(stance, n, axis=0),
         foot_force=None,
     )
 
@@ -164,9 +180,14 @@ def _same(x: Array) -> Array:
     return x
 
 
-def _stance(m: Measurement) -> NDArray[np.bool_]:
-    """The stance most often seen, shape (1, F)."""
-    assert m.standing is not None
+def _stance(
+    model: MachineModel, m: Measurement, names: Sequence[str] | None
+) -> NDArray[np.bool_] | None:
+    """Which legs stand, shape (1, F); None on a stand."""
+    if m.standing is None:
+        return None
+    if names is not None and model.legs is not None:
+        return np.array([[leg in names for leg in model.legs.names]])
     patterns, count = np.unique(m.standing, axis=0, return_counts=True)
     return np.asarray(patterns[[int(np.argmax(count))]])
 
