@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 HALF_LENGTH: Final = 2.0
 #: Largest cut-off per sampling rate: above it the kernel would no longer be sampled finely enough.
 LARGEST_SHARE: Final = 0.25
+#: A joint whose spectrum nowhere exceeds its noise by this factor stands still.
+SEEN: Final = 30.0
 
 
 @dataclass(frozen=True)
@@ -189,7 +191,8 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
         smallest: Lower bound [Hz].
 
     Returns:
-        Shape (C,) [Hz], at most `LARGEST_SHARE` of the rate; NaN for a column that never changes.
+        Shape (C,) [Hz], at most `LARGEST_SHARE` of the rate; NaN for a column that never changes or
+        shows nothing but noise.
     """
     from scipy.signal import welch
 
@@ -219,5 +222,6 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
     )
     above = level > 2.0 * noise
     first_below = np.where(above.all(axis=0), -1, np.argmin(above, axis=0))
-    out[moves] = np.clip(f[bins[first_below]], smallest, largest)
+    at_rest = level[: max(1, bins.size // 2)].max(axis=0) < SEEN * noise
+    out[moves] = np.where(at_rest, np.nan, np.clip(f[bins[first_below]], smallest, largest))
     return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Final
 
@@ -58,13 +59,20 @@ class Quality:
         """What `prepare` asks for."""
         return self.position_ok, self.effort_ok
 
-    def refuse(self) -> None:
+    def refuse(self, *, overlooked: Collection[str] = ()) -> None:
         """Refuse the log where a finding says so.
+
+        Args:
+            overlooked: Checks that do not lead to refusal.
 
         Raises:
             LogContentError: Names the first refused column and how many there are.
         """
-        refused = [finding for finding in self.findings if finding.verdict == "refused"]
+        refused = [
+            finding
+            for finding in self.findings
+            if finding.verdict == "refused" and finding.check not in overlooked
+        ]
         if not refused:
             return
         first = refused[0]

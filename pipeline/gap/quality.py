@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -222,7 +222,8 @@ def _efforts(log: Log, still: Mask, found: _Findings) -> Mask:
     for j, joint in enumerate(log.joints):
         column = column_name(joint, effort.channel)
         x = effort.values[:, j]
-        if joint in log.locked or _is_constant(log.position[:, j]):
+        off = _is_constant(log.position[:, j]) and _is_constant(x)
+        if joint in log.locked or off:
             ok[:, j] = False
             continue
         if _is_constant(x) or not np.isfinite(x).any():
@@ -257,14 +258,14 @@ def _efforts(log: Log, still: Mask, found: _Findings) -> Mask:
                 f"{int(limit.sum())} rows stick at {np.nanmax(np.abs(x[limit])):.5g} {effort.unit}",
             )
         if log.torque_off is not None and log.torque_off[:, j].any():
-            off = log.torque_off[:, j]
+            rows = log.torque_off[:, j]
             found.note(
                 column,
                 "torque_off",
-                float(off.mean()),
+                float(rows.mean()),
                 "1",
                 "masked",
-                f"{int(off.sum())} rows with the drive off; bridge "
+                f"{int(rows.sum())} rows with the drive off; bridge "
                 f"{log.torque_off_bridge or 'not stated (open or shorted?)'}",
             )
     if log.chosen_effort is None and len(log.channels) > 1:
@@ -316,11 +317,3 @@ def _repeated_rows(log: Log, still: Mask, found: _Findings) -> None:
             "warning",
             f"{int(same.sum())} rows repeat the one before in every channel while a joint moves",
         )
-
-
-def worst(quality: Quality) -> Mapping[str, int]:
-    """Number of findings per verdict."""
-    counts: dict[str, Any] = {}
-    for finding in quality.findings:
-        counts[finding.verdict] = counts.get(finding.verdict, 0) + 1
-    return counts

@@ -22,6 +22,7 @@ from pipeline.gap.table_file import (
     open_table,
     read_columns,
     row_count,
+    sample_columns,
     sha256,
     stream_columns,
 )
@@ -108,6 +109,24 @@ def stream_log(
             )
         first, last = first + len(log), float(log.time[-1])
         yield log
+
+
+def sample_log(
+    path: Path,
+    expected: Expected,
+    mapping: Mapping | None = None,
+    *,
+    stretches: int,
+    rows: int,
+) -> Iterator[Log]:
+    """Read some stretches of a Parquet log, spread over its length.
+
+    Raises:
+        GapError: As for `read_log`.
+    """
+    plan = plan_reading(path, expected, mapping)
+    for first, data in sample_columns(plan.table, plan.columns, stretches, rows):
+        yield assemble(plan, data, first_row=first, digest="")
 
 
 def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:

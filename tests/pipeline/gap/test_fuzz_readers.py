@@ -15,6 +15,7 @@ from pipeline.gap.errors import GapError
 from pipeline.gap.expected import Expected
 from pipeline.gap.intake import take_in
 from pipeline.gap.mapping import load_mapping
+from pipeline.gap.stream import stream_prepared
 
 Array = NDArray[np.float64]
 ROWS = 400
@@ -228,6 +229,9 @@ def check(path: Path, expected: Expected, mapping: Path | None) -> bool:
     try:
         rules = load_mapping(mapping) if mapping is not None else None
         intake = take_in([path], expected, rules)
+        if path.suffix == ".parquet":
+            for _, chunk in stream_prepared(path, expected, rules, rows=150):
+                assert np.isfinite(chunk.a).all()
     except (GapError, ActuatorError) as error:
         message = str(error)
         assert message

@@ -143,6 +143,36 @@ def test_streamed_chunks_equal_the_whole(
     assert np.array_equal(mask, whole.mask)
 
 
+@pytest.mark.parametrize("group", [1_000, 400_000])
+def test_a_long_rest_is_no_defect_of_a_stream(
+    two_joints: Expected, tmp_path: Path, group: int
+) -> None:
+    t, q, _, _, effort = noisy(200_000)
+    rest = slice(0, 50_000)
+    q[rest] = q[rest.stop]
+    effort[60_000:64_000, 1] = np.nan  # the drive is off for longer than a chunk
+    names = ("a__position_rad", "b__position_rad", "a__torque_Nm", "b__torque_Nm")
+    data = {"time_s": t} | dict(zip(names, np.hstack([q, effort]).T, strict=True))
+    path = tmp_path / "long.parquet"
+    pq.write_table(pa.table(data), path, row_group_size=group)
+    chunks = [p for _, p in stream_prepared(path, two_joints, rows=2_000)]
+    assert sum(p.core.stop - p.core.start for p in chunks) == t.size
+    assert len({p.cutoff for p in chunks}) == 1
+    assert 5.0 < chunks[0].cutoff < 60.0
+    assert chunks[3].mask[chunks[3].core].all()  # a joint at rest can be compared
+    expected = 0.5 * chunks[0].settings.lowpass.noise_gain
+    assert chunks[-1].noise == pytest.approx([expected, expected], rel=0.15)
+
+
+def test_a_joint_at_rest_does_not_choose_the_cutoff() -> None:
+    _, q, _, _, effort = noisy()
+    moving = choose_settings([made_log(q, effort, RATE)])
+    q[:, 1] = 0.3 + np.random.default_rng(8).normal(0, 1e-4, len(q))
+    one = choose_settings([made_log(q, effort, RATE)])
+    assert np.isnan(one.per_joint[1])
+    assert one.cutoff == pytest.approx(moving.per_joint[0])
+
+
 def test_period_and_noise_between_cycles() -> None:
     t = np.arange(6000) / RATE
     rng = np.random.default_rng(6)
