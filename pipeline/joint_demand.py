@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.contact_forces import ContactForces, least_tangential_forces
 from pipeline.errors import GaitError, TippingError
-from pipeline.kinematics import leg_posture
+from pipeline.kinematics import posture_at
 from pipeline.motion import Motion, Segment
 from pipeline.robot import Robot
 from pipeline.stability import stability_margins
@@ -94,15 +94,15 @@ def _ground(robot: Robot, segment: Segment, generalised: Array) -> tuple[Contact
     # Standing legs first: forces and torques are then worked out on a leading part of the arrays.
     order = stance + [i for i in range(len(legs)) if i not in stance]
     chains = robot.chains.of(order)
-    q = robot.leg_positions(segment.configuration)
+    columns = robot.position_index[robot.leg_columns[order]]
     rotation = robot.base_rotation(segment.configuration)  # base -> world, (N, 3, 3) or None
-    n, k = q.shape[0], len(stance)
+    n, k = segment.time.size, len(stance)
     feet = np.empty((n, len(legs), 3))
     force = np.zeros_like(feet)
     force_world = force if rotation is None else np.zeros_like(feet)
-    torque = np.empty((n, k, q.shape[2]))
+    torque = np.empty((n, k, columns.shape[1]))
     for s in _blocks(n):
-        posture = leg_posture(chains, q[s][:, order])
+        posture = posture_at(chains, segment.configuration[s].T[columns])
         feet[s, order] = posture.feet
         turn = None if rotation is None else rotation[s]
         in_base, in_world = _supplied(generalised[s, :6], posture.feet[:, :k], turn)

@@ -128,8 +128,17 @@ class LegPosture:
 
 def leg_posture(chains: LegChains, q: Array) -> LegPosture:
     """Work out the legs at joint positions q [rad], shape (N, L, 3)."""
-    angle = _samples_last(q)
-    cos, sin = np.cos(angle), np.sin(angle, out=angle)  # angle is a copy of our own
+    return posture_at(chains, _samples_last(q))
+
+
+def posture_at(chains: LegChains, angle: Array) -> LegPosture:
+    """Work out the legs at joint positions that are the caller's to give away.
+
+    Args:
+        chains: The legs.
+        angle: Joint positions [rad], shape (L, 3, N); overwritten.
+    """
+    cos, sin = np.cos(angle), np.sin(angle, out=angle)
     arm: list[Array] = []
     r = chains.foot.T[:, :, None]
     for j in reversed(range(JOINTS_PER_LEG)):

@@ -55,16 +55,23 @@ class LegChains:
             not np.array_equal(r, np.broadcast_to(np.eye(3), r.shape)) for r in self.rotation
         )
 
+    @cached_property
+    def _parts(self) -> dict[tuple[int, ...], LegChains]:
+        return {}
+
     def of(self, legs: Sequence[int]) -> LegChains:
-        """Some of the legs, by index."""
-        own = list(legs)
-        return LegChains(
-            tuple(self.names[i] for i in own),
-            self.rotation[:, own],
-            self.offset[:, own],
-            self.axis[:, own],
-            self.foot[own],
-        )
+        """Some of the legs, by index; made once for each choice."""
+        key = tuple(legs)
+        if key not in self._parts:
+            own = list(key)
+            self._parts[key] = LegChains(
+                tuple(self.names[i] for i in own),
+                self.rotation[:, own],
+                self.offset[:, own],
+                self.axis[:, own],
+                self.foot[own],
+            )
+        return self._parts[key]
 
 
 def leg_chains(
