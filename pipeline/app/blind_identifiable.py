@@ -49,7 +49,7 @@ THRESHOLD: Final = 6.0
 #: A rival stands for the truth only where it leaves less than this share of nothing's misfit.
 EXPLAINS: Final = 0.5
 #: Joints that feel less than this share of d are left out.
-_LEAST_SHARE: Final = 1e-3
+_LEAST_SHARE: Final = 0.02
 _ORDERS = 3  # ripples of the rivals, the strongest ones
 
 
