@@ -90,7 +90,9 @@ def _energy(given: Settings, walking: Walking, out: Path) -> int:
         list(labels.values()),
         electrical,
         title=f"Electrical energy per cycle, leg {leg}",
-        subtitle="returned energy is lost",
+        subtitle="returned energy is lost"
+        if given.regeneration.policy == "none"
+        else "what the motors draw; robot_energy.csv has what their return saves",
     )
     save_figure(figure, out, "electrical_energy")
     return 2 * len(walking.results) + 1

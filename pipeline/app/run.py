@@ -65,7 +65,10 @@ def run(options: argparse.Namespace) -> int:
             judgement, more = judging.judged(given)
             tables += more
         else:
-            print("changed numbers: the judgement of the paper's values is left out")
+            print(
+                "not held against the paper: no stored calibration belongs to this robot, these "
+                "numbers and these options"
+            )
     meta = metadata(given)
     for table in tables:
         decimal = "," if options.decimal == "comma" else "."
@@ -80,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
         files += write_figures(given, standing, walking, options.out)
         if judgement is not None:
             files += judging.pages(given, judgement, tables, options.out)
-    print(f"{files} tables and figures in {options.out}")
+    print(f"{files} tables{' and figures' if options.verb == 'reports' else ''} in {options.out}")
     for line in findings(walking, given) if walking else ():
         print(line)
     return 0
