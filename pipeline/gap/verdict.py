@@ -29,9 +29,14 @@ RIVAL_SIGMAS: Final = 3.0
 RIVAL_GAIN: Final = 9.0
 #: ... or by less than this share of what the better one explains.
 RIVAL_SHARE: Final = 0.002
-#: A column whose share after projecting out everything else lies below this is not identifiable:
-#: standard deviation of the estimate over what would be worth naming.
-LEAST_INFORMATION: Final = 10.0
+#: Below this share a candidate's column is explained by everything else that is free.
+LEAST_ALONE: Final = 1e-6
+#: General effects whose own coordinate may be invisible: name and size that would be worth naming.
+WORTH_NAMING: Final = {"backlash": ("width", 1e-3)}  # [rad]
+#: Scatter of an effect's size over blocks, over that of noise, that no right law shows ...
+LARGEST_SCATTER: Final = 8.0
+#: ... where more than this many times the noise is left as well.
+LARGEST_EXCESS: Final = 1.12
 #: Remaining error over the noise floor, in the naming channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
 #: Effects that one log may be found to lack.

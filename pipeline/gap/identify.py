@@ -1,0 +1,277 @@
+"""Steps 3 and 5 in one call: name what is missing, with intervals, verdicts and the proof."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.gap import verdict as limits
+from pipeline.gap.block_sums import BlockSums
+from pipeline.gap.columns import make_benches
+from pipeline.gap.effects.base import CHANNEL_UNITS, Place
+from pipeline.gap.intervals import estimates
+from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement
+from pipeline.gap.model import MachineModel
+from pipeline.gap.name import Selection, refit, select
+from pipeline.gap.problem import Problem
+from pipeline.gap.remainder import remainders
+from pipeline.gap.screen import Score
+from pipeline.gap.verdict import Candidate, Found, Naming
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """Naming with the model it leads to.
+
+    Attributes:
+        naming: Results.
+        model: With the accepted effects, tolerances as the files state them.
+        calibrated: With the accepted effects and the tolerances at their estimates.
+        problem: The least-squares problem at the end.
+    """
+
+    naming: Naming
+    model: MachineModel
+    calibrated: MachineModel
+    problem: Problem
+
+
+def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identified:
+    """Name what the model lacks.
+
+    Args:
+        model: What the engineer has.
+        measurements: Logs with parts, from `observe`.
+
+    Raises:
+        NamingError: A part of the data has no usable row.
+        ModelError: Model and logs do not fit.
+    """
+    sigma = np.sqrt(np.mean([m.noise**2 for m in measurements], axis=0))
+    start = Problem(model, make_benches(measurements), sigma)
+    selection = select(start)
+    problem = selection.problem
+    channel = measurements[0].channels[0]
+    sums = problem.sums()
+    theta = sums.solve(sums.blocks(FIT, CHOOSE))
+    count = len(problem.tolerances)
+    held = problem.held + theta[:count]
+    tolerances = {
+        (n.kind, n.place): (float(v) * n.sigma, n.sigma)
+        for n, v in zip(problem.tolerances, held, strict=True)
+    }
+    naming = Naming(
+        found=_found(start, selection, channel),
+        candidates=_candidates(start, selection),
+        tolerances=tolerances,
+        remainders=remainders(problem, theta),
+        tried=selection.tried,
+        channel=channel,
+        unit=CHANNEL_UNITS[channel],
+    )
+    plain = model
+    for a in problem.accepted:
+        plain = a.apply(plain)
+    calibrated = problem.model
+    for n, value in zip(problem.tolerances, held, strict=True):
+        calibrated = n.edit(calibrated, float(np.clip(value, -4.0, 4.0)) * n.sigma)
+    for a in problem.accepted:
+        calibrated = a.apply(calibrated)
+    return Identified(naming, plain, calibrated, problem)
+
+
+def errors(problem: Problem, parts: Sequence[int]) -> tuple[Array, Array]:
+    """Mean square error by joint and channel (J, C), and rows (J,), tolerances at their estimate.
+
+    Args:
+        problem: With some effects accepted.
+        parts: Parts of the data to judge on.
+    """
+    from pipeline.gap.remainder import remaining
+
+    sums = problem.sums()
+    theta = sums.solve(sums.blocks(FIT, CHOOSE))
+    squares = np.zeros(problem.sigma.shape)
+    rows = np.zeros(problem.sigma.shape)
+    for rest, bench in zip(remaining(problem, theta), problem.benches, strict=True):
+        for part in parts:
+            values = rest[bench.parts[part]] * problem.sigma
+            squares += np.nansum(values**2, axis=0)
+            rows += np.isfinite(values).sum(axis=0)
+    return squares / np.maximum(rows, 1), rows[:, 0]
+
+
+def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, ...]:
+    """Accepted effects with their proof, in order."""
+    problem = selection.problem
+    intervals = estimates(problem, channel)
+    rivals = {r.winner: r.rivals for r in selection.rounds}
+    out = []
+    bare = Problem(problem.model, problem.benches, problem.sigma, tolerances=problem.tolerances)
+    before = refit(bare)
+    for number, a in enumerate(problem.accepted):
+        after = refit(bare.with_accepted(problem.accepted[: number + 1]))
+        touched = _touched(problem, number)
+        old, rows = errors(before, (PROVE,))
+        new, _ = errors(after, (PROVE,))
+        gain = ((old - new) / problem.sigma**2)[touched].sum(axis=0)
+        c = int(np.argmax(gain))
+        unit = CHANNEL_UNITS[problem.benches[0].measurement.channels[c]]
+        key = (a.effect.name, a.place)
+        out.append(
+            Found(
+                order=number + 1,
+                effect=a.effect.name,
+                place=a.place,
+                parameters=intervals[number],
+                rivals=tuple(rivals.get(key, ())) + _unseen(problem, number),
+                gap_before=_rms(old, touched, c),
+                gap_after=_rms(new, touched, c),
+                unit=unit,
+                noise_floor=_rms(problem.sigma**2, touched, c),
+                excitation=a.effect.excitation,
+                doubtful=_doubt(problem, number),
+            )
+        )
+        before = after
+    return tuple(out)
+
+
+def _rms(squares: Array, joints: Sequence[int], channel: int) -> float:
+    return float(np.sqrt(np.mean(squares[list(joints), channel])))
+
+
+def _touched(problem: Problem, number: int) -> list[int]:
+    """Joints that an accepted effect changes."""
+    a = problem.accepted[number]
+    others = [o for k, o in enumerate(problem.accepted) if k != number]
+    without = problem.with_accepted(others).current()
+    out: set[int] = set()
+    for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
+        out |= set(bench.simulator.difference(prediction, without).joints)
+    named = [problem.model.index(p) for p in a.place if p in problem.model.joints]
+    return named or sorted(out)
+
+
+def _unseen(problem: Problem, number: int) -> tuple[tuple[str, Place], ...]:
+    """More general effects whose own part this motion cannot show: the name may be theirs."""
+    from pipeline.gap.effects.registry import EFFECTS
+
+    a = problem.accepted[number]
+    out = []
+    for effect in EFFECTS.values():
+        if a.effect.name not in effect.contains or effect.name not in limits.WORTH_NAMING:
+            continue
+        worth = limits.WORTH_NAMING[effect.name]
+        coordinate = next(c for c in effect.coordinates if c.name == worth[0])
+        information = 0.0
+        for k in range(len(problem.benches)):
+            columns = problem.columns(k, effect, a.place, {})
+            column = columns[effect.coordinates.index(coordinate)]
+            head = problem.head(k)
+            information += sum(float(np.sum(x[head] ** 2)) for x in column.values())
+        if information * worth[1] ** 2 < limits.LEAST_GAIN:
+            out.append((effect.name, a.place))
+    return tuple(out)
+
+
+def _doubt(problem: Problem, number: int) -> str:
+    """Whether the blocks contradict each other about an effect's size: a wrong law.
+
+    The scatter of the gradient over blocks is compared with what noise of the final misfit gives.
+    """
+    ratio, excess = fit_quality(problem, number)
+    if ratio > limits.LARGEST_SCATTER and excess > limits.LARGEST_EXCESS:
+        return (
+            f"parts of the log contradict one another about its size {ratio:.0f} times more than "
+            f"noise allows, and {excess:.1f} times the noise is left: its law is not that of the "
+            "machine"
+        )
+    return ""
+
+
+def fit_quality(problem: Problem, number: int) -> tuple[float, float]:
+    """Scatter of an effect's size over blocks over that of noise, and error over noise floor."""
+    sums: BlockSums = problem.sums()
+    blocks = sums.blocks(FIT, CHOOSE)
+    theta = sums.solve(blocks)
+    span = problem.span(number)
+    index = np.arange(span.start, span.stop)
+    gradient = (sums.h[blocks] - np.einsum("bij,j->bi", sums.H[blocks], theta))[:, index]
+    own = np.array([np.diag(sums.H[b])[index] for b in blocks])
+    scatter = (gradient**2).sum(axis=0) / np.maximum(own.sum(axis=0), 1e-300)
+    squares, _ = errors(problem, (FIT, CHOOSE, PROVE))
+    excess = np.sqrt((squares / problem.sigma**2)[_touched(problem, number)].mean(axis=0)).max()
+    return float(scatter.max()), float(excess)
+
+
+def _candidates(start: Problem, selection: Selection) -> tuple[Candidate, ...]:
+    """Every candidate once, accepted ones first."""
+    accepted = {(a.effect.name, a.place) for a in selection.problem.accepted}
+    rivals: dict[tuple[str, Place], list[str]] = {}
+    for r in selection.rounds:
+        for key in r.rivals:
+            rivals.setdefault(key, []).append(f"{r.winner[0]} at {', '.join(r.winner[1])}")
+    base = refit(start)
+    last = {(s.effect.name, s.place): s for s in selection.last}
+    old, _ = errors(base, (CHOOSE,))
+    new, _ = errors(selection.problem, (CHOOSE,))
+    out = [
+        _candidate(start, s, accepted, rivals, last, selection, (old, new)) for s in selection.first
+    ]
+    return tuple(sorted(out, key=lambda c: c.verdict != limits.ACCEPTED))
+
+
+def _candidate(
+    problem: Problem,
+    s: Score,
+    accepted: set[tuple[str, Place]],
+    rivals: dict[tuple[str, Place], list[str]],
+    last: dict[tuple[str, Place], Score],
+    selection: Selection,
+    gaps: tuple[Array, Array],
+) -> Candidate:
+    key = (s.effect.name, s.place)
+    m = problem.benches[0].measurement
+    joints = [problem.model.index(p) for p in s.place if p in problem.model.joints]
+    joints = joints or list(range(len(problem.model.joints)))
+    before = _rms(gaps[0], joints, 0)
+    trial = selection.trials.get(key)
+    after = before
+    identifiable = s.alone > limits.LEAST_ALONE
+    if key in accepted:
+        after = _rms(gaps[1], joints, 0)
+        verdict, reason = limits.ACCEPTED, "explains the log with the fewest parameters"
+    elif key in rivals:
+        after = _rms(gaps[1], joints, 0)
+        verdict = limits.INDISTINGUISHABLE + "; ".join(rivals[key])
+        reason = f"explains the log as well; a motion that {s.effect.excitation} would decide"
+    elif not identifiable:
+        verdict = limits.NOT_IDENTIFIABLE
+        reason = f"tolerances explain its signature; a motion that {s.effect.excitation} is needed"
+    else:
+        verdict = limits.REJECTED
+        now = last.get(key)
+        left = now.gain if now else 0.0
+        if s.gain < limits.LEAST_GAIN and trial is None:
+            reason = f"explains no more than noise ({s.gain:.3g} noise variances)"
+        elif left < limits.LEAST_GAIN:
+            reason = "the accepted effects explain what it would have explained"
+        else:
+            reason = "what it explains does not hold over all blocks or on held-out ones"
+    return Candidate(
+        effect=s.effect.name,
+        place=s.place,
+        before=before,
+        after=after,
+        unit=CHANNEL_UNITS[m.channels[0]],
+        identifiable=identifiable,
+        verdict=verdict,
+        reason=reason,
+        gain=s.gain,
+    )

@@ -1,0 +1,138 @@
+"""What is left when everything with a name is in the model, and what it looks like."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.gap import verdict as limits
+from pipeline.gap.effects.base import CHANNEL_UNITS
+from pipeline.gap.measurement import PROVE, Measurement
+from pipeline.gap.problem import Problem
+from pipeline.gap.verdict import Remainder
+
+Array = NDArray[np.float64]
+_BINS: Final = 12
+#: Share of the remaining variance that a variable's curve explains, to be worth a word.
+_TELLING: Final = 0.08
+
+
+def remaining(problem: Problem, theta: Array) -> list[Array]:
+    """Residual with tolerances at their estimate, in sigmas, per log (R, J, C); NaN where masked.
+
+    Args:
+        problem: With all accepted effects.
+        theta: Estimate of its unknowns.
+    """
+    out = []
+    for stack in problem.stacks():
+        bench = stack.bench
+        m = bench.measurement
+        rest = np.full((bench.rows.size, len(m.joints), len(m.channels)), np.nan)
+        for j, r in stack.r.items():
+            value = r - np.tensordot(theta[stack.ids[j]], stack.X[j], axes=1)
+            good = m.mask[bench.rows, j]
+            rest[good, j] = value[good] / bench.weight
+        out.append(rest)
+    return out
+
+
+def remainders(problem: Problem, theta: Array) -> tuple[Remainder, ...]:
+    """What is left on *prove*, by joint and channel, with a description where it is significant."""
+    rests = remaining(problem, theta)
+    first = problem.benches[0].measurement
+    out = []
+    for j, joint in enumerate(first.joints):
+        for c, channel in enumerate(first.channels):
+            proved = np.concatenate(
+                [
+                    rest[bench.parts[PROVE], j, c]
+                    for rest, bench in zip(rests, problem.benches, strict=True)
+                ]
+            )
+            proved = proved[np.isfinite(proved)]
+            ratio = float(np.sqrt(np.mean(proved**2))) if proved.size else 0.0
+            significant = ratio > limits.UNEXPLAINED
+            floor = float(problem.sigma[j, c])
+            text = _describe(problem, rests, j, c) if significant else ""
+            out.append(
+                Remainder(
+                    joint, channel, ratio * floor, floor, CHANNEL_UNITS[channel], significant, text
+                )
+            )
+    return tuple(out)
+
+
+def variables(m: Measurement, joint: int, load: Array) -> dict[str, Array]:
+    """Series on which a remainder may depend, by name in words, each (N,)."""
+    out = {
+        "position": m.q[:, joint],
+        "velocity": m.v[:, joint],
+        "acceleration": m.a[:, joint],
+        "load": load,
+        "load in the direction of motion": load * np.sign(m.v[:, joint]),
+        "time": m.time,
+    }
+    for other, name in enumerate(m.joints):
+        if other != joint and len(m.joints) <= 8:
+            out[f"position of {name}"] = m.q[:, other]
+            out[f"velocity of {name}"] = m.v[:, other]
+    return out
+
+
+def explained(rest: Array, variable: Array) -> float:
+    """Share of a remainder's variance that a step curve over a variable explains, adjusted."""
+    good = np.isfinite(rest) & np.isfinite(variable)
+    y, x = rest[good], variable[good]
+    if y.size < 5 * _BINS or np.ptp(x) == 0:
+        return 0.0
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)[1:-1]))
+    index = np.searchsorted(edges, x)
+    total = float(np.sum((y - y.mean()) ** 2))
+    within = 0.0
+    for k in range(edges.size + 1):
+        part = y[index == k]
+        if part.size:
+            within += float(np.sum((part - part.mean()) ** 2))
+    return 1.0 - within / max(total, 1e-300) - _BINS / y.size
+
+
+def _describe(problem: Problem, rests: list[Array], j: int, c: int) -> str:
+    """In words: what the remainder depends on most."""
+    series: dict[str, list[Array]] = {}
+    values = []
+    for rest, bench, prediction in zip(rests, problem.benches, problem.predictions(), strict=True):
+        m = bench.measurement
+        values.append(rest[:, j, c])
+        for name, x in variables(m, j, prediction.torque[:, j]).items():
+            series.setdefault(name, []).append(x[bench.rows])
+    y = np.concatenate(values)
+    shares = {name: explained(y, np.concatenate(x)) for name, x in series.items()}
+    best = max(shares, key=lambda name: shares[name])
+    joint = problem.model.joints[j]
+    if shares[best] < _TELLING:
+        return f"what is left in {joint} depends on no single variable of the motion"
+    text = f"what is left in {joint} depends on the {best} ({100 * shares[best]:.0f} % of it)"
+    if best == "position":
+        period = _period(y, np.concatenate(series[best]))
+        text += f", with a period of about {period:.3g} rad" if period else ""
+    return text
+
+
+def _period(y: Array, q: Array) -> float:
+    """Strongest period of a remainder over the position, 0 where the travel holds less than two."""
+    good = np.isfinite(y)
+    y, q = y[good] - y[good].mean(), q[good]
+    travel = float(np.ptp(q))
+    if travel <= 0:
+        return 0.0
+    orders = 2 * np.pi / travel * np.arange(1.0, 60.0, 0.25)
+    power = np.abs(
+        np.exp(-1j * orders[:, None] * q[None, :: max(1, q.size // 2000)])
+        @ y[:: max(1, q.size // 2000)]
+    )
+    best = float(orders[int(np.argmax(power))])
+    period = 2 * np.pi / best
+    return period if period < 0.5 * travel else 0.0
