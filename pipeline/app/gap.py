@@ -5,31 +5,45 @@ from __future__ import annotations
 import argparse
 import hashlib
 import logging
+from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from pipeline.app.gap_figures import write_where_map
+from pipeline.app import gap_words as words
+from pipeline.app.gap_figures import (
+    write_in_time,
+    write_signature,
+    write_waterfall,
+    write_where_map,
+)
 from pipeline.app.gap_options import split_items
+from pipeline.app.gap_report import Story, write_report
 from pipeline.app.gap_run import Progress, Whereabouts, find_where
 from pipeline.app.gap_setup import Setup, check_options, setup, take_in
-from pipeline.app.gap_tables import quality_table, where_table
+from pipeline.app.gap_stages import noise_floor, overall
+from pipeline.app.gap_story import Told, tell
+from pipeline.app.gap_tables import candidates_table, found_table, quality_table, where_table
 from pipeline.app.staging import staged
 from pipeline.gap.circumstances import WHOLE
+from pipeline.gap.finding import Finding
 from reports.table import Table
-from reports.writer import write_table
+from reports.writer import write_table, write_text
 
 logger = logging.getLogger("legwatt")
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 #: Written last: whoever sees them sees a whole run.
 LAST = ("report.md", "index.html")
+#: Of earlier runs; a run without them takes them away.
+PASSING = ("effect_*.png", "effect_*.svg", "deciding_motion.*")
+EXPLAINED, UNEXPLAINED = 0, 1
 
 
 def run_gap(options: argparse.Namespace) -> int:
     """Run one step, or all of them.
 
     Returns:
-        The exit code.
+        The exit code: 0 where the gap is down to noise, 1 where a part stays unexplained.
 
     Raises:
         PipelineError: Unusable robot.
@@ -40,39 +54,109 @@ def run_gap(options: argparse.Namespace) -> int:
     split_items(options)
     check_options(options)
     given = setup(options)
-    with Progress(8) as progress:
+    with Progress() as progress:
         progress.step("reading and judging the logs")
         intake, parts, fitted = take_in(given, options)
+        tables = [quality_table(intake.findings)]
         if options.step == "read":
-            tables = [quality_table(intake.findings)]
-            _write(options, given, tables, None)
-            for finding in intake.findings:
-                if finding.verdict != "ok":
-                    place = f" {finding.column}" if finding.column else ""
-                    print(f"{finding.log}{place}: {finding.verdict}: {finding.detail}")
-            return 0
+            _write_tables(options, given, tables)
+            _say_findings(intake.findings)
+            return EXPLAINED
         progress.step("simulating the logs' motion")
-        found = find_where(given, given.model, intake, parts, fitted)
-        tables = [quality_table(intake.findings), where_table(found.rows)]
+        where = find_where(given, given.model, intake, parts, fitted)
+        tables.append(where_table(where.rows))
+        if options.step == "where":
+            with staged(options.out) as folder:
+                _tables_into(folder, options, given, tables)
+                write_where_map(where.rows, given.model.joints, given.model.name, folder)
+            _say_where(where)
+            return EXPLAINED
+        progress.step("letting effects compete")
+        told = tell(given, where, options, progress)
+        naming = told.story.naming
+        tables += [
+            candidates_table(naming.candidates, naming.found, given.model),
+            found_table(naming.found, given.model),
+            *told.tables,
+        ]
         progress.step("writing")
-        _write(options, given, tables, found)
-        for row in [r for r in found.rows if r.by == WHOLE][:3]:
-            print(
-                f"{row.joint}: gap {row.gap:.3g} {row.unit}, {row.gap / row.noise_floor:.1f} times "
-                f"the noise floor, {row.share_of_total:.0%} of the whole"
-            )
-    return 0
+        if options.step == "name":
+            _write_tables(options, given, tables)
+        else:
+            with staged(options.out, LAST) as folder:
+                _tables_into(folder, options, given, tables)
+                if told.model_file:
+                    write_text(folder / "model.toml", told.model_file)
+                if options.step != "add":
+                    _figures_and_page(told, tables, folder)
+            _take_away_stale(options.out, told, tables)
+    _say_answer(told.story, options.out)
+    return UNEXPLAINED if naming.unexplained else EXPLAINED
 
 
-def _write(
-    options: argparse.Namespace, given: Setup, tables: list[Table], where: Whereabouts | None
+def _write_tables(options: argparse.Namespace, given: Setup, tables: Sequence[Table]) -> None:
+    with staged(options.out) as folder:
+        _tables_into(folder, options, given, tables)
+
+
+def _tables_into(
+    folder: Path, options: argparse.Namespace, given: Setup, tables: Sequence[Table]
 ) -> None:
     meta = metadata(options, given)
-    with staged(options.out, LAST) as folder:
-        for table in tables:
-            write_table(table, folder, meta=meta)
-        if where is not None:
-            write_where_map(where.rows, given.model.joints, given.model.name, folder)
+    for table in tables:
+        write_table(table, folder, meta=meta)
+
+
+def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None:
+    story, where = told.story, told.story.where
+    model, stages = story.given.model, story.stages
+    write_where_map(where.rows, model.joints, model.name, folder)
+    floor = noise_floor(where.measurements)
+    write_waterfall(stages, overall(floor), story.naming.unit, model.name, folder)
+    write_in_time(where.measurements, stages[1], stages[-1], told.shown, folder)
+    for k, (found, name) in enumerate(zip(story.naming.found, story.signatures, strict=True)):
+        joint = told.effect_joints[k]
+        stem = Path(name).stem
+        pair = (stages[k + 1], stages[k + 2])
+        write_signature(where.measurements, *pair, joint, found.effect, found.place, stem, folder)
+    footer = (
+        f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "
+        "input hashes, versions."
+    )
+    write_report(story, tables, folder, footer)
+
+
+def _take_away_stale(out: Path, told: Told, tables: Sequence[Table]) -> None:
+    """Remove what an earlier run of this verb left and this one has not."""
+    keep = {Path(name).stem for name in told.story.signatures} | {t.name for t in tables}
+    for pattern in PASSING:
+        for path in out.glob(pattern):
+            if path.name.split(".")[0] not in keep:
+                path.unlink(missing_ok=True)
+
+
+def _say_findings(findings: Sequence[Finding]) -> None:
+    odd = [finding for finding in findings if finding.verdict != "ok"]
+    for finding in odd:
+        place = f" {finding.column}" if finding.column else ""
+        print(f"{finding.log}{place}: {finding.verdict}: {finding.detail}")
+    print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
+
+
+def _say_where(where: Whereabouts) -> None:
+    for row in [r for r in where.rows if r.by == WHOLE][:3]:
+        print(
+            f"{row.joint}: gap {row.gap:.3g} {row.unit}, {row.gap / row.noise_floor:.1f} times "
+            f"the noise floor, {row.share_of_total:.0%} of the whole"
+        )
+
+
+def _say_answer(story: Story, out: Path) -> None:
+    from pipeline.app.gap_report import answer
+
+    for paragraph in answer(story):
+        print(words.plain(paragraph))
+    print(f"written to {out}")
 
 
 def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:

@@ -187,13 +187,20 @@ def _candidates(story: Story) -> TableBlock:
 
 
 def _smaller(story: Story, folder: Path) -> Section:
-    first, last = story.stages[0], story.stages[-1]
+    first, parts, last = story.stages[0], story.stages[1], story.stages[-1]
     floor = noise_floor(story.where.measurements)
     joints = story.given.model.joints
     unit = story.naming.unit
-    order = np.argsort(-np.nan_to_num(first.gap - last.gap))
+    order = np.argsort(-np.nan_to_num(parts.gap - last.gap))
     rows = tuple(
-        (joints[j], float(first.gap[j]), float(last.gap[j]), float(floor[j]), unit)
+        (
+            joints[j],
+            float(first.gap[j]),
+            float(parts.gap[j]),
+            float(last.gap[j]),
+            float(floor[j]),
+            unit,
+        )
         for j in order.tolist()
     )
     blocks: list[Block] = [
@@ -202,10 +209,11 @@ def _smaller(story: Story, folder: Path) -> Section:
             folder / "in_time.svg", "Measured and predicted, and what is left, before and after."
         ),
         TableBlock(
-            ("joint", "gap before", "after", "noise floor", "unit"),
+            ("joint", "as it was", "with tolerances", "with effects", "noise floor", "unit"),
             rows,
-            "Root mean square on data that had no say; `before` is the model with the tolerances "
-            "of its parts (masses, torque constants, encoder zeros) already estimated.",
+            "Gap, root mean square, on data that had no say. Tolerances are what every machine "
+            "differs in from its files: masses, torque constants, encoder zeros, each within its "
+            "stated uncertainty.",
             digits=3,
         ),
     ]

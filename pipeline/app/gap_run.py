@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Any
 
 from pipeline.app.gap_setup import Setup
+from pipeline.gap.bandwidth import with_encoder_noise
 from pipeline.gap.circumstances import Where, where
 from pipeline.gap.intake import Intake
 from pipeline.gap.measurement import Measurement
@@ -21,7 +22,7 @@ from pipeline.gap.simulate import Prediction, Simulator
 class Progress:
     """Steps of a run as a bar; on a terminal only."""
 
-    def __init__(self, steps: int) -> None:
+    def __init__(self, steps: int = 6) -> None:
         self._bar: Any = None
         if sys.stderr.isatty():
             from tqdm import tqdm
@@ -76,7 +77,8 @@ def find_where(
     Raises:
         GapError: The model does not predict what the log measures.
     """
-    measurements = observe(model, intake.prepared, parts)
+    seen = observe(model, intake.prepared, parts)
+    measurements = with_encoder_noise(model, intake.prepared, seen)
     predictions = predict(model, measurements)
     rows = where(measurements, predictions, legs_of(given))
     return Whereabouts(intake, parts, fitted, measurements, predictions, rows)

@@ -11,7 +11,7 @@ from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.errors import EffectError
 from pipeline.gap.finding import Finding
 from pipeline.gap.model import MachineModel
-from pipeline.gap.verdict import Candidate, Found
+from pipeline.gap.verdict import INDISTINGUISHABLE, Candidate, Found
 from reports.table import Table
 from reports.tables import gap as tables
 
@@ -28,8 +28,11 @@ def where_table(rows: Sequence[Where]) -> Table:
     return tables.where([asdict(row) for row in rows])
 
 
-def candidates_table(candidates: Sequence[Candidate], model: MachineModel) -> Table:
-    """Rows of `candidates.csv`."""
+def candidates_table(
+    candidates: Sequence[Candidate], found: Sequence[Found], model: MachineModel
+) -> Table:
+    """Rows of `candidates.csv`; what was found and has rivals says so, too."""
+    rivals = {(f.effect, f.place): f.rivals for f in found}
     rows = [
         {
             "effect": c.effect,
@@ -39,12 +42,18 @@ def candidates_table(candidates: Sequence[Candidate], model: MachineModel) -> Ta
             "heldout_after": c.after,
             "unit": c.unit,
             "identifiable": c.identifiable,
-            "verdict": c.verdict,
+            "verdict": _verdict(c, rivals.get((c.effect, c.place), ())),
             "reason": c.reason,
         }
         for c in candidates
     ]
     return tables.candidates(rows)
+
+
+def _verdict(c: Candidate, rivals: Sequence[tuple[str, tuple[str, ...]]]) -> str:
+    if not rivals:
+        return c.verdict
+    return INDISTINGUISHABLE + "; ".join(f"{name} at {', '.join(p)}" for name, p in rivals)
 
 
 def found_table(found: Sequence[Found], model: MachineModel) -> Table:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
+import re
 from collections.abc import Sequence
 
 from pipeline.app.gap_energy import PAIR, EnergyChange
@@ -13,6 +14,7 @@ from pipeline.gap.errors import EffectError
 from pipeline.gap.verdict import Estimate, Found, Naming, Remainder
 from reports.page import cell_text
 
+_LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 #: A band is worth a word when its gap is this many times the joint's.
 STANDS_OUT = 1.25
 #: A change of energy below this is none, as a share.
@@ -189,3 +191,8 @@ def _unit(unit: str) -> str:
 
 def _share(value: float) -> str:
     return "no share" if math.isnan(value) else f"{value:.1%}"
+
+
+def plain(text: str) -> str:
+    """A paragraph without marks, for a terminal."""
+    return _LINK.sub(r"\1", text).replace("**", "").replace("`", "")

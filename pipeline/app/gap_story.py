@@ -1,0 +1,151 @@
+"""Steps 3 to 5 of a run: name, add, shrink, gathered for tables, figures and the page."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+
+import numpy as np
+
+from pipeline.app.effects import Effects, effects
+from pipeline.app.gap_deciding import decide, motion_table
+from pipeline.app.gap_energy import EnergyChange, energy_change
+from pipeline.app.gap_report import Story
+from pipeline.app.gap_run import Progress, Whereabouts
+from pipeline.app.gap_setup import Setup
+from pipeline.app.gap_stages import Stage, stages
+from pipeline.app.gap_words import place_text
+from pipeline.errors import TippingError
+from pipeline.gap.effects.registry import effect_named
+from pipeline.gap.identify import identify
+from pipeline.gap.model import MachineModel
+from pipeline.gap.nuisance import Nuisance
+from pipeline.gap.verdict import Found, Naming
+from reports.table import Table
+
+AS_IT_WAS = "model as it was"
+TOLERANCES = "tolerances of its parts"
+#: Tolerances beyond this many sigmas would stand in for something else.
+MOST_SIGMAS = 4.0
+#: Joints that the figure in time shows.
+SHOWN = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What a run writes.
+
+    Attributes:
+        story: For the page.
+        tables: Besides those of the steps.
+        model_file: Text of the model file; empty where there is nothing to add.
+        shown: Columns of the joints that the figure in time shows.
+        effect_joints: Column per found effect whose signature is drawn.
+    """
+
+    story: Story
+    tables: tuple[Table, ...]
+    model_file: str
+    shown: tuple[int, ...]
+    effect_joints: tuple[int, ...]
+
+
+def with_tolerances(model: MachineModel, naming: Naming) -> MachineModel:
+    """The model with the tolerances that naming estimated."""
+    for (kind, place), (value, sigma) in naming.tolerances.items():
+        limit = MOST_SIGMAS * sigma
+        model = Nuisance(kind, place, sigma, "").edit(model, min(max(value, -limit), limit))
+    return model
+
+
+def with_found(model: MachineModel, found: Sequence[Found]) -> MachineModel:
+    """The model with effects, in order."""
+    return reduce(lambda m, f: effect_named(f.effect).apply(m, f.place, f.values), found, model)
+
+
+def gap_stages(model: MachineModel, where: Whereabouts, naming: Naming) -> tuple[Stage, ...]:
+    """The gap of the model as it was, with tolerances, and with one effect after another."""
+    now = with_tolerances(model, naming)
+    models = [(AS_IT_WAS, model), (TOLERANCES, now)]
+    for f in naming.found:
+        now = with_found(now, [f])
+        models.append((f"{f.effect} at {place_text(f.place)}", now))
+    return stages(models, where.measurements)
+
+
+def found_effects(given: Setup, found: Sequence[Found]) -> Effects:
+    """Found effects, ready for standing and walking."""
+    assert given.robot is not None
+    names = tuple(f.effect for f in found)
+    chain = given.catalog.chain(given.alternative)
+    return effects(given.robot, chain, lambda m: with_found(m, found), names, "model.toml")
+
+
+def cost(given: Setup, found: Sequence[Found]) -> tuple[EnergyChange | None, tuple[str, ...]]:
+    """Energy with and without found effects, and remarks; None for a robot that does not walk."""
+    if not given.legged or not found or given.robot is None or not given.robot.spec.tripods:
+        return None, ()
+    edits = found_effects(given, found)
+    try:
+        return energy_change(given.robot, given.catalog.chains(), edits), edits.remarks
+    except TippingError as error:
+        return None, (f"With these effects {error}",)
+
+
+def most_improved(before: Stage, after: Stage, found: Sequence[int]) -> tuple[int, ...]:
+    """Columns of the joints to show: those of effects first, then those with the largest gap."""
+    gain = np.nan_to_num(before.gap - after.gap, nan=-np.inf)
+    rank = [*dict.fromkeys(found), *np.argsort(-gain).tolist()]
+    return tuple(dict.fromkeys(k for k in rank if np.isfinite(before.gap[k])))[:SHOWN]
+
+
+def effect_column(model: MachineModel, f: Found, before: Stage, after: Stage) -> int:
+    """Column at which an effect shows: its joint, the one that carries its link, or the largest."""
+    for name in f.place:
+        joint = name if name in model.joints else model.links.get(name, "")
+        if joint in model.joints:
+            return model.index(joint)
+    return int(np.argmax(np.nan_to_num(before.gap - after.gap, nan=-np.inf)))
+
+
+def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress: Progress) -> Told:
+    """Name what is missing and gather everything that a run tells.
+
+    Raises:
+        GapError: Nothing can be compared.
+    """
+    naming = identify(given.model, where.measurements).naming
+    progress.step("weighing what was found")
+    steps = gap_stages(given.model, where, naming)
+    joints = tuple(
+        effect_column(given.model, f, steps[k + 1], steps[k + 2])
+        for k, f in enumerate(naming.found)
+    )
+    energy, remarks = cost(given, naming.found)
+    decided = decide(given, given.model, where.measurements, naming.found)
+    signatures = {
+        f"effect_{f.order}_{f.effect}.svg": (
+            f"{f.effect} at {place_text(f.place)}: the gap of {given.model.joints[j]} against the "
+            f"variable on which the effect depends, without it and with it."
+        )
+        for f, j in zip(naming.found, joints, strict=True)
+    }
+    story = Story(
+        given=given,
+        where=where,
+        naming=naming,
+        stages=steps,
+        energy=energy,
+        signatures=signatures,
+        decides=decided[1] if decided else "",
+        remarks=remarks,
+    )
+    return Told(
+        story=story,
+        tables=(motion_table(decided[0], given.model.joints),) if decided else (),
+        model_file="",
+        shown=most_improved(steps[1], steps[-1], joints),
+        effect_joints=joints,
+    )
