@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -76,6 +77,7 @@ def ask(folder: str, robot: str, out: str) -> dict[str, Any]:
     Returns:
         What `read_answer` needs beside the files.
     """
+    shutil.rmtree(out, ignore_errors=True)  # an older answer is none
     command = [sys.executable, "-P", "-m", "pipeline", "gap", "name", "log.csv"]
     command += ["--robot", robot, "--actuators", "actuators", "--out", str(Path(out).resolve())]
     environment = {k: v for k, v in os.environ.items() if k in ("PATH", "HOME", "LANG")}

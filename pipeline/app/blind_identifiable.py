@@ -8,11 +8,11 @@ The misfit of a rival is
 
     z = (u'u + p) / sqrt(sum over blocks of (u'e)^2 + p)
 
-where e is what the nominal model leaves of the trial's own log without d (sensor noise, and all
-that the simulated machine does otherwise than the workflow's laws), p is the prior's penalty, and
-blocks of the log, not samples, are what counts as independent. z is the number of standard
-deviations by which the truth beats the rival on average, on the parts of the log that have a say in
-naming. Everything is in units of the sensors' noise.
+where e is what the nominal model leaves of the machine without anything hidden, with the trial's
+own sensor noise (so all that the simulated machine does otherwise than the workflow's laws), p is
+the prior's penalty, and blocks of the log, not samples, are what counts as independent. z is the
+number of standard deviations by which the truth beats the rival on average, on the parts of the log
+that have a say in naming. Everything is in units of the sensors' noise.
 
 Note:
     The truth's law is the twin's. An effect whose law the workflow has wrong counts as
@@ -46,7 +46,7 @@ Column = Mapping[int, Array]
 #: deviations: 4.2 keep chance from passing for any of some 400 candidates in 99 of 100 logs, and
 #: 1.7 more let the truth be seen in 95 of 100.
 THRESHOLD: Final = 6.0
-#: A rival stands for the truth only where it leaves less than this share of nothing's misfit.
+#: A name is excused only where it leaves less than this share of nothing's misfit.
 EXPLAINS: Final = 0.5
 #: Joints that feel less than this share of d are left out.
 _LEAST_SHARE: Final = 0.02
@@ -88,8 +88,15 @@ class Identifiability:
     @property
     def like(self) -> tuple[Rival, ...]:
         """Rivals of the same class: to name one of them is right."""
-        limit = min(THRESHOLD, EXPLAINS * self.nothing)
-        return tuple(r for r in self.rivals if r.misfit < limit)
+        return tuple(r for r in self.rivals if r.misfit < THRESHOLD)
+
+    @property
+    def stand_ins(self) -> tuple[Rival, ...]:
+        """Rivals of the class that also explain most of the effect.
+
+        Where hardly anything can be seen every rival is of the class, and not every name is right.
+        """
+        return tuple(r for r in self.like if r.misfit < EXPLAINS * self.nothing)
 
     @property
     def alone(self) -> bool:
@@ -108,6 +115,7 @@ def identifiability(
     bench: Bench,
     exact: Measurement,
     without: Sequence[Measurement],
+    empty: Measurement,
     hidden: Sequence[HiddenTruth],
 ) -> list[Identifiability]:
     """Judge every hidden effect.
@@ -117,16 +125,18 @@ def identifiability(
         bench: The trial's log, made ready.
         exact: The same log without noise.
         without: The same without one of the hidden effects, in their order.
+        empty: The same with nothing hidden.
         hidden: What is in it.
     """
     base = bench.simulator.predict(model)
-    log = _rest(model, bench, bench.measurement)
     whole = _rest(model, bench, exact)
+    noise = _less(_rest(model, bench, bench.measurement), whole)
+    rest = _less(_rest(model, bench, empty), noise, sign=-1.0)
     out = []
     for k, one in enumerate(hidden):
         d = _less(whole, _rest(model, bench, without[k]))
         others = [other for i, other in enumerate(hidden) if i != k]
-        out.append(_judge(bench, base, d, _less(log, d), one, others))
+        out.append(_judge(bench, base, d, rest, one, others))
     return out
 
 
@@ -136,8 +146,8 @@ def _rest(model: MachineModel, bench: Bench, m: Measurement) -> dict[int, Array]
     return residual(own, own.simulator.predict(model), bench.measurement.noise)
 
 
-def _less(a: Column, b: Column) -> dict[int, Array]:
-    return {j: a[j] - b[j] for j in a}
+def _less(a: Column, b: Column, sign: float = 1.0) -> dict[int, Array]:
+    return {j: a[j] - sign * b[j] for j in a}
 
 
 def _judge(

@@ -71,10 +71,12 @@ def _judge(
         return []
     exact = {"whole": trial.exact["log"]}
     feet = "normal" if _SQUEEZE in effects else "full"
-    for k in range(len(effects)):
-        others = [name for i, name in enumerate(effects) if i != k]
-        without = make_trial(seed, others, motion, noise, foot_force=feet)
-        exact[f"without_{k}"] = without.exact["log"]
+    kinds = {f"without_{k}": [e for e in effects if e != name] for k, name in enumerate(effects)}
+    if len(effects) > 1:
+        kinds["empty"] = []
+    for name, others in kinds.items():
+        less = make_trial(seed, others, motion, noise, foot_force=feet)
+        exact[name] = less.exact["log"]
     with tempfile.TemporaryDirectory() as scratch:
         given, bench, measured = trial_bench(
             files.logs[0], files.robot, files.catalog, exact, Path(scratch)
@@ -85,6 +87,7 @@ def _judge(
         bench,
         measured["whole"],
         [measured[f"without_{k}"] for k in range(len(effects))],
+        measured.get("empty", measured["without_0"]),
         hidden,
     )
 
