@@ -9,7 +9,7 @@ LOG    ?= pipeline/gap/demo/walk.parquet
 ARGS   ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports gap blind calibrate test test-slow lint check bench urdf lock clean
+.PHONY: help env reports gap blind calibrate test test-slow lint check bench readme urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -41,6 +41,9 @@ check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
 
 bench: $(STAMP)  ## Print speed ratios measured in one run
 	$(PY) -m tests.bench
+
+readme: $(STAMP)  ## Renew the README's tables and pictures from a run
+	$(PY) -m tests.readme
 
 # Exit 1 is a finding (something stays unexplained), not an error of make.
 gap: $(STAMP)  ## Find what the model lacks, from a measured log (LOG=, ROBOT=, ARGS=); a demonstration by default

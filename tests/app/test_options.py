@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import string
 from pathlib import Path
 from typing import Any
@@ -155,6 +156,32 @@ def test_quasi_static_leaves_inertia_out(tmp_path: Path, command: Command, out: 
     for row in rows_of(tmp_path / "walking_energy.csv"):
         assert float(row["electrical_J"]) == promised[row["alternative"], row["leg"]]
     assert sidecar_of(tmp_path / "walking_energy.csv")["options"]["quasi_static"] is True
+
+
+def test_the_order_of_legs_changes_rows_not_numbers(
+    root: Path, tmp_path: Path, command: Command, out: Path
+) -> None:
+    """Joints are addressed by name: with a leg listed last, its rows come last, all else equal."""
+    text = (root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")
+    block = re.search(r"\[legs\.lf\].*?\n\n", text, flags=re.S)
+    assert block
+    moved = text.replace(block[0], "").replace("[gait]\n", f"{block[0]}[gait]\n")
+    (tmp_path / "moved.toml").write_text(moved, encoding="utf-8")
+    assert command("stand", tmp_path, robot=tmp_path / "moved.toml") == 0
+    assert command("walk", tmp_path, robot=tmp_path / "moved.toml") == 0
+    new, old = rows_of(tmp_path / "standing.csv"), rows_of(out / "standing.csv")
+    assert new[17]["joint"] == "lf_joint_3"
+    key = {(r["alternative"], r["joint"]): r for r in new}
+    for row in old:
+        other = key[row["alternative"], row["joint"]]
+        assert float(other["joint_torque_Nm"]) == pytest.approx(
+            float(row["joint_torque_Nm"]), abs=1e-9
+        )
+    energy = {(r["alternative"], r["leg"]): r for r in rows_of(tmp_path / "walking_energy.csv")}
+    for row in rows_of(out / "walking_energy.csv"):
+        assert float(energy[row["alternative"], row["leg"]]["electrical_J"]) == pytest.approx(
+            float(row["electrical_J"]), rel=1e-9
+        )
 
 
 def test_comma_copies_hold_the_same_numbers(tmp_path: Path, command: Command, out: Path) -> None:
