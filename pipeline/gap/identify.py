@@ -117,7 +117,7 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
     for number, a in enumerate(problem.accepted):
         after = refit(bare.with_accepted(problem.accepted[: number + 1]))
         touched = _touched(problem, number)
-        old, rows = errors(before, (PROVE,))
+        old, _ = errors(before, (PROVE,))
         new, _ = errors(after, (PROVE,))
         gain = ((old - new) / problem.sigma**2)[touched].sum(axis=0)
         c = int(np.argmax(gain))

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.friction import Friction
 from pipeline.gap.columns import Bench
 from pipeline.gap.effects.center_of_mass_offset import CenterOfMassOffset
 from pipeline.gap.effects.joint_elasticity import COMPLIANCE_TOLERANCE
@@ -29,6 +30,8 @@ Array = NDArray[np.float64]
 
 INERTIA_TOLERANCE: Final = 0.10  # of a link's rotational inertia [1]
 RESISTANCE_TOLERANCE: Final = 0.02  # of a winding [1]
+#: Friction that the actuator's files state already [1].
+FRICTION_TOLERANCE: Final = 0.005
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
 OFFSET_SIGMAS: Final = 0.5
 
@@ -39,8 +42,8 @@ class Nuisance:
 
     Attributes:
         kind: ``"mass"``, ``"com_x"`` (y, z), ``"inertia"``, ``"torque_constant"``,
-            ``"resistance"``, ``"encoder"``, ``"effort_zero"``, ``"compliance"`` or ``"skew"`` (of
-            all effort channels).
+            ``"resistance"``, ``"friction"`` (of the files), ``"encoder"``, ``"effort_zero"``,
+            ``"compliance"`` or ``"skew"`` (of all effort channels).
         place: Link or joint.
         sigma: Standard deviation before the log was seen.
         unit: Of it.
@@ -68,6 +71,14 @@ class Nuisance:
             changed = replace(actuator, encoder_offset=actuator.encoder_offset + value)
         elif self.kind == "compliance":
             changed = replace(actuator, compliance=actuator.compliance + value)
+        elif self.kind == "friction":
+            elements = tuple(
+                replace(e, coulomb=e.coulomb * (1.0 + value), viscous=e.viscous * (1.0 + value))
+                if isinstance(e, Friction)
+                else e
+                for e in actuator.elements
+            )
+            changed = replace(actuator, elements=elements)
         elif self.kind == "effort_zero":
             changed = replace(actuator, effort_offset=actuator.effort_offset + value)
         else:
@@ -118,6 +129,8 @@ def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple
         out.append(Nuisance("encoder", actuator.name, ENCODER_TOLERANCE, "rad"))
         zero = OFFSET_SIGMAS * float(m.noise[k, 0])
         out.append(Nuisance("effort_zero", actuator.name, zero, "channel"))
+        if any(isinstance(e, Friction) for e in actuator.elements):
+            out.append(Nuisance("friction", actuator.name, FRICTION_TOLERANCE, "1"))
         if actuator.motor is not None and electrical:
             out.append(Nuisance("compliance", actuator.name, COMPLIANCE_TOLERANCE, "rad/(N*m)"))
         if actuator.motor is not None and electrical:

@@ -18,7 +18,11 @@ _PERIODS = 1.5  # least number of periods inside the travel
 
 
 class TorqueRipple(Effect):
-    """A sine of the joint's angle; its order is found from the data."""
+    """A sine of the joint's angle that the drive puts into the joint; its order is found.
+
+    The torque amplitude sin(order position + phase) acts on the joint in its positive sense: the
+    actuator has to supply so much less.
+    """
 
     name = "torque_ripple"
     parameters: ClassVar = (
@@ -52,7 +56,7 @@ class TorqueRipple(Effect):
         """Add it at the joint."""
         p = self.physical(x, shape)
         actuator = model.actuator(place[0])
-        law = Ripple(self.name, p["amplitude"], p["order"], p["phase"])
+        law = Ripple(self.name, -p["amplitude"], p["order"], p["phase"])
         laws = (*actuator.position_torques, law)
         return model.with_actuator(replace(actuator, position_torques=laws))
 
