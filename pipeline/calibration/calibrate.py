@@ -53,7 +53,7 @@ class Effort:
     """
 
     starts: int = 4
-    draws: int = 320
+    draws: int = 560
     left_out_draws: int = 20
     reading_starts: int = 2
     sobol: int = 128
@@ -158,7 +158,7 @@ def calibrate(
         }
         readings = store.run(
             pool,
-            search.nearest,
+            search.reading,
             [
                 (
                     f"reading/{axis}/{count}/{i}",

@@ -30,6 +30,7 @@ Array = NDArray[np.float64]
 PATHS = ("cubic", "harmonic", "quintic", "cycloid")
 _PULL = 3.0  # the nearest point: a third of a half width counts like one prior sigma
 _FIRM = 8.0  # a member of the ensemble: close to its own goal
+_STRICT = 60.0  # whether a reading can be met at all: the prior hardly counts
 _SPAN = 0.85  # goals of members spread over this part of the half widths
 
 
@@ -97,6 +98,28 @@ def nearest(
         point = task.evaluate(z)
     except PipelineError as error:
         return {"failed": str(error), "path": path}
+    return summary(task, z, point) | {"path": path}
+
+
+def reading(
+    robot: str, path: str, axis_deg: float, legs: int, seed: int, start: int, evaluations: int
+) -> dict[str, Any]:
+    """As `nearest`, and where that misses a row, as close to the rows as the bounds allow.
+
+    What is then still missed is out of reach of this reading, whatever the prior says.
+    """
+    found = nearest(robot, path, axis_deg, legs, seed, start, evaluations)
+    if "failed" in found or found["admissible"]:
+        return found
+    task = problem(robot, path, axis_deg, legs, None)
+    z = np.array(found["z"])
+    try:
+        z = task.solve(
+            z, np.zeros(z.size), columns=np.arange(z.size), pull=_STRICT, evaluations=evaluations
+        )
+        point = task.evaluate(z)
+    except PipelineError:
+        return found
     return summary(task, z, point) | {"path": path}
 
 
