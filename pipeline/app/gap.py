@@ -21,6 +21,7 @@ from pipeline.app.gap_options import split_items
 from pipeline.app.gap_report import Story, write_report
 from pipeline.app.gap_run import Progress, Whereabouts, find_where
 from pipeline.app.gap_setup import Setup, check_options, setup, take_in
+from pipeline.app.gap_shrink import check
 from pipeline.app.gap_stages import noise_floor, overall
 from pipeline.app.gap_story import Told, tell
 from pipeline.app.gap_tables import candidates_table, found_table, quality_table, where_table
@@ -71,8 +72,12 @@ def run_gap(options: argparse.Namespace) -> int:
                 write_where_map(where.rows, given.model.joints, given.model.name, folder)
             _say_where(where)
             return EXPLAINED
-        progress.step("letting effects compete")
-        told = tell(given, where, options, progress)
+        if options.step == "shrink":
+            progress.step("weighing the model file's effects")
+            told = check(given, where, options)
+        else:
+            progress.step("letting effects compete")
+            told = tell(given, where, options, progress)
         naming = told.story.naming
         tables += [
             candidates_table(naming.candidates, naming.found, given.model),
@@ -113,11 +118,12 @@ def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None
     write_where_map(where.rows, model.joints, model.name, folder)
     floor = noise_floor(where.measurements)
     write_waterfall(stages, overall(floor), story.naming.unit, model.name, folder)
-    write_in_time(where.measurements, stages[1], stages[-1], told.shown, folder)
+    first = len(stages) - len(story.naming.found)
+    write_in_time(where.measurements, stages[first - 1], stages[-1], told.shown, folder)
     for k, (found, name) in enumerate(zip(story.naming.found, story.signatures, strict=True)):
         joint = told.effect_joints[k]
         stem = Path(name).stem
-        pair = (stages[k + 1], stages[k + 2])
+        pair = (stages[first + k - 1], stages[first + k])
         write_signature(where.measurements, *pair, joint, found.effect, found.place, stem, folder)
     footer = (
         f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "

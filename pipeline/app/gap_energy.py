@@ -51,19 +51,24 @@ class EnergyChange:
     break_even_after: float
 
 
-def energy_change(robot: Robot, chains: Mapping[str, Chain], effects: Effects) -> EnergyChange:
+def energy_change(
+    robot: Robot, chains: Mapping[str, Chain], effects: Effects, known: Effects | None = None
+) -> EnergyChange:
     """Walk and stand with and without effects.
 
     Args:
         robot: With a floating base and a gait.
         chains: By alternative.
-        effects: Of a model file.
+        effects: All of them.
+        known: Those among them that the comparison starts with; none by default.
 
     Raises:
         TippingError: With the effects a foot would have to pull.
     """
     period = robot.spec.parameters["gait_period"]
     before = _costs(robot, chains, None)
+    if known is not None:
+        before = _costs(known.robot, known.chains(chains), known.demand)
     after = _costs(effects.robot, effects.chains(chains), effects.demand)
     return EnergyChange(before, after, break_even(before, period), break_even(after, period))
 

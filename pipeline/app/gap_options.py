@@ -28,7 +28,9 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         + "; ".join(f"{name}: {text}" for name, text in STEPS.items()),
     )
     sub.add_argument(
-        "--robot", type=Path, default=DEFAULT_ROBOT, help="robot file, or URDF of a fixed robot"
+        "--robot",
+        type=Path,
+        help="robot file, or URDF of a fixed robot; the model file's or the hexapod by default",
     )
     sub.add_argument("--model", type=Path, help="model file with effects found earlier")
     sub.add_argument(

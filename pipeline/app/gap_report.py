@@ -14,7 +14,7 @@ from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
 from pipeline.app.gap_stages import Stage, noise_floor
 from pipeline.gap.circumstances import WHOLE
-from pipeline.gap.verdict import ACCEPTED, REJECTED, Naming
+from pipeline.gap.verdict import ACCEPTED, REJECTED, Naming, Remainder
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import (
@@ -57,6 +57,7 @@ class Story:
         signatures: File name to caption, one per effect.
         decides: What the deciding motion is, in words; empty without one.
         remarks: What else a reader should know.
+        writes_model: Whether ``model.toml`` is written.
     """
 
     given: Setup
@@ -67,6 +68,7 @@ class Story:
     signatures: dict[str, str]
     decides: str
     remarks: tuple[str, ...]
+    writes_model: bool = False
 
 
 def write_report(story: Story, tables: Sequence[Table], folder: Path, footer: str) -> None:
@@ -80,7 +82,7 @@ def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) ->
     """The page; see `write_report`."""
     names = ", ".join(m.name for m in story.where.measurements)
     files = {f"{t.name}.csv": t.description for t in tables.values()}
-    if story.naming.found:
+    if story.writes_model:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     return Page(
         title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
@@ -163,7 +165,8 @@ def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
             )
         )
     blocks += [FigureBlock(folder / name, caption) for name, caption in story.signatures.items()]
-    blocks.append(_candidates(story))
+    if story.naming.candidates:
+        blocks.append(_candidates(story))
     return Section("What is missing", tuple(blocks))
 
 
@@ -187,7 +190,8 @@ def _candidates(story: Story) -> TableBlock:
 
 
 def _smaller(story: Story, folder: Path) -> Section:
-    first, parts, last = story.stages[0], story.stages[1], story.stages[-1]
+    last = story.stages[-1]
+    first, parts = story.stages[0], story.stages[-1 - len(story.naming.found)]
     floor = noise_floor(story.where.measurements)
     joints = story.given.model.joints
     unit = story.naming.unit
@@ -244,6 +248,8 @@ def _energy(story: Story) -> tuple[Section, ...]:
 
 
 def _left(story: Story) -> Section:
+    every = sorted(story.naming.remainders, key=_ratio, reverse=True)
+    shown = [r for r in every if r.significant] or every[:5]
     rows = tuple(
         (
             r.joint,
@@ -254,12 +260,13 @@ def _left(story: Story) -> Section:
             "unexplained" if r.significant else "noise",
             r.description or None,
         )
-        for r in story.naming.remainders
+        for r in shown
     )
     block = TableBlock(
         ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like"),
         rows,
-        "What is left on data that had no say.",
+        f"What is left on data that had no say; the other {len(every) - len(shown)} pairs of joint "
+        "and channel are at their noise.",
         "",
         TONES,
         3,
@@ -272,6 +279,10 @@ def _left(story: Story) -> Section:
     return Section("What is left", tuple(blocks))
 
 
+def _ratio(r: Remainder) -> float:
+    return r.error / r.noise_floor if r.noise_floor > 0 else 0.0
+
+
 def _data(story: Story, tables: dict[str, Table]) -> Section:
     parts = story.where.parts
     settings = story.where.intake.settings
@@ -282,12 +293,10 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
     if parts.warning:
         texts.append(f"**Note:** {parts.warning}.")
     odd = [value != "ok" for value in tables["quality"].columns["verdict"]]
-    block = table_block(
-        tables["quality"],
-        keep=odd,
-        tones=TONES,
-        caption="Checks with a remark; `quality.csv` lists all."
-        if any(odd)
-        else "Every check passed.",
+    block: Block = Text(
+        f"Every one of the {len(odd)} checks passed; [quality.csv](quality.csv) lists them."
     )
+    if any(odd):
+        caption = "Checks with a remark; `quality.csv` lists all."
+        block = table_block(tables["quality"], keep=odd, tones=TONES, caption=caption)
     return Section("What the data are worth", (*map(Text, texts), block))

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from actuators.build import Catalog, load_catalog
+from actuators.build import CATALOG, Catalog, load_catalog
 from actuators.chain import Chain
-from pipeline.errors import PipelineError
+from pipeline.app.gap_options import DEFAULT_ROBOT
+from pipeline.errors import RobotFileError
 from pipeline.gap.bandwidth import lowered, naming_cutoff
 from pipeline.gap.contact import Contact, find_contact
 from pipeline.gap.errors import GapError, LogContentError, MappingError, ModelFileError
@@ -20,6 +21,7 @@ from pipeline.gap.intake import Intake, prepare_logs
 from pipeline.gap.log import EFFORTS, Log
 from pipeline.gap.mapping import Mapping, load_mapping
 from pipeline.gap.model import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.gap.model_file import ModelFile, apply_edits, new_model_file, read_model_file
 from pipeline.gap.parts import Parts, split
 from pipeline.gap.read import read_log
 from pipeline.robot import Robot, load_robot
@@ -42,6 +44,8 @@ class Setup:
         expected: What a log of it looks like.
         catalog: Actuator components and alternatives.
         alternative: Name of the actuator chain; empty without one.
+        file: The model file whose edits are in `model`; without edits where none was given.
+        bare: The model before those edits.
     """
 
     path: Path
@@ -51,6 +55,8 @@ class Setup:
     expected: Expected
     catalog: Catalog
     alternative: str
+    file: ModelFile
+    bare: MachineModel
 
     @property
     def legged(self) -> bool:
@@ -59,65 +65,70 @@ class Setup:
 
 
 def setup(options: argparse.Namespace) -> Setup:
-    """Load the robot and its actuator.
+    """Load the robot, its actuator and the model file.
 
     Raises:
         PipelineError: The robot file or URDF cannot be used.
         ActuatorError: The catalogue cannot be used, or has no such alternative.
-        GapError: `--base` does not fit the robot.
+        GapError: `--base` does not fit the robot, or the model file cannot be used.
     """
-    folder = options.actuators
-    catalog = load_catalog(folder) if folder else load_catalog()
-    path: Path = options.robot
-    if path.suffix.lower() != ".toml":
-        return _of_urdf(path, catalog, options)
-    spec = load_robot_file(path)
-    if options.base == "fixed" and spec.floating:
-        spec = replace(spec, floating=False)
-    if options.base in ("level", "measured") and not spec.floating:
-        raise GapError(f"{path}: its base is fixed; leave --base {options.base} out")
-    robot = load_robot(spec)
-    alternative = options.alternative or DEFAULT_ALTERNATIVE
-    chain = catalog.chain(alternative)
+    folder = options.actuators or Path(CATALOG)
+    catalog = load_catalog(folder)
+    given_file = read_model_file(options.model) if options.model else None
+    path: Path = options.robot or (given_file.robot if given_file else DEFAULT_ROBOT)
+    alternative = options.alternative or (given_file.alternative if given_file else "")
+    if path.suffix.lower() == ".toml":
+        alternative = alternative or DEFAULT_ALTERNATIVE
+    chain = catalog.chain(alternative) if alternative else None
+    if not path.is_file():
+        raise RobotFileError(f"{path}: no such robot file; name it with --robot")
+    robot = _robot(path, options.base)
+    if robot is None:
+        bare = machine_of_urdf(path, chain=chain)
+        ratio = _ratio(chain, len(bare.joints))
+        expected = expected_of_model(bare.rigid, bare.name, joints=bare.joints, ratio=ratio)
+        sources: tuple[Path, ...] = (path,)
+    else:
+        bare = machine_of_robot(robot, chain)
+        expected = expected_of_robot(robot, ratio=_ratio(chain, len(robot.joints)))
+        sources = (*robot.spec.sources, *(() if robot.spec.build else (robot.spec.urdf,)))
+    edits = given_file.edits if given_file else ()
+    file = replace(new_model_file(path, alternative, folder), edits=edits)
     return Setup(
         path=path,
-        sources=(*spec.sources, *(() if spec.build else (spec.urdf,)), *_catalog_files(folder)),
+        sources=(*sources, *(_catalog_files(folder) if chain else ())),
         robot=robot,
-        model=machine_of_robot(robot, chain),
-        expected=expected_of_robot(robot, ratio=_ratio(chain, len(robot.joints))),
+        model=apply_edits(bare, edits),
+        expected=expected,
         catalog=catalog,
         alternative=alternative,
+        file=file,
+        bare=bare,
     )
 
 
-def _of_urdf(path: Path, catalog: Catalog, options: argparse.Namespace) -> Setup:
-    if options.base in ("level", "measured"):
-        raise GapError(
-            f"{path}: a bare URDF stands on a fixed base; write a robot file for --base "
-            f"{options.base}"
-        )
-    chain = catalog.chain(options.alternative) if options.alternative else None
-    model = machine_of_urdf(path, chain=chain)
-    ratio = _ratio(chain, len(model.joints)) if chain else None
-    return Setup(
-        path=path,
-        sources=(path, *(_catalog_files(options.actuators) if chain else ())),
-        robot=None,
-        model=model,
-        expected=expected_of_model(model.rigid, model.name, joints=model.joints, ratio=ratio),
-        catalog=catalog,
-        alternative=options.alternative or "",
-    )
+def _robot(path: Path, base: str | None) -> Robot | None:
+    """The robot of a robot file, its base as asked for; None for a bare URDF."""
+    if path.suffix.lower() != ".toml":
+        if base in ("level", "measured"):
+            raise GapError(
+                f"{path}: a bare URDF stands on a fixed base; write a robot file for --base {base}"
+            )
+        return None
+    spec = load_robot_file(path)
+    if base == "fixed" and spec.floating:
+        spec = replace(spec, floating=False)
+    if base in ("level", "measured") and not spec.floating:
+        raise GapError(f"{path}: its base is fixed; leave --base {base} out")
+    return load_robot(spec)
 
 
-def _catalog_files(folder: Path | None) -> tuple[Path, ...]:
-    from actuators.build import CATALOG
-
-    return tuple(sorted((folder or Path(CATALOG)).glob("*.toml")))
+def _catalog_files(folder: Path) -> tuple[Path, ...]:
+    return tuple(sorted(folder.glob("*.toml")))
 
 
-def _ratio(chain: Chain, joints: int) -> np.ndarray:
-    return np.full(joints, float(np.asarray(chain.ratio)))
+def _ratio(chain: Chain | None, joints: int) -> np.ndarray | None:
+    return None if chain is None else np.full(joints, float(np.asarray(chain.ratio)))
 
 
 def read_logs(given: Setup, options: argparse.Namespace) -> tuple[list[Log], list[Log]]:
@@ -207,11 +218,8 @@ def check_options(options: argparse.Namespace) -> None:
     """Refuse options that cannot be, before anything is read.
 
     Raises:
-        PipelineError: A robot file that does not exist.
         GapError: A file that does not exist.
     """
-    if not options.robot.is_file():
-        raise PipelineError(f"{options.robot}: no such robot file; name it with --robot")
     if not options.logs:
         raise LogContentError(f"gap {options.step}: no log given; name a CSV or Parquet file")
     for path in (*options.logs, *options.holdout):

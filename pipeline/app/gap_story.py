@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
+from pathlib import Path
 
 import numpy as np
 
@@ -18,9 +19,12 @@ from pipeline.app.gap_setup import Setup
 from pipeline.app.gap_stages import Stage, stages
 from pipeline.app.gap_words import place_text
 from pipeline.errors import TippingError
+from pipeline.gap.deciding import Deciding
 from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.identify import identify
 from pipeline.gap.model import MachineModel
+from pipeline.gap.model_file import apply_edits
+from pipeline.gap.model_writer import edits_of, model_text
 from pipeline.gap.nuisance import Nuisance
 from pipeline.gap.verdict import Found, Naming
 from reports.table import Table
@@ -31,6 +35,8 @@ TOLERANCES = "tolerances of its parts"
 MOST_SIGMAS = 4.0
 #: Joints that the figure in time shows.
 SHOWN = 3
+#: ... where the gap shrinks by this share at least.
+WORTH_SHOWING = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,21 +81,35 @@ def gap_stages(model: MachineModel, where: Whereabouts, naming: Naming) -> tuple
     return stages(models, where.measurements)
 
 
-def found_effects(given: Setup, found: Sequence[Found]) -> Effects:
-    """Found effects, ready for standing and walking."""
+def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -> Effects:
+    """Found effects on top of the model file's, ready for standing and walking."""
     assert given.robot is not None
     names = tuple(f.effect for f in found)
     chain = given.catalog.chain(given.alternative)
-    return effects(given.robot, chain, lambda m: with_found(m, found), names, "model.toml")
+    edits = given.file.edits if known else ()
+
+    def apply(model: MachineModel) -> MachineModel:
+        return with_found(apply_edits(model, edits), found)
+
+    return effects(given.robot, chain, apply, names, "model.toml")
 
 
-def cost(given: Setup, found: Sequence[Found]) -> tuple[EnergyChange | None, tuple[str, ...]]:
-    """Energy with and without found effects, and remarks; None for a robot that does not walk."""
+def cost(
+    given: Setup, found: Sequence[Found], *, known: bool = True
+) -> tuple[EnergyChange | None, tuple[str, ...]]:
+    """Energy with and without found effects, and remarks; None for a robot that does not walk.
+
+    Args:
+        given: Robot, actuators and the effects known before.
+        found: Effects.
+        known: Whether those of the model file stand on both sides of the comparison.
+    """
     if not given.legged or not found or given.robot is None or not given.robot.spec.tripods:
         return None, ()
-    edits = found_effects(given, found)
+    edits = found_effects(given, found, known=known)
+    start = found_effects(given, ()) if known and given.file.edits else None
     try:
-        return energy_change(given.robot, given.catalog.chains(), edits), edits.remarks
+        return energy_change(given.robot, given.catalog.chains(), edits, start), edits.remarks
     except TippingError as error:
         return None, (f"With these effects {error}",)
 
@@ -97,7 +117,8 @@ def cost(given: Setup, found: Sequence[Found]) -> tuple[EnergyChange | None, tup
 def most_improved(before: Stage, after: Stage, found: Sequence[int]) -> tuple[int, ...]:
     """Columns of the joints to show: those of effects first, then those with the largest gap."""
     gain = np.nan_to_num(before.gap - after.gap, nan=-np.inf)
-    rank = [*dict.fromkeys(found), *np.argsort(-gain).tolist()]
+    better = [k for k in np.argsort(-gain).tolist() if gain[k] > WORTH_SHOWING * before.gap[k]]
+    rank = [*found, *better] or np.argsort(-np.nan_to_num(before.gap, nan=-1.0)).tolist()[:1]
     return tuple(dict.fromkeys(k for k in rank if np.isfinite(before.gap[k])))[:SHOWN]
 
 
@@ -110,6 +131,15 @@ def effect_column(model: MachineModel, f: Found, before: Stage, after: Stage) ->
     return int(np.argmax(np.nan_to_num(before.gap - after.gap, nan=-np.inf)))
 
 
+def added(given: Setup, where: Whereabouts, naming: Naming, out: Path) -> str:
+    """Step 4: the model file with what was found; empty where there is nothing to write."""
+    logs = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in where.measurements)
+    edits = edits_of(naming.found, logs)
+    if not edits and not given.file.edits:
+        return ""
+    return model_text(given.file.with_edits(edits), out)
+
+
 def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress: Progress) -> Told:
     """Name what is missing and gather everything that a run tells.
 
@@ -119,12 +149,36 @@ def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress
     naming = identify(given.model, where.measurements).naming
     progress.step("weighing what was found")
     steps = gap_stages(given.model, where, naming)
-    joints = tuple(
-        effect_column(given.model, f, steps[k + 1], steps[k + 2])
-        for k, f in enumerate(naming.found)
-    )
     energy, remarks = cost(given, naming.found)
     decided = decide(given, given.model, where.measurements, naming.found)
+    return gathered(given, where, naming, steps, (energy, remarks), decided, options)
+
+
+def gathered(
+    given: Setup,
+    where: Whereabouts,
+    naming: Naming,
+    steps: tuple[Stage, ...],
+    energy: tuple[EnergyChange | None, tuple[str, ...]],
+    decided: tuple[Deciding, str] | None,
+    options: argparse.Namespace,
+) -> Told:
+    """What a run writes, from what it found.
+
+    Args:
+        given: Robot and actuators.
+        where: Steps 1 and 2.
+        naming: Effects, each with a stage of its own at the end of `steps`.
+        steps: The gap stage by stage.
+        energy: With and without the effects, and remarks.
+        decided: Deciding motion, and it in words.
+        options: Of the command.
+    """
+    first = len(steps) - len(naming.found)
+    joints = tuple(
+        effect_column(given.model, f, steps[first + k - 1], steps[first + k])
+        for k, f in enumerate(naming.found)
+    )
     signatures = {
         f"effect_{f.order}_{f.effect}.svg": (
             f"{f.effect} at {place_text(f.place)}: the gap of {given.model.joints[j]} against the "
@@ -132,20 +186,22 @@ def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress
         )
         for f, j in zip(naming.found, joints, strict=True)
     }
+    file = added(given, where, naming, options.out) if options.step != "shrink" else ""
     story = Story(
         given=given,
         where=where,
         naming=naming,
         stages=steps,
-        energy=energy,
+        energy=energy[0],
         signatures=signatures,
         decides=decided[1] if decided else "",
-        remarks=remarks,
+        remarks=energy[1],
+        writes_model=bool(file),
     )
     return Told(
         story=story,
         tables=(motion_table(decided[0], given.model.joints),) if decided else (),
-        model_file="",
-        shown=most_improved(steps[1], steps[-1], joints),
+        model_file=file,
+        shown=most_improved(steps[first - 1], steps[-1], joints),
         effect_joints=joints,
     )

@@ -41,7 +41,7 @@ def where_words(rows: Sequence[Where]) -> str:
     text = (
         f"**Where:** model and machine disagree most at **{worst.joint}**: {number(worst.gap)} "
         f"{worst.unit} root mean square, {number(ratio, 2)} times the noise floor and "
-        f"{worst.share_of_total:.0%} of the squared gap of all joints"
+        f"{percent(worst.share_of_total)} of the squared gap of all joints"
     )
     bands = [
         row
@@ -50,8 +50,22 @@ def where_words(rows: Sequence[Where]) -> str:
     ]
     if bands:
         top = max(bands, key=lambda row: row.gap)
-        text += f"; it is largest sorted by {top.by}: {top.band} ({number(top.gap)} {worst.unit})"
+        text += f"; it is largest {_circumstance(top)} ({number(top.gap)} {worst.unit})"
     return text + "."
+
+
+def _circumstance(row: Where) -> str:
+    """A band in words."""
+    return {
+        "phase": f"in {row.band}",
+        "direction": f"in the {row.band} direction",
+        "speed": f"at {row.band} speed",
+        "load": f"under {row.band} load",
+        "power": f"where the joint is {row.band}",
+        "reversal": "near reversals" if row.band == "near" else "away from reversals",
+        "position": f"in the {row.band} third of its travel",
+        "time": f"in the {row.band} third of the log",
+    }.get(row.by, f"by {row.by}: {row.band}")
 
 
 def what_words(naming: Naming) -> str:
@@ -82,6 +96,11 @@ def meaning(effect: str) -> str:
     return f"`{effect}`: {line[0].lower()}{line[1:]}" if line else ""
 
 
+def percent(share: float) -> str:
+    """A share as a whole percentage."""
+    return f"{100 * share:.0f} %"
+
+
 def parameters_text(parameters: Sequence[Estimate]) -> str:
     """Values with their intervals."""
     return "; ".join(
@@ -96,7 +115,7 @@ def shrink_words(found: Sequence[Found]) -> str:
     parts = []
     for f in found:
         share = removed(f.gap_before, f.gap_after, f.noise_floor)
-        closed = "" if share is None else f", {share:.0%} of what could be removed"
+        closed = "" if share is None else f", {percent(share)} of what could be removed"
         parts.append(
             f"with {f.effect} at {place_text(f.place)} it falls from {number(f.gap_before)} to "
             f"{number(f.gap_after)} {f.unit}{closed} (noise floor {number(f.noise_floor)} {f.unit})"
@@ -190,7 +209,7 @@ def _unit(unit: str) -> str:
 
 
 def _share(value: float) -> str:
-    return "no share" if math.isnan(value) else f"{value:.1%}"
+    return "no share" if math.isnan(value) else f"{100 * value:.1f} %"
 
 
 def plain(text: str) -> str:
