@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 from pipeline.gap.derivatives import LowPass
 from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import MachineModel
+from pipeline.gap.noise import smoother_noise
 from pipeline.gap.observe import observe_all
 from pipeline.gap.prepare import LONGEST_KERNEL, TOLERATED_SHARE, Prepared, Settings
-from pipeline.gap.simulate import Simulator
+from pipeline.gap.simulate import Prediction, Simulator
 
 Array = NDArray[np.float64]
 #: Encoder noise in the prediction over effort noise.
@@ -71,6 +72,27 @@ def encoder_noise(model: MachineModel, one: Prepared, m: Measurement) -> Array:
         kernel = one.settings.lowpass.kernels[order]
         noise = raw * float(np.sqrt((kernel**2).sum()))
         total += (slope * noise[:, None]) ** 2
+    total += _force_noise(model, one, m, base) ** 2
+    return np.asarray(np.sqrt(total))
+
+
+def _force_noise(model: MachineModel, one: Prepared, m: Measurement, base: Prediction) -> Array:
+    """Standard deviation of the prediction from the noise of measured foot forces, (J, C)."""
+    total = np.zeros(base.effort.shape[1:])
+    raw = one.log.foot_force
+    if m.foot_force is None or raw is None or m.standing is None:
+        return total
+    flat = np.nan_to_num(raw[one.row]).reshape(len(one), -1)
+    lowpass = one.settings.lowpass
+    sigma = smoother_noise(
+        flat, np.ones(flat.shape, dtype=np.bool_), one.pieces, lowpass, in_band=True
+    )
+    for axis in range(3):
+        known = np.nan_to_num(sigma.reshape(raw.shape[1:])[:, axis])
+        push = np.zeros_like(m.foot_force)
+        push[..., axis] = m.standing * float(np.median(known))
+        pushed = Simulator(replace(m, foot_force=m.foot_force + push)).predict(model)
+        total += np.mean((pushed.effort - base.effort) ** 2, axis=0)
     return np.asarray(np.sqrt(total))
 
 

@@ -92,11 +92,19 @@ class BlockSums:
 
 
 def solve_spd(A: Array, b: Array) -> Array:
-    """Solution with a positive semidefinite matrix, scaled and slightly regularised."""
-    d = np.sqrt(np.maximum(np.diag(A), 1e-300))
+    """Solution with a positive semidefinite matrix, scaled and slightly regularised.
+
+    An unknown that nothing depends on comes out as zero.
+    """
+    diagonal = np.diag(A)
+    live = diagonal > 1e-30 * max(float(diagonal.max(initial=0.0)), 1e-300)
+    d = np.sqrt(np.where(live, diagonal, 1.0))
     scaled = A / np.outer(d, d)
-    scaled[np.diag_indices_from(scaled)] += 1e-10
-    rhs = b / (d if b.ndim == 1 else d[:, None])
+    scaled[~live, :] = 0.0
+    scaled[:, ~live] = 0.0
+    scaled[np.diag_indices_from(scaled)] = np.where(live, np.diag(scaled) + 1e-10, 1.0)
+    rhs = np.where(live if b.ndim == 1 else live[:, None], b, 0.0)
+    rhs = rhs / (d if b.ndim == 1 else d[:, None])
     result = np.linalg.solve(scaled, rhs)
     return np.asarray(result / (d if b.ndim == 1 else d[:, None]))
 

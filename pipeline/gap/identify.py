@@ -186,7 +186,9 @@ def _doubt(problem: Problem, number: int) -> str:
     The scatter of the gradient over blocks is compared with what noise of the final misfit gives.
     """
     ratio, excess = fit_quality(problem, number)
-    if ratio > limits.LARGEST_SCATTER and excess > limits.LARGEST_EXCESS:
+    contradicts = ratio > limits.LARGEST_SCATTER and excess > limits.LARGEST_EXCESS
+    suspect = ratio > limits.SUSPECT_SCATTER and excess > limits.UNEXPLAINED
+    if contradicts or suspect:
         return (
             f"parts of the log contradict one another about its size {ratio:.0f} times more than "
             f"noise allows, and {excess:.1f} times the noise is left: its law is not that of the "

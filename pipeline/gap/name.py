@@ -25,6 +25,7 @@ Key = tuple[str, Place]
 _TRIED = 8  # candidates tried in earnest per round
 _NEWTON = 3  # refits after an acceptance
 _HELD = 3.0  # sigmas
+_BEND = 0.3  # largest relative change of a nonlinear parameter in one step
 #: Tolerances in which the prediction bends enough to be taken up into the model.
 _RELINEARISED = ("torque_constant", "resistance", "encoder", "mass", "inertia", "skew")
 
@@ -136,9 +137,10 @@ def acceptable(problem: Problem, t: Trial, tried: int) -> bool:
     if tolerance and size < tolerance_gain(len(tolerance)):
         return False
     if t.score.effect.is_tolerance:
+        alarm = float(chi2.isf(limits.TOLERANCE_ALARM / max(tried, 1), max(t.freedom, 1)))
         # Tolerances explain a part already: the rest has to exceed them, and by its own size.
         least = tolerance_gain(max(t.freedom, 1))
-        return t.gain > least and t.significance > least
+        return t.gain > least and t.significance > alarm and t.held_out > 0.0
     least = max(limits.LEAST_GAIN * t.scale, limits.LEAST_SHARE * t.expected)
     return t.gain > least and t.held_out > 0.0 and t.significance > alarm
 
@@ -185,18 +187,15 @@ def _related(a: Effect, b: Effect) -> bool:
 def refit(problem: Problem) -> Problem:
     """Re-estimate all accepted effects together with the tolerances on *fit* and *choose*."""
     for _ in range(_NEWTON):
-        sums = problem.sums()
+        sums, spans = problem.with_shapes()
         theta = sums.solve(sums.blocks(FIT, CHOOSE))
         moved, largest = [], 0.0
         for number, a in enumerate(problem.accepted):
-            step = theta[problem.span(number)]
-            x = {}
-            for c, d in zip(a.effect.coordinates, step, strict=True):
-                value = a.x[c.name] + float(d)
-                value = value if c.signed else max(value, 0.0)
-                largest = max(largest, abs(value - a.x[c.name]) / (abs(value) + c.step))
-                x[c.name] = value
-            moved.append(replace(a, x=x))
+            after = _stepped(problem, a, theta[problem.span(number)], theta[spans[number]])
+            for c in a.effect.coordinates:
+                change = abs(after.x[c.name] - a.x[c.name])
+                largest = max(largest, change / (abs(after.x[c.name]) + c.step))
+            moved.append(after)
         count = len(problem.tolerances)
         # Beyond a few sigmas a tolerance only stands in for an effect not yet found.
         reach = np.array([_HELD if n.kind in _RELINEARISED else 0.0 for n in problem.tolerances])
@@ -206,6 +205,22 @@ def refit(problem: Problem) -> Problem:
         if largest < 2e-3:
             break
     return problem
+
+
+def _stepped(problem: Problem, a: Accepted, step: Array, bend: Array) -> Accepted:
+    """An effect moved by a Newton step, shortened until it stays inside what can be."""
+    for share in (1.0, 0.5, 0.25, 0.1, 0.02):
+        x = {}
+        for c, d in zip(a.effect.coordinates, step, strict=True):
+            value = a.x[c.name] + share * float(d)
+            x[c.name] = value if c.signed else max(value, 0.0)
+        shape = {}
+        for (name, value), d in zip(a.shape.items(), bend, strict=True):
+            most = _BEND * abs(value)
+            shape[name] = value + share * float(np.clip(d, -most, most))
+        if a.effect.plausible(problem.model, a.place, x, shape):
+            return replace(a, x=x, shape=shape)
+    return a
 
 
 def _pruned(problem: Problem) -> Problem:

@@ -23,6 +23,8 @@ Columns = Sequence[Mapping[int, Array]]
 
 #: Change of a tolerance, in sigmas, after which columns at its joint are computed anew.
 _STALE = 0.1
+#: Relative step of a nonlinear parameter for its column.
+SHAPE_STEP = 1e-4
 #: Prior precision of what is not free.
 FIXED = 1e9
 #: Effects whose like at another leg leaves this leg alone, where legs are separate.
@@ -312,6 +314,32 @@ class Problem:
         precision[list(absorbed)] = FIXED
         mean = np.concatenate([base.mean, np.zeros(p)])
         return BlockSums(H, h, base.s, base.count, base.part, precision, mean)
+
+    def with_shapes(self) -> tuple[BlockSums, list[slice]]:
+        """Normal equations with a column for every nonlinear parameter of accepted effects.
+
+        Returns:
+            The sums, and for each accepted effect where its nonlinear parameters stand.
+        """
+        per_log: list[list[dict[int, Array]]] = [[] for _ in self.benches]
+        spans, at = [], self.names
+        for number, a in enumerate(self.accepted):
+            spans.append(slice(at, at + len(a.shape)))
+            at += len(a.shape)
+            for name, value in a.shape.items():
+                step = SHAPE_STEP * max(abs(value), 1e-3)
+                moved = replace(a, shape={**a.shape, name: value + step})
+                model = self._start()
+                for k, other in enumerate(self.accepted):
+                    model = (moved if k == number else other).apply(model)
+                for k, bench in enumerate(self.benches):
+                    change = bench.simulator.difference(self.predictions()[k], model)
+                    per_log[k].append(
+                        bench.whitened(change.effort / step, change.joints, self.sigma)
+                    )
+        if at == self.names:
+            return self.sums(), spans
+        return self.extended(per_log), spans
 
     def rescaled(self, sigma: Array) -> Problem:
         """The problem with another noise level; columns are computed anew."""

@@ -23,10 +23,10 @@ LEAST_GAIN: Final = 30.0
 LEAST_SHARE: Final = 0.02
 #: A tolerance is exceeded beyond this many of its standard deviations.
 TOLERANCE_SIGMAS: Final = 2.5
-#: Rivals whose misfit on held-out blocks differs by fewer standard deviations are one class.
-RIVAL_SIGMAS: Final = 3.0
-#: ... or by less than this, in the unit of `LEAST_GAIN`.
-RIVAL_GAIN: Final = 9.0
+#: Chance that noise alone makes any tolerance look exceeded.
+TOLERANCE_ALARM: Final = 0.01
+#: Rivals whose penalised misfit differs by less than this are one class, in noise variances ...
+RIVAL_GAIN: Final = 16.0
 #: ... or by less than this share of what the better one explains.
 RIVAL_SHARE: Final = 0.002
 #: Below this share a candidate's column is explained by everything else that is free.
@@ -37,6 +37,8 @@ WORTH_NAMING: Final = {"backlash": ("width", 1e-3)}  # [rad]
 LARGEST_SCATTER: Final = 8.0
 #: ... where more than this many times the noise is left as well.
 LARGEST_EXCESS: Final = 1.12
+#: ... or this scatter where so much is left that it counts as unexplained.
+SUSPECT_SCATTER: Final = 2.5
 #: Remaining error over the noise floor, in the naming channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
 #: Effects that one log may be found to lack.

@@ -16,6 +16,7 @@ class EffortOffset(Effect):
     parameters: ClassVar = (Parameter("offset", "channel", -1e4, 1e4),)
     coordinates: ClassVar = (Coordinate("offset", 1e-3, signed=True),)
     signature = "time"
+    is_tolerance = True
     excitation = "stands still without load, then moves both ways"
 
     def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:

@@ -95,7 +95,7 @@ def _refuse_circle(model: MachineModel, place: Place) -> None:
     while joint:
         if joint in seen:
             raise EffectError(
-                f"transmission_coupling: {place[0]} and {place[1]} are coupled the other way already"
+                f"transmission_coupling: {place[0]} and {place[1]} are coupled the other way"
             )
         seen.add(joint)
         joint = model.actuator(joint).coupled_to
