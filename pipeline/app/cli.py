@@ -80,7 +80,10 @@ def parser() -> argparse.ArgumentParser:
 
 
 def _run_options(sub: argparse.ArgumentParser) -> None:
-    sub.add_argument("--robot", type=Path, default=DEFAULT_ROBOT, help="robot file")
+    sub.add_argument(
+        "--robot", type=Path, help="robot file; the model file's or the hexapod by default"
+    )
+    sub.add_argument("--model", type=Path, help="model file: include the effects that `gap` found")
     sub.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder for CSV and figures")
     sub.add_argument(
         "--set",

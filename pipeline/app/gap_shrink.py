@@ -10,46 +10,47 @@ import numpy as np
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
 from pipeline.app.gap_stages import Stage, noise_floor, stages
-from pipeline.app.gap_story import AS_IT_WAS, Told, cost, gathered
+from pipeline.app.gap_story import AS_IT_WAS, TOLERANCES, Told, cost, gathered, with_tolerances
 from pipeline.app.gap_words import place_text
+from pipeline.gap.columns import make_benches
 from pipeline.gap.effects.base import CHANNEL_UNITS
 from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.measurement import FIT, PROVE, Measurement
+from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.model_file import apply_edits
-from pipeline.gap.verdict import UNEXPLAINED, Estimate, Found, Naming, Remainder
+from pipeline.gap.name import refit
+from pipeline.gap.problem import Problem
+from pipeline.gap.remainder import remainders
+from pipeline.gap.verdict import Estimate, Found, Naming
 
 
 def check(given: Setup, where: Whereabouts, options: argparse.Namespace) -> Told:
-    """Gap with and without the model file's effects.
-
-    A log from which an effect was identified proves on its own held-out part; any other log proves
-    from end to end.
-    """
-    sources = " ".join(edit.source for edit in given.file.edits)
-    known = tuple(m if m.sha256 in sources else _all_proves(m) for m in where.measurements)
-    where = replace(where, measurements=known)
-    models = [(AS_IT_WAS, given.bare)]
-    for edit in given.file.edits:
-        models.append(
-            (f"{edit.effect} at {place_text(edit.place)}", apply_edits(models[-1][1], [edit]))
-        )
-    steps = stages(models, known)
-    found = tuple(_found(given, where, k, steps) for k in range(len(given.file.edits)))
-    channel = known[0].channels[0]
+    """Gap with and without the model file's effects, tolerances estimated on *fit* and *choose*."""
+    measurements = where.measurements
+    sigma = np.sqrt(np.mean([m.noise**2 for m in measurements], axis=0))
+    problem = refit(Problem(given.model, make_benches(measurements), sigma))
+    sums = problem.sums()
+    theta = sums.solve(sums.blocks(FIT, CHOOSE))
+    channel = measurements[0].channels[0]
     naming = Naming(
-        found=found,
+        found=(),
         candidates=(),
-        tolerances={},
-        remainders=_remainders(where, steps[-1]),
+        tolerances={
+            (n.kind, n.place): (float(v) * n.sigma, n.sigma)
+            for n, v in zip(problem.tolerances, problem.held + theta, strict=True)
+        },
+        remainders=remainders(problem, theta),
         tried=0,
         channel=channel,
         unit=CHANNEL_UNITS[channel],
     )
+    models = [(AS_IT_WAS, given.bare), (TOLERANCES, with_tolerances(given.bare, naming))]
+    for edit in given.file.edits:
+        label = f"{edit.effect} at {place_text(edit.place)}"
+        models.append((label, apply_edits(models[-1][1], [edit])))
+    steps = stages(models, measurements)
+    found = tuple(_found(given, where, k, steps[1:]) for k in range(len(given.file.edits)))
+    naming = replace(naming, found=found)
     return gathered(given, where, naming, steps, cost(given, found, known=False), None, options)
-
-
-def _all_proves(m: Measurement) -> Measurement:
-    return replace(m, part=np.where(m.part >= FIT, PROVE, m.part).astype(np.int8))
 
 
 def _found(given: Setup, where: Whereabouts, k: int, steps: tuple[Stage, ...]) -> Found:
@@ -78,22 +79,3 @@ def _found(given: Setup, where: Whereabouts, k: int, steps: tuple[Stage, ...]) -
 def _rms(values: np.ndarray) -> float:
     known = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
-
-
-def _remainders(where: Whereabouts, last: Stage) -> tuple[Remainder, ...]:
-    m = where.measurements[0]
-    floor = noise_floor(where.measurements)
-    unit = CHANNEL_UNITS[m.channels[0]]
-    return tuple(
-        Remainder(
-            joint,
-            m.channels[0],
-            float(last.gap[j]),
-            float(floor[j]),
-            unit,
-            bool(last.gap[j] > UNEXPLAINED * floor[j]),
-            "tolerances of the machine's parts are not taken out here",
-        )
-        for j, joint in enumerate(m.joints)
-        if np.isfinite(last.gap[j])
-    )

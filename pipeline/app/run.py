@@ -43,16 +43,17 @@ def run(options: argparse.Namespace) -> int:
     standing = walking = None
     if options.verb in ("stand", "reports"):
         logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
-        standing = stand(given.robot, given.catalog.chains())
+        standing = stand(given.machine, given.chains(), adjust=given.adjust)
         tables += tables_of_standing(given, standing)
     if options.verb in ("walk", "reports"):
         logger.info("walking one cycle, %d samples per segment", given.samples)
         walking = walk(
-            given.robot,
-            given.catalog.chains(),
+            given.machine,
+            given.chains(),
             samples=given.samples,
             quasi_static=given.quasi_static,
             regeneration=given.regeneration,
+            adjust=given.adjust,
         )
         tables += tables_of_walking(given, walking)
     tables.append(table_of_parameters(given))
@@ -109,7 +110,7 @@ def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:
 def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
     """The tables of one walking cycle."""
     legs = leg_joints(given.robot.spec)
-    chains = given.catalog.chains()
+    chains = given.chains()
     p = given.robot.spec.parameters
     tables = [
         walking_tables.walking_joint_demand(walking.demand),
@@ -129,11 +130,12 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
     ]
     if not given.quasi_static:
         static = walk(
-            given.robot,
+            given.machine,
             chains,
             samples=given.samples,
             quasi_static=True,
             regeneration=given.regeneration,
+            adjust=given.adjust,
         )
         tables += walking_tables.quasi_static_difference(
             walking.demand, static.demand, walking.supplies, static.supplies, legs
@@ -153,6 +155,7 @@ def metadata(given: Settings) -> dict[str, Any]:
     spec = given.robot.spec
     files = [*spec.sources, *([] if spec.build else [spec.urdf])]
     files += sorted(Path(CATALOG).glob("*.toml"))
+    files += [given.model] if given.model else []
     return {
         "inputs_sha256": {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in files},
         "urdf_sha256": hashlib.sha256(given.robot.urdf.encode()).hexdigest(),
@@ -164,11 +167,12 @@ def metadata(given: Settings) -> dict[str, Any]:
             "regeneration": given.regeneration.policy,
             "regeneration_fraction": given.regeneration.fraction,
             "transfer_path": spec.transfer_path,
+            "effects": list(given.effects.names) if given.effects else [],
         },
         "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
         "joint's direction; electrical power positive from supply to motor",
         "zero_pose": spec.zero_pose,
-        "warnings": [],
+        "warnings": list(given.effects.remarks) if given.effects else [],
     }
 
 
@@ -177,7 +181,7 @@ def findings(walking: Walking, given: Settings) -> list[str]:
     from actuators.limits import limit_rows
 
     lines = []
-    for name, chain in given.catalog.chains().items():
+    for name, chain in given.chains().items():
         breaches = [row for row in limit_rows(walking.results[name], chain.motor) if row.breach]
         if breaches:
             worst = max(breaches, key=lambda row: row.peak / row.limit)

@@ -5,13 +5,18 @@ from __future__ import annotations
 import argparse
 import math
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from actuators.build import Catalog, load_catalog
+from actuators.chain import Chain
 from actuators.errors import ActuatorError, closest, one_line
 from actuators.units import to_si
-from pipeline.app.compute import Regeneration
+from pipeline.app.compute import Adjust, Regeneration
+from pipeline.app.effects import IDEAL, Effects, effects
+from pipeline.app.gap_options import DEFAULT_ROBOT
 from pipeline.check import check_urdf
 from pipeline.errors import GaitError, RobotFileError, UnphysicalModelError
+from pipeline.gap.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.robot import Robot, load_robot
 from pipeline.robot_file import RobotSpec, check_parameters, load_robot_file
 from pipeline.transfer_path import transfer_path
@@ -32,6 +37,8 @@ class Settings:
         samples: Per segment of the gait.
         quasi_static: Whether the links' inertial terms are left out.
         changes: What ``--set`` changed, as written.
+        effects: Of the model file; None without one.
+        model: The model file; None without one.
     """
 
     robot: Robot
@@ -40,6 +47,23 @@ class Settings:
     samples: int
     quasi_static: bool
     changes: tuple[str, ...]
+    effects: Effects | None = None
+    model: Path | None = None
+
+    def chains(self) -> dict[str, Chain]:
+        """Every alternative's chain, with the model file's effects in it."""
+        chains = self.catalog.chains()
+        return chains if self.effects is None else self.effects.chains(chains)
+
+    @property
+    def machine(self) -> Robot:
+        """The robot with what the model file's effects change in bodies and ground."""
+        return self.robot if self.effects is None else self.effects.robot
+
+    @property
+    def adjust(self) -> Adjust | None:
+        """What the model file's effects change in the demand on the actuators."""
+        return None if self.effects is None else self.effects.demand
 
 
 def settings(options: argparse.Namespace) -> Settings:
@@ -48,8 +72,10 @@ def settings(options: argparse.Namespace) -> Settings:
     Raises:
         PipelineError: The robot file or a change cannot be used.
         ActuatorError: A catalogue file or a changed parameter cannot be used.
+        GapError: The model file cannot be used, or its effects do not fit the robot.
     """
-    spec = load_robot_file(options.robot)
+    file = read_model_file(options.model) if options.model else None
+    spec = load_robot_file(options.robot or (file.robot if file else DEFAULT_ROBOT))
     catalog = load_catalog()
     if options.samples < LEAST_SAMPLES:
         raise GaitError(
@@ -73,7 +99,17 @@ def settings(options: argparse.Namespace) -> Settings:
         samples=options.samples,
         quasi_static=options.quasi_static,
         changes=tuple(options.set),
+        effects=_effects(file, options.model, robot, catalog) if file else None,
+        model=options.model,
     )
+
+
+def _effects(file: ModelFile, path: Path, robot: Robot, catalog: Catalog) -> Effects:
+    """A model file's effects on this robot."""
+    names = tuple(edit.effect for edit in file.edits)
+    alternative = file.alternative or next(name for name in catalog.alternatives if name != IDEAL)
+    chain = catalog.chain(alternative)
+    return effects(robot, chain, lambda m: apply_edits(m, file.edits), names, path.name)
 
 
 def refuse_impossible(robot: Robot) -> None:
