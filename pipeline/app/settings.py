@@ -74,7 +74,8 @@ def settings(options: argparse.Namespace) -> Settings:
         ActuatorError: A catalogue file or a changed parameter cannot be used.
         GapError: The model file cannot be used, or its effects do not fit the robot.
     """
-    file = read_model_file(options.model) if options.model else None
+    model: Path | None = getattr(options, "model", None)
+    file = read_model_file(model) if model else None
     spec = load_robot_file(options.robot or (file.robot if file else DEFAULT_ROBOT))
     catalog = load_catalog()
     if options.samples < LEAST_SAMPLES:
@@ -99,8 +100,8 @@ def settings(options: argparse.Namespace) -> Settings:
         samples=options.samples,
         quasi_static=options.quasi_static,
         changes=tuple(options.set),
-        effects=_effects(file, options.model, robot, catalog) if file else None,
-        model=options.model,
+        effects=_effects(file, model, robot, catalog) if file and model else None,
+        model=model,
     )
 
 
