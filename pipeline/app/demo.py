@@ -19,8 +19,8 @@ from reports.atomic import replacing
 DEMO = Path(__file__).parents[1] / "gap" / "demo" / "walk.parquet"
 SEED = 2018
 RATE = 500.0  # [Hz]
-#: What is hidden: friction in the right middle knee that grows with the load.
-HIDDEN = Hidden("load_dependent_friction", ("rm_joint_3",), {"share": 0.12}, {"share": "1"})
+#: What is hidden: dry friction in the right middle hip.
+HIDDEN = Hidden("coulomb_friction", ("rm_joint_1",), {"torque": 2.0}, {"torque": "N*m"})
 
 
 def write_demo(path: Path = DEMO) -> Path:

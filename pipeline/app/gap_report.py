@@ -57,6 +57,7 @@ class Story:
         signatures: File name to caption, one per effect.
         decides: What the deciding motion is, in words; empty without one.
         remarks: What else a reader should know.
+        joints: Per effect, the column at which it shows.
         writes_model: Whether ``model.toml`` is written.
     """
 
@@ -68,6 +69,7 @@ class Story:
     signatures: dict[str, str]
     decides: str
     remarks: tuple[str, ...]
+    joints: tuple[int, ...] = ()
     writes_model: bool = False
 
 
@@ -105,12 +107,25 @@ def answer(story: Story) -> tuple[str, ...]:
     naming = story.naming
     out = [words.where_words(story.where.rows), words.what_words(naming)]
     if naming.found:
-        out.append(words.shrink_words(naming.found))
+        out.append(words.shrink_words(_falls(story)))
     if story.energy is not None:
         out.append(words.energy_words(story.energy, story.given.alternative))
     out.append(words.left_words(naming.remainders))
     undecided = words.rival_words(naming.found, bool(story.decides))
     return (*out, undecided) if undecided else tuple(out)
+
+
+def _falls(story: Story) -> list[tuple[str, str, float, float, float, str]]:
+    """Gap before and after each effect at the joint where it shows."""
+    floor = noise_floor(story.where.measurements)
+    first = len(story.stages) - len(story.naming.found)
+    out = []
+    for k, (f, j) in enumerate(zip(story.naming.found, story.joints, strict=True)):
+        before, after = (float(story.stages[first + i].gap[j]) for i in (k - 1, k))
+        name = f"{f.effect} at {words.place_text(f.place)}"
+        joint = story.given.model.joints[j]
+        out.append((name, joint, before, after, float(floor[j]), story.naming.unit))
+    return out
 
 
 def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:

@@ -196,6 +196,7 @@ def gathered(
         signatures=signatures,
         decides=decided[1] if decided else "",
         remarks=energy[1],
+        joints=joints,
         writes_model=bool(file),
     )
     return Told(

@@ -110,20 +110,21 @@ def parameters_text(parameters: Sequence[Estimate]) -> str:
     )
 
 
-def shrink_words(found: Sequence[Found]) -> str:
-    """How much smaller the gap is on data that had no say."""
+def shrink_words(falls: Sequence[tuple[str, str, float, float, float, str]]) -> str:
+    """How much smaller the gap is on data that had no say.
+
+    Args:
+        falls: Per effect: its words, the joint, gap before, gap after, noise floor, unit.
+    """
     parts = []
-    for f in found:
-        share = removed(f.gap_before, f.gap_after, f.noise_floor)
-        closed = "" if share is None else f", {percent(share)} of what could be removed"
+    for effect, joint, before, after, floor, unit in falls:
+        share = removed(before, after, floor)
+        closed = "" if share is None else f", {percent(share)} of what can be removed"
         parts.append(
-            f"with {f.effect} at {place_text(f.place)} it falls from {number(f.gap_before)} to "
-            f"{number(f.gap_after)} {f.unit}{closed} (noise floor {number(f.noise_floor)} {f.unit})"
+            f"with {effect} the gap of {joint} falls from {number(before)} to {number(after)} "
+            f"{unit}{closed} (noise floor {number(floor)} {unit})"
         )
-    return (
-        "**How much smaller:** on data that had no say in the choice the gap shrinks: "
-        f"{'; '.join(parts)}."
-    )
+    return f"**How much smaller:** on data that had no say in the choice, {'; '.join(parts)}."
 
 
 def removed(before: float, after: float, noise: float) -> float | None:
