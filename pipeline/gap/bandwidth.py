@@ -30,6 +30,10 @@ LARGEST_RATIO: Final = 0.5
 LEAST_CUTOFF: Final = 8.0
 
 
+#: Nor above this: a robot's motion does not reach there, resonances of its structure do [Hz].
+MOST_CUTOFF: Final = 30.0
+
+
 def naming_cutoff(model: MachineModel, prepared: Sequence[Prepared]) -> float:
     """The cut-off for naming [Hz], at most that of the prepared logs."""
     now = prepared[0].cutoff
@@ -42,7 +46,7 @@ def naming_cutoff(model: MachineModel, prepared: Sequence[Prepared]) -> float:
             share = min(share, float(np.sqrt(LARGEST_RATIO / max(ratio, 1e-12))))
     longest = max(float(one.time[-1] - one.time[0]) for one in prepared)
     least = max(LEAST_CUTOFF, 4.0 / (LONGEST_KERNEL * longest))
-    return float(min(now, max(share * now, least)))
+    return float(min(now, max(min(share * now, MOST_CUTOFF), least)))
 
 
 def with_encoder_noise(
@@ -82,6 +86,7 @@ def _force_noise(model: MachineModel, one: Prepared, m: Measurement, base: Predi
     raw = one.log.foot_force
     if m.foot_force is None or raw is None or m.standing is None:
         return total
+    # At the log's own rate, where the noise is white.
     flat = np.nan_to_num(raw[one.row]).reshape(len(one), -1)
     lowpass = one.settings.lowpass
     sigma = smoother_noise(

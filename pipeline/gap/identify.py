@@ -112,7 +112,13 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
     intervals = estimates(problem, channel)
     rivals = {r.winner: r.rivals for r in selection.rounds}
     out = []
-    bare = Problem(problem.model, problem.benches, problem.sigma, tolerances=problem.tolerances)
+    bare = Problem(
+        problem.model,
+        problem.benches,
+        problem.sigma,
+        tolerances=problem.tolerances,
+        floor=problem.floor,
+    )
     before = refit(bare)
     for number, a in enumerate(problem.accepted):
         after = refit(bare.with_accepted(problem.accepted[: number + 1]))
@@ -133,7 +139,7 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
                 gap_before=_rms(old, touched, c),
                 gap_after=_rms(new, touched, c),
                 unit=unit,
-                noise_floor=_rms(problem.sigma**2, touched, c),
+                noise_floor=_rms(problem.floor**2, touched, c),
                 excitation=a.effect.excitation,
                 doubtful=_doubt(problem, number),
             )
@@ -208,7 +214,7 @@ def fit_quality(problem: Problem, number: int) -> tuple[float, float]:
     own = np.array([np.diag(sums.H[b])[index] for b in blocks])
     scatter = (gradient**2).sum(axis=0) / np.maximum(own.sum(axis=0), 1e-300)
     squares, _ = errors(problem, (FIT, CHOOSE, PROVE))
-    excess = np.sqrt((squares / problem.sigma**2)[_touched(problem, number)].mean(axis=0)).max()
+    excess = np.sqrt((squares / problem.floor**2)[_touched(problem, number)].mean(axis=0)).max()
     return float(scatter.max()), float(excess)
 
 

@@ -25,6 +25,7 @@ Key = tuple[str, Place]
 _TRIED = 8  # candidates tried in earnest per round
 _NEWTON = 3  # refits after an acceptance
 _HELD = 3.0  # sigmas
+_RESCALED = 1.15  # noise levels that differ by less are the same
 _BEND = 0.3  # largest relative change of a nonlinear parameter in one step
 #: Tolerances in which the prediction bends enough to be taken up into the model.
 _RELINEARISED = ("torque_constant", "resistance", "encoder", "mass", "inertia", "skew")
@@ -83,8 +84,15 @@ def select(problem: Problem) -> Selection:
         scores = score_all(screen, catalogue(problem.current()), skip=held)
         if not first:
             first = tuple(scores)
+            noise = problem.richest()
+            if (noise > _RESCALED * problem.sigma).any():
+                # The log holds more than noise and the catalogue: judge against what is left.
+                problem = refit(problem.rescaled(noise))
+                screen = Screen(problem)
+                scores = score_all(screen, catalogue(problem.current()), skip=held)
+                first = tuple(scores)
         tried = len(first)
-        if len(problem.accepted) >= limits.MOST_EFFECTS:
+        if len(problem.accepted) >= limits.MOST_EFFECTS * len(problem.model.joints):
             break
         open_ = [s for s in scores if (s.effect.name, s.place) not in refused]
         open_ = [s for s in open_ if s.gain > 0.7 * least_gain(problem, s)]

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.gap.derivatives import LowPass
 from pipeline.gap.measurement import Measurement, near_rest
 from pipeline.gap.model import MachineModel
 from pipeline.gap.noise import smoother_noise
@@ -21,6 +22,8 @@ Mask = NDArray[np.bool_]
 REST_SHARE: Final = 0.003
 #: ... and at least this many standard deviations of the velocity's noise.
 REST_SIGMAS: Final = 3.0
+#: Rows kept per period of the cut-off; predictions are made and filtered at this rate.
+ROWS_PER_PERIOD: Final = 10.0
 #: Shortest piece over which scatter is taken, in reaches of the filter to one side.
 PIECE: Final = 3.0
 
@@ -78,31 +81,58 @@ def _observe(
     standing, force = _contact(model, one)
     if standing is not None:
         mask &= ~one.near_event()[:, None]
+    rows, pieces, step = _thinned(one)
+    lowpass = LowPass(one.rate / step, one.cutoff)
+
+    def smooth(x: Array) -> Array:
+        out = np.empty_like(x)
+        for piece in pieces:
+            out[piece] = lowpass.smooth(x[piece])
+        return out
+
+    def kept(x: Array | None) -> Array | None:
+        return None if x is None else x[rows]
+
     return Measurement(
         name=one.log.name,
-        time=one.time,
+        time=one.time[rows],
         joints=one.joints,
-        q=one.q,
-        v=one.v,
-        a=one.a,
+        q=one.q[rows],
+        v=one.v[rows],
+        a=one.a[rows],
         channels=channels,
-        effort=np.nan_to_num(effort),
+        effort=np.nan_to_num(effort[rows]),
         noise=noise,
-        mask=mask,
-        part=part,
-        block=_subdivided(block, one),
-        pieces=one.pieces,
-        lowpass=one.lowpass,
-        kernel=one.settings.lowpass.kernels[0],
+        mask=mask[rows],
+        part=part[rows],
+        block=_subdivided(block, one)[rows],
+        pieces=pieces,
+        lowpass=smooth,
+        kernel=lowpass.kernels[0],
         bandwidth=one.cutoff,
         at_motor=one.log.position_source == "motor",
         rest_speed=rest,
-        base_roll=one.base_roll,
-        base_pitch=one.base_pitch,
-        standing=standing,
-        foot_force=force,
+        base_roll=kept(one.base_roll),
+        base_pitch=kept(one.base_pitch),
+        standing=None if standing is None else standing[rows],
+        foot_force=kept(force),
         sha256=one.log.sha256,
     )
+
+
+def _thinned(one: Prepared) -> tuple[NDArray[np.intp], tuple[slice, ...], int]:
+    """Rows that say all that the bandwidth holds, their pieces, and the step between them.
+
+    A series filtered to a bandwidth repeats itself beyond a few samples per period of the cut-off.
+    """
+    step = max(1, int(one.rate / (ROWS_PER_PERIOD * one.cutoff)))
+    rows, pieces, at = [], [], 0
+    for piece in one.pieces:
+        part = np.arange(piece.start, piece.stop, step)
+        rows.append(part)
+        pieces.append(slice(at, at + part.size))
+        at += part.size
+    return np.concatenate(rows), tuple(pieces), step
 
 
 def _channels(model: MachineModel, one: Prepared) -> tuple[tuple[str, ...], Array, Array]:

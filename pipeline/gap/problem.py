@@ -81,10 +81,11 @@ class Problem:
     Attributes:
         model: Before any effect.
         benches: One per log.
-        sigma: Standard deviation of the noise, shape (J, C).
+        sigma: Standard deviation that residuals are judged against, shape (J, C).
         accepted: Effects in the model, in order.
         tolerances: Always free within their priors.
         held: What the present model holds of each tolerance, in its sigmas.
+        floor: Standard deviation of the noise, shape (J, C).
     """
 
     model: MachineModel
@@ -93,12 +94,15 @@ class Problem:
     accepted: tuple[Accepted, ...] = ()
     tolerances: tuple[Nuisance, ...] = ()
     held: Array = field(default_factory=lambda: np.zeros(0))
+    floor: Array = field(default_factory=lambda: np.zeros(0))
     _columns: dict[object, list[dict[int, Array]]] = field(default_factory=dict)
     _cache: dict[str, object] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.tolerances:
             self.tolerances = nuisances(self.model, [b.measurement for b in self.benches])
+        if self.floor.size == 0:
+            self.floor = self.sigma
         if self.held.size == 0:
             self.held = np.zeros(len(self.tolerances))
 
@@ -342,8 +346,57 @@ class Problem:
         return self.extended(per_log), spans
 
     def rescaled(self, sigma: Array) -> Problem:
-        """The problem with another noise level; columns are computed anew."""
-        return replace(self, sigma=sigma, _columns={}, _cache={})
+        """The problem at another noise level; columns are scaled, not computed anew."""
+        share = self.sigma / sigma
+        columns = {
+            key: [{j: x * share[j] for j, x in column.items()} for column in per_log]
+            for key, per_log in self._columns.items()
+        }
+        other = replace(self, sigma=sigma, _columns=columns, _cache={})
+        other._cache["near"] = self.predictions()
+        return other
+
+    def richest(self) -> Array:
+        """Noise level that even all candidates together would leave, shape (J, C).
+
+        Each joint's residual is fitted with every column computed so far. Where that leaves more
+        than the noise floor, the rest is taken for the machine's own scatter: what explains less
+        than this is not worth a name.
+        """
+        out = self.sigma.copy()
+        for j in range(out.shape[0]):
+            for c in range(out.shape[1]):
+                out[j, c] *= max(1.0, self._left(j, c))
+        return out
+
+    def _left(self, j: int, c: int) -> float:
+        """Root mean square of what is left of one channel, in sigmas."""
+        total = np.zeros((0, 0))
+        moment, square, rows = np.zeros(0), 0.0, 0
+        for log, stack in enumerate(self.stacks()):
+            head = self.head(log)
+            own = [stack.X[j][k][head, c] for k in range(stack.ids[j].size)]
+            for key, per_log in self._columns.items():
+                if isinstance(key, tuple) and key[0] == log and key[1] != "tolerance":
+                    own += [column[j][head, c] for column in per_log if j in column]
+            X = np.stack(own) if own else np.empty((0, head.stop - head.start))
+            r = stack.r[j][head, c]
+            if log == 0:
+                total, moment = np.zeros((len(own), len(own))), np.zeros(len(own))
+            if len(own) == moment.size:
+                total += X @ X.T
+                moment += X @ r
+                square += float(r @ r)
+                good = stack.bench.measurement.mask[stack.bench.rows[head], j]
+                rows += int(good.sum() * stack.bench.weight**2)
+        if rows <= 2 * moment.size or rows == 0:
+            return 1.0
+        scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
+        values, vectors = np.linalg.eigh(total / np.outer(scale, scale))
+        kept = values > 1e-7 * max(float(values.max(initial=0.0)), 1e-300)
+        along = vectors[:, kept].T @ (moment / scale)
+        left = square - float(np.sum(along**2 / values[kept]))
+        return float(np.sqrt(max(left, 0.0) / max(rows - int(kept.sum()), 1)))
 
     def remasked(self) -> Problem:
         """Without rows in which a coupled motor turns back, where its joint does not."""

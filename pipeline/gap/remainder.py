@@ -53,14 +53,12 @@ def remainders(problem: Problem, theta: Array) -> tuple[Remainder, ...]:
                 ]
             )
             proved = proved[np.isfinite(proved)]
-            ratio = float(np.sqrt(np.mean(proved**2))) if proved.size else 0.0
-            significant = ratio > limits.UNEXPLAINED
-            floor = float(problem.sigma[j, c])
+            floor = float(problem.floor[j, c])
+            error = float(np.sqrt(np.mean(proved**2)) * problem.sigma[j, c]) if proved.size else 0.0
+            significant = error > limits.UNEXPLAINED * floor
             text = _describe(problem, rests, j, c) if significant else ""
             out.append(
-                Remainder(
-                    joint, channel, ratio * floor, floor, CHANNEL_UNITS[channel], significant, text
-                )
+                Remainder(joint, channel, error, floor, CHANNEL_UNITS[channel], significant, text)
             )
     return tuple(out)
 
