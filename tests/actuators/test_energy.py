@@ -3,6 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from actuators.build import load_catalog
 from actuators.energy import (
     duration,
     integral,
@@ -39,7 +40,9 @@ def test_stage_energy_of_an_ideal_joint_in_closed_form():
         assert energy.reverse[0] == pytest.approx(10.0, rel=1e-6)
         assert energy.net[0] == pytest.approx(0.0, abs=1e-9)
     electrical = stage_energy(result, "el").net[0]
-    copper = 0.31585 * (5.0 / 400.0 / 0.030185) ** 2 * 2.0 * np.pi
+    motor = CHAINS["ideal"].motor
+    current = 5.0 / 400.0 / motor.torque_constant
+    copper = motor.resistance * current**2 * 2.0 * np.pi
     assert electrical == pytest.approx(copper, rel=1e-9)
 
 
@@ -83,7 +86,12 @@ def test_a_reversal_inside_an_interval_has_to_be_split():
         t = np.linspace(0.0, 3.0, samples)
         return series(t, 0.5 * (t - 1.0) ** 2, t - 1.0, np.ones_like(t), np.full_like(t, 20.0))
 
-    chain = CHAINS["reversible"]
+    catalog = load_catalog()
+    for name, value in (("coulomb", 3.3), ("load", 0.134), ("viscous", 1.05)):
+        catalog = catalog.replaced(f"harmonic_drive.{name}", value)
+    for name, value in (("coulomb", 0.026), ("load", 0.03), ("viscous", 1e-5)):
+        catalog = catalog.replaced(f"timing_belt.{name}", value)
+    chain = catalog.chain("reversible")
     fine = stage_energy(chain.moving(split(line(30002))), "el").forward
     raw = stage_energy(chain.moving(line(12)), "el").forward
     cut = stage_energy(chain.moving(split(line(12))), "el").forward

@@ -73,7 +73,7 @@ def failures(findings: list[Finding]) -> set[str]:
 @pytest.mark.parametrize(
     ("pattern", "replacement", "check"),
     [
-        (r'<mass value="1.3"', '<mass value="-1.3"', "mass positive"),
+        (r'(<link name="lf_femur_link">.*?<mass value=")', r"\1-", "mass positive"),
         (r'ixx="[^"]*"', 'ixx="-0.1"', "inertia positive definite"),
         (r'ixx="[^"]*"', 'ixx="9"', "triangle inequality"),
         (r"<limit[^>]*/>", "", "limits present"),
@@ -103,7 +103,8 @@ def test_a_triangle_at_the_limit_passes(root: Path, tmp_path: Path) -> None:
 def test_broken_symmetry_and_wrong_total_are_found(root: Path, tmp_path: Path) -> None:
     robot_file = (root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")
     path = tmp_path / "own.toml"
-    urdf = edited(root, tmp_path, r'<mass value="1.3"', '<mass value="1.4"')
+    heavier = r'(<link name="lf_femur_link">.*?<mass value=)"[^"]*"'
+    urdf = edited(root, tmp_path, heavier, r'\1"1.77"')
     text = robot_file.replace('build = "hexapod"', "").replace("hexapod.urdf", urdf.name)
     # Without `build` the geometry parameters have no meaning and the feet are given outright.
     keep = ("total_mass", "foot_stroke", "foot_lift", "walking_speed", "gait_period", "gravity")
