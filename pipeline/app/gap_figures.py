@@ -22,7 +22,7 @@ from reports.figures.save import save_figure
 
 Array = NDArray[np.float64]
 #: A stretch of time that a picture can show [s].
-_LONGEST = 4.0
+_LONGEST = 8.0
 #: Ways of sorting in the order in which the map shows them.
 SHOWN = (WHOLE, "phase", "direction", "speed", "load", "power", "reversal", "position", "time")
 TITLES = {WHOLE: "all rows", "power": "joint is"}
@@ -82,7 +82,7 @@ def write_in_time(
     joints: Sequence[int],
     out: Path,
 ) -> None:
-    """Draw `in_time`: the joints over the longest stretch that proves.
+    """Draw `in_time`: the joints around the longest stretch that proves.
 
     Args:
         measurements: One per log.
@@ -106,28 +106,30 @@ def write_in_time(
                 after=series[1][rows, j],
                 noise_floor=float(m.noise[j, 0]),
                 unit=CHANNEL_UNITS[m.channels[0]],
+                proves=m.part[rows] == PROVE,
             )
         )
     figure = gap_time_figure(
         traces,
         title="Measured and predicted, before and after",
-        subtitle=f"log '{m.name}', a stretch that had no say; low-passed at {m.bandwidth:.3g} Hz",
+        subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: had no say",
         channel=m.channels[0],
     )
     save_figure(figure, out, "in_time")
 
 
 def _stretch(measurements: Sequence[Measurement]) -> tuple[int, slice]:
-    """Log and rows of the block of *prove* in which most rows of most joints count."""
+    """Log and rows around the block of *prove* in which most rows of most joints count."""
     best, found = -1.0, (0, slice(0, len(measurements[0])))
     for k, m in enumerate(measurements):
         proving = m.part == PROVE
         edges = np.flatnonzero(np.diff(np.concatenate([[0], proving.astype(np.int8), [0]])))
         for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-            stop = min(stop, start + max(2, int(_LONGEST * m.rate)))
             count = float(m.mask[start:stop].sum())
             if count > best:
-                best, found = count, (k, slice(start, stop))
+                size = max(2, int(_LONGEST * m.rate))
+                first = max(0, min((start + stop - size) // 2, len(m) - size))
+                best, found = count, (k, slice(first, min(first + size, len(m))))
     return found
 
 
@@ -157,11 +159,10 @@ def write_signature(
     label, x = "", []
     rest: list[list[Array]] = [[], []]
     for k, m in enumerate(measurements):
-        rows = m.part == PROVE
         label, values = signature_variable(variable, m, without.predictions[k], joint, place)
-        x.append(values[rows])
+        x.append(values)
         for part, stage in zip(rest, (without, with_), strict=True):
-            part.append(gap_of(m, stage.predictions[k])[rows, joint])
+            part.append(gap_of(m, stage.predictions[k])[:, joint])
     first = measurements[0]
     figure = gap_signature_figure(
         Signature(
@@ -173,7 +174,7 @@ def write_signature(
             CHANNEL_UNITS[first.channels[0]],
         ),
         title=f"{effect} at {first.joints[joint]}",
-        subtitle="on data that had no say; line: mean, band: noise, 2 sigma",
+        subtitle="all compared rows; line: mean, band: noise, 2 sigma",
     )
     save_figure(figure, out, name)
 

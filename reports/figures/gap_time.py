@@ -16,6 +16,7 @@ from reports.figures.style import (
     ORANGE,
     QUIET,
     SHADE,
+    YELLOW,
     headline,
     new_figure,
     number,
@@ -44,6 +45,7 @@ class GapTrace:
         after: Predicted with everything found, shape (N,).
         noise_floor: Standard deviation of the noise.
         unit: Of the channel.
+        proves: Rows that had no say in what was found, shape (N,), shaded; None for all of them.
     """
 
     joint: str
@@ -53,6 +55,7 @@ class GapTrace:
     after: Array
     noise_floor: float
     unit: str
+    proves: NDArray[np.bool_] | None = None
 
 
 @styled
@@ -72,7 +75,7 @@ def gap_time_figure(
     """
     if not 1 <= len(traces) <= 3:
         raise FigureError(f"gap in time: {len(traces)} joints; give 1 to 3")
-    figure = new_figure(3.6 * len(traces) + 2.2, 5.0)
+    figure = new_figure(max(3.8 * len(traces) + 1.0, 8.6), 5.0)
     axes = figure.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.0))
     for k, trace in enumerate(traces):
         _trace(axes[0, k], axes[1, k], _thinned(trace), channel, first=k == 0)
@@ -90,6 +93,7 @@ def _thinned(trace: GapTrace) -> GapTrace:
         measured=trace.measured[::every],
         before=trace.before[::every],
         after=trace.after[::every],
+        proves=None if trace.proves is None else trace.proves[::every],
     )
 
 
@@ -104,9 +108,16 @@ def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: boo
     left_before, left_after = trace.measured - trace.before, trace.measured - trace.after
     bottom.plot(t, left_before, color=ORANGE, linewidth=1.0)
     bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
-    rms = [float(np.sqrt(np.nanmean(x**2))) for x in (left_before, left_after)]
+    kept = np.ones(t.size, dtype=np.bool_)
+    if trace.proves is not None and np.isfinite(left_after[trace.proves]).any():
+        kept = trace.proves
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(np.int8), [0]])))
+        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            for ax in (top, bottom):
+                ax.axvspan(t[start], t[stop - 1], color=YELLOW, alpha=0.18, linewidth=0, zorder=0)
+    rms = [float(np.sqrt(np.nanmean(x[kept] ** 2))) for x in (left_before, left_after)]
     bottom.set_title(
-        f"gap {number(rms[0])} before, {number(rms[1])} after; band: noise, 2 sigma",
+        f"gap {number(rms[0])} before, {number(rms[1])} after; grey: noise, 2 sigma",
         fontsize=8,
         color=QUIET,
     )

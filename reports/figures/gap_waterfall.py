@@ -23,6 +23,9 @@ from reports.figures.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+#: A change below this share of the whole gap is none.
+_NOTHING = 0.003
+
 
 @dataclass(frozen=True)
 class GapStep:
@@ -72,7 +75,10 @@ def gap_waterfall_figure(
         ax.barh(k, old - new, left=new, color=GREEN if new < old else ORANGE, height=0.62)
         ax.plot([old, old], [k - 1 + 0.31, k - 0.31], color=QUIET, linewidth=0.8)
         sign = "\N{MINUS SIGN}" if new <= old else "+"
-        ax.text(max(old, new), k, f" {sign}{number(abs(old - new))}", va="center", fontsize=8.5)
+        change = f"{sign}{number(abs(old - new), 2)}"
+        if abs(new - old) < _NOTHING * before:
+            change = "0"
+        ax.text(max(old, new), k, f" {change}", va="center", fontsize=8.5)
     last = len(labels) - 1
     ax.barh(last, gaps[-1], color=BLUE, height=0.62)
     if last > 1:

@@ -1,0 +1,113 @@
+"""A whole run of `gap` on the shipped demonstration, and what its files promise."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from pipeline.app.demo import DEMO, HIDDEN
+from pipeline.gap.model_file import load_model, read_model_file
+from tests.app.conftest import exit_code, rows_of, sidecar_of
+
+COLUMNS = {
+    "quality": "log column check value unit verdict detail",
+    "candidates": "effect joint place heldout_before heldout_after unit identifiable verdict "
+    "reason",
+    "found": "order effect joint parameter value ci_low ci_high unit gap_before gap_after gap_unit "
+    "noise_floor",
+}
+FIGURES = ("where_map", "waterfall", "in_time", "effect_1_coulomb_friction")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, root: Path) -> tuple[int, Path]:
+    out = tmp_path_factory.mktemp("gap")
+    robot = root / "urdf" / "hexapod.toml"
+    return exit_code(["gap", str(DEMO), "--robot", str(robot), "--out", str(out)]), out
+
+
+def test_the_demonstration_names_what_was_hidden(run: tuple[int, Path]) -> None:
+    code, out = run
+    assert code == 0
+    rows = rows_of(out / "found.csv")
+    assert {(r["effect"], r["joint"]) for r in rows} == {(HIDDEN.effect, HIDDEN.place[0])}
+    for row in rows:
+        truth = HIDDEN.parameters[row["parameter"]]
+        assert float(row["ci_low"]) <= truth <= float(row["ci_high"])
+        assert float(row["gap_after"]) < 1.6 * float(row["noise_floor"])
+
+
+@pytest.mark.parametrize("name", COLUMNS)
+def test_tables_have_the_promised_columns(run: tuple[int, Path], name: str) -> None:
+    _, out = run
+    with (out / f"{name}.csv").open(encoding="utf-8", newline="") as file:
+        assert next(csv.reader(file)) == COLUMNS[name].split()
+    meta = sidecar_of(out / f"{name}.csv")
+    assert "walk.parquet" in meta["inputs_sha256"]
+    assert str(out) not in (out / f"{name}.meta.json").read_text(encoding="utf-8")
+
+
+def test_pictures_and_page_are_there(run: tuple[int, Path]) -> None:
+    _, out = run
+    for name in FIGURES:
+        assert (out / f"{name}.png").stat().st_size > 5000
+        assert (out / f"{name}.svg").is_file()
+    report = (out / "report.md").read_text(encoding="utf-8")
+    first = report.split("##")[0]
+    for word in ("rm_joint_1", "coulomb_friction", "N*m", "95 %", "J", "noise"):
+        assert word in first
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    assert "data:image/svg+xml" in page
+
+
+def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: Path) -> None:
+    _, out = run
+    file = read_model_file(out / "model.toml")
+    (edit,) = file.edits
+    assert edit.effect == HIDDEN.effect
+    assert edit.basis == "identified"
+    assert not file.changed
+    found = {r["parameter"]: float(r["value"]) for r in rows_of(out / "found.csv")}
+    assert edit.values == pytest.approx(found, rel=1e-12)
+    assert load_model(out / "model.toml").actuator("rm_joint_1").elements[0].name == HIDDEN.effect
+    text = tomllib.loads((out / "model.toml").read_text(encoding="utf-8"))
+    assert not Path(text["robot"]["file"]).is_absolute()
+    model = ["--model", str(out / "model.toml")]
+    for verb in ("walk", "stand"):
+        assert exit_code([verb, *model, "--out", str(tmp_path)]) == 0
+    losses = rows_of(tmp_path / "walking_losses.csv")
+    added = [r for r in losses if r["element"] == HIDDEN.effect and float(r["loss_J"]) > 0]
+    assert {(r["alternative"], r["joint"]) for r in added} == {
+        (name, "rm_joint_1") for name in ("rotor", "reversible", "irreversible")
+    }
+    assert "model.toml" in sidecar_of(tmp_path / "walking_losses.csv")["inputs_sha256"]
+
+
+def test_a_stored_model_is_checked_against_a_log(
+    run: tuple[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out = run
+    arguments = ["gap", "shrink", str(DEMO), "--model", str(out / "model.toml")]
+    assert exit_code([*arguments, "--out", str(tmp_path)]) == 0
+    (row,) = rows_of(tmp_path / "found.csv")
+    assert float(row["gap_after"]) < 0.1 * float(row["gap_before"])
+    assert not (tmp_path / "model.toml").exists()
+    assert "falls from" in capsys.readouterr().out
+
+
+def test_where_gives_the_same_bytes_twice(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        assert exit_code(["gap", "where", str(DEMO), "--out", str(tmp_path / name)]) == 0
+    files = sorted(p.name for p in (tmp_path / "one").iterdir())
+    assert files == sorted(p.name for p in (tmp_path / "two").iterdir())
+    for name in files:
+        one, two = ((tmp_path / folder / name).read_bytes() for folder in ("one", "two"))
+        assert one == two, name
+    rows = rows_of(tmp_path / "one" / "where.csv")
+    assert rows[0]["joint"] == HIDDEN.place[0]
+    shares = [float(r["share_of_total"]) for r in rows if r["by"] == "joint"]
+    assert sum(shares) == pytest.approx(1.0)
