@@ -37,6 +37,8 @@ class Editing(Protocol):
         """The changed model."""
 
 
+#: Key among nonlinear parameters: how many of its small steps a column reaches across.
+REACH = "reach"
 #: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
 ROWS_PER_PERIOD = 4.0
 #: Most informative rows of all logs together.
@@ -160,6 +162,8 @@ def effect_columns(
         sigma: Shape (J, C).
         at: Coordinates to differentiate at; zero by default.
     """
+    shape = dict(shape)
+    reach = shape.pop(REACH, 1.0)
     zero = dict.fromkeys((c.name for c in effect.coordinates), 0.0)
     centre = zero | dict(at or {})
     start = (
@@ -167,9 +171,10 @@ def effect_columns(
     )
     out = []
     for c in effect.coordinates:
-        moved = centre | {c.name: centre[c.name] + c.step}
+        step = reach * c.step
+        moved = centre | {c.name: centre[c.name] + step}
         change = bench.simulator.difference(start, _edit(effect, base, place, moved, shape))
-        out.append(bench.whitened(change.effort / c.step, change.joints, sigma))
+        out.append(bench.whitened(change.effort / step, change.joints, sigma))
     return out
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,7 +145,7 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
             )
         )
         before = after
-    return tuple(out)
+    return _second_thoughts(problem, out)
 
 
 def _rms(squares: Array, joints: Sequence[int], channel: int) -> float:
@@ -201,6 +201,26 @@ def _doubt(problem: Problem, number: int) -> str:
             "machine"
         )
     return ""
+
+
+def _second_thoughts(problem: Problem, found: list[Found]) -> tuple[Found, ...]:
+    """Doubt names that share a joint with what is doubtful or has closed nothing."""
+    out = []
+    for number, f in enumerate(found):
+        effect = problem.accepted[number].effect
+        idle = f.gap_after > limits.IDLE * f.gap_before and not effect.is_tolerance
+        _, excess = fit_quality(problem, number)
+        if not f.doubtful and idle and excess > limits.UNEXPLAINED:
+            f = replace(f, doubtful="it closes none of the gap on data that had no say")
+        out.append(f)
+    shaken = {j for k, f in enumerate(out) if f.doubtful for j in _touched(problem, k)}
+    for k, f in enumerate(out):
+        _, excess = fit_quality(problem, k)
+        near = shaken & set(_touched(problem, k))
+        if near and not f.doubtful and excess > limits.UNEXPLAINED:
+            joints = ", ".join(problem.model.joints[j] for j in sorted(near))
+            out[k] = replace(f, doubtful=f"what else was found in {joints} is doubtful itself")
+    return tuple(out)
 
 
 def fit_quality(problem: Problem, number: int) -> tuple[float, float]:

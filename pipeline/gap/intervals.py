@@ -4,8 +4,8 @@ Blocks of *fit* and *choose* are drawn with replacement and the linearised probl
 for each draw, all tolerances free within their priors. Nonlinear parameters (order of a ripple,
 Stribeck speed) have a column of their own here. With few blocks a bootstrap is too narrow: the
 spread is widened to what noise alone would give where that is more. Two things a log cannot know
-are added: that a law holds to about one per cent (`LAW`), and, for an effect that every machine has
-in small, how much of it is the machine's tolerance.
+are added: that a law holds to about one per cent (`LAW`), and how much of a delay is the skew of
+sampling.
 """
 
 from __future__ import annotations
@@ -75,7 +75,9 @@ def _estimate(
     value = float(best[name])
     if name not in a.shape and name != "phase":
         tolerance = a.effect.tolerance(model, a.place).get(name, 0.0)
-        extra = 1.96 * float(np.hypot(LAW * value, tolerance if a.effect.is_tolerance else 0.0))
+        extra = 1.96 * float(
+            np.hypot(LAW * value, tolerance if a.effect.name == "time_delay" else 0.0)
+        )
         low, high = value - np.hypot(value - low, extra), value + np.hypot(high - value, extra)
         bounds = next(p for p in a.effect.parameters if p.name == name)
         low, high = max(low, bounds.low), min(high, bounds.high)

@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.gap import verdict as limits
+from pipeline.gap.columns import REACH
 from pipeline.gap.effects.base import Effect, Place
-from pipeline.gap.effects.registry import catalogue
+from pipeline.gap.effects.registry import catalogue, effect_named
+from pipeline.gap.effects.transmission_coupling import BareCoupling
 from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.problem import Accepted, Problem
 from pipeline.gap.screen import Score, Screen, refine, score_all
@@ -25,6 +27,8 @@ Key = tuple[str, Place]
 _TRIED = 8  # candidates tried in earnest per round
 _NEWTON = 3  # refits after an acceptance
 _HELD = 3.0  # sigmas
+_INFLATION = 10.0  # of gains, at most
+_CONTRIBUTION = 3.0  # largest part of an effort one effect may have, in its RMS
 _RESCALED = 1.15  # noise levels that differ by less are the same
 _BEND = 0.3  # largest relative change of a nonlinear parameter in one step
 #: Tolerances in which the prediction bends enough to be taken up into the model.
@@ -96,25 +100,36 @@ def select(problem: Problem) -> Selection:
             break
         open_ = [s for s in scores if (s.effect.name, s.place) not in refused]
         open_ = [s for s in open_ if s.gain > 0.7 * least_gain(problem, s)]
-        best = [refine(screen, s) for s in open_[:_TRIED]]
-        made = [try_candidate(problem, s) for s in best]
+        # A coupling brings a shaft with friction and inertia along: each joint's own come first.
+        own = [s for s in open_ if not isinstance(s.effect, BareCoupling)]
+        coupled = [s for s in open_ if isinstance(s.effect, BareCoupling)]
+        made, good = [], []
+        for group in (own, coupled):
+            tries = [try_candidate(problem, refine(screen, s)) for s in group[:_TRIED]]
+            made += tries
+            good = [t for t in tries if acceptable(problem, t, tried)]
+            if good:
+                break
         for t in made:
             trials.setdefault(t.key, t)
-        good = [t for t in made if acceptable(problem, t, tried)]
         if not good:
             break
         winner = _preferred(problem, good)
         rivals = _rivals(problem, winner, made)
-        added = Accepted(
-            winner.score.effect, winner.score.place, winner.score.x, winner.score.shape
-        )
+        shape = {k: v for k, v in winner.score.shape.items() if k != REACH}
+        added = Accepted(winner.score.effect, winner.score.place, winner.score.x, shape)
         candidate = refit(problem.with_accepted([*problem.accepted, added]).remasked())
         candidate = _pruned(candidate)
+        if _runs_away(candidate):
+            refused.add(winner.key)
+            continue
         if not any(a.effect is added.effect and a.place == added.place for a in candidate.accepted):
             refused.add(winner.key)
             continue
         rounds.append(Round(winner.key, winner, rivals))
         problem = candidate
+    problem, renamed = _specialised(problem)
+    rounds = [replace(r, winner=renamed.get(r.winner, r.winner)) for r in rounds]
     kept = {(a.effect.name, a.place) for a in problem.accepted}
     rounds = [r for r in rounds if r.winner in kept]
     return Selection(problem, tuple(rounds), first, tuple(scores), trials, tried)
@@ -153,16 +168,21 @@ def acceptable(problem: Problem, t: Trial, tried: int) -> bool:
     return t.gain > least and t.held_out > 0.0 and t.significance > alarm
 
 
-def _threshold(gain: float) -> float:
-    """Difference of gains below which two explanations count as equally good."""
-    return max(limits.RIVAL_GAIN, limits.RIVAL_SHARE * gain)
+def _threshold(t: Trial) -> float:
+    """Difference of gains below which two explanations count as equally good.
+
+    Where blocks scatter more than noise lets them, so do gains.
+    """
+    inflation = max(1.0, t.gain / max(t.significance, 1e-9)) if t.significance > 0 else 1.0
+    inflation = 1.0 if t.score.effect.is_tolerance else min(inflation, _INFLATION)
+    return max(limits.RIVAL_GAIN * inflation * max(t.scale, 1.0), limits.RIVAL_SHARE * t.gain)
 
 
 def _preferred(problem: Problem, good: Sequence[Trial]) -> Trial:
     """The best candidate; of a family the most specific member that does as well."""
     winner = max(good, key=lambda t: t.gain)
     accepted = {(a.effect.name, a.place) for a in problem.accepted}
-    near = [t for t in good if winner.gain - t.gain < _threshold(winner.gain)]
+    near = [t for t in good if winner.gain - t.gain < _threshold(winner)]
 
     def cost(t: Trial) -> tuple[int, float]:
         # What takes the place of an accepted special case costs one effect less.
@@ -176,7 +196,7 @@ def _rivals(problem: Problem, winner: Trial, made: Sequence[Trial]) -> tuple[Key
     """Candidates that explain the same part of the log as well as the winner."""
     out = []
     for t in made:
-        if t is winner or winner.gain - t.gain >= _threshold(winner.gain):
+        if t is winner or winner.gain - t.gain >= _threshold(winner):
             continue
         if _related(winner.score.effect, t.score.effect) and winner.score.place == t.score.place:
             continue
@@ -243,8 +263,60 @@ def _pruned(problem: Problem) -> Problem:
     return problem
 
 
+def _runs_away(problem: Problem) -> bool:
+    """Whether some effect takes what another gives: a direction that the log does not hold."""
+    for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
+        m = bench.measurement
+        size = np.sqrt(np.mean(m.effort**2, axis=0))  # (J, C)
+        for k in range(len(problem.accepted)):
+            others = [a for i, a in enumerate(problem.accepted) if i != k]
+            without = problem.with_accepted(others).current()
+            change = bench.simulator.difference(prediction, without)
+            for column, j in enumerate(change.joints):
+                part = np.sqrt(np.mean(change.effort[:, column] ** 2, axis=0))
+                if (part > _CONTRIBUTION * size[j]).any():
+                    return True
+    return False
+
+
+def _specialised(problem: Problem) -> tuple[Problem, dict[Key, Key]]:
+    """With special cases in place of general effects whose further parameters earn nothing."""
+    renamed: dict[Key, Key] = {}
+    for number in range(len(problem.accepted)):
+        a = problem.accepted[number]
+        present = {(o.effect.name, o.place) for o in problem.accepted}
+        sums = problem.sums()
+        both = sums.blocks(FIT, CHOOSE)
+        now = sums.objective(sums.solve(both), both)
+        scale = float(sums.loss(sums.solve(both), both).sum()) / max(
+            float(sums.count[both].sum()), 1.0
+        )
+        for name in a.effect.contains:
+            if (name, a.place) in present:
+                continue
+            special = effect_named(name)
+            others = [o for k, o in enumerate(problem.accepted) if k != number]
+            screen = Screen(problem.with_accepted(others))
+            score = screen.score(special, a.place, {})
+            if score is None or score.gain <= 0.0:
+                continue
+            moved = list(problem.accepted)
+            moved[number] = Accepted(special, a.place, score.x, {})
+            simple = refit(problem.with_accepted(moved))
+            after = simple.sums()
+            theta = after.solve(both)
+            if after.objective(theta, both) - now < limits.RIVAL_GAIN * max(scale, 1.0):
+                renamed[(a.effect.name, a.place)] = (name, a.place)
+                problem = simple
+                break
+    return problem, renamed
+
+
 def _needed(problem: Problem, number: int) -> tuple[float, float]:
     """Rise of the penalised misfit without one effect, and the least that keeps it."""
+    own = problem.accepted[number]
+    if all(own.x[c.name] == 0.0 for c in own.effect.coordinates):
+        return 0.0, 1.0
     sums = problem.sums()
     both = sums.blocks(FIT, CHOOSE)
     a, span = problem.accepted[number], problem.span(number)

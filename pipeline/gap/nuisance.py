@@ -33,7 +33,7 @@ RESISTANCE_TOLERANCE: Final = 0.02  # of a winding [1]
 #: Friction that the actuator's files state already [1].
 FRICTION_TOLERANCE: Final = 0.005
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
-OFFSET_SIGMAS: Final = 0.5
+OFFSET_SIGMAS: Final = 0.75
 
 
 @dataclass(frozen=True)

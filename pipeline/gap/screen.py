@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.gap.block_sums import inverse_spd
+from pipeline.gap.columns import REACH
 from pipeline.gap.effects.base import Effect, Place
 from pipeline.gap.effects.torque_ripple import TorqueRipple
 from pipeline.gap.measurement import CHOOSE, FIT
@@ -228,6 +229,8 @@ def score_all(
                 shapes = screen.ripple_orders(effect, model.index(place[0]))
             else:
                 shapes = effect.shapes(model, m, place)
+            if effect.reaches != (1.0,):
+                shapes = [{**shape, REACH: r} for shape in shapes for r in effect.reaches]
             scores = [s for shape in shapes if (s := screen.score(effect, place, shape))]
             if scores:
                 out.append(max(scores, key=lambda s: s.gain))

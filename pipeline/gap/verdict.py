@@ -41,6 +41,8 @@ LARGEST_EXCESS: Final = 1.12
 SUSPECT_SCATTER: Final = 2.5
 #: Remaining error over the noise floor, in the naming channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
+#: A name that leaves more than this share of the gap on *prove* has closed nothing.
+IDLE: Final = 0.95
 #: Effects that one log may be found to lack, per joint.
 MOST_EFFECTS: Final = 4
 

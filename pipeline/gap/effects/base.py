@@ -65,6 +65,7 @@ class Effect(ABC):
         signature: Variable against which its residual shows, a key of `signature.VARIABLES`.
         excitation: The motion that shows it, in words.
         is_tolerance: Whether every machine has it in small, as a tolerance that is always free.
+        reaches: Multiples of the coordinates' steps to look across, where the prediction bends.
         contains: Effects that are special cases of this one at the same place.
     """
 
@@ -75,6 +76,7 @@ class Effect(ABC):
     signature: ClassVar[str] = "velocity"
     excitation: ClassVar[str]
     is_tolerance: ClassVar[bool] = False
+    reaches: ClassVar[tuple[float, ...]] = (1.0,)
     contains: ClassVar[tuple[str, ...]] = ()
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

@@ -24,6 +24,7 @@ class JointElasticity(Effect):
     coordinates: ClassVar = (Coordinate("compliance", 1e-6),)
     signature = "torque rate"
     is_tolerance = True
+    reaches: ClassVar = (1.0, 100.0, 600.0)
     excitation = "changes its torque fast: accelerates, brakes and steps hard"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:

@@ -22,6 +22,7 @@ class TimeDelay(Effect):
     coordinates: ClassVar = (Coordinate("delay", 2e-4, signed=True),)
     signature = "effort rate"
     is_tolerance = True
+    reaches: ClassVar = (1.0, 20.0, 60.0, 150.0)
     excitation = "changes its torque fast: accelerates, brakes and reverses"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
