@@ -29,6 +29,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, root: Path) -> tuple[int, Path
     return exit_code(["gap", str(DEMO), "--robot", str(robot), "--out", str(out)]), out
 
 
+@pytest.mark.slow
 def test_the_demonstration_names_what_was_hidden(run: tuple[int, Path]) -> None:
     code, out = run
     assert code == 0
@@ -40,6 +41,7 @@ def test_the_demonstration_names_what_was_hidden(run: tuple[int, Path]) -> None:
         assert float(row["gap_after"]) < 1.6 * float(row["noise_floor"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", COLUMNS)
 def test_tables_have_the_promised_columns(run: tuple[int, Path], name: str) -> None:
     _, out = run
@@ -50,6 +52,7 @@ def test_tables_have_the_promised_columns(run: tuple[int, Path], name: str) -> N
     assert str(out) not in (out / f"{name}.meta.json").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_pictures_and_page_are_there(run: tuple[int, Path]) -> None:
     _, out = run
     for name in FIGURES:
@@ -64,6 +67,7 @@ def test_pictures_and_page_are_there(run: tuple[int, Path]) -> None:
     assert "data:image/svg+xml" in page
 
 
+@pytest.mark.slow
 def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: Path) -> None:
     _, out = run
     file = read_model_file(out / "model.toml")
@@ -87,6 +91,7 @@ def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: 
     assert "model.toml" in sidecar_of(tmp_path / "walking_losses.csv")["inputs_sha256"]
 
 
+@pytest.mark.slow
 def test_a_stored_model_is_checked_against_a_log(
     run: tuple[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
