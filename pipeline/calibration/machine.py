@@ -90,7 +90,7 @@ def leg_joints(spec: RobotSpec, leg: str) -> tuple[str, ...]:
     return next(entry.joints for entry in spec.legs if entry.name == leg)
 
 
-def solve_posture(spec: RobotSpec, target: Array, free: tuple[str, ...] = POSTURE) -> RobotSpec:
+def solve_posture(spec: RobotSpec, target: Array) -> RobotSpec:
     """Place joint 2, the body's height and the trunk's mass so that standing comes out as printed.
 
     Statics of the loaded leg in its frontal plane, x outboard, R the reaction, phi the tibia's tilt
@@ -104,7 +104,6 @@ def solve_posture(spec: RobotSpec, target: Array, free: tuple[str, ...] = POSTUR
     Args:
         spec: The robot.
         target: Reaction [N], torque of joint 2 and of joint 3 [N*m].
-        free: Which of `POSTURE` to move; each serves the target of the same place.
 
     Raises:
         CalibrationError: No posture meets the targets.
@@ -117,36 +116,30 @@ def solve_posture(spec: RobotSpec, target: Array, free: tuple[str, ...] = POSTUR
     cosine = (torque_2 - torque_3) / ((weight_f * p["femur_com"] + weight_t - reaction) * femur)
     if not (abs(sine) < 1 and 0 < cosine < 1):
         raise CalibrationError("no posture of the robot gives the torques of Table III")
-    solved = {
+    placed = {
         "joint_2_lateral": p["robot_width"] / 2 - femur * cosine - tibia * sine,
         "body_height": tibia * math.sqrt(1 - sine**2) - femur * math.sqrt(1 - cosine**2),
     }
-    spec = spec.with_parameters({k: v for k, v in solved.items() if k in free})
-    if "trunk_com_left" in free:
-        shifts = (0.0, 0.01)
-        found = [standing_state(spec.with_parameters({"trunk_com_left": x}))[1] for x in shifts]
-        slope = (found[1] - found[0]) / (shifts[1] - shifts[0])
-        shift = (reaction - found[0]) / slope
-        spec = spec.with_parameters({"trunk_com_left": shift})
-    return spec
+    spec = spec.with_parameters(placed)
+    shifts = (0.0, 0.01)
+    found = [standing_state(spec.with_parameters({"trunk_com_left": x}))[1] for x in shifts]
+    slope = (found[1] - found[0]) / (shifts[1] - shifts[0])
+    return spec.with_parameters({"trunk_com_left": (reaction - found[0]) / slope})
 
 
-def robot_part(
-    spec: RobotSpec, values: Mapping[str, float], target: Array, free: tuple[str, ...] = POSTURE
-) -> RobotPart:
+def robot_part(spec: RobotSpec, values: Mapping[str, float], target: Array) -> RobotPart:
     """Solve the posture and walk one cycle.
 
     Args:
         spec: The robot file.
         values: Free numbers; those of the robot are applied.
         target: As for `solve_posture`.
-        free: As for `solve_posture`.
 
     Raises:
         PipelineError: Out of reach, tipping, or no posture meets the targets.
     """
     own = {key.split(".")[1]: v for key, v in values.items() if key.startswith(ROBOT + ".")}
-    return part_of(solve_posture(spec.with_parameters(own), target, free))
+    return part_of(solve_posture(spec.with_parameters(own), target))
 
 
 def part_of(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:

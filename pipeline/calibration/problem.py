@@ -18,7 +18,6 @@ from actuators.build import Catalog
 from actuators.limits import limit_rows
 from actuators.units import to_si
 from pipeline.calibration.machine import (
-    POSTURE,
     ROBOT,
     ActuatorPart,
     RobotPart,
@@ -37,6 +36,9 @@ Array = NDArray[np.float64]
 #: Rows met exactly by solving the posture.
 EXACT = ("standing_reaction_rm", "standing_torque_2", "standing_torque_3")
 EXTRA = "walking_extra_J"
+#: Fitted rows whose half width is mere rounding: any value within it is as good as another.
+ROUNDED = ("ideal_current_2", "ideal_voltage_2", "rotor_motor_torque_2")
+_INSIDE = 1.0  # half widths, within which a rounded row pulls at nothing
 _STEEP = 200.0  # residual per relative excess over a motor limit
 _STEP = 1e-4  # of a prior standard deviation, for derivatives
 
@@ -78,6 +80,7 @@ class Problem:
         published: All printed values.
         standing_legs: How many middle legs Fig. 21 counts as loaded.
         without: A target left out, or None.
+        posture_offset: Added to the reaction [N] and the torques [N*m] that fix the posture.
     """
 
     spec: RobotSpec
@@ -86,6 +89,7 @@ class Problem:
     published: Mapping[str, Published]
     standing_legs: int = 1
     without: str | None = None
+    posture_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     _robots: dict[bytes, RobotPart] = field(default_factory=dict, repr=False)
 
     @property
@@ -117,12 +121,8 @@ class Problem:
         if key not in self._robots:
             if len(self._robots) > 64:
                 self._robots.clear()
-            free = tuple(
-                name for name, row in zip(POSTURE, EXACT, strict=True) if row != self.without
-            )
-            self._robots[key] = robot_part(
-                self.spec, self.prior.values(z), standing_targets(self.published), free
-            )
+            goal = standing_targets(self.published) + np.array(self.posture_offset)
+            self._robots[key] = robot_part(self.spec, self.prior.values(z), goal)
         return self._robots[key]
 
     def evaluate(self, z: Array) -> Evaluation:
@@ -143,19 +143,26 @@ class Problem:
                 excess[key] = max(excess.get(key, -1.0), row.peak / row.limit - 1)
         return Evaluation(values, excess, robot, actuators)
 
-    def residuals(self, z: Array, centre: Array, *, pull: float, goal: Array | float) -> Array:
+    def residuals(self, z: Array, centre: Array, *, pull: float, goal: Array | None) -> Array:
         """Residual vector at z.
 
         Args:
             z: Coordinates (D,).
             centre: Coordinates whose neighbourhood is sought: 0 for the prior's centre.
             pull: Weight of the distance from the printed values, per half width.
-            goal: Where to aim, in half widths from the printed values: 0, or (T,).
+            goal: Where to aim, in half widths from the printed values, (T,). None aims at the
+                printed values, rounded ones anywhere within their rounding.
         """
         point = self.evaluate(z)
         error = np.array([(point.values[t.name] - t.centre) / t.half_width for t in self.targets])
+        if goal is None:
+            rounded = np.array([t.name in ROUNDED for t in self.targets])
+            free = np.sign(error) * np.maximum(np.abs(error) - _INSIDE, 0.0)
+            error = np.where(rounded, free, error)
+        else:
+            error = error - goal
         limits = _STEEP * np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
-        return np.concatenate([z - centre, pull * (error - goal), limits])
+        return np.concatenate([z - centre, pull * error, limits])
 
     def solve(
         self,
@@ -164,7 +171,7 @@ class Problem:
         *,
         columns: NDArray[np.intp],
         pull: float,
-        goal: Array | float = 0.0,
+        goal: Array | None = None,
         evaluations: int = 40,
     ) -> Array:
         """Least-squares solution in some of the coordinates, the others staying at `start`.

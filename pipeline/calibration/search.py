@@ -31,6 +31,7 @@ PATHS = ("cubic", "harmonic", "quintic", "cycloid")
 _PULL = 3.0  # the nearest point: a third of a half width counts like one prior sigma
 _FIRM = 8.0  # a member of the ensemble: close to its own goal
 _STRICT = 60.0  # whether a reading can be met at all: the prior hardly counts
+_DRAWN = (4.5, 0.15, 0.04)  # half ranges for a left-out reaction [N] and torques 2, 3 [N*m]
 _SPAN = 0.85  # goals of members spread over this part of the half widths
 
 
@@ -158,12 +159,11 @@ def left_out(
 def _moved_draw(task: Problem, path: str, rng: np.random.Generator) -> dict[str, Any]:
     z0 = task.prior.draw(rng)
     if task.without in EXACT:
-        # The posture number that serves this target is then free: draw it, too.
-        name = ("trunk_com_left", "joint_2_lateral", "body_height")[EXACT.index(task.without)]
-        entry = task.spec.parameters.parameter(name)
-        assert entry.interval is not None
-        low, high = entry.interval
-        task.spec = task.spec.with_parameters({name: float(rng.uniform(low, high))})
+        # The posture is then solved for a drawn value; the other rows decide whether it passes.
+        i = EXACT.index(task.without)
+        offset = [0.0, 0.0, 0.0]
+        offset[i] = float(rng.uniform(-_DRAWN[i], _DRAWN[i]))
+        task.posture_offset = (offset[0], offset[1], offset[2])
     goal = rng.uniform(-_SPAN, _SPAN, len(task.targets))
     try:
         task.robot(z0)  # a body that cannot stand as printed is not worth a search
