@@ -6,7 +6,7 @@ identity, and that is how the simulation knows what need not be computed again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -140,6 +140,7 @@ class MachineModel:
         floating: Whether the base floats.
         bodies: Changes of bodies, ground and contact.
         actuators: One per joint.
+        links: Moving link's name to the joint that carries it.
     """
 
     name: str
@@ -150,6 +151,7 @@ class MachineModel:
     floating: bool
     bodies: Bodies = field(default_factory=Bodies)
     actuators: tuple[JointModel, ...] = ()
+    links: Mapping[str, str] = field(default_factory=dict)
 
     def index(self, joint: str) -> int:
         """Column of a joint.
@@ -174,14 +176,9 @@ class MachineModel:
         """The same with other bodies, ground or contact."""
         return replace(self, bodies=bodies)
 
-    @property
-    def links(self) -> dict[str, str]:
-        """Moving link's name to the joint that carries it."""
-        out = {}
-        for index in range(1, len(self.rigid.names)):
-            if self.rigid.inertias[index].mass > 0:
-                out[link_name(self.rigid, index)] = str(self.rigid.names[index])
-        return out
+    def __post_init__(self) -> None:
+        if not self.links:
+            object.__setattr__(self, "links", _links(self.rigid))
 
     def carrier(self, link: str) -> str:
         """Joint that carries a link.
@@ -189,10 +186,19 @@ class MachineModel:
         Raises:
             ModelError: No moving link of that name.
         """
-        links = self.links
-        if link not in links:
-            raise ModelError(f"{self.name}: no moving link '{link}'; {closest(link, list(links))}")
-        return links[link]
+        if link not in self.links:
+            raise ModelError(
+                f"{self.name}: no moving link '{link}'; {closest(link, list(self.links))}"
+            )
+        return self.links[link]
+
+
+def _links(rigid: pin.Model) -> dict[str, str]:
+    out = {}
+    for index in range(1, len(rigid.names)):
+        if rigid.inertias[index].mass > 0:
+            out[link_name(rigid, index)] = str(rigid.names[index])
+    return out
 
 
 def link_name(model: pin.Model, joint: int) -> str:
