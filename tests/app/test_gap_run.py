@@ -6,9 +6,10 @@ import csv
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from pipeline.app.demo import DEMO, HIDDEN
+from pipeline.app.demo import DEMO, HIDDEN, write_demo
 from pipeline.gap.model_file import load_model, read_model_file
 from tests.app.conftest import exit_code, rows_of, sidecar_of
 
@@ -116,3 +117,15 @@ def test_where_gives_the_same_bytes_twice(tmp_path: Path) -> None:
     assert rows[0]["joint"] == HIDDEN.place[0]
     shares = [float(r["share_of_total"]) for r in rows if r["by"] == "joint"]
     assert sum(shares) == pytest.approx(1.0)
+
+
+def test_the_shipped_log_is_of_the_shipped_robot(tmp_path: Path) -> None:
+    """A changed robot file or catalogue asks for `python -m pipeline.app.demo`."""
+    import pyarrow.parquet as pq
+
+    shipped, anew = (
+        pq.read_table(p).to_pandas() for p in (DEMO, write_demo(tmp_path / "walk.parquet"))
+    )
+    assert list(shipped) == list(anew)
+    assert len(shipped) == len(anew)
+    np.testing.assert_allclose(shipped.to_numpy(), anew.to_numpy(), rtol=1e-3, atol=1e-3)
