@@ -25,7 +25,11 @@ ROBOT_FILES = {
     "sets of no legs": (r"^tripods = .*?$", "tripods = 2", r"gait.tripods must be two lists"),
     "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass is beyond any robot"),
     "unknown leg": (r'feet = \["lf"', 'feet = ["fl"', r"standing.feet: leg 'fl' is not known"),
-    "unknown path": (r'"cubic"', '"cubical"', r"'cubical' is not known; did you mean 'cubic'"),
+    "unknown path": (
+        r'path = "\w+"',
+        'path = "cubical"',
+        r"'cubical' is not known; did you mean 'cubic'",
+    ),
     "missing number": (
         r"^\[parameters\.total_mass\].*?\n\n",
         "",
@@ -37,7 +41,7 @@ ROBOT_FILES = {
     "text for a number": (r"value = 40$", 'value = "40"', r"'total_mass': value must be a number"),
     "negative mass": (r"value = 40$", "value = -40", r"total_mass = -40 kg must be positive"),
     "negative link mass": (
-        r"(\[parameters\.tibia_mass\]\nvalue = )0.5(.*?interval = \[)0.2",
+        r"(\[parameters\.tibia_mass\]\nvalue = )[\d.]+(.*?interval = \[)[\d.]+",
         r"\g<1>-0.5\g<2>-1",
         r"tibia_mass = -0.5 kg must be positive",
     ),
@@ -80,7 +84,7 @@ CHANGES = {
     "negative mass": ("femur_mass=-1", r"femur_mass = -1 kg must be positive"),
     "negative period": ("gait_period=-3", r"gait_period = -3 s must be positive"),
     "outside the link": ("tibia_com=1.2", r"tibia_com = 1.2 lies outside the link"),
-    "no trunk left": ("femur_mass=6", r"leave -6.2 kg for the trunk; lower the link masses"),
+    "no trunk left": ("femur_mass=6", r"leave -[\d.]+ kg for the trunk; lower the link masses"),
     "unknown path": ("gait.transfer_path=cubik", r"did you mean 'cubic'"),
     "negative friction": ("harmonic_drive.load=-0.1", r"outside its bounds \[0, 0.5\]"),
     "ratios apart": ("harmonic_drive.ratio=90", r"'requirement.ratio' asks for 400"),
@@ -159,7 +163,11 @@ def test_option(
 @pytest.mark.parametrize(
     ("pattern", "replacement", "message"),
     [
-        (r'<mass value="1.3"', '<mass value="-1.3"', r"lf_femur_link: mass positive fails"),
+        (
+            r'(<link name="lf_femur_link">.*?<mass value=")',
+            r"\1-",
+            r"lf_femur_link: mass positive fails",
+        ),
         (r'ixx="[^"]*"', 'ixx="-0.1"', r"inertia positive definite fails"),
         (r'ixx="[^"]*"', 'ixx="9"', r"triangle inequality fails \(moments"),
         (r'ixx="[^"]*"', 'ixx="nan"', r"'nan' should be 1 finite numbers"),
@@ -212,7 +220,9 @@ def test_a_robot_that_tips_is_a_finding(
 ) -> None:
     """Hips less than the stroke apart: exit 1, with instant, foot, force and margin."""
     code = command("walk", tmp_path / "out", "--set", "hip_spacing=200")
-    message = r"tips at t = 0 s .* leg 'lf' would have to pull with 21.9 N, static margin -17.2 mm"
+    message = (
+        r"tips at t = 0 s .* leg 'lf' would have to pull with \d+\.\d N, static margin -17\.\d mm"
+    )
     refused(capsys, tmp_path / "out", code, message, expected=1)
 
 

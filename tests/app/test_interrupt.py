@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -104,7 +105,8 @@ def test_check_and_urdf_verbs(
         assert main(["check", str(built)]) == 0
     assert main(["check", "-v", str(tmp_path / "hexapod.toml")]) == 0
     assert "FAIL" not in capsys.readouterr().out
-    light = built.read_text(encoding="utf-8").replace('<mass value="0.5"', '<mass value="-0.5"')
+    tibia = r'(<link name="rm_tibia_link">.*?<mass value=")[^"]*"'
+    light = re.sub(tibia, r'\1-0.5"', built.read_text(encoding="utf-8"), count=1, flags=re.S)
     built.write_text(light, encoding="utf-8")
     assert main(["check", str(built)]) == 1
     assert "FAIL rm_tibia_link: mass positive: -0.5 kg" in capsys.readouterr().out

@@ -277,8 +277,8 @@ def test_contact_from_forces_columns_schedule_and_lowest_feet(hexapod: Robot, wa
     )
     inside = np.ones(len(q), dtype=np.bool_)
     for edge in np.flatnonzero((truth[1:] != truth[:-1]).any(axis=1)) + 1:
-        inside[max(0, edge - 60) : edge + 60] = False
-    inside[:60] = inside[-60:] = False
+        inside[max(0, edge - 90) : edge + 90] = False
+    inside[:90] = inside[-90:] = False
     seen = lowest_feet(hexapod, flat, None, None)
     assert np.array_equal(seen.standing[inside], truth[inside])
     planned = scheduled_contact(hexapod, time, start=0.0)
