@@ -1,0 +1,107 @@
+"""Laws that naming adds to a chain: at rest, without load, with power reversed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from actuators.directional import DirectionalFriction
+from actuators.element import Element
+from actuators.errors import UnphysicalElementError
+from actuators.heating import Heating, warm_resistance, warm_torque_constant
+from actuators.position_torque import ParallelSpring, Ripple
+from actuators.quadrant import QuadrantFriction
+from actuators.shaft import ShaftSeries
+from actuators.stribeck import Stribeck
+
+LAWS = [
+    Stribeck("s", excess=2.0, speed=0.1),
+    DirectionalFriction("d", positive=2.0, negative=0.5),
+    QuadrantFriction("q", when_driving=0.2, when_driven=0.05),
+]
+
+
+def series(velocity: list[float], torque: list[float]) -> ShaftSeries:
+    n = len(velocity)
+    v, t = np.array(velocity)[:, None], np.array(torque)[:, None]
+    zero = np.zeros((n, 1))
+    return ShaftSeries(("j",), np.arange(n) * 0.1, zero, v, zero, t, np.sign(v))
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda e: e.name)
+def test_rest_takes_nothing_in_motion_and_holds_an_interval(law: Element) -> None:
+    still = series([0.0, 0.0], [3.0, -3.0])
+    assert np.array_equal(law.moving(still).torque, still.torque)
+    low, high = law.holding(still.torque, still.torque)
+    assert (low < still.torque).all()
+    assert (high > still.torque).all()
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda e: e.name)
+def test_friction_never_gives_power(law: Element) -> None:
+    rng = np.random.default_rng(3)
+    side = series(list(rng.normal(size=400)), list(rng.normal(size=400) * 5))
+    power = (law.moving(side).torque - side.torque) * side.velocity
+    assert (power >= 0).all()
+    loss = law.loss(side, law.moving(side))
+    assert loss is not None
+    assert np.allclose(loss, power)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda e: e.name)
+def test_driving_inverts_moving(law: Element) -> None:
+    rng = np.random.default_rng(4)
+    side = series(list(rng.normal(size=400)), list(rng.normal(size=400) * 5))
+    assert np.allclose(law.driving(law.moving(side)).torque, side.torque)
+
+
+def test_stribeck_falls_to_a_share_1_over_e_at_its_speed() -> None:
+    law = Stribeck("s", excess=2.0, speed=0.1)
+    friction = law.moving(series([0.1, -0.1, 10.0], [0.0, 0.0, 0.0])).torque[:, 0]
+    assert np.allclose(friction, [2 / np.e, -2 / np.e, 0.0])
+
+
+def test_quadrants_are_those_of_power_at_the_joint() -> None:
+    law = QuadrantFriction("q", when_driving=0.2, when_driven=0.05)
+    friction = law.moving(series([1, 1, -1, -1], [10, -10, 10, -10])).torque[:, 0]
+    assert np.allclose(friction - [10, -10, 10, -10], [2.0, 0.5, -0.5, -2.0])
+    # No load, no friction.
+    assert np.allclose(law.moving(series([1, -1], [0, 0])).torque, 0.0)
+
+
+def test_directional_is_coulomb_and_offset_in_motion() -> None:
+    law = DirectionalFriction("d", positive=2.0, negative=0.5)
+    friction = law.moving(series([1, -1], [0, 0])).torque[:, 0]
+    assert np.allclose(friction, [1.25 + 0.75, -1.25 + 0.75])
+
+
+def test_spring_and_ripple() -> None:
+    q = np.array([0.3, 0.1, -0.2])
+    assert np.allclose(ParallelSpring("k", 2.0, 0.1).torque(q), [0.4, 0.0, -0.6])
+    ripple = Ripple("r", 0.5, 4.0, 0.2)
+    assert np.allclose(ripple.torque(q), 0.5 * np.sin(4 * q + 0.2))
+    assert np.allclose(ripple.torque(q + np.pi / 2), ripple.torque(q))
+
+
+def test_heating_follows_its_exponential() -> None:
+    time = np.linspace(0, 20, 400)
+    node = Heating(thermal_resistance=2.0, time_constant=5.0, rise=10.0)
+    rise = node.temperature_rise(time, np.full(400, 3.0))
+    assert np.allclose(rise, 16.0 * (1 - np.exp(-time / 5.0)))
+    assert np.isclose(warm_resistance(0.3, rise)[-1], 0.3 * (1 + 0.00393 * rise[-1]))
+    assert warm_torque_constant(0.03, rise)[-1] < 0.03
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: Stribeck("s", excess=-1.0),
+        lambda: Stribeck("s", excess=1.0, speed=0.0),
+        lambda: DirectionalFriction("d", positive=-1.0),
+        lambda: QuadrantFriction("q", when_driven=1.0),
+        lambda: Heating(time_constant=0.0),
+    ],
+)
+def test_unphysical_values_are_refused(make) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(UnphysicalElementError):
+        make()

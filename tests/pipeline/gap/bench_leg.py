@@ -1,0 +1,76 @@
+"""A leg on its stand, moved by sines and measured without a filter: logs for tests of naming."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from actuators.build import load_catalog
+from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement, near_rest
+from pipeline.gap.model import MachineModel, machine_of_robot
+from pipeline.gap.simulate import Simulator
+from pipeline.robot import load_robot
+from pipeline.robot_file import load_robot_file
+
+ROOT = Path(__file__).parents[3]
+RATE = 200.0
+CURRENT, VOLTAGE = 0.004, 0.003  # standard deviations of the noise [A], [V]
+
+
+def leg_model() -> MachineModel:
+    """The leg with a rotor at every joint."""
+    robot = load_robot(load_robot_file(ROOT / "urdf" / "leg.toml"))
+    return machine_of_robot(robot, load_catalog().chain("rotor"))
+
+
+def leg_motion(seed: int = 0, duration: float = 16.0) -> Measurement:
+    """Sines of several speeds; efforts are zero until `measured` fills them."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(duration * RATE)) / RATE
+    model = leg_model()
+    q, v, a = (np.zeros((t.size, 3)) for _ in range(3))
+    for j in range(3):
+        for f, size in ((0.11, 0.3), (0.31, 0.15), (0.7, 0.06), (1.3, 0.025)):
+            w = 2 * np.pi * f * rng.uniform(0.85, 1.15)
+            phase = rng.uniform(0, 2 * np.pi)
+            q[:, j] += size * np.sin(w * t + phase)
+            v[:, j] += size * w * np.cos(w * t + phase)
+            a[:, j] -= size * w * w * np.sin(w * t + phase)
+    block = (np.arange(t.size) * 40) // t.size
+    part = np.array([FIT, CHOOSE, FIT, PROVE], dtype=np.int8)[block % 4]
+    rest = np.full(3, 2e-3)
+    whole = (slice(0, t.size),)
+    noise = np.tile([CURRENT, VOLTAGE], (3, 1))
+    return Measurement(
+        name="sines",
+        time=t,
+        joints=model.joints,
+        q=q,
+        v=v,
+        a=a,
+        channels=("current", "voltage"),
+        effort=np.zeros((t.size, 3, 2)),
+        noise=noise,
+        mask=~near_rest(v, rest, whole, RATE, 50.0),
+        part=part,
+        block=block,
+        pieces=whole,
+        rest_speed=rest,
+    )
+
+
+def measured(truth: MachineModel, motion: Measurement, seed: int = 1) -> Measurement:
+    """The log of a machine on a motion.
+
+    Voltage is predicted from the measured current, so the current comes first.
+    """
+    rng = np.random.default_rng(seed)
+    current = Simulator(motion).predict(truth).effort[..., 0]
+    effort = np.zeros_like(motion.effort)
+    effort[..., 0] = current + CURRENT * rng.standard_normal(current.shape)
+    with_current = replace(motion, effort=effort)
+    voltage = Simulator(with_current).predict(truth).effort[..., 1]
+    effort[..., 1] = voltage + VOLTAGE * rng.standard_normal(current.shape)
+    return replace(motion, effort=effort)
