@@ -186,7 +186,8 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
                 f"{r.name}: {r.hits} of {r.trials} = {r.value:.1%} ({low:.1%} to {high:.1%}), "
                 f"aim {r.aim[0]:.0%} to {r.aim[1]:.0%} {mark}"
             )
-    print(f"{len(trials)} trials, {sorted(seconds)[len(seconds) // 2]:.1f} s each (median)")
+    usual = sorted(seconds)[len(seconds) // 2]
+    print(f"{len(trials)} trials; an answer takes {usual:.1f} s of computing (median)")
     return 0 if all(r.reached for r in reached if r.trials) else 1
 
 
