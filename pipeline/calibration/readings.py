@@ -8,6 +8,10 @@ from dataclasses import dataclass
 from typing import Any
 
 
+#: Half widths within which the search meets a row whose tolerance is a hard edge.
+SEARCH_SLACK = 0.02
+
+
 @dataclass(frozen=True)
 class Reading:
     """One reading, calibrated on its own.
@@ -39,7 +43,7 @@ class Reading:
     @property
     def meets_all(self) -> bool:
         """Every fitted row within its half width and every motor within its data sheet."""
-        return self.worst_error <= 1 + 1e-9 and self.worst_limit <= 0
+        return self.worst_error <= 1 + SEARCH_SLACK and self.worst_limit <= 0
 
 
 def readings(results: Mapping[str, Any]) -> list[Reading]:
