@@ -12,7 +12,7 @@ from pipeline.app import gap_words as words
 from pipeline.app.gap_energy import EnergyChange
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
-from pipeline.app.gap_stages import Stage, noise_floor
+from pipeline.app.gap_stages import Stage, noise_floor, overall
 from pipeline.gap.circumstances import WHOLE
 from pipeline.gap.verdict import ACCEPTED, REJECTED, Naming, Remainder
 from reports.html import write_html
@@ -107,7 +107,7 @@ def answer(story: Story) -> tuple[str, ...]:
     naming = story.naming
     out = [words.where_words(story.where.rows), words.what_words(naming)]
     if naming.found:
-        out.append(words.shrink_words(_falls(story)))
+        out.append(words.shrink_words(_falls(story), _whole(story)))
     if story.energy is not None:
         out.append(words.energy_words(story.energy, story.given.alternative))
     out.append(words.left_words(naming.remainders))
@@ -126,6 +126,12 @@ def _falls(story: Story) -> list[tuple[str, str, float, float, float, str]]:
         joint = story.given.model.joints[j]
         out.append((name, joint, before, after, float(floor[j]), story.naming.unit))
     return out
+
+
+def _whole(story: Story) -> tuple[float, float]:
+    """Gap of all joints before and after all effects."""
+    first = len(story.stages) - len(story.naming.found)
+    return overall(story.stages[first - 1].gap), overall(story.stages[-1].gap)
 
 
 def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
@@ -289,6 +295,9 @@ def _left(story: Story) -> Section:
     blocks: list[Block] = [block]
     if story.decides:
         blocks.append(Text(f"The motion that decides: {story.decides}."))
+    uncertain = words.doubts(story.naming.found)
+    if len(uncertain) > words.TOLD:
+        blocks += [Text("Names that are not certain:"), Points(tuple(uncertain))]
     if story.naming.notes:
         blocks.append(Points(story.naming.notes))
     return Section("What is left", tuple(blocks))

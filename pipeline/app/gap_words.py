@@ -17,6 +17,8 @@ from reports.page import cell_text
 _LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 #: A band is worth a word when its gap is this many times the joint's.
 STANDS_OUT = 1.25
+#: Effects that the first lines tell in full.
+TOLD = 3
 #: A change of energy below this is none, as a share.
 NO_CHANGE = 5e-4
 
@@ -79,8 +81,9 @@ def what_words(naming: Naming) -> str:
         )
     parts = [
         f"**{f.effect} at {place_text(f.place)}** ({parameters_text(f.parameters)})"
-        for f in naming.found
+        for f in naming.found[:TOLD]
     ]
+    parts += [f"{f.effect} at {place_text(f.place)}" for f in naming.found[TOLD:]]
     text = f"**What:** the model lacks {_listed(parts)}."
     first = naming.found[0]
     return f"{text} {meaning(first.effect)}" if len(naming.found) == 1 else text
@@ -110,21 +113,29 @@ def parameters_text(parameters: Sequence[Estimate]) -> str:
     )
 
 
-def shrink_words(falls: Sequence[tuple[str, str, float, float, float, str]]) -> str:
+def shrink_words(
+    falls: Sequence[tuple[str, str, float, float, float, str]], whole: tuple[float, float]
+) -> str:
     """How much smaller the gap is on data that had no say.
 
     Args:
+        whole: Gap of all joints before and after all effects.
         falls: Per effect: its words, the joint, gap before, gap after, noise floor, unit.
     """
     parts = []
-    for effect, joint, before, after, floor, unit in falls:
+    for effect, joint, before, after, floor, unit in falls[:TOLD]:
         share = removed(before, after, floor)
         closed = "" if share is None else f", {percent(share)} of what can be removed"
         parts.append(
             f"with {effect} the gap of {joint} falls from {number(before)} to {number(after)} "
             f"{unit}{closed} (noise floor {number(floor)} {unit})"
         )
-    return f"**How much smaller:** on data that had no say in the choice, {'; '.join(parts)}."
+    text = f"**How much smaller:** on data that had no say in the choice, {'; '.join(parts)}"
+    if len(falls) > TOLD:
+        text += f"; and so on with {len(falls) - TOLD} more"
+    unit = falls[0][5]
+    text += f". Over all joints it falls from {number(whole[0])} to {number(whole[1])} {unit}"
+    return text + ", root mean square."
 
 
 def removed(before: float, after: float, noise: float) -> float | None:
@@ -175,8 +186,8 @@ def left_words(remainders: Sequence[Remainder]) -> str:
     return f"**What stays unexplained:** {'. '.join(parts[:3])}{more}."
 
 
-def rival_words(found: Sequence[Found], decides: bool) -> str:
-    """Effects that cannot be told apart, and what would decide; empty without any."""
+def doubts(found: Sequence[Found]) -> list[str]:
+    """Names that are not certain, each in words."""
     parts = []
     for f in found:
         if f.rivals:
@@ -186,9 +197,16 @@ def rival_words(found: Sequence[Found], decides: bool) -> str:
             )
         if f.doubtful:
             parts.append(f"{f.effect} at {place_text(f.place)} is doubtful: {f.doubtful}")
+    return parts
+
+
+def rival_words(found: Sequence[Found], decides: bool) -> str:
+    """Effects that cannot be told apart, and what would decide; empty without any."""
+    parts = doubts(found)
     if not parts:
         return ""
-    text = f"**Not decided:** {'; '.join(parts)}."
+    more = f"; {len(parts) - TOLD} more remarks of this kind below" if len(parts) > TOLD else ""
+    text = f"**Not decided:** {'; '.join(parts[:TOLD])}{more}."
     if any(f.rivals for f in found):
         text += (
             " Log the motion of [deciding_motion.csv](deciding_motion.csv), which stays inside the "
