@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-
 #: Half widths within which the search meets a row whose tolerance is a hard edge.
 SEARCH_SLACK = 0.02
 
