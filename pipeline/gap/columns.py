@@ -98,9 +98,6 @@ def make_bench(measurement: Measurement, share: float = 1.0) -> Bench:
     Args:
         measurement: One log.
         share: Of the rows that remain, to keep.
-
-    Raises:
-        NamingError: A part of the data has no usable row.
     """
     m = measurement
     wanted = ROWS_PER_PERIOD * m.bandwidth
@@ -114,9 +111,6 @@ def make_bench(measurement: Measurement, share: float = 1.0) -> Bench:
     order = np.lexsort((rows, m.block[rows], m.part[rows]))
     rows = rows[order]
     part, block = m.part[rows], m.block[rows]
-    for wanted_part, name in ((FIT, "fit"), (CHOOSE, "choose"), (PROVE, "prove")):
-        if not (part == wanted_part).any():
-            raise NamingError(f"{m.name}: no usable row is left to {name} with; log longer")
     new = np.flatnonzero((np.diff(block) != 0) | (np.diff(part) != 0)) + 1
     edges = np.concatenate([[0], new, [rows.size]])
     parts = {
@@ -133,8 +127,12 @@ def make_benches(measurements: Sequence[Measurement]) -> tuple[Bench, ...]:
     """Benches of several logs, with at most `LARGEST_ROWS` rows together.
 
     Raises:
-        NamingError: A part of a log has no usable row.
+        NamingError: A part of the data has no usable row in any log.
     """
+    for part, name in ((FIT, "fit"), (CHOOSE, "choose"), (PROVE, "prove")):
+        if not any(((m.part == part) & m.mask.any(axis=1)).any() for m in measurements):
+            names = ", ".join(m.name for m in measurements)
+            raise NamingError(f"{names}: no usable row is left to {name} with; log longer")
     benches = tuple(make_bench(m) for m in measurements)
     rows = sum(b.rows.size for b in benches)
     if rows <= LARGEST_ROWS:
