@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
@@ -10,6 +11,9 @@ from pipeline.gap.effects.base import Place
 from pipeline.gap.effects.link_mass import own_mass
 from pipeline.gap.model import MachineModel
 from pipeline.gap.twin.effects.drive import FLANKS
+from pipeline.gap.twin.trial import ROBOT_FILES, plan_of
+from pipeline.robot import load_robot
+from pipeline.robot_file import load_robot_file
 
 #: Parameter of the twin to parameter of the workflow, where the names differ.
 _NAMES: Final = {
@@ -26,8 +30,8 @@ class HiddenTruth:
         effect: Name.
         place: Where.
         values: Parameters as the workflow calls them, of the effect alone.
-        total: The same with the machine's own tolerance of the same kind, which no log can tell
-            from the effect: what an interval has to cover.
+        total: What an interval has to cover: the same with the machine's own tolerance of the same
+            kind, which no log can tell from the effect, and as the log sees it.
         in_catalogue: Whether the workflow has a name for it.
         strength: RMS torque over noise.
     """
@@ -66,7 +70,7 @@ def _hidden(item: Mapping[str, Any], truth: Mapping[str, Any], model: MachineMod
         effect=effect,
         place=place,
         values=values,
-        total=_total(effect, place, values, truth["tolerances"], model),
+        total=_total(effect, place, values, truth, model),
         in_catalogue=bool(item["in_catalogue"]),
         strength=float("nan") if strength is None else float(strength),
     )
@@ -76,10 +80,10 @@ def _total(
     effect: str,
     place: Place,
     values: Mapping[str, float],
-    tolerances: Mapping[str, Mapping[str, float]],
+    truth: Mapping[str, Any],
     model: MachineModel,
 ) -> dict[str, float]:
-    total = dict(values)
+    total, tolerances = dict(values), truth["tolerances"]
     if effect == "torque_constant_error":
         factor = tolerances["torque_constant_factor"][place[0]]
         total["relative"] = (1 + values["relative"]) * factor - 1
@@ -88,6 +92,11 @@ def _total(
     elif effect == "link_mass":
         factor = tolerances["mass_factor"][model.carrier(place[0])]
         total["mass"] = values["mass"] + (factor - 1) * own_mass(model, place[0])
+    elif effect == "winding_heating":
+        # The machine runs a moment before its log starts: the log sees what is left of the rise.
+        robot = load_robot(load_robot_file(ROBOT_FILES[truth["motion"]]))
+        before = plan_of(robot, truth["seed"], 0).log_from
+        total["rise"] = values["rise"] * math.exp(-before / values["time_constant"])
     return total
 
 
