@@ -1,8 +1,8 @@
 """Torque at the joints that bodies, gravity and ground ask for along a measured motion.
 
-Inverse dynamics in one batch (`rneaInParallel`); a walking robot's base moves as its standing feet
-let it (they do not move, the base does not rotate faster than it is measured to stand), and the
-ground's forces are the measured ones where the log has them, else those of
+Inverse dynamics in one batch (`rneaInParallel`). Where a walking robot's foot forces are measured,
+they are the ground's forces and tell how the base accelerates. Else the base moves as its standing
+feet let it (they do not move, and the base does not rotate), and the ground's forces are those of
 `pipeline.contact_forces` with the least tangential parts.
 """
 
@@ -58,7 +58,7 @@ class RigidBodies:
 
     def __init__(self, measurement: Measurement) -> None:
         self.measurement = measurement
-        self._base: tuple[Array, tuple[Array, Array]] | None = None
+        self._base: tuple[Array, Array] | None = None
         self._ground: tuple[Array, object, Array] | None = None
 
     def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
@@ -79,7 +79,7 @@ class RigidBodies:
         v[:, index_v], a[:, index_v] = motion[1], motion[2]
         if machine.floating:
             q[:, 3:7] = _quaternions(m, n)
-            v[:, :3], a[:, :3] = self._base_motion(machine, motion)
+            v[:, :3], a[:, :6] = self._base_motion(machine)
         pool = pin.ModelPool(model, 1)
         generalised = np.asarray(pin.rneaInParallel(1, pool, q.T, v.T, a.T)).T.reshape(v.shape)
         torque: Array = generalised[:, index_v]
@@ -87,15 +87,17 @@ class RigidBodies:
             torque = torque - self._ground_torque(machine, motion[0], generalised[:, :6])
         return torque
 
-    def _base_motion(
-        self, machine: MachineModel, motion: tuple[Array, Array, Array]
-    ) -> tuple[Array, Array]:
-        if self._base is None or self._base[0] is not motion[0]:
-            computed = _base_motion(machine.legs, self.measurement, motion)
-            if motion[0] is not self.measurement.q:
-                return computed
-            self._base = (motion[0], computed)
-        return self._base[1]
+    def _base_motion(self, machine: MachineModel) -> tuple[Array, Array]:
+        if self._base is None:
+            # What the base did is told by the measured motion, whatever an effect makes of it.
+            m = self.measurement
+            velocity, acceleration = _base_motion(machine.legs, m, (m.q, m.v, m.a))
+            if legs_are_separate(machine, m):
+                acceleration = _measured_acceleration(machine, m, velocity)
+            else:
+                acceleration = np.hstack([acceleration, np.zeros_like(acceleration)])
+            self._base = (velocity, acceleration)
+        return self._base
 
     def _ground_torque(self, machine: MachineModel, q: Array, wrench: Array) -> Array:
         m = self.measurement
@@ -180,6 +182,47 @@ def _base_motion(
         velocity[s] = -np.einsum("nl,nli->ni", weight, rate)
         acceleration[s] = -np.einsum("nl,nli->ni", weight, bend)
     return velocity, acceleration
+
+
+def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Array) -> Array:
+    """Spatial acceleration of the base from the measured foot forces, own frame, (N, 6).
+
+    The feet's wrench less what joints' motion and gravity ask is the composite inertia times the
+    acceleration. Masses are known to a few per cent only, so that the mean, which for a robot that
+    walks is none, is taken off.
+    """
+    assert machine.legs is not None
+    assert m.foot_force is not None
+    model = machine.rigid
+    n = m.q.shape[0]
+    index_q = np.array([model.joints[model.getJointId(j)].idx_q for j in machine.joints])
+    index_v = np.array([model.joints[model.getJointId(j)].idx_v for j in machine.joints])
+    q = np.tile(pin.neutral(model), (n, 1))
+    v, a = np.zeros((n, model.nv)), np.zeros((n, model.nv))
+    _place_joints(model, q, index_q, m.q)
+    q[:, 3:7] = _quaternions(m, n)
+    v[:, index_v], a[:, index_v] = m.v, m.a
+    v[:, :3] = velocity
+    pool = pin.ModelPool(model, 1)
+
+    def base_wrench(acceleration: Array, speed: Array) -> Array:
+        torque = pin.rneaInParallel(1, pool, q.T, speed.T, acceleration.T)
+        return np.asarray(torque).T.reshape(v.shape)[:, :6]
+
+    asked = base_wrench(a, v)
+    still = np.zeros_like(v)
+    weight = base_wrench(still, still)
+    inertia = np.empty((n, 6, 6))
+    for k in range(6):
+        unit = still.copy()
+        unit[:, k] = 1.0
+        inertia[:, :, k] = base_wrench(unit, still) - weight
+    feet = foot_positions(machine.legs, _legs(m.q))
+    rotation = _base_rotation(m, n)
+    force = m.foot_force if rotation is None else np.einsum("nji,nfj->nfi", rotation, m.foot_force)
+    given = np.hstack([force.sum(axis=1), np.cross(feet, force).sum(axis=1)])
+    acceleration = np.linalg.solve(inertia, (given - asked)[..., None])[..., 0]
+    return np.asarray(acceleration - acceleration.mean(axis=0))
 
 
 def _ground_torque(
