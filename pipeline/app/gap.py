@@ -58,14 +58,13 @@ def run_gap(options: argparse.Namespace) -> int:
     with Progress() as progress:
         progress.step("reading and judging the logs")
         intake, parts, fitted = take_in(given, options)
-        tables = [quality_table(intake.findings)]
         if options.step == "read":
-            _write_tables(options, given, tables)
+            _write_tables(options, given, [quality_table(intake.findings)])
             _say_findings(intake.findings)
             return EXPLAINED
         progress.step("simulating the logs' motion")
         where = find_where(given, given.model, intake, parts, fitted)
-        tables.append(where_table(where.rows))
+        tables = [quality_table(where.intake.findings), where_table(where.rows)]
         if options.step == "where":
             with staged(options.out) as folder:
                 _tables_into(folder, options, given, tables)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Any
 
 from pipeline.app.gap_setup import Setup
 from pipeline.gap.bandwidth import with_encoder_noise
 from pipeline.gap.circumstances import Where, where
+from pipeline.gap.finding import refuse
 from pipeline.gap.intake import Intake
 from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import MachineModel
+from pipeline.gap.model_check import against_model
 from pipeline.gap.observe import observe
 from pipeline.gap.parts import Parts
 from pipeline.gap.simulate import Prediction, Simulator
@@ -75,11 +77,18 @@ def find_where(
     """Simulate every log's own motion and table the gap.
 
     Raises:
-        GapError: The model does not predict what the log measures.
+        GapError: The model does not predict what the log measures, or betrays a wrong unit.
     """
     seen = observe(model, intake.prepared, parts)
     measurements = with_encoder_noise(model, intake.prepared, seen)
     predictions = predict(model, measurements)
+    findings = [
+        finding
+        for m, prediction in zip(measurements, predictions, strict=True)
+        for finding in against_model(m, prediction, given.expected.ratio)
+    ]
+    refuse(findings)
+    intake = replace(intake, findings=(*intake.findings, *findings))
     rows = where(measurements, predictions, legs_of(given))
     return Whereabouts(intake, parts, fitted, measurements, predictions, rows)
 

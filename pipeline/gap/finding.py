@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -68,14 +68,19 @@ class Quality:
         Raises:
             LogContentError: Names the first refused column and how many there are.
         """
-        refused = [
-            finding
-            for finding in self.findings
-            if finding.verdict == "refused" and finding.check not in overlooked
-        ]
-        if not refused:
-            return
-        first = refused[0]
-        column = f", column '{first.column}'" if first.column else ""
-        more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
-        raise LogContentError(f"{first.log}{column}: {first.detail}{more}")
+        refuse([f for f in self.findings if f.check not in overlooked])
+
+
+def refuse(findings: Sequence[Finding]) -> None:
+    """Stop where a finding refuses its log.
+
+    Raises:
+        LogContentError: Names the log, the first refused column and how many there are.
+    """
+    refused = [finding for finding in findings if finding.verdict == "refused"]
+    if not refused:
+        return
+    first = refused[0]
+    column = f", column '{first.column}'" if first.column else ""
+    more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
+    raise LogContentError(f"{first.log}{column}: {first.detail}{more}")

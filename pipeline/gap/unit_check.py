@@ -1,4 +1,4 @@
-"""Columns that are wrong by a factor the model betrays: degrees for radians, mA for A."""
+"""Columns that are wrong by a factor that limits or other columns betray."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pipeline.gap.skew import Skew, skew
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_DEG: Final = 180.0 / math.pi
+DEG: Final = 180.0 / math.pi
 _SUFFIX: Final = {
     "position": "position_rad",
     "motor_position": "motor_position_rad",
@@ -29,15 +29,15 @@ _SUFFIX: Final = {
     "goal_position": "goal_position_rad",
 }
 #: Factors by which each channel is commonly wrong, and what the numbers then are.
-_WRONG: Final[Mapping[str, Mapping[float, str]]] = {
-    "velocity": {_DEG: "deg/s", 30.0 / math.pi: "rpm", 1e3: "mrad/s"},
+WRONG: Final[Mapping[str, Mapping[float, str]]] = {
+    "velocity": {DEG: "deg/s", 30.0 / math.pi: "rpm", 1e3: "mrad/s"},
     "torque": {1e3: "mN*m", 1e2: "N*cm", 1e-3: "kN*m"},
     "current": {1e3: "mA", 1e-3: "kA"},
     "voltage": {1e3: "mV", 1e-3: "kV"},
     "power": {1e3: "mW", 1e-3: "kW"},
 }
 #: Relative distance from a factor within which it is taken for it.
-_NEAR: Final = 0.25
+NEAR: Final = 0.25
 #: Rows of velocity and position that are compared.
 _COMPARED_ROWS: Final = 50_000
 
@@ -74,7 +74,7 @@ def position_units(log: Log, expected: Expected, ok: Mask) -> list[Finding]:
         if outside == 0.0:
             continue
         limits = f"the joint's limits are {low:.4g} to {high:.4g} rad"
-        turned = q / _DEG
+        turned = q / DEG
         fits = turned.min() >= low - margin and turned.max() <= high + margin
         if fits and outside > 0.2:
             detail = f"{span}, {limits}: looks like degrees; give its unit in a mapping file"
@@ -122,7 +122,7 @@ def _speed_limit(log: Log, expected: Expected, j: int, rate: Array) -> list[Find
     quantity = "motor_position" if log.position_source == "motor" else "position"
     detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: " + (
         "looks like degrees, or time not in seconds"
-        if top / _DEG <= 1.2 * limit
+        if top / DEG <= 1.2 * limit
         else "wrong unit of position or time, or the log of another robot"
     )
     column = column_name(log.joints[j], quantity)
@@ -131,15 +131,15 @@ def _speed_limit(log: Log, expected: Expected, j: int, rate: Array) -> list[Find
 
 def _velocity_findings(log: Log, column: str, seen: Skew, dt: float) -> list[Finding]:
     out = []
-    wrong = _nearest(abs(seen.factor), _WRONG["velocity"])
-    inverse = abs(seen.factor) * _DEG
+    wrong = nearest(abs(seen.factor), WRONG["velocity"])
+    inverse = abs(seen.factor) * DEG
     if wrong is not None:
         detail = (
             f"is {abs(seen.factor):.4g} times the rate of the position: looks like {wrong}; give "
             "its unit in a mapping file"
         )
         out.append(_finding(log, column, "factor", seen.factor, "1", "refused", detail))
-    elif abs(inverse - 1) < _NEAR:
+    elif abs(inverse - 1) < NEAR:
         detail = (
             f"is 1/{1 / abs(seen.factor):.4g} of the rate of the position: the position looks "
             "like degrees; give its unit in a mapping file"
@@ -181,7 +181,7 @@ def effort_units(log: Log, largest: Mapping[str, Array]) -> list[Finding]:
             if top <= 5.0 * limit[j]:
                 continue
             unit = next(
-                (u for f, u in _WRONG[channel].items() if f > 1 and top / f <= limit[j]), None
+                (u for f, u in WRONG[channel].items() if f > 1 and top / f <= limit[j]), None
             )
             detail = f"reaches {top:.4g}, the drive's limit is {limit[j]:.4g}: " + (
                 f"looks like {unit}; give its unit in a mapping file"
@@ -193,81 +193,7 @@ def effort_units(log: Log, largest: Mapping[str, Array]) -> list[Finding]:
     return out
 
 
-def compare_with_prediction(
-    log: Log,
-    measured: Array,
-    predicted: Array,
-    mask: Mask,
-    dt: float,
-    channel: str,
-    *,
-    ratio: Array | None = None,
-) -> list[Finding]:
-    """Efforts against a first simulation of the same motion: unit, sign, side of the gear, skew.
-
-    A factor of a hundred or a thousand is a unit where the shapes agree. A joint that carries
-    little can show it through friction alone (a wrist without load), so that there shapes must
-    agree closely.
-
-    Args:
-        log: The log.
-        measured: Filtered effort, shape (N, J).
-        predicted: By the model before anything is fitted, same bandwidth, shape (N, J).
-        mask: Rows to compare, shape (N, J).
-        dt: [s].
-        channel: Which effort.
-        ratio: Gear ratios, shape (J,), to recognise torque at the motor side.
-    """
-    out = []
-    agree = []
-    sizes = [
-        float(np.std(predicted[mask[:, j], j])) if mask[:, j].any() else 0.0
-        for j in range(len(log.joints))
-    ]
-    for j, joint in enumerate(log.joints):
-        x = np.where(mask[:, j], measured[:, j], np.nan)
-        seen = skew(x, np.where(mask[:, j], predicted[:, j], np.nan), dt, longest=0.1)
-        if seen is None:
-            continue
-        agree.append(seen.correlation)
-        column = column_name(joint, channel)
-        good = np.isfinite(x)
-        size = float(np.std(x[good]) / max(np.std(predicted[good, j]), 1e-300))
-        unit = _nearest(size, _WRONG[channel], near=3.0) if size > 30 or size < 0.003 else None
-        loaded = sizes[j] >= 0.3 * max(sizes) and (size > 300 or size < 0.003)
-        gear = None if ratio is None or channel != "torque" else abs(1.0 / float(ratio[j]))
-        strong = abs(seen.correlation) > 0.7
-        if gear is not None and strong and gear / 1.5 < size < 1.5 * gear and gear < 0.2:
-            detail = f"is {size:.3g} times the simulated: torque at the motor side? scale it by "
-            detail += f"{1 / gear:.4g} in a mapping file"
-            out.append(_finding(log, column, "factor", size, "1", "refused", detail))
-        elif unit is not None and abs(seen.correlation) > (0.5 if loaded else 0.9):
-            detail = f"is {size:.3g} times the simulated: looks like {unit}; give its unit in a "
-            detail += "mapping file"
-            out.append(_finding(log, column, "factor", size, "1", "refused", detail))
-        elif seen.correlation < -0.8:
-            detail = "runs against the simulation: flip it, or the position, in a mapping file"
-            out.append(_finding(log, column, "sign", seen.correlation, "1", "refused", detail))
-        else:
-            detail = f"{size:.3g} times the simulated, correlation {seen.correlation:.2f}"
-            out.append(_finding(log, column, "factor", size, "1", "ok", detail))
-        if strong and seen.correlation > 0.9:
-            late = abs(seen.lag) > max(0.5 * dt, 4 * seen.lag_error)
-            detail = f"{1e3 * seen.lag:.3g} ms behind the simulation of the same motion"
-            verdict = "warning" if late else "ok"
-            out.append(_finding(log, column, "skew", seen.lag, "s", verdict, detail))
-    if len(agree) >= 3 and float(np.median(agree)) < 0.1 and max(agree) < 0.5:
-        detail = (
-            f"{channel}s have nothing in common with the simulation (median correlation "
-            f"{np.median(agree):.2f}): the log of another robot, or joints are swapped"
-        )
-        out.append(
-            _finding(log, "", "correlation", float(np.median(agree)), "1", "refused", detail)
-        )
-    return out
-
-
-def _nearest(factor: float, table: Mapping[float, str], near: float = 1 + _NEAR) -> str | None:
+def nearest(factor: float, table: Mapping[float, str], near: float = 1 + NEAR) -> str | None:
     """Name of the wrong unit whose factor lies within `near` times, or None."""
     for wrong, unit in table.items():
         if wrong / near < factor < wrong * near:

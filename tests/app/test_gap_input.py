@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from pipeline.app.demo import DEMO
-from tests.app.conftest import exit_code
+from pipeline.gap.twin.trial import make_trial
+from tests.app.conftest import exit_code, rows_of
 
 Columns = dict[str, np.ndarray]
 
@@ -81,6 +82,83 @@ def test_a_bad_log_is_refused_in_one_line(
     assert err.count("\n") == 1
     assert "bad" in err
     assert not out.exists()
+
+
+@pytest.fixture(scope="module")
+def simulated_leg() -> Columns:
+    """A log that the model explains: only its model can tell that its units were changed."""
+    return make_trial(3, None, "leg", "low").logs["log"]
+
+
+def _scaled(factor: float, *names: str) -> Callable[[Columns], Columns]:
+    def spoil(c: Columns) -> Columns:
+        return {k: factor * v if k in names else v for k, v in c.items()}
+
+    return spoil
+
+
+def _milliamperes(c: Columns) -> Columns:
+    # Drawn by a robot so light that its milliamperes are less than the drive's amperes.
+    return _scaled(1e3, *(k for k in c if k.endswith("current_A")))(c)
+
+
+def _exchanged(c: Columns) -> Columns:
+    one, two = "rm_joint_1__current_A", "rm_joint_2__current_A"
+    return c | {one: c[two], two: c[one]}
+
+
+def _of_another_machine(c: Columns) -> Columns:
+    other = make_trial(4, None, "leg", "low").logs["log"]
+    rows = min(other["time_s"].size, c["time_s"].size)
+    return {k: (other if k.endswith("current_A") else c)[k][:rows] for k in c}
+
+
+SPOILT = {
+    "mA": (_milliamperes, "rm_joint_1__current_A", "mA"),
+    "mA at one joint": (_scaled(1e3, "rm_joint_2__current_A"), "rm_joint_2__current_A", "mA"),
+    "sign": (_scaled(-1.0, "rm_joint_2__current_A"), "rm_joint_2__current_A", "flip"),
+    "degrees": (_degrees, "rm_joint_1__position_rad", "degrees"),
+    "degrees at one joint": (
+        _scaled(180.0 / np.pi, "rm_joint_1__position_rad"),
+        "rm_joint_1__position_rad",
+        "degrees",
+    ),
+    "exchanged joints": (_exchanged, "rm_joint_1__current_A", "rm_joint_2"),
+    "another robot": (_of_another_machine, "spoilt", "another robot"),
+}
+
+
+@pytest.mark.parametrize("case", SPOILT)
+def test_a_wrong_unit_that_the_model_betrays_is_refused_by_column(
+    tmp_path: Path,
+    root: Path,
+    capsys: pytest.CaptureFixture[str],
+    simulated_leg: Columns,
+    case: str,
+) -> None:
+    spoil, column, word = SPOILT[case]
+    log = write_log(tmp_path / "spoilt.csv", spoil(dict(simulated_leg)))
+    out = tmp_path / "out"
+    robot = root / "urdf" / "leg.toml"
+    assert exit_code(["gap", "where", str(log), "--robot", str(robot), "--out", str(out)]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert column in err
+    assert word in err
+    assert not out.exists()
+
+
+def test_the_same_log_unspoilt_is_accepted(
+    tmp_path: Path, root: Path, simulated_leg: Columns
+) -> None:
+    log = write_log(tmp_path / "good.csv", simulated_leg)
+    robot = root / "urdf" / "leg.toml"
+    arguments = ["gap", "where", str(log), "--robot", str(robot), "--out", str(tmp_path / "out")]
+    assert exit_code(arguments) == 0
+    quality = rows_of(tmp_path / "out" / "quality.csv")
+    simulated = [r for r in quality if "simulated" in r["detail"]]
+    assert len(simulated) == 3
+    assert {r["verdict"] for r in simulated} == {"ok"}
 
 
 @pytest.mark.parametrize(

@@ -10,10 +10,10 @@ from pipeline.gap.errors import GapError
 from pipeline.gap.expected import Expected
 from pipeline.gap.finding import Quality
 from pipeline.gap.log import Log
+from pipeline.gap.model_check import compare_with_prediction
 from pipeline.gap.quality import judge
 from pipeline.gap.sampling import held, quantum
 from pipeline.gap.skew import skew
-from pipeline.gap.unit_check import compare_with_prediction
 from tests.pipeline.gap.logs import made_log, motion
 
 Array = NDArray[np.float64]
