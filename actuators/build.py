@@ -84,7 +84,12 @@ class Catalog:
             )
             for e in alternative.elements
         )
-        motor = DCMotor(name=WINDING, **self.components[alternative.motor].parameters)
+        constants = self.components[alternative.motor].parameters
+        spread = {
+            f"{name}_spread": constants.parameter(name).spread
+            for name in ("torque_constant", "resistance")
+        }
+        motor = DCMotor(name=WINDING, **constants, **spread)
         stages = {e.stage: e.name for e in alternative.elements if e.stage}
         chain = Chain(name=name, elements=elements, motor=motor, stages=MappingProxyType(stages))
         total, promised = float(np.asarray(chain.ratio)), self.parameter(alternative.ratio).value

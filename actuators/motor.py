@@ -23,6 +23,8 @@ class DCMotor:
         supply_voltage: Voltage at hand [V].
         continuous_current: Permissible root mean square current [A].
         peak_current: Permissible instantaneous current [A].
+        torque_constant_spread: Standard deviation of k as its file states it, relative [1].
+        resistance_spread: Of R likewise [1].
 
     Raises:
         UnphysicalElementError: A constant or limit is not positive.
@@ -38,10 +40,16 @@ class DCMotor:
     supply_voltage: float = math.inf
     continuous_current: float = math.inf
     peak_current: float = math.inf
+    torque_constant_spread: float = 0.0
+    resistance_spread: float = 0.0
 
     def __post_init__(self) -> None:
         require_non_negative(
-            self.name, torque_constant=self.torque_constant, resistance=self.resistance
+            self.name,
+            torque_constant=self.torque_constant,
+            resistance=self.resistance,
+            torque_constant_spread=self.torque_constant_spread,
+            resistance_spread=self.resistance_spread,
         )
         require(np.greater(self.torque_constant, 0.0), self.name, "torque_constant must be > 0")
         for limit in ("max_speed", "supply_voltage", "continuous_current", "peak_current"):

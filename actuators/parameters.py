@@ -14,6 +14,7 @@ from actuators.units import dimension, from_si, si_unit, to_si
 BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified", "assumed")
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
 _KEYS: Final = ("value", "unit", "basis", "source", "interval", "bounds", "reason")
+_SIGMAS_95: Final = 1.96
 
 Interval = tuple[float, float]
 
@@ -46,6 +47,14 @@ class Parameter:
     interval: Interval | None = None
     bounds: Interval | None = None
     reason: str = ""
+
+    @property
+    def spread(self) -> float:
+        """Standard deviation over value, the interval taken for one of 95 %; 0 without one [1]."""
+        if self.interval is None or self.value == 0.0:
+            return 0.0
+        low, high = self.interval
+        return (high - low) / (2.0 * _SIGMAS_95 * abs(self.value))
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.value):

@@ -82,6 +82,7 @@ class Measurement:
         standing: Which feet stand, shape (N, F), or None.
         foot_force: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None
             where the ground's forces are computed.
+        temperature: Of the motors' sensors, shape (N, J) [degC], or None.
         sha256: Of the log.
     """
 
@@ -107,6 +108,7 @@ class Measurement:
     base_pitch: Array | None = None
     standing: Mask | None = None
     foot_force: Array | None = None
+    temperature: Array | None = None
     sha256: str = ""
 
     def __len__(self) -> int:

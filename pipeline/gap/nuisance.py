@@ -29,7 +29,8 @@ from pipeline.gap.simulate import Prediction
 Array = NDArray[np.float64]
 
 INERTIA_TOLERANCE: Final = 0.10  # of a link's rotational inertia [1]
-RESISTANCE_TOLERANCE: Final = 0.02  # of a winding [1]
+#: Of a winding, where its file states no wider interval [1].
+RESISTANCE_TOLERANCE: Final = 0.02
 #: Friction that the actuator's files state already [1].
 FRICTION_TOLERANCE: Final = 0.005
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
@@ -134,9 +135,12 @@ def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple
         if actuator.motor is not None and electrical:
             out.append(Nuisance("compliance", actuator.name, COMPLIANCE_TOLERANCE, "rad/(N*m)"))
         if actuator.motor is not None and electrical:
-            out.append(Nuisance("torque_constant", actuator.name, CONSTANT_TOLERANCE, "1"))
+            motor = actuator.motor
+            constant = max(CONSTANT_TOLERANCE, motor.torque_constant_spread)
+            out.append(Nuisance("torque_constant", actuator.name, constant, "1"))
             if "voltage" in m.channels or "power" in m.channels:
-                out.append(Nuisance("resistance", actuator.name, RESISTANCE_TOLERANCE, "1"))
+                resistance = max(RESISTANCE_TOLERANCE, motor.resistance_spread)
+                out.append(Nuisance("resistance", actuator.name, resistance, "1"))
     out.append(Nuisance("skew", "", SKEW_TOLERANCE, "s"))
     return tuple(out)
 

@@ -116,8 +116,15 @@ def _observe(
         base_pitch=kept(one.base_pitch),
         standing=None if standing is None else standing[rows],
         foot_force=kept(force),
+        temperature=kept(_temperature(one)),
         sha256=one.log.sha256,
     )
+
+
+def _temperature(one: Prepared) -> Array | None:
+    """Of the motors, shape (N, J) [degC]; None where some joint's sensor is silent somewhere."""
+    temperature = one.other.get("temperature")
+    return None if temperature is None or not np.isfinite(temperature).all() else temperature
 
 
 def _thinned(one: Prepared) -> tuple[NDArray[np.intp], tuple[slice, ...], int]:

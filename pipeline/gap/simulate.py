@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.heating import warm_resistance, warm_torque_constant
+from actuators.heating import Heating, warm_resistance, warm_torque_constant
 from actuators.shaft import ShaftSeries
 from pipeline.gap.errors import ModelError
 from pipeline.gap.measurement import Measurement
@@ -248,11 +248,24 @@ class Simulator:
             resistance: Array | float = cold
             current = m.effort[:, k, i] - a.effort_offset
             if a.heating is not None:
-                rise = a.heating.temperature_rise(m.time, cold * current**2)
+                rise = self._rise(a.heating, k, cold * current**2)
                 resistance = warm_resistance(cold, rise)
             out[:, c] += resistance * current
         out[:, 0] += a.effort_offset
         return out
+
+    def _rise(self, heating: Heating, k: int, loss: Array) -> Array:
+        """How much warmer than its data sheet one motor is, (N,) [K]."""
+        m = self.measurement
+        rise = heating.temperature_rise(m.time, loss)
+        if not heating.sensor_gain:
+            return rise
+        if m.temperature is None:
+            raise ModelError(
+                f"log '{m.name}' has no temperature of joint '{m.joints[k]}', from which the "
+                "model's winding_heating takes the winding's"
+            )
+        return rise + heating.sensed(m.temperature[:, k])
 
     def _electrical(self, out: Array, a: JointModel, k: int, torque: Array, speed: Array) -> None:
         """Current, voltage, power of one motor; with measured current voltage is k speed alone."""
@@ -264,7 +277,7 @@ class Simulator:
         if a.heating is not None:
             measured = "current" in m.channels
             drawn = m.effort[:, k, m.channels.index("current")] if measured else torque / k0
-            rise = a.heating.temperature_rise(m.time, r0 * drawn**2)
+            rise = self._rise(a.heating, k, r0 * drawn**2)
             resistance = warm_resistance(r0, rise)
             constant = warm_torque_constant(k0, rise)
         motor = replace(a.motor, torque_constant=constant, resistance=resistance)

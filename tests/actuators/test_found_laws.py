@@ -92,6 +92,11 @@ def test_heating_follows_its_exponential() -> None:
     assert warm_torque_constant(0.03, rise)[-1] < 0.03
 
 
+def test_a_sensor_tells_warming_above_the_data_sheets_temperature() -> None:
+    node = Heating(sensor_gain=4.0)
+    assert np.allclose(node.sensed(np.array([25.0, 30.0, 20.0])), [0.0, 20.0, -20.0])
+
+
 @pytest.mark.parametrize(
     "make",
     [

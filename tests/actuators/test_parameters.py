@@ -131,3 +131,9 @@ def test_any_entry_is_valid_or_an_actuator_error(fields):
         assert math.isfinite(mass.value)
         assert mass.basis not in ("calibrated", "identified", "assumed") or mass.interval
     assert "\n" not in message
+
+
+def test_an_interval_tells_a_spread():
+    p = load(mass=entry(basis="assumed", reason="guess", interval=[1.0, 3.0]))
+    assert p.parameter("mass").spread == pytest.approx(1.0 / 1.96 / 2.0)
+    assert p.parameter("torque").spread == 0.0

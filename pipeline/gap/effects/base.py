@@ -26,12 +26,14 @@ class Parameter:
         unit: ``"channel"`` stands for the unit of the compared channel.
         low: Below this the effect makes no sense.
         high: Above this likewise.
+        optional: Whether it may be left out and is zero then.
     """
 
     name: str
     unit: str
     low: float
     high: float
+    optional: bool = False
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,10 @@ class Effect(ABC):
         """Values of the nonlinear parameters to try first; one empty set where there are none."""
         return [{}]
 
+    def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
+        """Whether this motion can show the effect at these nonlinear parameters at all."""
+        return True
+
     def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
         """Shapes near one that did well; `factor` shrinks from round to round."""
         return []
@@ -122,7 +128,11 @@ class Effect(ABC):
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Whether an estimate lies inside the bounds of what can be."""
         values = self.physical(x, shape)
-        return all(p.low <= values[p.name] <= p.high for p in self.parameters)
+        return all(
+            p.low <= values[p.name] <= p.high
+            for p in self.parameters
+            if p.name in values or not p.optional
+        )
 
     def apply(self, model: MachineModel, place: Place, values: Values) -> MachineModel:
         """The machine with the effect at the given parameters.
@@ -137,6 +147,8 @@ class Effect(ABC):
                 raise EffectError(f"{self.name}: no parameter '{name}'; {closest(name, known)}")
         for parameter in self.parameters:
             if parameter.name not in values:
+                if parameter.optional:
+                    continue
                 raise EffectError(f"{self.name}: parameter '{parameter.name}' is missing")
             value = values[parameter.name]
             if not parameter.low <= value <= parameter.high:

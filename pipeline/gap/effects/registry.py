@@ -28,7 +28,7 @@ from pipeline.gap.effects.torque_constant_error import TorqueConstantError
 from pipeline.gap.effects.torque_ripple import TorqueRipple
 from pipeline.gap.effects.transmission_coupling import BareCoupling, TransmissionCoupling
 from pipeline.gap.effects.viscous_friction import ViscousFriction
-from pipeline.gap.effects.winding_heating import WindingHeating
+from pipeline.gap.effects.winding_heating import SensedHeating, WindingHeating
 from pipeline.gap.errors import EffectError
 from pipeline.gap.model import MachineModel
 
@@ -61,6 +61,7 @@ EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
     }
 )
 _BARE_COUPLING: Final = BareCoupling()
+_SENSED_HEATING: Final = SensedHeating()
 
 
 def effect_named(name: str) -> Effect:
@@ -77,6 +78,8 @@ def effect_named(name: str) -> Effect:
 def catalogue(model: MachineModel) -> tuple[Effect, ...]:
     """Every effect in the form in which it competes for this machine."""
     bare = any(a.motor is None for a in model.actuators)
-    return tuple(
+    effects = [
         _BARE_COUPLING if bare and e.name == _BARE_COUPLING.name else e for e in EFFECTS.values()
-    )
+    ]
+    # A log with the motors' temperature has places for this one, any other for the plain one.
+    return (*effects, _SENSED_HEATING)

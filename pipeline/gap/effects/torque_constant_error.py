@@ -45,5 +45,7 @@ class TorqueConstantError(Effect):
         return (("torque_constant", place[0]),)
 
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """Two per cent."""
-        return {"relative": CONSTANT_TOLERANCE}
+        """Two per cent, or what the motor's file states where that is more."""
+        motor = model.actuator(place[0]).motor
+        stated = 0.0 if motor is None else motor.torque_constant_spread
+        return {"relative": max(CONSTANT_TOLERANCE, stated)}

@@ -11,6 +11,7 @@ from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import MachineModel
 
 _TIMES = (1.5, 4.0, 10.0, 30.0)  # [s]
+_HOTTEST = 150.0  # above or below what the data sheet's values hold for [K]; insulation gives way
 
 
 class WindingHeating(Effect):
@@ -18,11 +19,12 @@ class WindingHeating(Effect):
 
     name = "winding_heating"
     parameters: ClassVar = (
-        Parameter("rise", "K", -300.0, 300.0),
+        Parameter("rise", "K", -_HOTTEST, _HOTTEST),
         Parameter("thermal_resistance", "K/W", 0.0, 1e3),
         Parameter("time_constant", "s", 0.01, 1e5),
+        Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
     )
-    coordinates: ClassVar = (
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
         Coordinate("rise", 1.0, signed=True, required=False),
         Coordinate("thermal_resistance", 0.5, required=False),
     )
@@ -31,9 +33,7 @@ class WindingHeating(Effect):
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Joints with a motor, where an electrical channel is measured."""
-        if "torque" in m.channels:
-            return []
-        return [(a.name,) for a in model.actuators if a.motor is not None and a.heating is None]
+        return [] if m.temperature is not None else _places(model, m)
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
         """Time constants that a log of this length can show."""
@@ -46,9 +46,29 @@ class WindingHeating(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Give the motor a thermal node."""
-        node = Heating(
-            thermal_resistance=x["thermal_resistance"],
-            time_constant=shape["time_constant"],
-            rise=x["rise"],
+        return model.with_actuator(
+            replace(model.actuator(place[0]), heating=Heating(**self.physical(x, shape)))
         )
-        return model.with_actuator(replace(model.actuator(place[0]), heating=node))
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Of the node."""
+        return {"rise": 0.0, "thermal_resistance": 0.0, **x, **shape}
+
+
+class SensedHeating(WindingHeating):
+    """The same where a sensor on the motor's housing is read: it tells what warmed it before."""
+
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+        Coordinate("sensor_gain", 0.1, required=False),
+        Coordinate("thermal_resistance", 0.5, required=False),
+    )
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Joints with a motor whose temperature is measured beside an electrical channel."""
+        return _places(model, m) if m.temperature is not None else []
+
+
+def _places(model: MachineModel, m: Measurement) -> list[Place]:
+    if "torque" in m.channels:
+        return []
+    return [(a.name,) for a in model.actuators if a.motor is not None and a.heating is None]
