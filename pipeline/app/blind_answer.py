@@ -30,6 +30,7 @@ class Named:
         rivals: What the answer calls indistinguishable from it, in its words; empty where the name
             is given with confidence.
         intervals: Parameter to value and ends of the 95 % interval.
+        doubt: Why the answer does not trust the name; empty where it does.
         gap_before: Error on *prove* without it.
         gap_after: The same with it.
         noise_floor: Of the joints it acts on.
@@ -38,6 +39,7 @@ class Named:
     effect: str
     place: tuple[str, ...]
     rivals: str
+    doubt: str
     intervals: dict[str, tuple[float, float, float]]
     gap_before: float
     gap_after: float
@@ -45,8 +47,8 @@ class Named:
 
     @property
     def confident(self) -> bool:
-        """Whether nothing else is offered beside it."""
-        return not self.rivals
+        """Whether the name is trusted and nothing else is offered beside it."""
+        return not self.rivals and not self.doubt
 
 
 @dataclass(frozen=True)
@@ -134,6 +136,7 @@ def read_answer(run: dict[str, Any], out: Path) -> Answer:
                 effect=effect,
                 place=place,
                 rivals=verdict.removeprefix(INDISTINGUISHABLE) if verdict != ACCEPTED else "",
+                doubt=first["doubt"],
                 intervals={
                     row["parameter"]: (
                         _number(row["value"]),

@@ -24,7 +24,7 @@ OUTCOMES: Final = {
     "right": "name and place first, or a member of its class",
     "wrong place": "the right name at another place first",
     "wrong name": "another name first, without calling the truth indistinguishable from it",
-    "unexplained": "no name; the gap called unexplained",
+    "unexplained": "no name, or a doubted one that is not right; the gap called unexplained",
     "nothing": "nothing found",
     "failed": "no answer",
 }
@@ -135,6 +135,8 @@ def _outcome(hidden: Sequence[HiddenTruth], classes: Sequence[set[Key]], answer:
     first = answer.named[0]
     if any(_meets(first, members) for members in classes):
         return "right"
+    if answer.code == 1 and all(n.doubt for n in answer.named):
+        return "unexplained"
     return "wrong place" if first.effect in {one.effect for one in hidden} else "wrong name"
 
 

@@ -220,6 +220,7 @@ def _row(t: Scored) -> dict[str, Any]:
         "named": _join(n.effect for n in named),
         "named_place": _join(place_text(n.place) for n in named),
         "named_rivals": _join(n.rivals for n in named if n.rivals),
+        "named_doubts": _join(n.doubt for n in named if n.doubt),
         "named_values": _join(
             " ".join(
                 f"{k}={value:.6g} ({low:.6g} to {high:.6g})"

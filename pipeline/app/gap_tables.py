@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
@@ -39,7 +40,7 @@ def candidates_table(
             "joint": joint_of(model, c.effect, c.place),
             "place": JOINED.join(c.place),
             "heldout_before": c.before,
-            "heldout_after": c.after,
+            "heldout_after": None if math.isnan(c.after) else c.after,
             "unit": c.unit,
             "identifiable": c.identifiable,
             "verdict": _verdict(c, rivals.get((c.effect, c.place), ())),
@@ -75,6 +76,7 @@ def found_table(found: Sequence[Found], model: MachineModel) -> Table:
                     "gap_after": f.gap_after,
                     "gap_unit": f.unit,
                     "noise_floor": f.noise_floor,
+                    "doubt": f.doubtful,
                 }
             )
     return tables.found(rows)

@@ -79,14 +79,28 @@ def what_words(naming: Naming) -> str:
             f"**What:** nothing is missing. {naming.tried} candidates were tried and none is "
             "needed beyond the stated tolerances of the machine's parts."
         )
+    sure = [f for f in naming.found if not f.doubtful]
+    nearest = [f for f in naming.found if f.doubtful]
+    text = "**What:** "
+    if sure:
+        text += f"the model lacks {_named(sure)}."
+    else:
+        text += "no effect of the catalogue explains it."
+    if nearest:
+        joined = "come" if len(nearest) > 1 else "comes"
+        text += f" Nearest to what is {'left ' if sure else ''}missing {joined} {_named(nearest)},"
+        text += " which is doubtful and not taken into the model."
+    return f"{text} {meaning(naming.found[0].effect)}" if len(naming.found) == 1 else text
+
+
+def _named(found: Sequence[Found]) -> str:
+    """Effects with their places, the first ones with their parameters."""
     parts = [
         f"**{f.effect} at {place_text(f.place)}** ({parameters_text(f.parameters)})"
-        for f in naming.found[:TOLD]
+        for f in found[:TOLD]
     ]
-    parts += [f"{f.effect} at {place_text(f.place)}" for f in naming.found[TOLD:]]
-    text = f"**What:** the model lacks {_listed(parts)}."
-    first = naming.found[0]
-    return f"{text} {meaning(first.effect)}" if len(naming.found) == 1 else text
+    parts += [f"{f.effect} at {place_text(f.place)}" for f in found[TOLD:]]
+    return _listed(parts)
 
 
 def meaning(effect: str) -> str:

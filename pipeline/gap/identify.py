@@ -134,14 +134,14 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
                 order=number + 1,
                 effect=a.effect.name,
                 place=a.place,
-                parameters=intervals[number],
+                parameters=intervals[number].parameters,
                 rivals=tuple(rivals.get(key, ())) + _unseen(problem, number),
                 gap_before=_rms(old, touched, c),
                 gap_after=_rms(new, touched, c),
                 unit=unit,
                 noise_floor=_rms(problem.floor**2, touched, c),
                 excitation=a.effect.excitation,
-                doubtful=_doubt(problem, number),
+                doubtful=_doubt(problem, number, intervals[number].certain),
             )
         )
         before = after
@@ -176,8 +176,9 @@ def _unseen(problem: Problem, number: int) -> tuple[tuple[str, Place], ...]:
         worth = limits.WORTH_NAMING[effect.name]
         coordinate = next(c for c in effect.coordinates if c.name == worth[0])
         information = 0.0
+        shapes = effect.shapes(problem.model, problem.benches[0].measurement, a.place)
         for k in range(len(problem.benches)):
-            columns = problem.columns(k, effect, a.place, {})
+            columns = problem.columns(k, effect, a.place, shapes[0])
             column = columns[effect.coordinates.index(coordinate)]
             head = problem.head(k)
             information += sum(float(np.sum(x[head] ** 2)) for x in column.values())
@@ -186,7 +187,7 @@ def _unseen(problem: Problem, number: int) -> tuple[tuple[str, Place], ...]:
     return tuple(out)
 
 
-def _doubt(problem: Problem, number: int) -> str:
+def _doubt(problem: Problem, number: int, certain: bool) -> str:
     """Whether the blocks contradict each other about an effect's size: a wrong law.
 
     The scatter of the gradient over blocks is compared with what noise of the final misfit gives.
@@ -200,6 +201,8 @@ def _doubt(problem: Problem, number: int) -> str:
             f"noise allows, and {excess:.1f} times the noise is left: its law is not that of the "
             "machine"
         )
+    if not certain:
+        return "beside the other effects found its size may be nothing at all"
     return ""
 
 
@@ -270,13 +273,13 @@ def _candidate(
     joints = joints or list(range(len(problem.model.joints)))
     before = _rms(gaps[0], joints, 0)
     trial = selection.trials.get(key)
-    after = before
+    # What was not tried in earnest has no estimate to judge by.
+    after = before * np.sqrt(max(1.0 - trial.held_share, 0.0)) if trial else float("nan")
     identifiable = s.alone > limits.LEAST_ALONE
     if key in accepted:
         after = _rms(gaps[1], joints, 0)
         verdict, reason = limits.ACCEPTED, "explains the log with the fewest parameters"
     elif key in rivals:
-        after = _rms(gaps[1], joints, 0)
         verdict = limits.INDISTINGUISHABLE + "; ".join(rivals[key])
         reason = f"explains the log as well; a motion that {s.effect.excitation} would decide"
     elif not identifiable:

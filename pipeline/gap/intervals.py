@@ -11,10 +11,12 @@ sampling.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from pipeline.gap.block_sums import BlockSums, inverse_spd, solve_spd
 from pipeline.gap.measurement import CHOOSE, FIT
@@ -30,7 +32,20 @@ _COVERED: Final = (0.025, 0.975)
 LAW: Final = 0.01
 
 
-def estimates(problem: Problem, channel: str) -> list[tuple[Estimate, ...]]:
+@dataclass(frozen=True)
+class Sized:
+    """One accepted effect's estimates.
+
+    Attributes:
+        parameters: With intervals.
+        certain: Whether "nothing of it" lies outside their common 95 % region.
+    """
+
+    parameters: tuple[Estimate, ...]
+    certain: bool
+
+
+def estimates(problem: Problem, channel: str) -> list[Sized]:
     """Estimates of every accepted effect, in order.
 
     Args:
@@ -55,8 +70,20 @@ def estimates(problem: Problem, channel: str) -> list[tuple[Estimate, ...]]:
             }
             samples.append(a.effect.physical(x, shape))
         best = a.effect.physical(a.x, a.shape)
-        out.append(tuple(_estimate(a, n, best, samples, channel, problem.model) for n in best))
+        parameters = tuple(_estimate(a, n, best, samples, channel, problem.model) for n in best)
+        size = np.array([a.x[n] for n in names])
+        out.append(Sized(parameters, _certain(size, draws[:, coordinates])))
     return out
+
+
+def _certain(size: Array, draws: Array) -> bool:
+    """Whether coordinates (p,) differ from nothing, given deviations (n, p) of their estimate."""
+    used = size != 0.0
+    if not used.any():
+        return False
+    spread = np.atleast_2d(np.cov(draws[:, used].T))
+    wald = float(size[used] @ np.linalg.pinv(spread, hermitian=True) @ size[used])
+    return wald > float(chi2.isf(0.05, int(used.sum())))
 
 
 def _estimate(
@@ -73,13 +100,14 @@ def _estimate(
         values = best[name] + (values - best[name] + np.pi) % (2 * np.pi) - np.pi
     low, high = np.quantile(values, _COVERED)
     value = float(best[name])
+    bounds = next(p for p in a.effect.parameters if p.name == name)
     if name not in a.shape and name != "phase":
         tolerance = a.effect.tolerance(model, a.place).get(name, 0.0)
         extra = 1.96 * float(
             np.hypot(LAW * value, tolerance if a.effect.name == "time_delay" else 0.0)
         )
         low, high = value - np.hypot(value - low, extra), value + np.hypot(high - value, extra)
-        bounds = next(p for p in a.effect.parameters if p.name == name)
+    if name != "phase":
         low, high = max(low, bounds.low), min(high, bounds.high)
     return Estimate(
         name, value, float(min(low, value)), float(max(high, value)), a.effect.unit(name, channel)

@@ -82,6 +82,7 @@ class JointModel:
         position_torques: Torques that depend on the joint's position alone.
         compliance: Of the transmission [rad/(N*m)].
         backlash: Whole width [rad].
+        crossing: Torque over which the joint passes from one flank to the other [N*m].
         coupled_to: Joint with which this one's motor also turns; empty without.
         coupling: Turns of the motor, at the joint side, per turn of that other joint [1].
         heating: Thermal node of the motor; None for a motor that stays cold.
@@ -96,6 +97,7 @@ class JointModel:
     position_torques: tuple[PositionTorque, ...] = ()
     compliance: float = 0.0
     backlash: float = 0.0
+    crossing: float = 0.0
     coupled_to: str = ""
     coupling: float = 0.0
     heating: Heating | None = None

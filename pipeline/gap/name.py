@@ -246,7 +246,8 @@ def _stepped(problem: Problem, a: Accepted, step: Array, bend: Array) -> Accepte
         for (name, value), d in zip(a.shape.items(), bend, strict=True):
             most = _BEND * abs(value)
             shape[name] = value + share * float(np.clip(d, -most, most))
-        if a.effect.plausible(problem.model, a.place, x, shape):
+        seen = any(a.effect.shown(b.measurement, a.place, shape) for b in problem.benches)
+        if seen and a.effect.plausible(problem.model, a.place, x, shape):
             return replace(a, x=x, shape=shape)
     return a
 

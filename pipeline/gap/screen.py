@@ -103,6 +103,8 @@ class Screen:
     def score(self, effect: Effect, place: Place, shape: Mapping[str, float]) -> Score | None:
         """Score of one candidate; None where it does not change the prediction at all."""
         p = self.problem
+        if not any(effect.shown(b.measurement, place, shape) for b in p.benches):
+            return None
         columns = [p.columns(k, effect, place, shape) for k in range(len(p.benches))]
         if not any(column for per_log in columns for column in per_log):
             return None

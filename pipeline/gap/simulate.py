@@ -19,8 +19,7 @@ from pipeline.gap.model import JointModel, MachineModel
 from pipeline.gap.rigid import RigidBodies
 
 Array = NDArray[np.float64]
-#: Torque over which backlash passes from one flank to the other, as a share of the RMS torque.
-_FLANK_SHARE = 0.02
+_LEAST_CROSSING = 1e-9  # [N*m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,7 +118,7 @@ class Simulator:
             new, old = model.actuators[k], near.model.actuators[k]
             if new.encoder_offset != old.encoder_offset:
                 return True
-            wound = (new.compliance, new.backlash) != (old.compliance, old.backlash)
+            wound = _winding(new) != _winding(old)
             if self.measurement.at_motor and wound:
                 return True
         return False
@@ -166,8 +165,7 @@ class Simulator:
         """Motor angle less joint angle at the joint side, (N,) [rad], at the log's bandwidth."""
         wind = a.compliance * torque
         if a.backlash:
-            scale = _FLANK_SHARE * float(np.sqrt(np.mean(torque**2))) + 1e-9
-            wind = wind + 0.5 * a.backlash * np.tanh(torque / scale)
+            wind = wind + 0.5 * a.backlash * np.tanh(torque / max(a.crossing, _LEAST_CROSSING))
         return self.measurement.lowpass(wind)
 
     def _load(self, model: MachineModel, k: int, q: Array, torque: Array) -> Array:
@@ -282,7 +280,8 @@ class Simulator:
             constant = warm_torque_constant(k0, rise)
         motor = replace(a.motor, torque_constant=constant, resistance=resistance)
         current = motor.current(torque)
-        voltage = motor.voltage(current, speed)
+        driven = speed if m.open_winding is None else np.where(m.open_winding[:, k], 0.0, speed)
+        voltage = motor.voltage(current, driven)
         for c, channel in enumerate(m.channels):
             if channel == "current":
                 out[:, c] = current
@@ -296,6 +295,10 @@ class Simulator:
                 raise ModelError(
                     f"channel '{channel}' is not known; torque, current, voltage, power"
                 )
+
+
+def _winding(a: JointModel) -> tuple[float, float, float]:
+    return a.compliance, a.backlash, a.crossing
 
 
 def _delayed(time: Array, x: Array, delay: float) -> Array:

@@ -23,6 +23,7 @@ class Trial:
         score: What was tried.
         gain: Fall of the penalised misfit on *fit* and *choose* together.
         held_out: Fall of the misfit on *choose* at estimates from *fit*, penalties included.
+        held_share: Fall of the plain misfit there, over what it is at the joints it touches.
         significance: Wald statistic of the coordinates with the scatter over blocks.
         freedom: Number of coordinates in use.
         scale: Misfit per independent sample that is left with the candidate.
@@ -32,6 +33,7 @@ class Trial:
     score: Score
     gain: float
     held_out: float
+    held_share: float
     significance: float
     freedom: int
     scale: float
@@ -65,9 +67,8 @@ def try_candidate(problem: Problem, score: Score) -> Trial:
 
     gain = _objective(plain, both, old) - _objective(sums, both, free)
     before, after = plain.solve(fit, old), sums.solve(fit, free)
-    held_out = (float(plain.loss(before, choose).sum()) + plain.penalty(before)) - (
-        float(sums.loss(after, choose).sum()) + sums.penalty(after)
-    )
+    fall = float(plain.loss(before, choose).sum()) - float(sums.loss(after, choose).sum())
+    held_out = fall + plain.penalty(before) - sums.penalty(after)
     theta = sums.solve(both, free)
     covariance = sums.covariance(theta, both, free)
     tail = slice(n, None)
@@ -77,7 +78,19 @@ def try_candidate(problem: Problem, score: Score) -> Trial:
     touched = {j for per_log in columns for column in per_log for j in column}
     share = len(touched) / len(problem.model.joints)
     scale = float(sums.loss(theta, both).sum()) / max(count, 1.0)
-    return Trial(score, gain, held_out, significance, len(used), scale, count * share)
+    loss = _loss_of(problem, touched, before)
+    return Trial(score, gain, held_out, fall / loss, significance, len(used), scale, count * share)
+
+
+def _loss_of(problem: Problem, joints: set[int], theta: Array) -> float:
+    """Misfit of some joints on *choose* at an estimate."""
+    total = 1e-300
+    for stack in problem.stacks():
+        rows = stack.bench.parts[CHOOSE]
+        for j in joints:
+            rest = stack.r[j][rows] - np.tensordot(theta[stack.ids[j]], stack.X[j][:, rows], 1)
+            total += float(np.sum(rest**2))
+    return total
 
 
 def _objective(sums: BlockSums, blocks: NDArray[np.intp], free: NDArray[np.intp]) -> float:

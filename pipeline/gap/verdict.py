@@ -74,7 +74,7 @@ class Candidate:
         effect: Name.
         place: Joints, link, ground or effort channels.
         before: Held-out error (*choose*) of the joints it touches without it, in `unit`.
-        after: The same with it.
+        after: The same with it; NaN where it was not tried in earnest.
         unit: Of the compared channel.
         identifiable: Whether this motion could show it.
         verdict: `ACCEPTED`, `REJECTED`, `NOT_IDENTIFIABLE` or `INDISTINGUISHABLE` + names.

@@ -32,6 +32,7 @@ TRIALS = {
     "named": ("effects found, in order", ""),
     "named_place": ("where", ""),
     "named_rivals": ("what the answer calls indistinguishable from them", ""),
+    "named_doubts": ("why the answer does not trust them", ""),
     "named_values": ("parameters with 95 % intervals", ""),
     "outcome": ("of the first name: right, wrong place, wrong name, unexplained, nothing", ""),
     "wrong_names": ("given with confidence, neither hidden nor of a hidden one's class", ""),

@@ -40,7 +40,7 @@ CANDIDATES = {
     "joint": ("joint it acts at; empty where it acts on all", ""),
     "place": ("joints, link or ground it acts on", ""),
     "heldout_before": ("gap without it on data that did not fit it", "see unit"),
-    "heldout_after": ("the same with it", "see unit"),
+    "heldout_after": ("the same with it; empty where it was not tried in earnest", "see unit"),
     "unit": ("unit of both", ""),
     "identifiable": ("whether this motion could show it", ""),
     "verdict": ("accepted, rejected, not identifiable on this motion, indistinguishable from", ""),
@@ -59,6 +59,7 @@ FOUND = {
     "gap_after": ("the same with it", "see gap_unit"),
     "gap_unit": ("unit of both gaps and the noise floor", ""),
     "noise_floor": ("of the joints it acts on", "see gap_unit"),
+    "doubt": ("why the name is not trusted; empty where it is", ""),
 }
 
 

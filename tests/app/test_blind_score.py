@@ -23,10 +23,11 @@ def named(
     effect: str,
     place: tuple[str, ...] = JOINT,
     rivals: str = "",
+    doubt: str = "",
     gap: tuple[float, float, float] = (1.0, 0.1, 0.1),
     **intervals: tuple[float, float, float],
 ) -> Named:
-    return Named(effect, place, rivals, intervals, *gap)
+    return Named(effect, place, rivals, doubt, intervals, *gap)
 
 
 def answer(*names: Named, code: int = 0) -> Answer:

@@ -18,7 +18,7 @@ COLUMNS = {
     "candidates": "effect joint place heldout_before heldout_after unit identifiable verdict "
     "reason",
     "found": "order effect joint parameter value ci_low ci_high unit gap_before gap_after gap_unit "
-    "noise_floor",
+    "noise_floor doubt",
 }
 SAME_FOR = 5.0  # [s] of the shipped log
 SAME_SHARE = 0.95  # of all samples

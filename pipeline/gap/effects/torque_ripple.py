@@ -48,6 +48,11 @@ class TorqueRipple(Effect):
         low = max(_LEAST_ORDER, _PERIODS * 2 * np.pi / travel)
         return np.arange(low, max(top, low), 0.35 * 2 * np.pi / travel)
 
+    def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
+        """Whether it repeats inside the travel: else it is any function of the position."""
+        travel = float(np.ptp(m.q[:, m.joints.index(place[0])]))
+        return shape["order"] >= max(_LEAST_ORDER, _PERIODS * 2 * np.pi / max(travel, 1e-9))
+
     def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
         """Orders to either side."""
         return [{"order": shape["order"] + e} for e in (-factor, factor)]

@@ -22,7 +22,7 @@ HIDDEN = {
     "center_of_mass_offset": (("rm_tibia_link",), {"x": 0.05, "y": 0.0, "z": 0.0}),
     "base_tilt": (("ground",), {"roll": 0.03, "pitch": -0.06}),
     "joint_elasticity": (("rm_joint_3",), {"stiffness": 2000.0}),
-    "backlash": (("rm_joint_3",), {"width": 0.01, "stiffness": 1e5}),
+    "backlash": (("rm_joint_3",), {"width": 0.01, "stiffness": 1e5, "crossing": 0.1}),
     "torque_ripple": (("rm_joint_1",), {"amplitude": 0.3, "order": 60.0, "phase": 0.7}),
     "transmission_coupling": (
         ("rm_joint_3", "rm_joint_2"),
