@@ -17,6 +17,7 @@ from pipeline.app.gap_figures import (
     write_waterfall,
     write_where_map,
 )
+from pipeline.app.gap_forward import by_model, forward, forward_table, rms, rollout_tables, say
 from pipeline.app.gap_options import split_items
 from pipeline.app.gap_report import Story, write_report
 from pipeline.app.gap_run import Progress, Whereabouts, find_where
@@ -71,6 +72,9 @@ def run_gap(options: argparse.Namespace) -> int:
                 write_where_map(where.rows, given.model.joints, given.model.name, folder)
             _say_where(where)
             return EXPLAINED
+        if options.step == "forward":
+            progress.step("driving the model by its servos")
+            return _drive(given, where, options)
         if options.step == "shrink":
             progress.step("weighing the model file's effects")
             told = check(given, where, options)
@@ -96,6 +100,17 @@ def run_gap(options: argparse.Namespace) -> int:
             _take_away_stale(options.out, told, tables)
     _say_answer(told.story, options.out)
     return UNEXPLAINED if naming.unexplained else EXPLAINED
+
+
+def _drive(given: Setup, where: Whereabouts, options: argparse.Namespace) -> int:
+    """Step `forward`: 1 where the model file's effects bring positions no nearer."""
+    drives = forward(given, where, options)
+    joints = given.model.joints
+    found = [forward_table(drives, joints), *rollout_tables(drives, joints)]
+    _write_tables(options, given, found)
+    say(drives)
+    first, *rest = (rms(own) for own in by_model(drives).values())
+    return UNEXPLAINED if rest and rest[-1] >= first else EXPLAINED
 
 
 def _write_tables(options: argparse.Namespace, given: Setup, tables: Sequence[Table]) -> None:

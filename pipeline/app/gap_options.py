@@ -6,12 +6,13 @@ import argparse
 from pathlib import Path
 from typing import Final
 
-#: The steps, each of which includes those before it; without a step all of them run.
+#: The steps; without one all but `forward` run, which needs goals and the servos' law.
 STEPS: Final = {
     "read": "judge the logs: quality.csv",
     "where": "where model and machine disagree: where.csv and the where-map",
     "name": "which effects the model lacks: candidates.csv, found.csv",
     "add": "the same, and write the effects into model.toml",
+    "forward": "drive the model under its servos' law and compare positions: forward.csv",
     "shrink": "the gap with and without the effects of a model file (--model)",
 }
 DEFAULT_OUT: Final = Path("reports/out/gap")

@@ -43,7 +43,7 @@ def check(given: Setup, where: Whereabouts, options: argparse.Namespace) -> Told
         channel=channel,
         unit=CHANNEL_UNITS[channel],
     )
-    models = [(AS_IT_WAS, given.bare), (TOLERANCES, with_tolerances(given.bare, naming))]
+    models = [(AS_IT_WAS, given.bare), (TOLERANCES, with_tolerances(given.bare, naming.tolerances))]
     for edit in given.file.edits:
         label = f"{edit.effect} at {place_text(edit.place)}"
         models.append((label, apply_edits(models[-1][1], [edit])))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from pathlib import Path
@@ -58,9 +58,11 @@ class Told:
     effect_joints: tuple[int, ...]
 
 
-def with_tolerances(model: MachineModel, naming: Naming) -> MachineModel:
-    """The model with the tolerances that naming estimated."""
-    for (kind, place), (value, sigma) in naming.tolerances.items():
+def with_tolerances(
+    model: MachineModel, tolerances: Mapping[tuple[str, str], tuple[float, float]]
+) -> MachineModel:
+    """The model with estimated tolerances: (kind, place) to (value, sigma)."""
+    for (kind, place), (value, sigma) in tolerances.items():
         limit = MOST_SIGMAS * sigma
         model = Nuisance(kind, place, sigma, "").edit(model, min(max(value, -limit), limit))
     return model
@@ -73,7 +75,7 @@ def with_found(model: MachineModel, found: Sequence[Found]) -> MachineModel:
 
 def gap_stages(model: MachineModel, where: Whereabouts, naming: Naming) -> tuple[Stage, ...]:
     """The gap of the model as it was, with tolerances, and with one effect after another."""
-    now = with_tolerances(model, naming)
+    now = with_tolerances(model, naming.tolerances)
     models = [(AS_IT_WAS, model), (TOLERANCES, now)]
     for f in naming.found:
         now = with_found(now, [f])

@@ -82,6 +82,8 @@ class Measurement:
         standing: Which feet stand, shape (N, F), or None.
         foot_force: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None
             where the ground's forces are computed.
+        open_winding: Rows in which a drive is off and its winding open, (N, J), or None: no current
+            flows, and a voltage that is compared has no part from the speed.
         temperature: Of the motors' sensors, shape (N, J) [degC], or None.
         sha256: Of the log.
     """
@@ -108,6 +110,7 @@ class Measurement:
     base_pitch: Array | None = None
     standing: Mask | None = None
     foot_force: Array | None = None
+    open_winding: Mask | None = None
     temperature: Array | None = None
     sha256: str = ""
 

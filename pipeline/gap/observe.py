@@ -75,9 +75,16 @@ def _observe(
     rest: Array,
 ) -> Measurement:
     channels, effort, noise = _channels(model, one)
-    mask = one.mask & np.isfinite(effort).all(axis=2) & ~_standing(one, rest)
+    known = one.mask
+    idle = _idle(one, channels)
+    if idle is not None:
+        effort[idle] = 0.0
+        within = np.zeros(len(one), dtype=np.bool_)
+        within[one.core] = one.motion_ok.all(axis=1)[one.core]
+        known = known | (idle & within[:, None])
+    mask = known & np.isfinite(effort).all(axis=2) & ~_standing(one, rest)
     if one.torque_off is not None:
-        mask &= ~one.torque_off
+        mask &= ~one.torque_off if idle is None else ~one.torque_off | idle
     standing, force = _contact(model, one)
     if standing is not None:
         mask &= ~one.near_event()[:, None]
@@ -116,9 +123,32 @@ def _observe(
         base_pitch=kept(one.base_pitch),
         standing=None if standing is None else standing[rows],
         foot_force=kept(force),
+        open_winding=_open_winding(one, rows) if idle is not None else None,
         temperature=kept(_temperature(one)),
         sha256=one.log.sha256,
     )
+
+
+def _idle(one: Prepared, channels: tuple[str, ...]) -> Mask | None:
+    """Rows whose filter sees nothing but a drive that is off and tells what flows, (N, J), or None.
+
+    With an open winding no current flows, with a shorted one no voltage is applied; either way the
+    compared effort is zero, and the motion alone says what friction and inertia are.
+    """
+    off, bridge = one.torque_off, one.log.torque_off_bridge
+    told = {"open": ("voltage", "current", "power"), "shorted": ("voltage",)}
+    if off is None or bridge is None or len(channels) > 1 or channels[0] not in told[bridge]:
+        return None
+    out = np.zeros(off.shape, dtype=np.bool_)
+    for piece in one.pieces:
+        out[piece] = one.settings.lowpass.share(~off[piece]) <= 1e-9
+    return out
+
+
+def _open_winding(one: Prepared, rows: NDArray[np.intp]) -> Mask | None:
+    if one.torque_off is None or one.log.torque_off_bridge != "open":
+        return None
+    return one.torque_off[rows]
 
 
 def _temperature(one: Prepared) -> Array | None:

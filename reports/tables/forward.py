@@ -1,0 +1,62 @@
+"""Tables of the forward simulation: position errors by model and log, and what each log did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.table import Table, table_from_rows
+from reports.wide import Quantity, wide_series
+
+Array = NDArray[np.float64]
+
+FORWARD = {
+    "model": ("what the model has that the one of the rows before has not", ""),
+    "log": ("name of the log; all: of all logs together", ""),
+    "joint": ("name of the joint", ""),
+    "position_rms_rad": ("root mean square of measured less simulated position", "rad"),
+    "position_mean_abs_rad": ("mean of its magnitude", "rad"),
+    "position_largest_rad": ("largest magnitude", "rad"),
+    "rows": ("rows compared", "1"),
+}
+
+
+def forward(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Position errors of models that drive themselves under the servos' law."""
+    text = "Measured less simulated position; nothing but the first instant is taken from the log."
+    return table_from_rows("forward", rows, FORWARD, text)
+
+
+def rollout(
+    log: str,
+    joints: Sequence[str],
+    time: Array,
+    measured: Array,
+    before: Array,
+    after: Array,
+    voltage: Array,
+) -> Table:
+    """One log and two simulations of it.
+
+    Args:
+        log: Its name.
+        joints: J names.
+        time: Shape (N,) [s].
+        measured: Positions of the machine, shape (N, J) [rad].
+        before: Of the model as it was, likewise.
+        after: Of the model with all effects, likewise.
+        voltage: Applied by its servos, shape (N, J) [V].
+    """
+    quantities = (
+        Quantity("measured_position", "rad", "position that the machine reached", measured),
+        Quantity("before_position", "rad", "position of the model as it was", before),
+        Quantity("after_position", "rad", "position of the model with all effects", after),
+        Quantity(
+            "after_voltage", "V", "that its servo applies; empty with an open bridge", voltage
+        ),
+    )
+    text = f"Forward simulation of log {log} under the servos' own law."
+    return wide_series(f"rollout_{log}", time, joints, quantities, description=text)
