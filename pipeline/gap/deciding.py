@@ -173,6 +173,8 @@ def _measurement(
         base_pitch=None,
         standing=None if stance is None else np.repeat(stance, n, axis=0),
         foot_force=None,
+        open_winding=None,
+        temperature=None if like.temperature is None else np.tile(like.temperature.mean(0), (n, 1)),
     )
 
 
