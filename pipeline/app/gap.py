@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import logging
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -20,7 +19,7 @@ from pipeline.app.gap_figures import (
 from pipeline.app.gap_forward import by_model, forward, forward_table, rms, rollout_tables, say
 from pipeline.app.gap_options import split_items
 from pipeline.app.gap_report import Story, write_report
-from pipeline.app.gap_run import Progress, Whereabouts, find_where
+from pipeline.app.gap_run import Progress, Whereabouts, find_where, judged
 from pipeline.app.gap_setup import Setup, check_options, setup, take_in
 from pipeline.app.gap_shrink import check
 from pipeline.app.gap_stages import noise_floor, overall
@@ -29,6 +28,7 @@ from pipeline.app.gap_tables import candidates_table, found_table, quality_table
 from pipeline.app.staging import staged
 from pipeline.gap.circumstances import WHOLE
 from pipeline.gap.finding import Finding
+from pipeline.gap.table_file import sha256
 from reports.table import Table
 from reports.writer import write_table, write_text
 
@@ -60,8 +60,9 @@ def run_gap(options: argparse.Namespace) -> int:
         progress.step("reading and judging the logs")
         intake, parts, fitted = take_in(given, options)
         if options.step == "read":
-            _write_tables(options, given, [quality_table(intake.findings)])
-            _say_findings(intake.findings)
+            found = judged(intake).findings
+            _write_tables(options, given, [quality_table(found)])
+            _say_findings(found)
             return EXPLAINED
         progress.step("simulating the logs' motion")
         where = find_where(given, given.model, intake, parts, fitted)
@@ -184,7 +185,7 @@ def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
     files = [*options.logs, *options.holdout, *given.sources]
     files += [path for path in (options.mapping, options.model) if path]
     return {
-        "inputs_sha256": {path.name: _sha256(path) for path in files},
+        "inputs_sha256": {path.name: sha256(path) for path in files},
         "versions": {name: version(name) for name in PACKAGES},
         "options": {
             "step": options.step,
@@ -198,7 +199,3 @@ def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
         "direction; gap is measured less predicted",
         "warnings": [],
     }
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -10,9 +10,10 @@ from typing import Any
 
 from pipeline.app.gap_setup import Setup
 from pipeline.gap.bandwidth import with_encoder_noise
-from pipeline.gap.circumstances import Where, where
+from pipeline.gap.circumstances import Tally, Where, edges_of, where
 from pipeline.gap.finding import refuse
 from pipeline.gap.intake import Intake
+from pipeline.gap.long import LongLogs
 from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import MachineModel
 from pipeline.gap.model_check import against_model
@@ -88,9 +89,42 @@ def find_where(
         for finding in against_model(m, prediction, given.expected.ratio)
     ]
     refuse(findings)
+    if intake.long is None:
+        rows = where(measurements, predictions, legs_of(given))
+    else:
+        rows = _where_in_chunks(given, model, intake.long, measurements, predictions)
+    intake = judged(intake)
     intake = replace(intake, findings=(*intake.findings, *findings))
-    rows = where(measurements, predictions, legs_of(given))
     return Whereabouts(intake, parts, fitted, measurements, predictions, rows)
+
+
+def judged(intake: Intake) -> Intake:
+    """With the judgement on every row where only stretches are held.
+
+    Raises:
+        GapError: A chunk cannot be used.
+    """
+    if intake.long is None:
+        return intake
+    return replace(intake, findings=intake.long.findings(intake.findings))
+
+
+def _where_in_chunks(
+    given: Setup,
+    model: MachineModel,
+    long: LongLogs,
+    measurements: Sequence[Measurement],
+    predictions: Sequence[Prediction],
+) -> tuple[Where, ...]:
+    """The table of every row, in the bands of the stretches that stand for the logs."""
+    edges = [
+        edges_of(m, prediction, long.span(k))
+        for k, (m, prediction) in enumerate(zip(measurements, predictions, strict=True))
+    ]
+    tally = Tally(legs_of(given))
+    for k, simulator in long.chunks(model, measurements):
+        tally.add(simulator.measurement, simulator.predict(model), edges[k])
+    return tally.ranked(measurements)
 
 
 def predict(model: MachineModel, measurements: Sequence[Measurement]) -> tuple[Prediction, ...]:

@@ -19,11 +19,12 @@ from pipeline.gap.errors import GapError, LogContentError, MappingError, ModelFi
 from pipeline.gap.expected import Expected, expected_of_model, expected_of_robot
 from pipeline.gap.intake import Intake, prepare_logs
 from pipeline.gap.log import EFFORTS, Log
-from pipeline.gap.mapping import Mapping, load_mapping
+from pipeline.gap.long import LONG_ROWS, LongLogs, parts_of_surveys
+from pipeline.gap.mapping import load_mapping
 from pipeline.gap.model import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.gap.model_file import ModelFile, apply_edits, new_model_file, read_model_file
 from pipeline.gap.parts import Parts, split
-from pipeline.gap.read import read_log
+from pipeline.gap.stream import Stream, Survey, survey
 from pipeline.robot import Robot, load_robot
 from pipeline.robot_file import load_robot_file
 
@@ -131,27 +132,27 @@ def _ratio(chain: Chain | None, joints: int) -> np.ndarray | None:
     return None if chain is None else np.full(joints, float(np.asarray(chain.ratio)))
 
 
-def read_logs(given: Setup, options: argparse.Namespace) -> tuple[list[Log], list[Log]]:
-    """Read the logs that may be fitted and those that only prove.
+def open_logs(given: Setup, options: argparse.Namespace) -> list[Stream]:
+    """The logs that may be fitted, then those that only prove.
 
     Raises:
-        GapError: A log or the mapping cannot be used.
+        GapError: The mapping cannot be used.
     """
     mapping = load_mapping(options.mapping) if options.mapping else None
-    fitted = [_read(path, given, mapping, options) for path in options.logs]
-    proving = [_read(path, given, mapping, options) for path in options.holdout]
-    if given.model.actuators and given.model.actuators[0].motor is None:
-        for log in (*fitted, *proving):
-            if log.effort.channel != "torque":
-                raise LogContentError(
-                    f"{log.name}: measures {log.effort.channel} and a bare URDF has no motor; name "
-                    "the actuator with --alternative"
-                )
-    return fitted, proving
+
+    def adjust(log: Log) -> Log:
+        return _adjusted(log, given, options)
+
+    paths = (*options.logs, *options.holdout)
+    return [Stream(path, given.expected, mapping, adjust) for path in paths]
 
 
-def _read(path: Path, given: Setup, mapping: Mapping | None, options: argparse.Namespace) -> Log:
-    log = read_log(path, given.expected, mapping)
+def _adjusted(log: Log, given: Setup, options: argparse.Namespace) -> Log:
+    """A log, or a piece of one, as the options want it.
+
+    Raises:
+        GapError: It does not hold what they ask for.
+    """
     if options.effort:
         log = log.with_changes(chosen_effort=options.effort)
         _ = log.effort  # refuses a channel that is not there
@@ -162,6 +163,12 @@ def _read(path: Path, given: Setup, mapping: Mapping | None, options: argparse.N
         )
     if options.base in ("level", "fixed"):
         log = log.with_changes(base_roll=None, base_pitch=None)
+    actuators = given.model.actuators
+    if actuators and actuators[0].motor is None and log.effort.channel != "torque":
+        raise LogContentError(
+            f"{log.name}: measures {log.effort.channel} and a bare URDF has no motor; name "
+            "the actuator with --alternative"
+        )
     return log
 
 
@@ -169,6 +176,7 @@ def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, i
     """Step 1: read, judge and prepare all logs, and cut them into fit, choose and prove.
 
     All scores are taken at one bandwidth: `--cutoff`, else where the encoders' noise is silent.
+    Of logs with more than `LONG_ROWS` rows together only the stretches that tell most are held.
 
     Returns:
         The logs, their parts, and how many of them may be fitted (the first ones).
@@ -176,22 +184,28 @@ def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, i
     Raises:
         GapError: Unusable input; one line.
     """
-    fitted, proving = read_logs(given, options)
+    streams = open_logs(given, options)
+    count = len(options.logs)
+    surveys: tuple[Survey, ...] = ()
+    if sum(stream.rows for stream in streams) > LONG_ROWS:
+        lasts = [options.prove_last if k < count else None for k in range(len(streams))]
+        surveys = tuple(survey(s, prove_last=t) for s, t in zip(streams, lasts, strict=True))
+    logs = [s.log for s in surveys] or [stream.whole for stream in streams]
+    largest, contact = _largest(given), _contact(given)
     intake = prepare_logs(
-        [*fitted, *proving],
-        given.expected,
-        cutoff=options.cutoff,
-        largest=_largest(given),
-        contact=_contact(given),
+        logs, given.expected, cutoff=options.cutoff, largest=largest, contact=contact
     )
     if options.cutoff is None and options.step != "read":
         cutoff = naming_cutoff(given.model, intake.prepared)
         prepared = lowered(intake.prepared, cutoff)
         intake = replace(intake, prepared=prepared, settings=prepared[0].settings)
-    count = len(fitted)
-    parts = split(
-        intake.prepared[:count], holdout=intake.prepared[count:], prove_last=options.prove_last
-    )
+    prepared = intake.prepared
+    last = None if surveys else options.prove_last
+    parts = split(prepared[:count], holdout=prepared[count:], prove_last=last)
+    if surveys:
+        parts = parts_of_surveys(parts, prepared, surveys)
+        long = LongLogs(tuple(streams), surveys, prepared, parts, largest, contact)
+        intake = replace(intake, long=long)
     return intake, parts, count
 
 

@@ -47,7 +47,7 @@ def check(given: Setup, where: Whereabouts, options: argparse.Namespace) -> Told
     for edit in given.file.edits:
         label = f"{edit.effect} at {place_text(edit.place)}"
         models.append((label, apply_edits(models[-1][1], [edit])))
-    steps = stages(models, measurements)
+    steps = stages(models, measurements, where.intake.long)
     found = tuple(_found(given, where, k, steps[1:]) for k in range(len(given.file.edits)))
     naming = replace(naming, found=found)
     return gathered(given, where, naming, steps, cost(given, found, known=False), None, options)

@@ -80,7 +80,7 @@ def gap_stages(model: MachineModel, where: Whereabouts, naming: Naming) -> tuple
     for f in naming.found:
         now = with_found(now, [f])
         models.append((f"{f.effect} at {place_text(f.place)}", now))
-    return stages(models, where.measurements)
+    return stages(models, where.measurements, where.intake.long)
 
 
 def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -> Effects:

@@ -15,6 +15,7 @@ from pipeline.gap.errors import LogContentError
 from pipeline.gap.expected import Expected
 from pipeline.gap.finding import Finding
 from pipeline.gap.log import Log
+from pipeline.gap.long import LongLogs
 from pipeline.gap.mapping import Mapping as MappingFile
 from pipeline.gap.prepare import Prepared, Settings, choose_settings, prepare
 from pipeline.gap.quality import judge
@@ -32,11 +33,13 @@ class Intake:
         prepared: One per log, in the order given.
         findings: Rows of `quality.csv`.
         settings: Common to all.
+        long: The logs chunk by chunk where `prepared` holds but stretches of them, else None.
     """
 
     prepared: tuple[Prepared, ...]
     findings: tuple[Finding, ...]
     settings: Settings
+    long: LongLogs | None = None
 
 
 def take_in(

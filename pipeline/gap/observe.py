@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -54,6 +55,25 @@ def observe_all(model: MachineModel, prepared: Sequence[Prepared]) -> tuple[Meas
     )
 
 
+def observe_chunk(
+    model: MachineModel, one: Prepared, part: NDArray[np.int8], like: Measurement
+) -> Measurement:
+    """Measurement of a chunk of a longer log.
+
+    Args:
+        model: Whose joints and legs the columns are.
+        one: The chunk; rows outside of its core do not count.
+        part: Of its rows, shape (N,).
+        like: Of the log as a whole: noise and rest speed.
+    """
+    block = np.full(len(one), -1, dtype=np.intp)
+    core = np.zeros(len(one), dtype=np.bool_)
+    core[one.core] = True
+    counted = replace(one, mask=one.mask & core[:, None])
+    m = _observe(model, counted, part, block, like.rest_speed)
+    return replace(m, noise=like.noise)
+
+
 def _subdivided(block: NDArray[np.intp], one: Prepared) -> NDArray[np.intp]:
     """Blocks cut into pieces of a few reaches of the filter: enough of them to see scatter."""
     length = max(2, int(np.ceil(PIECE * one.memory * one.rate)))
@@ -80,7 +100,7 @@ def _observe(
     if idle is not None:
         effort[idle] = 0.0
         within = np.zeros(len(one), dtype=np.bool_)
-        within[one.core] = one.motion_ok.all(axis=1)[one.core]
+        within[one.core] = np.asarray(one.motion_ok[one.core]).all(axis=1)
         known = known | (idle & within[:, None])
     mask = known & np.isfinite(effort).all(axis=2) & ~_standing(one, rest)
     if one.torque_off is not None:

@@ -21,8 +21,6 @@ from pipeline.gap.table_file import (
     TableFile,
     open_table,
     read_columns,
-    row_count,
-    sample_columns,
     sha256,
     stream_columns,
 )
@@ -90,15 +88,26 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
 
 
 def stream_log(
-    path: Path, expected: Expected, mapping: Mapping | None = None, *, rows: int = 200_000
+    path: Path,
+    expected: Expected,
+    mapping: Mapping | None = None,
+    *,
+    rows: int = 200_000,
+    digest: str = "",
 ) -> Iterator[Log]:
     """Read a Parquet log in consecutive pieces of at most `rows` rows.
+
+    Args:
+        path: Parquet.
+        expected: Names, limits and ratios of the robot.
+        mapping: For foreign columns.
+        rows: Of a piece.
+        digest: SHA-256 of the file, where it is known.
 
     Raises:
         GapError: As for `read_log`; time is checked across pieces, too.
     """
     plan = plan_reading(path, expected, mapping)
-    digest = sha256(path)
     first, last = 0, -np.inf
     for data in stream_columns(plan.table, plan.columns, rows):
         log = assemble(plan, data, first_row=first, digest=digest)
@@ -109,24 +118,6 @@ def stream_log(
             )
         first, last = first + len(log), float(log.time[-1])
         yield log
-
-
-def sample_log(
-    path: Path,
-    expected: Expected,
-    mapping: Mapping | None = None,
-    *,
-    stretches: int,
-    rows: int,
-) -> Iterator[Log]:
-    """Read some stretches of a Parquet log, spread over its length.
-
-    Raises:
-        GapError: As for `read_log`.
-    """
-    plan = plan_reading(path, expected, mapping)
-    for first, data in sample_columns(plan.table, plan.columns, stretches, rows):
-        yield assemble(plan, data, first_row=first, digest="")
 
 
 def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:
@@ -460,8 +451,3 @@ def _drive(plan: ReadingPlan, data: dict[str, Array], arrays: dict[str, Any], n:
     if "torque_off" in arrays:
         valid &= ~arrays["torque_off"]
     arrays["valid"] = valid
-
-
-def rows_in(path: Path) -> int | None:
-    """Rows of a Parquet log; None for CSV."""
-    return row_count(open_table(path))

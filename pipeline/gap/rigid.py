@@ -203,20 +203,25 @@ def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Arra
     q[:, 3:7] = _quaternions(m, n)
     v[:, index_v], a[:, index_v] = m.v, m.a
     v[:, :3] = velocity
-    pool = pin.ModelPool(model, 1)
+    weightless = model.copy()
+    weightless.gravity.linear = np.zeros(3)
+    pool, floating = pin.ModelPool(model, 1), pin.ModelPool(weightless, 1)
 
-    def base_wrench(acceleration: Array, speed: Array) -> Array:
-        torque = pin.rneaInParallel(1, pool, q.T, speed.T, acceleration.T)
+    def base_wrench(among: pin.ModelPool, acceleration: Array, speed: Array) -> Array:
+        torque = pin.rneaInParallel(1, among, q.T, speed.T, acceleration.T)
         return np.asarray(torque).T.reshape(v.shape)[:, :6]
 
-    asked = base_wrench(a, v)
+    asked = base_wrench(pool, a, v)
     still = np.zeros_like(v)
-    weight = base_wrench(still, still)
-    inertia = np.empty((n, 6, 6))
-    for k in range(6):
+    # A composite body's spatial inertia is [[m 1, -m [c]x], [m [c]x, J]]: what turning asks for
+    # tells all of it but the mass.
+    inertia = np.zeros((n, 6, 6))
+    inertia[:, :3, :3] = pin.computeTotalMass(model) * np.eye(3)
+    for k in range(3, 6):
         unit = still.copy()
         unit[:, k] = 1.0
-        inertia[:, :, k] = base_wrench(unit, still) - weight
+        inertia[:, :, k] = base_wrench(floating, unit, still)
+    inertia[:, 3:, :3] = inertia[:, :3, 3:].transpose(0, 2, 1)
     feet = foot_positions(machine.legs, _legs(m.q))
     rotation = _base_rotation(m, n)
     force = m.foot_force if rotation is None else np.einsum("nji,nfj->nfi", rotation, m.foot_force)

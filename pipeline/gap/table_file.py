@@ -192,51 +192,24 @@ def stream_columns(
         raise LogFormatError(_reason(error, table)) from None
 
 
-def sample_columns(
-    table: TableFile, columns: Sequence[str], stretches: int, rows: int
-) -> Iterator[tuple[int, dict[str, Array]]]:
-    """Read stretches of `rows` rows of a Parquet file, spread over its length.
-
-    Yields:
-        Number of the first row in the file, and the columns.
+def row_count(table: TableFile) -> int:
+    """Rows of a Parquet file from its footer, of a CSV file from its line ends.
 
     Raises:
-        LogFormatError: The file is not Parquet or breaks off.
+        LogFormatError: The footer cannot be read.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     if not table.parquet:
-        raise LogFormatError(f"{table.where}: streaming needs Parquet; convert the CSV first")
+        with table.path.open("rb") as stream:
+            return max(
+                0, sum(part.count(b"\n") for part in iter(lambda: stream.read(1 << 22), b"")) - 1
+            )
     try:
-        with pq.ParquetFile(table.path, memory_map=False, pre_buffer=False) as file:
-            sizes = [file.metadata.row_group(g).num_rows for g in range(file.num_row_groups)]
-            starts = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
-            every = max(1, int(starts[-1]) // max(1, stretches * rows))
-            many = len(sizes) >= stretches
-            # With few row groups the stretches lie inside them, else one at the head of each.
-            for g in np.unique(np.linspace(0, len(sizes) - 1, stretches).astype(int)).tolist():
-                first = int(starts[g])
-                batches = file.iter_batches(batch_size=rows, row_groups=[g], columns=list(columns))
-                for k, batch in enumerate(batches):
-                    if batch.num_rows and k % every == 0:
-                        whole = pa.table(batch)
-                        yield (
-                            first,
-                            {n: _numbers(whole.column(n), n, table.where) for n in columns},
-                        )
-                    first += batch.num_rows
-                    if many:
-                        break
+        return int(pq.read_metadata(table.path).num_rows)
     except (pa.ArrowException, OSError) as error:
         raise LogFormatError(_reason(error, table)) from None
-
-
-def row_count(table: TableFile) -> int | None:
-    """Rows of a Parquet file from its footer; None for CSV, which does not tell."""
-    import pyarrow.parquet as pq
-
-    return int(pq.read_metadata(table.path).num_rows) if table.parquet else None
 
 
 def _read_parquet(table: TableFile, columns: Sequence[str]) -> Any:
