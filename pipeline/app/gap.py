@@ -193,6 +193,7 @@ def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
             "alternative": given.alternative,
             "effort": options.effort or "the log's most direct",
             "cutoff_Hz": options.cutoff,
+            "gait_start_s": options.gait_start,
             "prove_last": options.prove_last,
         },
         "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "

@@ -43,6 +43,13 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         help="how the base stands; measured where the log has roll or pitch, else level or fixed "
         "as the robot file says",
     )
+    sub.add_argument(
+        "--gait-start",
+        type=float,
+        metavar="SECONDS",
+        help="time in the log at which a period of the robot file's gait begins: tells which feet "
+        "stand where the log has neither foot forces nor contacts; the lowest feet without it",
+    )
     sub.add_argument("--mapping", type=Path, help="mapping file (TOML) for foreign columns")
     sub.add_argument(
         "--alternative",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -191,7 +192,7 @@ def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, i
         lasts = [options.prove_last if k < count else None for k in range(len(streams))]
         surveys = tuple(survey(s, prove_last=t) for s, t in zip(streams, lasts, strict=True))
     logs = [s.log for s in surveys] or [stream.whole for stream in streams]
-    largest, contact = _largest(given), _contact(given)
+    largest, contact = _largest(given), _contact(given, options.gait_start)
     intake = prepare_logs(
         logs, given.expected, cutoff=options.cutoff, largest=largest, contact=contact
     )
@@ -209,11 +210,13 @@ def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, i
     return intake, parts, count
 
 
-def _contact(given: Setup) -> Callable[[Log], Contact | None] | None:
+def _contact(given: Setup, start: float | None) -> Callable[[Log], Contact | None] | None:
     robot = given.robot
     if robot is None or not robot.floating:
+        if start is not None:
+            raise GapError(f"{given.path}: its base is fixed; leave --gait-start out")
         return None
-    return lambda log: find_contact(log, robot)
+    return lambda log: find_contact(log, robot, start=start)
 
 
 def _largest(given: Setup) -> dict[str, np.ndarray]:
@@ -245,5 +248,7 @@ def check_options(options: argparse.Namespace) -> None:
         raise ModelFileError(f"{options.model}: no such model file")
     if options.step == "shrink" and not options.model:
         raise ModelFileError("gap shrink: name the model file to check with --model")
+    if options.gait_start is not None and not math.isfinite(options.gait_start):
+        raise GapError(f"--gait-start {options.gait_start}: expected a time in the log [s]")
     if options.effort and options.effort not in EFFORTS:
         raise GapError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")

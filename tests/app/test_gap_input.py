@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 from pipeline.app.demo import DEMO
@@ -169,6 +170,8 @@ def test_the_same_log_unspoilt_is_accepted(
         (["--base", "measured"], "leg.toml"),
         (["--alternative", "reversable"], "reversible"),
         (["--cutoff", "100000"], "Hz"),
+        (["--gait-start", "0.5"], "fixed"),
+        (["--gait-start", "nan"], "--gait-start"),
         (["--holdout", "none.csv"], "none.csv"),
         (["--model", "none.toml"], "none.toml"),
     ],
@@ -208,6 +211,23 @@ def test_a_urdf_with_currents_asks_for_the_actuator(
     arguments = ["gap", "where", str(log), "--robot", str(robot), "--out", str(tmp_path / "out")]
     assert exit_code(arguments) == 2
     assert "--alternative" in capsys.readouterr().err
+
+
+def _contact_source(tmp_path: Path, log: Path, more: list[str]) -> str:
+    out = tmp_path / "out"
+    assert exit_code(["gap", "read", str(log), "--out", str(out), *more]) == 0
+    (row,) = [r for r in rows_of(out / "quality.csv") if r["check"] == "contact"]
+    return row["detail"]
+
+
+def test_a_start_of_the_gait_tells_contact_where_the_log_does_not(tmp_path: Path) -> None:
+    whole = pq.read_table(DEMO)
+    bare = tmp_path / "bare.parquet"
+    pq.write_table(whole.drop([n for n in whole.column_names if "force" in n]), bare)
+    start = ["--gait-start", "0.9"]
+    assert "lowest feet" in _contact_source(tmp_path, bare, [])
+    assert "schedule" in _contact_source(tmp_path, bare, start)
+    assert "forces" in _contact_source(tmp_path, DEMO, start)
 
 
 def test_a_step_without_a_log_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
