@@ -17,7 +17,7 @@ from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement
 from pipeline.gap.model import MachineModel
 from pipeline.gap.name import Selection, refit, select
 from pipeline.gap.problem import Problem
-from pipeline.gap.remainder import remainders
+from pipeline.gap.remainder import errors, remainders
 from pipeline.gap.screen import Score
 from pipeline.gap.verdict import Candidate, Found, Naming
 
@@ -55,8 +55,11 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
     sigma = np.sqrt(np.mean([m.noise**2 for m in measurements], axis=0))
     start = Problem(model, make_benches(measurements), sigma)
     selection = select(start)
-    problem = selection.problem
     channel = measurements[0].channels[0]
+    found = _found(start, selection, channel)
+    if selection.nearest and found[-1].gap_after > limits.IDLE * found[-1].gap_before:
+        selection, found = selection.without_nearest(), found[:-1]
+    problem = selection.problem
     sums = problem.sums()
     theta = sums.solve(sums.blocks(FIT, CHOOSE))
     count = len(problem.tolerances)
@@ -66,7 +69,7 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
         for n, v in zip(problem.tolerances, held, strict=True)
     }
     naming = Naming(
-        found=_found(start, selection, channel),
+        found=found,
         candidates=_candidates(start, selection),
         tolerances=tolerances,
         remainders=remainders(problem, theta),
@@ -83,27 +86,6 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
     for a in problem.accepted:
         calibrated = a.apply(calibrated)
     return Identified(naming, plain, calibrated, problem)
-
-
-def errors(problem: Problem, parts: Sequence[int]) -> tuple[Array, Array]:
-    """Mean square error by joint and channel (J, C), and rows (J,), tolerances at their estimate.
-
-    Args:
-        problem: With some effects accepted.
-        parts: Parts of the data to judge on.
-    """
-    from pipeline.gap.remainder import remaining
-
-    sums = problem.sums()
-    theta = sums.solve(sums.blocks(FIT, CHOOSE))
-    squares = np.zeros(problem.sigma.shape)
-    rows = np.zeros(problem.sigma.shape)
-    for rest, bench in zip(remaining(problem, theta), problem.benches, strict=True):
-        for part in parts:
-            values = rest[bench.parts[part]] * problem.sigma
-            squares += np.nansum(values**2, axis=0)
-            rows += np.isfinite(values).sum(axis=0)
-    return squares / np.maximum(rows, 1), rows[:, 0]
 
 
 def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, ...]:
@@ -141,7 +123,9 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
                 unit=unit,
                 noise_floor=_rms(problem.floor**2, touched, c),
                 excitation=a.effect.excitation,
-                doubtful=_doubt(problem, number, intervals[number].certain),
+                doubtful=limits.NEAREST
+                if key == selection.nearest
+                else _doubt(problem, number, intervals[number].certain),
             )
         )
         before = after

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2
 
 from pipeline.gap import verdict as limits
 from pipeline.gap.columns import REACH
@@ -19,6 +20,7 @@ from pipeline.gap.effects.registry import catalogue, effect_named
 from pipeline.gap.effects.transmission_coupling import BareCoupling
 from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.problem import Accepted, Problem
+from pipeline.gap.remainder import errors
 from pipeline.gap.screen import Score, Screen, refine, score_all
 from pipeline.gap.trial import Trial, joint_gain, try_candidate
 
@@ -61,6 +63,8 @@ class Selection:
         last: Scores of the last round.
         trials: Best trial of each candidate tried in earnest.
         tried: Candidates screened, shapes not counted.
+        nearest: What was added last though its case does not stand, where nothing better explains
+            a large gap.
     """
 
     problem: Problem
@@ -69,6 +73,12 @@ class Selection:
     last: tuple[Score, ...]
     trials: dict[Key, Trial]
     tried: int
+    nearest: Key | None = None
+
+    def without_nearest(self) -> Selection:
+        """The same where what came nearest is not offered after all."""
+        problem = self.problem.with_accepted(self.problem.accepted[:-1])
+        return replace(self, problem=problem, rounds=self.rounds[:-1], nearest=None)
 
 
 def select(problem: Problem) -> Selection:
@@ -81,6 +91,7 @@ def select(problem: Problem) -> Selection:
     trials: dict[Key, Trial] = {}
     first: tuple[Score, ...] = ()
     refused: set[Key] = set()
+    made: list[Trial] = []
     problem = refit(problem)
     while True:
         screen = Screen(problem)
@@ -103,7 +114,8 @@ def select(problem: Problem) -> Selection:
         # A coupling brings a shaft with friction and inertia along: each joint's own come first.
         own = [s for s in open_ if not isinstance(s.effect, BareCoupling)]
         coupled = [s for s in open_ if isinstance(s.effect, BareCoupling)]
-        made, good = [], []
+        good: list[Trial] = []
+        made = []
         for group in (own, coupled):
             tries = [try_candidate(problem, refine(screen, s)) for s in group[:_TRIED]]
             made += tries
@@ -116,8 +128,7 @@ def select(problem: Problem) -> Selection:
             break
         winner = _preferred(problem, good)
         rivals = _rivals(problem, winner, made)
-        shape = {k: v for k, v in winner.score.shape.items() if k != REACH}
-        added = Accepted(winner.score.effect, winner.score.place, winner.score.x, shape)
+        added = _accepted(winner)
         candidate = refit(problem.with_accepted([*problem.accepted, added]).remasked())
         candidate = _pruned(candidate)
         if _runs_away(candidate):
@@ -130,9 +141,33 @@ def select(problem: Problem) -> Selection:
         problem = candidate
     problem, renamed = _specialised(problem)
     rounds = [replace(r, winner=renamed.get(r.winner, r.winner)) for r in rounds]
+    nearest = None
+    if (best := _nearest(problem, made)) is not None:
+        nearest = best.key
+        problem = problem.with_accepted([*problem.accepted, _accepted(best)])
+        rounds.append(Round(best.key, best, ()))
     kept = {(a.effect.name, a.place) for a in problem.accepted}
     rounds = [r for r in rounds if r.winner in kept]
-    return Selection(problem, tuple(rounds), first, tuple(scores), trials, tried)
+    return Selection(problem, tuple(rounds), first, tuple(scores), trials, tried, nearest)
+
+
+def _accepted(t: Trial) -> Accepted:
+    shape = {k: v for k, v in t.score.shape.items() if k != REACH}
+    return Accepted(t.score.effect, t.score.place, t.score.x, shape)
+
+
+def _nearest(problem: Problem, made: Sequence[Trial]) -> Trial | None:
+    """What comes nearest to an unexplained gap, though its case does not stand by itself."""
+    squares, _ = errors(problem, (FIT, CHOOSE))
+    excess = np.sqrt((squares / problem.floor**2).max(axis=1))
+    out = []
+    for t in made:
+        likely = t.significance > float(chi2.isf(limits.NEAREST_ALARM, max(t.freedom, 1)))
+        large = t.held_share > limits.NEAREST_SHARE and t.held_out > 0.0
+        left = max((excess[j] for j in t.touched), default=0.0) > limits.UNEXPLAINED
+        if likely and large and left:
+            out.append(t)
+    return max(out, key=lambda t: t.held_share, default=None)
 
 
 def least_gain(problem: Problem, score: Score) -> float:
@@ -144,16 +179,12 @@ def least_gain(problem: Problem, score: Score) -> float:
 
 def tolerance_gain(freedom: int) -> float:
     """Gain beyond which a tolerance counts as exceeded."""
-    from scipy.stats import chi2
-
     chance = chi2.sf(limits.TOLERANCE_SIGMAS**2, 1)
     return float(chi2.isf(chance, freedom))
 
 
 def acceptable(problem: Problem, t: Trial, tried: int) -> bool:
     """Whether a candidate's case stands by itself."""
-    from scipy.stats import chi2
-
     tolerance = t.score.effect.tolerance(problem.model, t.score.place)
     size = sum((t.score.x[k] / s) ** 2 for k, s in tolerance.items())
     alarm = float(chi2.isf(limits.FALSE_ALARM / max(tried, 1), max(t.freedom, 1)))

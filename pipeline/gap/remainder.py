@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.gap import verdict as limits
 from pipeline.gap.effects.base import CHANNEL_UNITS
-from pipeline.gap.measurement import PROVE, Measurement
+from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement
 from pipeline.gap.problem import Problem
 from pipeline.gap.verdict import Remainder
 
@@ -37,6 +38,25 @@ def remaining(problem: Problem, theta: Array) -> list[Array]:
             rest[good, j] = value[good] / bench.weight
         out.append(rest)
     return out
+
+
+def errors(problem: Problem, parts: Sequence[int]) -> tuple[Array, Array]:
+    """Mean square error by joint and channel (J, C), and rows (J,), tolerances at their estimate.
+
+    Args:
+        problem: With some effects accepted.
+        parts: Parts of the data to judge on.
+    """
+    sums = problem.sums()
+    theta = sums.solve(sums.blocks(FIT, CHOOSE))
+    squares = np.zeros(problem.sigma.shape)
+    rows = np.zeros(problem.sigma.shape)
+    for rest, bench in zip(remaining(problem, theta), problem.benches, strict=True):
+        for part in parts:
+            values = rest[bench.parts[part]] * problem.sigma
+            squares += np.nansum(values**2, axis=0)
+            rows += np.isfinite(values).sum(axis=0)
+    return squares / np.maximum(rows, 1), rows[:, 0]
 
 
 def remainders(problem: Problem, theta: Array) -> tuple[Remainder, ...]:

@@ -28,6 +28,7 @@ class Trial:
         freedom: Number of coordinates in use.
         scale: Misfit per independent sample that is left with the candidate.
         expected: Misfit of noise alone at the joints it touches, on *fit* and *choose*.
+        touched: Those joints.
     """
 
     score: Score
@@ -38,6 +39,7 @@ class Trial:
     freedom: int
     scale: float
     expected: float
+    touched: frozenset[int]
 
     @property
     def key(self) -> tuple[str, tuple[str, ...]]:
@@ -79,7 +81,10 @@ def try_candidate(problem: Problem, score: Score) -> Trial:
     share = len(touched) / len(problem.model.joints)
     scale = float(sums.loss(theta, both).sum()) / max(count, 1.0)
     loss = _loss_of(problem, touched, before)
-    return Trial(score, gain, held_out, fall / loss, significance, len(used), scale, count * share)
+    touches = frozenset(touched)
+    return Trial(
+        score, gain, held_out, fall / loss, significance, len(used), scale, count * share, touches
+    )
 
 
 def _loss_of(problem: Problem, joints: set[int], theta: Array) -> float:

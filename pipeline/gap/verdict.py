@@ -43,6 +43,15 @@ SUSPECT_SCATTER: Final = 2.5
 UNEXPLAINED: Final = 1.6
 #: A name that leaves more than this share of the gap on *prove* has closed nothing.
 IDLE: Final = 0.95
+#: What is not acceptable is offered as the nearest, with doubt, where it takes this share of an
+#: unexplained gap on held-out data ...
+NEAREST_SHARE: Final = 0.2
+#: ... and its size would come out as large by chance in this share of logs.
+NEAREST_ALARM: Final = 0.01
+NEAREST: Final = (
+    "it takes a fifth or more of the gap on held-out data, but parts of the log disagree about its "
+    "size too much to be sure of the law"
+)
 #: Effects that one log may be found to lack, per joint.
 MOST_EFFECTS: Final = 4
 
