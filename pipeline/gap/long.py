@@ -7,6 +7,7 @@ the proof on every row. What proves are the rows outside of those stretches: non
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Final
 
@@ -121,7 +122,7 @@ class LongLogs:
     def _chunks(self, k: int) -> Iterator[tuple[Quality, Prepared]]:
         ready = self.prepared[k]
         noise = (ready.noise, ready.position_noise)
-        yield from prepared_chunks(
+        chunks = prepared_chunks(
             self.streams[k],
             self.settings,
             noise,
@@ -129,6 +130,12 @@ class LongLogs:
             largest=self.largest,
             contact=self.contact,
         )
+        # One core reads and filters the next chunk while the other simulates this one.
+        with ThreadPoolExecutor(max_workers=1) as other:
+            coming = other.submit(next, chunks, None)
+            while (chunk := coming.result()) is not None:
+                coming = other.submit(next, chunks, None)
+                yield chunk
 
     def _part(self, k: int, one: Prepared) -> NDArray[np.int8]:
         """Which rows of a chunk prove, shape (N,)."""

@@ -8,6 +8,8 @@ feet let it (they do not move, and the base does not rotate), and the ground's f
 
 from __future__ import annotations
 
+import os
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
@@ -25,6 +27,7 @@ from pipeline.kinematics import (
 
 Array = NDArray[np.float64]
 _BLOCK = 2048
+_MANY = 8192  # rows from which a second thread pays
 
 
 def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
@@ -80,8 +83,10 @@ class RigidBodies:
         if machine.floating:
             q[:, 3:7] = _quaternions(m, n)
             v[:, :3], a[:, :6] = self._base_motion(machine)
-        pool = pin.ModelPool(model, 1)
-        generalised = np.asarray(pin.rneaInParallel(1, pool, q.T, v.T, a.T)).T.reshape(v.shape)
+        threads = _threads(n)
+        pool = pin.ModelPool(model, threads)
+        result = pin.rneaInParallel(threads, pool, q.T, v.T, a.T)
+        generalised = np.asarray(result).T.reshape(v.shape)
         torque: Array = generalised[:, index_v]
         if machine.floating and machine.legs is not None:
             torque = torque - self._ground_torque(machine, motion[0], generalised[:, :6])
@@ -109,6 +114,11 @@ class RigidBodies:
                 self._ground = (q, machine.bodies.squeeze, torque)
             return self._ground[2]
         return _ground_torque(machine, m, q, wrench, rotation)
+
+
+def _threads(rows: int) -> int:
+    """Threads worth their start; the result is the same with any number."""
+    return min(2, os.cpu_count() or 1) if rows >= _MANY else 1
 
 
 def legs_are_separate(machine: MachineModel, m: Measurement) -> bool:
@@ -205,10 +215,11 @@ def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Arra
     v[:, :3] = velocity
     weightless = model.copy()
     weightless.gravity.linear = np.zeros(3)
-    pool, floating = pin.ModelPool(model, 1), pin.ModelPool(weightless, 1)
+    threads = _threads(n)
+    pool, floating = pin.ModelPool(model, threads), pin.ModelPool(weightless, threads)
 
     def base_wrench(among: pin.ModelPool, acceleration: Array, speed: Array) -> Array:
-        torque = pin.rneaInParallel(1, among, q.T, speed.T, acceleration.T)
+        torque = pin.rneaInParallel(threads, among, q.T, speed.T, acceleration.T)
         return np.asarray(torque).T.reshape(v.shape)[:, :6]
 
     asked = base_wrench(pool, a, v)

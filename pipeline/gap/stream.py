@@ -27,9 +27,9 @@ Array = NDArray[np.float64]
 #: Refusals that concern a log as a whole and not a chunk of it.
 FINE_IN_A_CHUNK: Final = ("rows", "constant", "empty")
 #: Rows that are surveyed, and that naming works on, per log.
-SURVEYED: Final = 8 * STRETCH
-#: Rows of a chunk: with 18 joints, voltages and foot forces about half a gigabyte at the peak.
-CHUNK_ROWS: Final = 100_000
+SURVEYED: Final = 6 * STRETCH
+#: Rows of a chunk: with 18 joints, voltages and foot forces about a quarter of a gigabyte.
+CHUNK_ROWS: Final = 50_000
 
 
 def as_read(log: Log) -> Log:
