@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.app import gap_words as words
+from pipeline.app.gap_constants import voltage_remarks
 from pipeline.app.gap_energy import EnergyChange
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
@@ -185,6 +186,8 @@ def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
                 digits=3,
             )
         )
+    told = voltage_remarks(story.given.model.actuators, story.naming, story.where.measurements)
+    blocks += [Text(sentence) for sentence in told]
     blocks += [FigureBlock(folder / name, caption) for name, caption in story.signatures.items()]
     if story.naming.candidates:
         blocks.append(_candidates(story))

@@ -66,7 +66,7 @@ def _cell(x: object) -> str:
     return str(x)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def shared_data() -> Path:
     """Folder of the measured logs of real machines."""
     root = os.environ.get("LEGWATT_SHARED")

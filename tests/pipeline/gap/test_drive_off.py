@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.build import load_catalog
+from pipeline.app.gap_constants import voltage_per_speed, voltage_remarks
 from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.expected import expected_of_model
 from pipeline.gap.forward import ForwardSimulator, ServoInput
@@ -21,6 +22,7 @@ from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import MachineModel, machine_of_urdf
 from pipeline.gap.observe import observe
 from pipeline.gap.parts import split
+from pipeline.gap.verdict import Naming
 
 Array = NDArray[np.float64]
 FILES = Path(__file__).parent / "data_files"
@@ -88,6 +90,11 @@ def measurements(bridge: str | None) -> tuple[Measurement, ...]:
     return observe(model, intake.prepared, parts)
 
 
+@cache
+def named(bridge: str) -> Naming:
+    return identify(stated(), measurements(bridge)).naming
+
+
 def test_only_rows_whose_filter_sees_no_drive_count() -> None:
     told, untold = measurements("open")[0], measurements(None)[0]
     assert told.open_winding is not None
@@ -105,9 +112,21 @@ def test_only_rows_whose_filter_sees_no_drive_count() -> None:
 
 @pytest.mark.parametrize("bridge", ["open", "shorted"])
 def test_free_rows_tell_the_torque_constant_from_viscous_friction(bridge: str) -> None:
-    naming = identify(stated(), measurements(bridge)).naming
+    naming = named(bridge)
     found = {f.effect: f.values for f in naming.found}
     assert found["load_dependent_friction"]["share"] == pytest.approx(SHARE, abs=0.03)
     assert found["viscous_friction"]["coefficient"] == pytest.approx(VISCOUS, rel=0.15)
     constant = 0.39 * (1 + naming.tolerances["torque_constant", JOINT][0])
     assert constant == pytest.approx(0.34, rel=0.03)
+
+
+def test_the_sum_that_voltage_shows_is_told() -> None:
+    seen, naming = measurements("open"), named("open")
+    total, *_ = voltage_per_speed(stated().actuator(JOINT), naming)
+    assert total == pytest.approx(0.34 + 4.4 * VISCOUS / 0.34, rel=0.02)
+    (sentence,) = voltage_remarks(stated().actuators, naming, seen)
+    assert f"{total:.3g} V*s/rad" in sentence
+    assert "drive off" in sentence
+    assert (
+        voltage_remarks(stated().actuators, naming, [replace(seen[0], channels=("current",))]) == ()
+    )
