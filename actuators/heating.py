@@ -5,6 +5,8 @@ the torque constant with them. The temperature follows from one thermal node,
 
     time_constant d(dT)/dt = rise + thermal_resistance R I^2 - dT,    dT(0) = initial
 
+with the warm winding's own R, so that warming feeds itself.
+
 Where a sensor on the housing is read, a winding in balance with it adds sensor_gain (T - 25 degC):
 both rise in proportion to the loss, the winding by the larger thermal resistance.
 """
@@ -43,20 +45,30 @@ class Heating:
         require_non_negative("heating", thermal_resistance=self.thermal_resistance)
         require(self.time_constant > 0.0, "heating", "time_constant must be > 0")
 
-    def temperature_rise(self, time: FloatArray, copper_loss: FloatArray) -> FloatArray:
-        """Return dT (N,) [K] over time (N,) [s], strictly increasing, for a loss (N,) [W].
+    def temperature_rise(self, time: FloatArray, cold_loss: FloatArray) -> FloatArray:
+        """Return dT (N,) [K] over time (N,) [s], strictly increasing.
 
-        The node's equation is stepped exactly for a target held over each interval.
+        With R = R0 (1 + COPPER dT) the node's equation stays linear in dT; it is stepped exactly
+        for a current held over each interval.
+
+        Args:
+            time: Shape (N,) [s].
+            cold_loss: R0 I^2 with the data sheet's resistance, shape (N,) [W].
         """
-        target = self.rise + self.thermal_resistance * copper_loss
-        blend = 1.0 - np.exp(-np.diff(time) / self.time_constant)
-        result = np.empty_like(target)
+        own = self.thermal_resistance * cold_loss  # [K]
+        step = np.diff(time) / self.time_constant
+        decay = (1.0 - COPPER * own[:-1]) * step
+        keep = np.exp(-decay)
+        # (1 - exp(-x)) / x, which is one for no decay at all.
+        small = np.abs(decay) < 1e-12
+        blend = step * np.where(small, 1.0, -np.expm1(-decay) / np.where(small, 1.0, decay))
+        drive = (blend * (self.rise + own[:-1])).tolist()
         level = self.initial
-        result[0] = level
-        for k in range(blend.size):
-            level += blend[k] * (target[k] - level)
-            result[k + 1] = level
-        return result
+        result = [level]
+        for factor, more in zip(keep.tolist(), drive, strict=True):
+            level = factor * level + more
+            result.append(level)
+        return np.asarray(result)
 
     def sensed(self, temperature: FloatArray) -> FloatArray:
         """Return the part of dT (...) [K] that a sensor at some temperature (...) [degC] tells."""

@@ -178,7 +178,7 @@ def confusion(trials: Sequence[Scored]) -> tuple[list[str], list[str], NDArray[n
 
 
 def _said(score: Score) -> str:
-    if score.outcome == "right":
+    if score.outcome == "right" and score.hidden[0].in_catalogue:
         return score.hidden[0].effect
     special = {"failed": FAILED, "nothing": NOTHING, "unexplained": UNEXPLAINED}
     if score.outcome in special:

@@ -20,6 +20,11 @@ _NAMES: Final = {
     ("effort_offset", "current"): "offset",
     ("internal_foot_force", "commanded_lateral"): "lateral",
 }
+#: Parameters to which Coulomb friction of the same joint adds.
+_LEVELS: Final = {
+    "direction_dependent_friction": ("positive", "negative"),
+    "stribeck_friction": ("coulomb",),
+}
 
 
 @dataclass(frozen=True)
@@ -97,6 +102,13 @@ def _total(
         robot = load_robot(load_robot_file(ROBOT_FILES[truth["motion"]]))
         before = plan_of(robot, truth["seed"], 0).log_from
         total["rise"] = values["rise"] * math.exp(-before / values["time_constant"])
+    for name in _LEVELS.get(effect, ()):
+        # Coulomb friction of the same joint is a part of it that nothing can tell apart.
+        total[name] += sum(
+            float(other["parameters"]["torque"]["value"])
+            for other in truth["hidden"]
+            if other["effect"] == "coulomb_friction" and tuple(other["place"]) == place
+        )
     return total
 
 

@@ -196,7 +196,7 @@ class ForwardSimulator:
             if row + 1 == n:
                 break
             width = float(servo.time[row + 1] - servo.time[row])
-            own = self._warmed(own, resistance * current[row] ** 2, width)
+            own = self._warmed(own, current[row], width)
             steps = max(1, int(np.ceil(width / LONGEST_STEP - 1e-9)))
             for k in range(steps):
                 share = (k + 0.5) / steps
@@ -223,14 +223,14 @@ class ForwardSimulator:
             resistance[k] = warm_resistance(float(np.asarray(motor.resistance)), rise)[0]
         return constant, resistance
 
-    def _warmed(self, own: Array, loss: Array, width: float) -> Array:
-        """The motors' thermal nodes after a time [s] at a loss (J,) [W]."""
+    def _warmed(self, own: Array, current: Array, width: float) -> Array:
+        """The motors' thermal nodes after a time [s] at a current (J,) [A]."""
         out = own.copy()
         for k, a in enumerate(self._actuators):
-            if a.heating is not None:
+            if a.heating is not None and a.motor is not None:
                 node = replace(a.heating, initial=float(own[k]))
-                time = np.array([0.0, width])
-                out[k] = node.temperature_rise(time, np.full(2, loss[k]))[-1]
+                loss = float(np.asarray(a.motor.resistance)) * float(current[k]) ** 2
+                out[k] = node.temperature_rise(np.array([0.0, width]), np.full(2, loss))[-1]
         return out
 
     def _electrical(

@@ -185,6 +185,10 @@ def _doubt(problem: Problem, number: int, certain: bool) -> str:
             f"noise allows, and {excess:.1f} times the noise is left: its law is not that of the "
             "machine"
         )
+    a = problem.accepted[number]
+    further = {name: 1.1 * value for name, value in a.x.items()}
+    if not a.effect.plausible(problem.model, a.place, further, a.shape):
+        return "its estimate runs into the bound of what can be"
     if not certain:
         return "beside the other effects found its size may be nothing at all"
     return ""
