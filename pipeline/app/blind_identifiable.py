@@ -171,8 +171,8 @@ def _judge(
         if not other.in_catalogue:
             continue
         effect = EFFECTS[other.effect]
-        _, known = effect.internal(other.values)
-        free += effect_columns(bench, base, effect, other.place, known, sigma)
+        for known in _shapes(effect, model, m, other):
+            free += effect_columns(bench, base, effect, other.place, known, sigma)
     columns: list[Column] = [*free, d]
     tried: list[tuple[Effect, Place, slice]] = []
     hidden = {(one.effect, one.place) for one in (truth, *others)}
@@ -189,6 +189,15 @@ def _judge(
     only = {j: r for j, r in rest.items() if j in felt}
     sums = block_sums([make_stack(bench, columns, only)], precision, np.zeros(len(columns)))
     return _compare(sums, len(free), tried)
+
+
+def _shapes(
+    effect: Effect, model: MachineModel, m: Measurement, truth: HiddenTruth
+) -> list[dict[str, float]]:
+    """Nonlinear parameters of a hidden effect; those to try where the twin's law has no such."""
+    if all(p.name in truth.values for p in effect.parameters if not p.optional):
+        return [effect.internal(truth.values)[1]]
+    return effect.shapes(model, m, truth.place)
 
 
 def _compare(
