@@ -246,7 +246,12 @@ def check(path: Path, expected: Expected, mapping: Path | None) -> bool:
     return True
 
 
-def fuzz(expected: Expected, folder: Path, count: int, seed: int) -> dict[str, int]:
+KINDS = ("csv", "mapping", "csv", "parquet")
+
+
+def fuzz(
+    expected: Expected, folder: Path, count: int, seed: int, kinds: tuple[str, ...] = KINDS
+) -> dict[str, int]:
     rng = np.random.default_rng(seed)
     csv = valid_csv()
     good = folder / "good.csv"
@@ -256,7 +261,7 @@ def fuzz(expected: Expected, folder: Path, count: int, seed: int) -> dict[str, i
     whole = parquet.read_bytes()
     accepted = {"csv": 0, "mapping": 0, "parquet": 0}
     for k in range(count):
-        kind = ("csv", "mapping", "csv", "parquet")[k % 4]
+        kind = kinds[k % len(kinds)]
         rough = bool(rng.integers(3) == 0)
         if kind == "csv":
             bad = folder / "bad.csv"
@@ -291,5 +296,6 @@ def test_three_hundred_inputs(two_joints: Expected, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_ten_thousand_inputs(two_joints: Expected, tmp_path: Path) -> None:
-    fuzz(two_joints, tmp_path, 10_000, seed=2)
+@pytest.mark.parametrize("kind", ["csv", "parquet", "mapping"])
+def test_ten_thousand_inputs(two_joints: Expected, tmp_path: Path, kind: str) -> None:
+    fuzz(two_joints, tmp_path, 10_000, seed=2, kinds=(kind,))
