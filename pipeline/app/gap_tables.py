@@ -40,7 +40,7 @@ def candidates_table(
             "joint": joint_of(model, c.effect, c.place),
             "place": JOINED.join(c.place),
             "heldout_before": c.before,
-            "heldout_after": None if math.isnan(c.after) else c.after,
+            "heldout_after": _known(c.after),
             "unit": c.unit,
             "identifiable": c.identifiable,
             "verdict": _verdict(c, rivals.get((c.effect, c.place), ())),
@@ -72,14 +72,19 @@ def found_table(found: Sequence[Found], model: MachineModel) -> Table:
                     "ci_low": p.low,
                     "ci_high": p.high,
                     "unit": p.unit,
-                    "gap_before": f.gap_before,
-                    "gap_after": f.gap_after,
+                    "gap_before": _known(f.gap_before),
+                    "gap_after": _known(f.gap_after),
                     "gap_unit": f.unit,
                     "noise_floor": f.noise_floor,
                     "doubt": f.doubtful,
                 }
             )
     return tables.found(rows)
+
+
+def _known(value: float) -> float | None:
+    """A number, or an empty cell where there is none."""
+    return None if math.isnan(value) else value
 
 
 def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:

@@ -105,9 +105,10 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
     for number, a in enumerate(problem.accepted):
         after = refit(bare.with_accepted(problem.accepted[: number + 1]))
         touched = _touched(problem, number)
-        old, _ = errors(before, (PROVE,))
+        old, rows = errors(before, (PROVE,))
         new, _ = errors(after, (PROVE,))
-        gain = ((old - new) / problem.sigma**2)[touched].sum(axis=0)
+        proved = [j for j in touched if rows[j]]
+        gain = ((old - new) / problem.sigma**2)[proved].sum(axis=0)
         c = int(np.argmax(gain))
         unit = CHANNEL_UNITS[problem.benches[0].measurement.channels[c]]
         key = (a.effect.name, a.place)
@@ -118,14 +119,17 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
                 place=a.place,
                 parameters=intervals[number].parameters,
                 rivals=tuple(rivals.get(key, ())) + _unseen(problem, number),
-                gap_before=_rms(old, touched, c),
-                gap_after=_rms(new, touched, c),
+                gap_before=_rms(old, proved, c),
+                gap_after=_rms(new, proved, c),
                 unit=unit,
                 noise_floor=_rms(problem.floor**2, touched, c),
                 excitation=a.effect.excitation,
-                doubtful=limits.NEAREST
-                if key == selection.nearest
-                else _doubt(problem, number, intervals[number].certain),
+                doubtful=(
+                    limits.NEAREST
+                    if key == selection.nearest
+                    else _doubt(problem, number, intervals[number].certain)
+                    or (limits.IDLE_NAME if proved and gain.sum() <= 0.0 else "")
+                ),
             )
         )
         before = after
@@ -133,7 +137,8 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
 
 
 def _rms(squares: Array, joints: Sequence[int], channel: int) -> float:
-    return float(np.sqrt(np.mean(squares[list(joints), channel])))
+    """Over some joints; NaN without any."""
+    return float(np.sqrt(np.mean(squares[list(joints), channel]))) if joints else float("nan")
 
 
 def _touched(problem: Problem, number: int) -> list[int]:
@@ -202,9 +207,10 @@ def _second_thoughts(problem: Problem, found: list[Found]) -> tuple[Found, ...]:
         idle = f.gap_after > limits.IDLE * f.gap_before and not effect.is_tolerance
         _, excess = fit_quality(problem, number)
         if not f.doubtful and idle and excess > limits.UNEXPLAINED:
-            f = replace(f, doubtful="it closes none of the gap on data that had no say")
+            f = replace(f, doubtful=limits.IDLE_NAME)
         out.append(f)
-    shaken = {j for k, f in enumerate(out) if f.doubtful for j in _touched(problem, k)}
+    doubted = [k for k, f in enumerate(out) if f.doubtful not in ("", limits.IDLE_NAME)]
+    shaken = {j for k in doubted for j in _touched(problem, k)}
     for k, f in enumerate(out):
         _, excess = fit_quality(problem, k)
         near = shaken & set(_touched(problem, k))

@@ -40,6 +40,10 @@ def near_rest(
         Shape (N, J).
     """
     still = np.abs(v) < STANDING * rest
+    # A fast joint turns back between two samples, neither of which is slow.
+    turned = np.signbit(v[1:]) != np.signbit(v[:-1])
+    still[1:] |= turned
+    still[:-1] |= turned
     reach = int(np.ceil(SEEN * rate / bandwidth)) if np.isfinite(bandwidth) else 0
     out = np.zeros_like(still)
     for piece in pieces:

@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 Key = tuple[str, Place]
 _TRIED = 8  # candidates tried in earnest per round
 _NEWTON = 3  # refits after an acceptance
+_PASSES = 2  # through all accepted effects, to choose each anew
 _HELD = 3.0  # sigmas
 _INFLATION = 10.0  # of gains, at most
 _CONTRIBUTION = 3.0  # largest part of an effort one effect may have, in its RMS
@@ -139,8 +140,7 @@ def select(problem: Problem) -> Selection:
             continue
         rounds.append(Round(winner.key, winner, rivals))
         problem = candidate
-    problem, renamed = _specialised(problem)
-    rounds = [replace(r, winner=renamed.get(r.winner, r.winner)) for r in rounds]
+    problem, rounds = _reconsidered(problem, rounds, tried)
     nearest = None
     if (best := _nearest(problem, made)) is not None:
         nearest = best.key
@@ -311,37 +311,51 @@ def _runs_away(problem: Problem) -> bool:
     return False
 
 
-def _specialised(problem: Problem) -> tuple[Problem, dict[Key, Key]]:
-    """With special cases in place of general effects whose further parameters earn nothing."""
-    renamed: dict[Key, Key] = {}
-    for number in range(len(problem.accepted)):
-        a = problem.accepted[number]
-        present = {(o.effect.name, o.place) for o in problem.accepted}
-        sums = problem.sums()
-        both = sums.blocks(FIT, CHOOSE)
-        now = sums.objective(sums.solve(both), both)
-        scale = float(sums.loss(sums.solve(both), both).sum()) / max(
-            float(sums.count[both].sum()), 1.0
-        )
-        for name in a.effect.contains:
-            if (name, a.place) in present:
-                continue
-            special = effect_named(name)
+def _reconsidered(
+    problem: Problem, rounds: Sequence[Round], tried: int
+) -> tuple[Problem, list[Round]]:
+    """With every effect chosen anew while the others stay: what came early was judged alone.
+
+    A single effect is only held against its own special cases: all others it has met already.
+    """
+    chosen = {r.winner: r for r in rounds}
+    for _ in range(_PASSES):
+        changed = False
+        for number, a in enumerate(problem.accepted):
+            key = (a.effect.name, a.place)
             others = [o for k, o in enumerate(problem.accepted) if k != number]
-            screen = Screen(problem.with_accepted(others))
-            score = screen.score(special, a.place, {})
-            if score is None or score.gain <= 0.0:
+            rest = refit(problem.with_accepted(others))
+            screen = Screen(rest)
+            made = [try_candidate(rest, refine(screen, s)) for s in _again(screen, a, others)]
+            good = [t for t in made if acceptable(rest, t, tried)]
+            if not good:
                 continue
-            moved = list(problem.accepted)
-            moved[number] = Accepted(special, a.place, score.x, {})
-            simple = refit(problem.with_accepted(moved))
-            after = simple.sums()
-            theta = after.solve(both)
-            if after.objective(theta, both) - now < limits.RIVAL_GAIN * max(scale, 1.0):
-                renamed[(a.effect.name, a.place)] = (name, a.place)
-                problem = simple
-                break
-    return problem, renamed
+            best = _preferred(rest, good)
+            if best.key == key or (best.score.effect.name, best.score.place) in chosen:
+                continue
+            accepted = [*others[:number], _accepted(best), *others[number:]]
+            candidate = refit(rest.with_accepted(accepted))
+            if _runs_away(candidate):
+                continue
+            problem, changed = candidate, True
+            del chosen[key]
+            chosen[best.key] = Round(best.key, best, _rivals(rest, best, made))
+        if not changed:
+            break
+    order = [(a.effect.name, a.place) for a in problem.accepted]
+    return problem, [chosen[key] for key in order if key in chosen]
+
+
+def _again(screen: Screen, a: Accepted, others: Sequence[Accepted]) -> list[Score]:
+    """What may stand in the place of an accepted effect, itself among it."""
+    held = [(o.effect.name, o.place) for o in others]
+    problem = screen.problem
+    if others:
+        scores = score_all(screen, catalogue(problem.current()), skip=held, near=a.place)
+        return [s for s in scores[:_TRIED] if s.gain > 0.7 * least_gain(problem, s)]
+    every = [(a.effect, a.shape), *((effect_named(name), {}) for name in a.effect.contains)]
+    scored = [screen.score(effect, a.place, shape) for effect, shape in every]
+    return [s for s in scored if s is not None and s.gain > 0.0]
 
 
 def _needed(problem: Problem, number: int) -> tuple[float, float]:

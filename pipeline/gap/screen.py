@@ -216,16 +216,26 @@ def bounded_gain(
 
 
 def score_all(
-    screen: Screen, effects: Sequence[Effect], skip: Sequence[tuple[str, Place]] = ()
+    screen: Screen,
+    effects: Sequence[Effect],
+    skip: Sequence[tuple[str, Place]] = (),
+    near: Place = (),
 ) -> list[Score]:
-    """Best score of every effect at every place, the highest gain first."""
+    """Best score of every effect at every place, the highest gain first.
+
+    Args:
+        screen: The problem.
+        effects: To score.
+        skip: Names and places to leave out.
+        near: Only places that share a joint or link with this one; all by default.
+    """
     p = screen.problem
     model = p.current()
     m = p.benches[0].measurement
     out = []
     for effect in effects:
         for place in effect.places(model, m):
-            if (effect.name, place) in skip:
+            if (effect.name, place) in skip or (near and not set(near) & set(place)):
                 continue
             if isinstance(effect, TorqueRipple):
                 shapes = screen.ripple_orders(effect, model.index(place[0]))

@@ -26,7 +26,7 @@ TOLERANCE_SIGMAS: Final = 2.5
 #: Chance that noise alone makes any tolerance look exceeded.
 TOLERANCE_ALARM: Final = 0.01
 #: Rivals whose penalised misfit differs by less than this are one class, in noise variances ...
-RIVAL_GAIN: Final = 16.0
+RIVAL_GAIN: Final = 25.0
 #: ... or by less than this share of what the better one explains.
 RIVAL_SHARE: Final = 0.002
 #: Below this share a candidate's column is explained by everything else that is free.
@@ -43,6 +43,7 @@ SUSPECT_SCATTER: Final = 2.5
 UNEXPLAINED: Final = 1.6
 #: A name that leaves more than this share of the gap on *prove* has closed nothing.
 IDLE: Final = 0.95
+IDLE_NAME: Final = "it closes none of the gap on data that had no say"
 #: What is not acceptable is offered as the nearest, with doubt, where it takes this share of an
 #: unexplained gap on held-out data ...
 NEAREST_SHARE: Final = 0.2
@@ -113,7 +114,7 @@ class Found:
         parameters: Estimates.
         rivals: Effects at places that explain the log as well.
         gap_before: Error on *prove* without it (with those before it), RMS of the joints it
-            touches, in `unit`.
+            touches, in `unit`; NaN where none of them has a row there.
         gap_after: The same with it.
         unit: Of the compared channel.
         noise_floor: Of the same joints, in `unit`.
@@ -189,4 +190,5 @@ class Naming:
     @property
     def unexplained(self) -> bool:
         """Whether a significant part of the gap has no name."""
-        return any(r.significant for r in self.remainders) or any(f.doubtful for f in self.found)
+        doubted = any(f.doubtful not in ("", IDLE_NAME) for f in self.found)
+        return doubted or any(r.significant for r in self.remainders)

@@ -1,0 +1,45 @@
+"""Two logs of one machine: what the first lacks goes into the model, the second has a payload."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.app.conftest import exit_code, rows_of
+
+SEED = 5  # of the machine: its tolerances, its motion and what is hidden
+
+
+def _twin(out: Path, *hidden: str) -> dict[str, dict[str, float]]:
+    sealed = out.with_suffix(".json")
+    arguments = ["twin", "--seed", str(SEED), "--hide", *hidden]
+    assert exit_code([*arguments, "--out", str(out), "--sealed", str(sealed)]) == 0
+    truth = json.loads(sealed.read_text(encoding="utf-8"))
+    return {
+        item["effect"]: {name: p["value"] for name, p in item["parameters"].items()}
+        for item in truth["hidden"]
+    }
+
+
+def _gap(step: str, folder: Path, out: Path, *more: str) -> list[dict[str, str]]:
+    files = [str(folder / "log.csv"), "--robot", str(folder / "urdf" / "leg.toml")]
+    files += ["--actuators", str(folder / "actuators"), "--out", str(out)]
+    assert exit_code(["gap", step, *files, *more]) == 0
+    return rows_of(out / "found.csv") if (out / "found.csv").exists() else []
+
+
+def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) -> None:
+    bare, loaded = tmp_path / "bare", tmp_path / "loaded"
+    _twin(bare, "coulomb_friction")
+    truth = _twin(loaded, "coulomb_friction", "link_mass")
+    _gap("add", bare, tmp_path / "first")
+    model = tmp_path / "first" / "model.toml"
+    (found,) = _gap("name", loaded, tmp_path / "second", "--model", str(model))
+    assert (found["effect"], found["joint"]) == ("link_mass", "rm_joint_3")
+    mass = truth["link_mass"]["mass"]
+    assert float(found["ci_low"]) <= mass <= float(found["ci_high"])
+    assert float(found["value"]) == pytest.approx(mass, rel=0.15)
+
+    # Without the first log's model the friction is found again beside the payload.
+    both = {row["effect"] for row in _gap("name", loaded, tmp_path / "alone")}
+    assert both >= {"coulomb_friction", "link_mass"}
