@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -18,8 +19,9 @@ SAME_AS: Final[Mapping[str, frozenset[str]]] = {
 }
 #: Parameters that are compared only up to conventions (a phase) or drawn beside the size.
 NOT_COVERED: Final = frozenset({"phase", "rest", "velocity", "order", "time_constant"})
-#: A removable gap is one whose square exceeds this share of the squared noise floor.
-LEAST_GAP: Final = 0.2
+#: A gap counts as removable where its square, above the floor's, is this many squared noise floors:
+#: of less, some hundred samples on *prove* do not tell nine tenths from all.
+LEAST_GAP: Final = 1.0
 OUTCOMES: Final = {
     "right": "name and place first, or a member of its class",
     "wrong place": "the right name at another place first",
@@ -42,7 +44,7 @@ class Score:
         outcome: Key of `OUTCOMES`; by the first name.
         wrong: Names given with confidence that are neither hidden nor of a hidden one's class.
         right: Hidden effects that were named, or whose class was.
-        intervals: Parameters of rightly named effects with an interval.
+        intervals: Parameters of rightly named effects, not doubted, with an interval.
         covered: Of them, those whose interval holds the truth.
         closed: Share of the removable gap on *prove* that is closed; NaN without a name.
     """
@@ -145,7 +147,7 @@ def _coverage(hidden: Sequence[HiddenTruth], named: Sequence[Named]) -> tuple[in
     truths = {(one.effect, one.place): one for one in hidden}
     for n in named:
         truth = truths.get((n.effect, n.place))
-        if truth is None:
+        if truth is None or n.doubt:
             continue
         for parameter, (_, low, high) in n.intervals.items():
             if parameter not in truth.total or parameter in NOT_COVERED or not low < high:
@@ -158,10 +160,11 @@ def _coverage(hidden: Sequence[HiddenTruth], named: Sequence[Named]) -> tuple[in
 def _closed(named: Sequence[Named]) -> float:
     """Of what lies above the noise floor in squares, before the first name and after the last.
 
-    NaN where there was hardly anything above the floor: tolerances had taken it up.
+    NaN where there was hardly anything above the floor (tolerances had taken it up), or no row.
     """
     before: dict[tuple[str, ...], float] = {}
     after: dict[tuple[str, ...], float] = {}
+    named = [n for n in named if not math.isnan(n.gap_before)]
     for n in named:
         before.setdefault(n.place, max(n.gap_before**2 - n.noise_floor**2, 0.0))
         after[n.place] = max(n.gap_after**2 - n.noise_floor**2, 0.0)

@@ -129,7 +129,7 @@ def rates(trials: Sequence[Scored]) -> list[Rate]:
     out.append(
         Rate(
             "intervals_that_cover",
-            "95 % intervals of rightly named effects that hold the truth, by parameter",
+            "95 % intervals of rightly named effects, not doubted, that hold the truth",
             sum(s.covered for s in named),
             sum(s.intervals for s in named),
             (0.90, 0.99),
@@ -140,7 +140,7 @@ def rates(trials: Sequence[Scored]) -> list[Rate]:
     out.append(
         Rate(
             "gap_closed",
-            "rightly named effects with at least 90 % of the removable gap closed on prove",
+            "rightly named effects, of a gap above the noise floor at least 90 % closed on prove",
             sum(t.score.closed >= 0.9 for t in closed),
             len(closed),
             (0.95, 1.0),

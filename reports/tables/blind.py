@@ -36,7 +36,7 @@ TRIALS = {
     "named_values": ("parameters with 95 % intervals", ""),
     "outcome": ("of the first name: right, wrong place, wrong name, unexplained, nothing", ""),
     "wrong_names": ("given with confidence, neither hidden nor of a hidden one's class", ""),
-    "intervals": ("parameters of rightly named effects", "1"),
+    "intervals": ("parameters of rightly named effects, not doubted", "1"),
     "intervals_that_cover": ("of them, those whose interval holds the truth", "1"),
     "gap_closed": ("share of the gap above the noise floor, in squares, closed on prove", "1"),
     "message": ("of gap, where it gave no answer", ""),
