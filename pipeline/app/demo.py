@@ -1,7 +1,8 @@
-"""Writes the demonstration log that `make gap` reads: ``python -m pipeline.app.demo``.
+"""Writes the demonstration logs that `make gap` reads: ``python -m pipeline.app.demo``.
 
-A hexapod of the blind trials' simulator walks with something hidden in it. The simulator shares no
-law with the workflow that is to find it, and is not used when the demonstration runs.
+A hexapod of the blind trials' simulator walks with something hidden in it, and walks once more at
+another speed, for the proof. The simulator shares no law with the workflow that is to find it, and
+is not used when the demonstration runs.
 """
 
 from __future__ import annotations
@@ -15,23 +16,33 @@ from pipeline.gap.twin.effects import Hidden
 from pipeline.gap.twin.trial import make_trial
 from reports.atomic import replacing
 
+_FOLDER = Path(__file__).parents[1] / "gap" / "demo"
 #: The log; its robot is `urdf/hexapod.toml`, its actuator the catalogue's alternative "rotor".
-DEMO = Path(__file__).parents[1] / "gap" / "demo" / "walk.parquet"
+DEMO = _FOLDER / "walk.parquet"
+#: The same machine at another speed, held out to prove.
+SLOW = _FOLDER / "walk_slow.parquet"
 SEED = 2018
 RATE = 500.0  # [Hz]
 #: What is hidden: dry friction in the right middle hip.
 HIDDEN = Hidden("coulomb_friction", ("rm_joint_1",), {"torque": 2.0}, {"torque": "N*m"})
 
 
-def write_demo(path: Path = DEMO) -> Path:
-    """Simulate and write the log."""
+def write_demo(folder: Path = _FOLDER) -> tuple[Path, Path]:
+    """Simulate and write both logs."""
+    trial = make_trial(SEED, [HIDDEN], "walk", "low", logs=2, rate=RATE)
+    paths = (folder / DEMO.name, folder / SLOW.name)
+    for path, log in zip(paths, ("log", "log_2"), strict=True):
+        _write(trial.logs[log], path)
+    return paths
+
+
+def _write(log: dict[str, NDArray[np.float64]], path: Path) -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    trial = make_trial(SEED, [HIDDEN], "walk", "low", rate=RATE)
     columns: dict[str, NDArray[np.float32] | NDArray[np.float64]] = {
         name: values if name == "time_s" else values.astype(np.float32)
-        for name, values in trial.logs["log"].items()
+        for name, values in log.items()
     }
     with replacing(path) as (temporary,):
         pq.write_table(
@@ -42,8 +53,7 @@ def write_demo(path: Path = DEMO) -> Path:
             use_dictionary=False,
             use_byte_stream_split=True,
         )
-    return path
 
 
 if __name__ == "__main__":
-    print(write_demo())
+    print(*write_demo(), sep="\n")

@@ -70,7 +70,7 @@ def write_waterfall(
         noise,
         unit,
         title=f"{robot}: the gap, effect by effect",
-        subtitle="root mean square over all joints, on data that had no say",
+        subtitle="root mean square over all joints, on held-out data",
     )
     save_figure(figure, out, "waterfall")
 
@@ -111,8 +111,9 @@ def write_in_time(
         )
     figure = gap_time_figure(
         traces,
-        title="Measured and predicted, before and after",
-        subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: had no say",
+        title="Measured and predicted, without and with what was found",
+        subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: held out; "
+        "breaks: not compared",
         channel=m.channels[0],
     )
     save_figure(figure, out, "in_time")
@@ -174,7 +175,7 @@ def write_signature(
             CHANNEL_UNITS[first.channels[0]],
         ),
         title=f"{effect} at {first.joints[joint]}",
-        subtitle="all compared rows; line: mean, band: noise, 2 sigma",
+        subtitle="all compared rows; line: running mean, band: noise, 2 sigma",
     )
     save_figure(figure, out, name)
 

@@ -15,7 +15,7 @@ from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
 from pipeline.app.gap_stages import Stage, noise_floor, overall
 from pipeline.gap.circumstances import WHOLE
-from pipeline.gap.verdict import ACCEPTED, REJECTED, Naming, Remainder
+from pipeline.gap.verdict import ACCEPTED, REJECTED, UNEXPLAINED, Naming, Remainder
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import (
@@ -152,14 +152,16 @@ def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
         (
             FigureBlock(
                 folder / "where_map.svg",
-                "Gap of the model as it was, by joint and circumstance. A cause shows as a band "
-                "that stands out.",
+                "Gap of the model as it was, by joint and circumstance, over the noise floor. A "
+                "dark row points to a joint, a dark band in it to a circumstance; blank: too few "
+                "rows.",
             ),
             table_block(
                 tables["where"],
                 shown,
                 keep=whole,
-                caption="Measured less predicted before anything is added, all compared rows.",
+                caption="Measured less predicted before anything is added, all compared rows, the "
+                "largest part of the gap above the noise first.",
                 digits=3,
             ),
         ),
@@ -182,7 +184,9 @@ def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
                     "ci_high": "to",
                     "unit": "unit",
                 },
-                caption="What the model lacked.",
+                caption="What the model lacked; torques and frictions at the joint. The interval "
+                "holds what the log's scatter, the stated tolerances and one per cent for the law "
+                "leave open.",
                 digits=3,
             )
         )
@@ -206,7 +210,10 @@ def _candidates(story: Story) -> TableBlock:
     return TableBlock(
         ("effect", "place", "held out without", "with", "unit", "verdict", "why"),
         rows,
-        f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried.",
+        f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried. "
+        "Without and with: gap on data that did not fit the candidate, tolerances estimated anew "
+        "for either, so that what they take up speaks for no candidate; a dash: left out after "
+        "screening.",
         "candidates.csv",
         TONES,
         3,
@@ -234,12 +241,13 @@ def _smaller(story: Story, folder: Path) -> Section:
     blocks: list[Block] = [
         FigureBlock(folder / "waterfall.svg", "The gap of all joints, effect by effect."),
         FigureBlock(
-            folder / "in_time.svg", "Measured and predicted, and what is left, before and after."
+            folder / "in_time.svg",
+            "Measured and predicted, and what is left, without and with what was found.",
         ),
         TableBlock(
             ("joint", "as it was", "with tolerances", "with effects", "noise floor", "unit"),
             rows,
-            "Gap, root mean square, on data that had no say. Tolerances are what every machine "
+            "Gap, root mean square, on held-out data. Tolerances are what every machine "
             "differs in from its files: masses, torque constants, encoder zeros, each within its "
             "stated uncertainty.",
             digits=3,
@@ -266,9 +274,19 @@ def _energy(story: Story) -> tuple[Section, ...]:
         ("alternative", "cycle before [J]", "after [J]", "standing before [W]", "after [W]"),
         rows,
         "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
-        "energy lost; power to stand as the robot file says.",
+        "energy lost, and power to stand as the robot file says, without and with what was found.",
     )
-    return (Section("What it costs", (block, *map(Text, story.remarks))),)
+    catalog = story.given.catalog
+    titles = [
+        f"`{name}`: {catalog.alternatives[name].title.split(': ', 1)[-1]}"
+        for name in change.before
+        if name in catalog.alternatives
+    ]
+    told = Text(
+        f"The log was compared with `{story.given.alternative}`. The actuators: "
+        f"{'; '.join(titles)}. What was found counts in all of them but the ideal one."
+    )
+    return (Section("What it costs", (block, told, *map(Text, story.remarks))),)
 
 
 def _left(story: Story) -> Section:
@@ -289,8 +307,8 @@ def _left(story: Story) -> Section:
     block = TableBlock(
         ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like"),
         rows,
-        f"What is left on data that had no say; the other {len(every) - len(shown)} pairs of joint "
-        "and channel are at their noise.",
+        f"What is left on held-out data; {len(every) - len(shown)} pairs of joint and channel "
+        f"are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as noise.",
         "",
         TONES,
         3,
@@ -313,10 +331,17 @@ def _ratio(r: Remainder) -> float:
 def _data(story: Story, tables: dict[str, Table]) -> Section:
     parts = story.where.parts
     settings = story.where.intake.settings
+    shares = [float(m.mask.mean()) for m in story.where.measurements]
     texts = [
-        f"Compared at a bandwidth of {settings.cutoff:.3g} Hz ({settings.reason}); "
-        f"parts fit, choose and prove: {parts.rule}, blocks {parts.guard:.2g} s apart."
+        f"Compared at a bandwidth of {settings.cutoff:.3g} Hz ({settings.reason}). "
+        f"{words.percent(float(np.mean(shares)))} of the rows count, by joint: not those whose "
+        "filter sees the joint stop or turn back, where friction takes any value, nor the ends of "
+        "the log.",
+        f"Blocks of the log fit, choose between candidates or are held out to prove: {parts.rule}, "
+        f"{parts.guard:.2g} s apart, so that none holds a trace of another. "
+        + words.held_out_words(story.where.measurements),
     ]
+    texts += words.one_way_words(story.where.measurements, story.joints)
     if parts.warning:
         texts.append(f"**Note:** {parts.warning}.")
     odd = [value != "ok" for value in tables["quality"].columns["verdict"]]

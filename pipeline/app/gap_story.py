@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from pipeline.app.gap_energy import EnergyChange, energy_change
 from pipeline.app.gap_report import Story
 from pipeline.app.gap_run import Progress, Whereabouts
 from pipeline.app.gap_setup import Setup
-from pipeline.app.gap_stages import Stage, stages
+from pipeline.app.gap_stages import Stage, noise_floor, stages
 from pipeline.app.gap_words import place_text
 from pipeline.errors import TippingError
 from pipeline.gap.deciding import Deciding
@@ -151,9 +151,32 @@ def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress
     naming = identify(given.model, where.measurements).naming
     progress.step("weighing what was found")
     steps = gap_stages(given.model, where, naming)
+    naming = replace(naming, found=_proved(given.model, where, naming, steps))
     energy, remarks = cost(given, naming.found)
     decided = decide(given, given.model, where.measurements, naming.found)
     return gathered(given, where, naming, steps, (energy, remarks), decided, options)
+
+
+def _proved(
+    model: MachineModel, where: Whereabouts, naming: Naming, steps: Sequence[Stage]
+) -> tuple[Found, ...]:
+    """Effects with the gap of the models with and without them, simulated anew."""
+    first = len(steps) - len(naming.found)
+    floor = noise_floor(where.measurements)
+    out = []
+    for k, f in enumerate(naming.found):
+        before, after = steps[first + k - 1], steps[first + k]
+        j = effect_column(model, f, before, after)
+        out.append(
+            replace(
+                f,
+                gap_before=float(before.gap[j]),
+                gap_after=float(after.gap[j]),
+                unit=naming.unit,
+                noise_floor=float(floor[j]),
+            )
+        )
+    return tuple(out)
 
 
 def gathered(

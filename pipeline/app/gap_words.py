@@ -7,10 +7,13 @@ import math
 import re
 from collections.abc import Sequence
 
+import numpy as np
+
 from pipeline.app.gap_energy import PAIR, EnergyChange
 from pipeline.gap.circumstances import WHOLE, Where
 from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.errors import EffectError
+from pipeline.gap.measurement import PROVE, Measurement
 from pipeline.gap.verdict import Estimate, Found, Naming, Remainder
 from reports.page import cell_text
 
@@ -19,6 +22,8 @@ _LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 STANDS_OUT = 1.25
 #: Effects that the first lines tell in full.
 TOLD = 3
+#: Held-out rows turn one way where less than this share turns the other way.
+ONE_WAY = 0.05
 #: A change of energy below this is none, as a share.
 NO_CHANGE = 5e-4
 
@@ -41,9 +46,10 @@ def where_words(rows: Sequence[Where]) -> str:
     worst = whole[0]
     ratio = worst.gap / worst.noise_floor if worst.noise_floor > 0 else math.inf
     text = (
-        f"**Where:** model and machine disagree most at **{worst.joint}**: {number(worst.gap)} "
-        f"{worst.unit} root mean square, {number(ratio, 2)} times the noise floor and "
-        f"{percent(worst.share_of_total)} of the squared gap of all joints"
+        f"**Where:** model and machine disagree most at **{worst.joint}**: the gap (root mean "
+        f"square of measured less predicted) is {number(worst.gap)} {worst.unit}, "
+        f"{number(ratio, 2)} times the noise floor and {percent(worst.share_of_total)} of the "
+        "squared gap of all joints"
     )
     bands = [
         row
@@ -121,16 +127,26 @@ def percent(share: float) -> str:
 def parameters_text(parameters: Sequence[Estimate]) -> str:
     """Values with their intervals."""
     return "; ".join(
-        f"{p.name} {number(p.value)}{_unit(p.unit)}, 95 % interval {number(p.low)} to "
-        f"{number(p.high)}"
+        f"{p.name} {_sized(p.value, p)}{_unit(p.unit)}, 95 % interval {_sized(p.low, p)} to "
+        f"{_sized(p.high, p)}"
         for p in parameters
     )
+
+
+def _sized(value: float, p: Estimate) -> str:
+    """A number with the decimals that its interval is worth."""
+    half = 0.5 * (p.high - p.low)
+    if not 1e-4 <= half < 100.0:
+        return number(value)
+    decimals = max(0, -math.floor(math.log10(half)))
+    text = f"{value:.{decimals}f}"
+    return ("0" if float(text) == 0 else text).replace("-", "\N{MINUS SIGN}")
 
 
 def shrink_words(
     falls: Sequence[tuple[str, str, float, float, float, str]], whole: tuple[float, float]
 ) -> str:
-    """How much smaller the gap is on data that had no say.
+    """How much smaller the gap is on held-out data.
 
     Args:
         whole: Gap of all joints before and after all effects.
@@ -139,17 +155,28 @@ def shrink_words(
     parts = []
     for effect, joint, before, after, floor, unit in falls[:TOLD]:
         share = removed(before, after, floor)
-        closed = "" if share is None else f", {percent(share)} of what can be removed"
+        closed = "" if share is None else f", {percent(share)} of what lies above the noise"
+        if math.isnan(before):
+            parts.append(f"{effect} cannot be proved: no row of {joint} is held out")
+            continue
         parts.append(
-            f"with {effect} the gap of {joint} falls from {number(before)} to {number(after)} "
-            f"{unit}{closed} (noise floor {number(floor)} {unit})"
+            f"with {effect} the gap of {joint} {_moves(before, after)} from {number(before)} to "
+            f"{number(after)} {unit}{closed} (noise floor {number(floor)} {unit})"
         )
-    text = f"**How much smaller:** on data that had no say in the choice, {'; '.join(parts)}"
+    text = (
+        "**How much smaller:** on held-out data, which had no say in what is named or with which "
+        f"value, {'; '.join(parts)}"
+    )
     if len(falls) > TOLD:
         text += f"; and so on with {len(falls) - TOLD} more"
     unit = falls[0][5]
-    text += f". Over all joints it falls from {number(whole[0])} to {number(whole[1])} {unit}"
+    moves = _moves(*whole)
+    text += f". Over all joints it {moves} from {number(whole[0])} to {number(whole[1])} {unit}"
     return text + ", root mean square."
+
+
+def _moves(before: float, after: float) -> str:
+    return "rises" if after > before else "falls"
 
 
 def removed(before: float, after: float, noise: float) -> float | None:
@@ -172,25 +199,66 @@ def energy_words(change: EnergyChange, alternative: str) -> str:
         if abs(new - old) <= NO_CHANGE * old:
             parts.append(f"{name} stays at {number(old, 4)} J")
         else:
-            parts.append(f"{name} {number(old, 4)} to {number(new, 4)} J ({new - old:+.2g} J)")
-    text = f"**What it costs:** one gait cycle of the whole robot, electrical: {'; '.join(parts)}."
+            share = f"{100 * (new - old) / old:+.1f}".replace("-", "\N{MINUS SIGN}")
+            parts.append(f"{name} {old:.1f} to {new:.1f} J ({share} %)")
+    text = (
+        "**What it costs:** electrical energy of one gait cycle of the whole robot, by actuator: "
+        f"{'; '.join(parts)}."
+    )
     before, after = change.break_even_before, change.break_even_after
     if math.isnan(before) and math.isnan(after):
         return text + (
             " Reversible and irreversible actuators have no break-even in the middle legs, with or "
-            "without it."
+            "without what was found."
         )
     return text + (
-        " In the middle legs the irreversible actuator pays above "
-        f"{_share(before)} of the time standing without it and above {_share(after)} with it."
+        " Break-even: in the middle legs the irreversible actuator uses less energy than the "
+        f"reversible one where the robot stands still for more than {_share(before)} of the time, "
+        f"and with what was found for more than {_share(after)}."
     )
+
+
+def held_out_words(measurements: Sequence[Measurement]) -> str:
+    """Which stretches prove."""
+    spans = []
+    for m in measurements:
+        inside = np.concatenate([[0], (m.part == PROVE).astype(np.int8), [0]])
+        edges = np.flatnonzero(np.diff(inside))
+        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            spans.append((m.name, float(m.time[start]), float(m.time[stop - 1])))
+    whole = sum(stop - start for _, start, stop in spans)
+    text = f"Held out are {number(whole)} s in {len(spans)} stretch{'es' * (len(spans) != 1)}"
+    if len(spans) <= TOLD:
+        listed = [f"{start:.2f} to {stop:.2f} s of log '{name}'" for name, start, stop in spans]
+        text += f": {_listed(listed)}"
+    return text + "."
+
+
+def one_way_words(measurements: Sequence[Measurement], joints: Sequence[int]) -> list[str]:
+    """Joints with an effect whose held-out rows all turn one way, a remark each."""
+    out = []
+    for j in dict.fromkeys(joints):
+        speeds = np.concatenate([m.v[(m.part == PROVE) & m.mask[:, j], j] for m in measurements])
+        ahead = float((speeds > 0).mean()) if speeds.size else 0.5
+        if min(ahead, 1.0 - ahead) < ONE_WAY:
+            way = "positive" if ahead > 0.5 else "negative"
+            out.append(
+                f"**Note:** the held-out rows of {measurements[0].joints[j]} turn in its {way} "
+                "direction only; the other is fitted, not proved. A second log with `--holdout` "
+                "proves both."
+            )
+    return out
 
 
 def left_words(remainders: Sequence[Remainder]) -> str:
     """What stays unexplained and what it looks like."""
     left = [r for r in remainders if r.significant]
     if not left:
-        return "**What is left** is noise: nothing significant stays unexplained."
+        text = "**What is left** is noise: nothing significant stays unexplained."
+        blind = list(dict.fromkeys(r.joint for r in remainders if not r.rows))
+        if blind:
+            text += f" Of {_listed(blind)} no row is held out: there it is not proved."
+        return text
     parts = [
         f"{r.joint}: {number(r.error)} {r.unit}, {number(r.error / r.noise_floor, 2)} times the "
         f"noise floor{'; ' + r.description if r.description else ''}"

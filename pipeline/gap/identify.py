@@ -284,7 +284,12 @@ def _candidate(
         now = last.get(key)
         left = now.gain if now else 0.0
         if s.gain < limits.LEAST_GAIN and trial is None:
-            reason = f"explains no more than noise ({s.gain:.3g} noise variances)"
+            reason = (
+                f"explains no more than noise ({s.gain:.2g} noise variances; "
+                f"{limits.LEAST_GAIN:.0f} are asked)"
+            )
+        elif after > before:
+            reason = "makes held-out data worse"
         elif left < limits.LEAST_GAIN:
             reason = "the accepted effects explain what it would have explained"
         else:

@@ -78,7 +78,16 @@ def remainders(problem: Problem, theta: Array) -> tuple[Remainder, ...]:
             significant = error > limits.UNEXPLAINED * floor
             text = _describe(problem, rests, j, c) if significant else ""
             out.append(
-                Remainder(joint, channel, error, floor, CHANNEL_UNITS[channel], significant, text)
+                Remainder(
+                    joint,
+                    channel,
+                    error,
+                    floor,
+                    CHANNEL_UNITS[channel],
+                    significant,
+                    text,
+                    int(proved.size),
+                )
             )
     return tuple(out)
 

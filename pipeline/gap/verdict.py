@@ -43,7 +43,7 @@ SUSPECT_SCATTER: Final = 2.5
 UNEXPLAINED: Final = 1.6
 #: A name that leaves more than this share of the gap on *prove* has closed nothing.
 IDLE: Final = 0.95
-IDLE_NAME: Final = "it closes none of the gap on data that had no say"
+IDLE_NAME: Final = "it closes none of the gap on held-out data"
 #: What is not acceptable is offered as the nearest, with doubt, where it takes this share of an
 #: unexplained gap on held-out data ...
 NEAREST_SHARE: Final = 0.2
@@ -150,8 +150,9 @@ class Remainder:
         error: RMS, in `unit`.
         noise_floor: In `unit`.
         unit: Unit.
-        significant: Whether it is more than noise.
+        significant: Whether it is more than `UNEXPLAINED` times the noise floor.
         description: What it depends on, in words; empty where it is noise.
+        rows: Held-out rows that were compared.
     """
 
     joint: str
@@ -161,6 +162,7 @@ class Remainder:
     unit: str
     significant: bool
     description: str
+    rows: int = 1
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class GapTrace:
         after: Predicted with everything found, shape (N,).
         noise_floor: Standard deviation of the noise.
         unit: Of the channel.
-        proves: Rows that had no say in what was found, shape (N,), shaded; None for all of them.
+        proves: Held-out rows, shape (N,), shaded; None for all of them.
     """
 
     joint: str
@@ -99,25 +99,25 @@ def _thinned(trace: GapTrace) -> GapTrace:
 
 def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: bool) -> None:
     t = trace.time
-    top.plot(t, trace.measured, color=INK, linewidth=1.6, label="measured")
-    top.plot(t, trace.before, color=ORANGE, linewidth=1.1, label="before")
-    top.plot(t, trace.after, color=BLUE, linewidth=1.1, label="after")
+    top.plot(t, trace.measured, color=INK, linewidth=2.6, alpha=0.55, label="measured")
+    top.plot(t, trace.before, color=ORANGE, linewidth=1.1, label="without the effects")
+    top.plot(t, trace.after, color=BLUE, linewidth=1.1, label="with them")
     top.set_title(trace.joint)
     bottom.axhspan(-2 * trace.noise_floor, 2 * trace.noise_floor, color=SHADE, zorder=0)
     zero_line(bottom)
     left_before, left_after = trace.measured - trace.before, trace.measured - trace.after
     bottom.plot(t, left_before, color=ORANGE, linewidth=1.0)
     bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
-    kept = np.ones(t.size, dtype=np.bool_)
+    kept, where = np.ones(t.size, dtype=np.bool_), ""
     if trace.proves is not None and np.isfinite(left_after[trace.proves]).any():
-        kept = trace.proves
+        kept, where = trace.proves, "held out: "
         edges = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(np.int8), [0]])))
         for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             for ax in (top, bottom):
                 ax.axvspan(t[start], t[stop - 1], color=YELLOW, alpha=0.18, linewidth=0, zorder=0)
     rms = [float(np.sqrt(np.nanmean(x[kept] ** 2))) for x in (left_before, left_after)]
     bottom.set_title(
-        f"gap {number(rms[0])} before, {number(rms[1])} after; grey: noise, 2 sigma",
+        f"{where}gap {number(rms[0])} without, {number(rms[1])} with; grey: noise, 2 sigma",
         fontsize=8,
         color=QUIET,
     )

@@ -83,12 +83,13 @@ def gap_waterfall_figure(
     ax.barh(last, gaps[-1], color=BLUE, height=0.62)
     if last > 1:
         ax.plot([gaps[-1]] * 2, [last - 1 + 0.31, last - 0.31], color=QUIET, linewidth=0.8)
-    ax.text(gaps[-1], last, f" {number(gaps[-1])}", va="center", fontsize=8.5)
+    beside = max(gaps[-1], noise_floor if gaps[-1] > 0.5 * noise_floor else 0.0)
+    ax.text(beside, last, f" {number(gaps[-1])}", va="center", fontsize=8.5)
     ax.axvline(noise_floor, color=INK, linewidth=1.0, linestyle=(0, (4, 2)))
     ax.text(
         noise_floor,
         -0.62,
-        f" noise floor {number(noise_floor)}",
+        f" noise floor {number(noise_floor)} {unit}",
         va="bottom",
         fontsize=8,
         color=QUIET,
@@ -99,6 +100,6 @@ def gap_waterfall_figure(
     ax.set_ylim(last + 0.55, -1.05)
     ax.tick_params(axis="y", length=0)
     ax.spines["left"].set_visible(False)
-    ax.set_xlabel(f"gap on data that had no say, root mean square [{unit}]")
+    ax.set_xlabel(f"gap on held-out data, root mean square [{unit}]")
     headline(figure, title, subtitle)
     return figure

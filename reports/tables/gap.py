@@ -55,7 +55,10 @@ FOUND = {
     "ci_low": ("lower end of the 95 % interval", "see unit"),
     "ci_high": ("upper end of the 95 % interval", "see unit"),
     "unit": ("unit of value and interval", ""),
-    "gap_before": ("gap without it, on data that had no say, root mean square", "see gap_unit"),
+    "gap_before": (
+        "gap without it, held-out data, root mean square; empty without rows",
+        "see gap_unit",
+    ),
     "gap_after": ("the same with it", "see gap_unit"),
     "gap_unit": ("unit of both gaps and the noise floor", ""),
     "noise_floor": ("of the joints it acts on", "see gap_unit"),

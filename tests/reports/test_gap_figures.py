@@ -29,7 +29,7 @@ def trace(rows: int = 400) -> GapTrace:
 def test_gap_in_time_tells_what_is_left() -> None:
     figure = gap_time_figure([trace()], title="t", channel="current")
     bottom = figure.axes[1]
-    assert "after" in bottom.get_title(loc="left")
+    assert "0.0200 with" in bottom.get_title(loc="left")
     gap = np.asarray(bottom.lines[2].get_ydata(), dtype=float)
     assert np.sqrt(np.nanmean(gap**2)) == pytest.approx(0.02, rel=0.2)
     with pytest.raises(FigureError, match="1 to 3"):
