@@ -39,7 +39,7 @@ def candidates_table(
             "effect": c.effect,
             "joint": joint_of(model, c.effect, c.place),
             "place": JOINED.join(c.place),
-            "heldout_before": c.before,
+            "heldout_before": _known(c.before),
             "heldout_after": _known(c.after),
             "unit": c.unit,
             "identifiable": c.identifiable,

@@ -137,8 +137,10 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
 
 
 def _rms(squares: Array, joints: Sequence[int], channel: int) -> float:
-    """Over some joints; NaN without any."""
-    return float(np.sqrt(np.mean(squares[list(joints), channel]))) if joints else float("nan")
+    """Over those of some joints that are known; NaN without any."""
+    known = squares[list(joints), channel]
+    known = known[np.isfinite(known)]
+    return float(np.sqrt(known.mean())) if known.size else float("nan")
 
 
 def _touched(problem: Problem, number: int) -> list[int]:
@@ -244,8 +246,9 @@ def _candidates(start: Problem, selection: Selection) -> tuple[Candidate, ...]:
             rivals.setdefault(key, []).append(f"{r.winner[0]} at {', '.join(r.winner[1])}")
     base = refit(start)
     last = {(s.effect.name, s.place): s for s in selection.last}
-    old, _ = errors(base, (CHOOSE,))
+    old, rows = errors(base, (CHOOSE,))
     new, _ = errors(selection.problem, (CHOOSE,))
+    old[rows == 0], new[rows == 0] = np.nan, np.nan
     out = [
         _candidate(start, s, accepted, rivals, last, selection, (old, new)) for s in selection.first
     ]

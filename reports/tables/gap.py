@@ -39,7 +39,7 @@ CANDIDATES = {
     "effect": ("name in the catalogue of effects", ""),
     "joint": ("joint it acts at; empty where it acts on all", ""),
     "place": ("joints, link or ground it acts on", ""),
-    "heldout_before": ("gap without it on data that did not fit it", "see unit"),
+    "heldout_before": ("gap without it on data that did not fit it; empty: no rows", "see unit"),
     "heldout_after": ("the same with it; empty where it was not tried in earnest", "see unit"),
     "unit": ("unit of both", ""),
     "identifiable": ("whether this motion could show it", ""),
