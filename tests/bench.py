@@ -37,6 +37,7 @@ from pipeline.robot import Robot, load_robot
 from pipeline.robot_file import load_robot_file
 from reports.tables.walking import walking_joint_demand
 from reports.writer import csv_bytes
+from tests.bench_gap import gap_costs
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = 3000  # of the whole cycle
@@ -248,6 +249,7 @@ def main() -> None:
     demand_ratios(robot, motion)
     csv_ratio(robot, motion)
     cold_run()
+    gap_costs()
 
 
 if __name__ == "__main__":

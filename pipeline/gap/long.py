@@ -1,7 +1,8 @@
 """Logs too long to be held: surveyed once, then gone through chunk by chunk, every row once.
 
 Naming works on the stretches that tell most (`informative`); quality, the gap by circumstance and
-the proof on every row. What proves are the rows outside of those stretches: none had a say.
+the proof on every row. What proves are the rows outside of those stretches, and the blocks left
+out within them: none had a say.
 """
 
 from __future__ import annotations
@@ -17,10 +18,10 @@ from numpy.typing import NDArray
 from pipeline.gap.contact import Contact
 from pipeline.gap.finding import VERDICTS, Finding, Quality
 from pipeline.gap.log import Log
-from pipeline.gap.measurement import FIT, PROVE, UNUSED, Measurement
+from pipeline.gap.measurement import CHOOSE, FIT, PROVE, UNUSED, Measurement
 from pipeline.gap.model import MachineModel
 from pipeline.gap.observe import observe_chunk
-from pipeline.gap.parts import GUARD, Parts
+from pipeline.gap.parts import Parts
 from pipeline.gap.prepare import Prepared, Settings
 from pipeline.gap.simulate import Simulator
 from pipeline.gap.stream import CHUNK_ROWS, Stream, Survey, prepared_chunks
@@ -149,11 +150,12 @@ class LongLogs:
         elif np.isfinite(survey.proves_from):
             out[one.time >= survey.proves_from + self.parts.guard] = PROVE
         else:
-            # A filter's reach around what naming saw had a say, too.
-            edges = survey.spans + GUARD * one.memory * np.array([-1.0, 1.0])
-            index = np.searchsorted(edges[:, 0], one.time, side="right") - 1
-            inside = (index >= 0) & (one.time <= edges[np.maximum(index, 0), 1])
-            out[~inside] = PROVE
+            # Around what naming worked on a filter's reach had a say, too.
+            ready = self.prepared[k]
+            said = ready.time[np.isin(self.parts.part[k], (FIT, CHOOSE))]
+            after = np.clip(np.searchsorted(said, one.time), 1, said.size - 1)
+            far = np.minimum(np.abs(one.time - said[after - 1]), np.abs(one.time - said[after]))
+            out[far > 0.999 * self.parts.guard] = PROVE
         return out
 
 
@@ -170,7 +172,7 @@ def parts_of_surveys(
     if not any(np.isfinite(s.proves_from) for s in surveys):
         if any(not (part == FIT).any() for part in parts.part):
             return parts
-        rule = "proved on every row outside of the stretches that naming worked on"
+        rule = "proved on every row that had no say in the naming"
         return replace(parts, rule=rule)
     out = []
     for part, block, one, seen in zip(parts.part, parts.block, prepared, surveys, strict=True):

@@ -94,13 +94,11 @@ class Survey:
     Attributes:
         log: The stretches that tell most; what lies between them is a gap.
         found: All stretches.
-        spans: First and last time of every stretch taken, shape (S, 2) [s].
         proves_from: Time from which the log only proves [s]; infinite where nothing was said.
     """
 
     log: Log
     found: Scan
-    spans: Array
     proves_from: float
 
 
@@ -137,8 +135,7 @@ def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:
         at += len(piece)
     if not parts:
         raise LogContentError(f"{stream.path.name}: no row can be compared")
-    spans = np.array([[part.time[0], part.time[-1]] for part in parts])
-    return Survey(join_logs(*parts), found, spans, proves_from)
+    return Survey(join_logs(*parts), found, proves_from)
 
 
 def join_logs(*parts: Log) -> Log:
