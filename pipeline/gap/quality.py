@@ -72,11 +72,30 @@ def judge(log: Log, expected: Expected, *, largest: Mapping[str, Array] | None =
         found += position_units(log, expected, position_ok)
         found += velocity_units(log, expected, position_ok, beat)
     found += effort_units(log, {"torque": expected.effort_limit, **(largest or {})})
+    _feet(log, found)
     if log.ignored:
         found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
     for channel, formula in log.derived.items():
         found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
     return Quality(tuple(found), position_ok, effort_ok)
+
+
+def _feet(log: Log, found: _Findings) -> None:
+    """What the feet's sensors tell, and what not."""
+    if log.foot_force is None:
+        return
+    absent = [axis for k, axis in enumerate("xy") if not np.isfinite(log.foot_force[..., k]).any()]
+    number = len(log.feet)
+    if not absent:
+        detail = "forces in three directions: taken as the ground's; they tell contact too"
+        found.note("", "foot_forces", number, "1", "ok", detail)
+        return
+    detail = (
+        f"no force_{' and no force_'.join(absent)} at every foot: the others tell contact and "
+        "loads, the rest is computed as the least tangential forces, so that feet that squeeze "
+        "the ground cannot be told"
+    )
+    found.note("", "foot_forces", number, "1", "warning", detail)
 
 
 def _bridged(x: Array) -> Array:

@@ -359,7 +359,8 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
     if "motor_position" in arrays:
         side = "motor"
         arrays["position"] = arrays.pop("motor_position") / expected.ratio
-    _feet(arrays, force, expected)
+    unused = _feet(arrays, force, expected)
+    ignored = [s.column for t, s in plan.sources.items() if (t.owner, t.quantity) in unused]
     _drive(plan, data, arrays, n)
     return Log(
         name=plan.table.path.stem,
@@ -371,7 +372,7 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
         condition=dict(plan.rule.condition),
         locked=tuple(mapping.locked),
         extra={column: data[column] for column in mapping.keep},
-        ignored=plan.ignored,
+        ignored=(*plan.ignored, *ignored),
         chosen_effort=mapping.effort,
         sha256=digest,
         source=plan.table.path,
@@ -404,22 +405,31 @@ def _check_time(time: Array, where: str, first_row: int) -> None:
         )
 
 
-def _feet(arrays: dict[str, Any], force: dict[tuple[str, str], Array], expected: Expected) -> None:
-    """Foot forces and contacts, of the legs that have them."""
-    complete = [
-        foot for foot in expected.feet if all((foot, f"force_{axis}") in force for axis in "xyz")
-    ]
-    touching = [foot for foot in expected.feet if (foot, "contact") in force]
-    if complete:
-        arrays["feet"] = tuple(complete)
-        arrays["foot_force"] = np.stack(
-            [np.stack([force[f, f"force_{axis}"] for axis in "xyz"], axis=-1) for f in complete],
-            axis=1,
-        )
-        touching = complete if set(complete) <= set(touching) else []
-    if touching:
-        arrays["feet"] = tuple(touching)
-        arrays["contact"] = np.stack([force[f, "contact"] > 0.5 for f in touching], axis=1)
+def _feet(
+    arrays: dict[str, Any], force: dict[tuple[str, str], Array], expected: Expected
+) -> set[tuple[str, str]]:
+    """Foot forces and contacts, where every foot has them; what was not measured is NaN.
+
+    Returns:
+        Leg and quantity of what cannot be used: some feet alone do not tell who carries the robot,
+        and lateral forces alone do not tell who stands.
+    """
+    feet = expected.feet
+    unused = set(force)
+    if feet and all((foot, "force_z") in force for foot in feet):
+        # Where lateral sensors are missing at some feet, those of the others fit no sum of forces.
+        axes = [axis for axis in "xyz" if all((foot, f"force_{axis}") in force for foot in feet)]
+        block = np.full((arrays["time"].size, len(feet), 3), np.nan)
+        for i, foot in enumerate(feet):
+            for axis in axes:
+                block[:, i, "xyz".index(axis)] = force[foot, f"force_{axis}"]
+        arrays["feet"], arrays["foot_force"] = feet, block
+        unused -= {(foot, f"force_{axis}") for foot in feet for axis in axes}
+    if feet and all((foot, "contact") in force for foot in feet):
+        arrays["feet"] = feet
+        arrays["contact"] = np.stack([force[foot, "contact"] > 0.5 for foot in feet], axis=1)
+        unused -= {(foot, "contact") for foot in feet}
+    return unused
 
 
 def _drive(plan: ReadingPlan, data: dict[str, Array], arrays: dict[str, Any], n: int) -> None:

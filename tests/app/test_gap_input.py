@@ -230,6 +230,26 @@ def test_a_start_of_the_gait_tells_contact_where_the_log_does_not(tmp_path: Path
     assert "forces" in _contact_source(tmp_path, DEMO, start)
 
 
+def test_vertical_foot_forces_alone_tell_contact_and_say_what_they_do_not(tmp_path: Path) -> None:
+    whole = pq.read_table(DEMO)
+    lateral = [n for n in whole.column_names if "force_x" in n or "force_y" in n]
+    vertical = tmp_path / "vertical.parquet"
+    pq.write_table(whole.drop(lateral), vertical)
+    out = tmp_path / "out"
+    gaps = []
+    for log in (DEMO, vertical):
+        assert exit_code(["gap", "where", str(log), "--out", str(out)]) == 0
+        rows = rows_of(out / "where.csv")
+        assert rows[0]["joint"] == "rm_joint_1"
+        gaps.append({r["joint"]: float(r["gap"]) for r in rows if r["by"] == "joint"})
+    quality = {r["check"]: r for r in rows_of(out / "quality.csv")}
+    assert quality["foot_forces"]["verdict"] == "warning"
+    assert "least tangential" in quality["foot_forces"]["detail"]
+    assert "forces" in quality["contact"]["detail"]
+    # Computed lateral forces are further from the ground's than measured ones.
+    assert sum(gaps[1].values()) > 1.2 * sum(gaps[0].values())
+
+
 def test_a_step_without_a_log_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert exit_code(["gap", "read"]) == 2
     assert capsys.readouterr().err.count("\n") == 1

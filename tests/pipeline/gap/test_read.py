@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.gap.errors import GapError
 from pipeline.gap.expected import Expected
+from pipeline.gap.quality import judge
 from pipeline.gap.read import read_log, stream_log
 from pipeline.gap.table_file import open_table, row_count
 
@@ -75,6 +77,42 @@ def test_feet_go_by_leg_or_frame(two_joints: Expected, columns: Columns, write: 
     assert np.array_equal(log.foot_force[0, 0], [0.0, 1.0, 2.0])
     assert log.contact is not None
     assert log.contact.all()
+
+
+@pytest.mark.parametrize(
+    ("given", "kept", "verdict"), [("xyz", "xyz", "ok"), ("z", "z", "warning"), ("xy", "", "")]
+)
+def test_forces_of_feet_are_kept_as_measured(
+    two_joints: Expected, columns: Columns, write: Write, given: str, kept: str, verdict: str
+) -> None:
+    n = columns["time_s"].size
+    for axis in given:
+        columns[f"lf__force_{axis}_N"] = np.full(n, float("xyz".index(axis)))
+    log = read_log(write(columns), two_joints)
+    found = [f for f in judge(log, two_joints).findings if f.check == "foot_forces"]
+    if not kept:
+        assert log.foot_force is None
+        assert set(log.ignored) == {f"lf__force_{axis}_N" for axis in given}
+        assert not found
+        return
+    assert log.foot_force is not None
+    for k, axis in enumerate("xyz"):
+        expected = float(k) if axis in kept else np.nan
+        assert np.array_equal(log.foot_force[:, 0, k], np.full(n, expected), equal_nan=True)
+    assert [f.verdict for f in found] == [verdict]
+
+
+def test_forces_of_some_feet_alone_are_not_used(
+    two_joints: Expected, columns: Columns, write: Write
+) -> None:
+    six = replace(two_joints, feet=("lf", "rf"))
+    for axis in "xyz":
+        columns[f"lf__force_{axis}_N"] = np.ones(columns["time_s"].size)
+    columns["lf__contact"] = np.ones(columns["time_s"].size)
+    log = read_log(write(columns), six)
+    assert log.foot_force is None
+    assert log.contact is None
+    assert len(log.ignored) == 4
 
 
 def test_empty_effort_cells_are_masked_not_invented(
