@@ -68,6 +68,11 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help="prove on this last share of every log instead of on blocks in between",
     )
+    sub.add_argument(
+        "--keep-doubtful",
+        action="store_true",
+        help="write effects whose name is doubted into the model file, too, marked as such",
+    )
     sub.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder for everything written")
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 

@@ -133,10 +133,12 @@ def effect_column(model: MachineModel, f: Found, before: Stage, after: Stage) ->
     return int(np.argmax(np.nan_to_num(before.gap - after.gap, nan=-np.inf)))
 
 
-def added(given: Setup, where: Whereabouts, naming: Naming, out: Path) -> str:
+def added(
+    given: Setup, where: Whereabouts, naming: Naming, out: Path, *, keep_doubtful: bool = False
+) -> str:
     """Step 4: the model file with what was found; empty where there is nothing to write."""
     logs = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in where.measurements)
-    edits = edits_of(naming.found, logs)
+    edits = edits_of(naming.found, logs, keep_doubtful=keep_doubtful)
     if not edits and not given.file.edits:
         return ""
     return model_text(given.file.with_edits(edits), out)
@@ -211,7 +213,9 @@ def gathered(
         )
         for f, j in zip(naming.found, joints, strict=True)
     }
-    file = added(given, where, naming, options.out) if options.step != "shrink" else ""
+    file = ""
+    if options.step != "shrink":
+        file = added(given, where, naming, options.out, keep_doubtful=options.keep_doubtful)
     story = Story(
         given=given,
         where=where,

@@ -49,7 +49,7 @@ _ROBOT: Final = ("file", "sha256")
 _ACTUATORS: Final = ("alternative", "sha256")
 _EDIT: Final = ("effect", "place", "basis", "source", "parameters")
 _PARAMETER: Final = ("value", "unit", "interval")
-_BASES: Final = ("identified", "assumed")
+_BASES: Final = ("identified", "doubtful", "assumed")
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,8 @@ class Edit:
         effect: Name in the catalogue of effects.
         place: Joints, link, ground or effort channels.
         parameters: In the effect's order.
-        basis: ``"identified"`` or ``"assumed"``.
+        basis: ``"identified"``, ``"doubtful"`` (identified, but the name is not trusted) or
+            ``"assumed"``.
         source: The log and its hash.
     """
 

@@ -12,12 +12,15 @@ from pipeline.gap.model_file import SCHEMA, Edit, EditParameter, ModelFile
 from pipeline.gap.verdict import Found
 
 
-def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
-    """Edits of the effects that naming accepted and does not doubt.
+def edits_of(
+    found: Sequence[Found], source: str, *, keep_doubtful: bool = False
+) -> tuple[Edit, ...]:
+    """Edits of the effects that naming accepted.
 
     Args:
         found: From naming.
         source: The logs and their hashes, in words.
+        keep_doubtful: Whether those whose name is doubted are among them.
     """
     return tuple(
         Edit(
@@ -27,9 +30,10 @@ def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
                 EditParameter(p.name, p.value, p.unit, (p.low, p.high)) for p in one.parameters
             ),
             source=source,
+            basis="doubtful" if one.doubtful else "identified",
         )
         for one in found
-        if not one.doubtful
+        if keep_doubtful or not one.doubtful
     )
 
 

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.gap.model_writer import edits_of
+from pipeline.gap.verdict import Estimate, Found
 from tests.app.conftest import exit_code, rows_of
 
 SEED = 5  # of the machine: its tolerances, its motion and what is hidden
@@ -43,3 +45,26 @@ def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) 
     # Without the first log's model the friction is found again beside the payload.
     both = {row["effect"] for row in _gap("name", loaded, tmp_path / "alone")}
     assert both >= {"coulomb_friction", "link_mass"}
+
+
+def test_a_doubted_name_reaches_the_model_file_only_when_asked() -> None:
+    def found(doubt: str) -> Found:
+        torque = Estimate("torque", 1.0, 0.9, 1.1, "N*m")
+        return Found(
+            order=1,
+            effect="coulomb_friction",
+            place=("j",),
+            parameters=(torque,),
+            rivals=(),
+            gap_before=1.0,
+            gap_after=0.5,
+            unit="A",
+            noise_floor=0.1,
+            excitation="",
+            doubtful=doubt,
+        )
+
+    both = [found(""), found("its law is not that of the machine")]
+    assert [edit.basis for edit in edits_of(both, "log")] == ["identified"]
+    kept = edits_of(both, "log", keep_doubtful=True)
+    assert [edit.basis for edit in kept] == ["identified", "doubtful"]
