@@ -82,7 +82,7 @@ def test_tx40_reaches_the_aims_on_the_last_part(tx40: Run) -> None:
     assert by_joint[4] <= 1.1
     assert by_joint[5] <= 1.1
     assert rms(by_joint) <= 1.75
-    # The wrist with its rows at rest, against 1.01 and 1.09 of a fit made for it.
+    # With rows at rest the aim is met by both wrist joints together; joint 6 alone is at 1.14.
     assert rms(proved[:, 4:]) <= 1.1
 
 
