@@ -130,9 +130,8 @@ def _falls(story: Story) -> list[tuple[str, str, float, float, float, str]]:
 
 
 def _whole(story: Story) -> tuple[float, float]:
-    """Gap of all joints before and after all effects."""
-    first = len(story.stages) - len(story.naming.found)
-    return overall(story.stages[first - 1].gap), overall(story.stages[-1].gap)
+    """Gap of all joints of the model as it was and with everything estimated."""
+    return overall(story.stages[0].gap), overall(story.stages[-1].gap)
 
 
 def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:

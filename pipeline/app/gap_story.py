@@ -21,7 +21,7 @@ from pipeline.app.gap_words import place_text
 from pipeline.errors import TippingError
 from pipeline.gap.deciding import Deciding
 from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.identify import identify
+from pipeline.gap.identify import Identified, identify
 from pipeline.gap.model import MachineModel
 from pipeline.gap.model_file import apply_edits
 from pipeline.gap.model_writer import edits_of, model_text
@@ -73,13 +73,14 @@ def with_found(model: MachineModel, found: Sequence[Found]) -> MachineModel:
     return reduce(lambda m, f: effect_named(f.effect).apply(m, f.place, f.values), found, model)
 
 
-def gap_stages(model: MachineModel, where: Whereabouts, naming: Naming) -> tuple[Stage, ...]:
-    """The gap of the model as it was, with tolerances, and with one effect after another."""
-    now = with_tolerances(model, naming.tolerances)
-    models = [(AS_IT_WAS, model), (TOLERANCES, now)]
-    for f in naming.found:
-        now = with_found(now, [f])
-        models.append((f"{f.effect} at {place_text(f.place)}", now))
+def gap_stages(model: MachineModel, where: Whereabouts, named: Identified) -> tuple[Stage, ...]:
+    """The gap of the model as it was, with tolerances, and with one effect after another.
+
+    Tolerances are estimated anew beside every effect: what they would take up without it is no
+    merit of the effect.
+    """
+    labels = [f"{f.effect} at {place_text(f.place)}" for f in named.naming.found]
+    models = [(AS_IT_WAS, model), *zip([TOLERANCES, *labels], named.stages, strict=True)]
     return stages(models, where.measurements, where.intake.long)
 
 
@@ -150,9 +151,10 @@ def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress
     Raises:
         GapError: Nothing can be compared.
     """
-    naming = identify(given.model, where.measurements).naming
+    named = identify(given.model, where.measurements)
     progress.step("weighing what was found")
-    steps = gap_stages(given.model, where, naming)
+    steps = gap_stages(given.model, where, named)
+    naming = named.naming
     naming = replace(naming, found=_proved(given.model, where, naming, steps))
     energy, remarks = cost(given, naming.found)
     decided = decide(given, given.model, where.measurements, naming.found)

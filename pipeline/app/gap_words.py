@@ -149,7 +149,7 @@ def shrink_words(
     """How much smaller the gap is on held-out data.
 
     Args:
-        whole: Gap of all joints before and after all effects.
+        whole: Gap of all joints of the model as it was and with everything found.
         falls: Per effect: its words, the joint, gap before, gap after, noise floor, unit.
     """
     parts = []
@@ -171,7 +171,10 @@ def shrink_words(
         text += f"; and so on with {len(falls) - TOLD} more"
     unit = falls[0][5]
     moves = _moves(*whole)
-    text += f". Over all joints it {moves} from {number(whole[0])} to {number(whole[1])} {unit}"
+    text += (
+        f". Over all joints it {moves} from {number(whole[0])} {unit} of the model as it was to "
+        f"{number(whole[1])} {unit}"
+    )
     return text + ", root mean square."
 
 

@@ -31,13 +31,14 @@ class Identified:
     Attributes:
         naming: Results.
         model: With the accepted effects, tolerances as the files state them.
-        calibrated: With the accepted effects and the tolerances at their estimates.
+        stages: With no effect, the first, the first two, ...: tolerances at their estimates beside
+            those effects.
         problem: The least-squares problem at the end.
     """
 
     naming: Naming
     model: MachineModel
-    calibrated: MachineModel
+    stages: tuple[MachineModel, ...]
     problem: Problem
 
 
@@ -56,9 +57,9 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
     start = Problem(model, make_benches(measurements), sigma)
     selection = select(start)
     channel = measurements[0].channels[0]
-    found = _found(start, selection, channel)
+    found, models = _found(start, selection, channel)
     if selection.nearest and found[-1].gap_after > limits.IDLE * found[-1].gap_before:
-        selection, found = selection.without_nearest(), found[:-1]
+        selection, found, models = selection.without_nearest(), found[:-1], models[:-1]
     problem = selection.problem
     sums = problem.sums()
     theta = sums.solve(sums.blocks(FIT, CHOOSE))
@@ -80,16 +81,26 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
     plain = model
     for a in problem.accepted:
         plain = a.apply(plain)
-    calibrated = problem.model
+    return Identified(naming, plain, (*models[:-1], _calibrated(problem)), problem)
+
+
+def _calibrated(problem: Problem) -> MachineModel:
+    """The machine with the accepted effects and tolerances at their estimates."""
+    sums = problem.sums()
+    theta = sums.solve(sums.blocks(FIT, CHOOSE))
+    held = problem.held + theta[: len(problem.tolerances)]
+    model = problem.model
     for n, value in zip(problem.tolerances, held, strict=True):
-        calibrated = n.edit(calibrated, float(np.clip(value, -4.0, 4.0)) * n.sigma)
+        model = n.edit(model, float(np.clip(value, -4.0, 4.0)) * n.sigma)
     for a in problem.accepted:
-        calibrated = a.apply(calibrated)
-    return Identified(naming, plain, calibrated, problem)
+        model = a.apply(model)
+    return model
 
 
-def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, ...]:
-    """Accepted effects with their proof, in order."""
+def _found(
+    start: Problem, selection: Selection, channel: str
+) -> tuple[tuple[Found, ...], list[MachineModel]]:
+    """Accepted effects with their proof, in order, and the machine before and after each."""
     problem = selection.problem
     intervals = estimates(problem, channel)
     rivals = {r.winner: r.rivals for r in selection.rounds}
@@ -102,6 +113,7 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
         floor=problem.floor,
     )
     before = refit(bare)
+    models = [_calibrated(before)]
     for number, a in enumerate(problem.accepted):
         after = refit(bare.with_accepted(problem.accepted[: number + 1]))
         touched = _touched(problem, number)
@@ -133,7 +145,8 @@ def _found(start: Problem, selection: Selection, channel: str) -> tuple[Found, .
             )
         )
         before = after
-    return _second_thoughts(problem, out)
+        models.append(_calibrated(after))
+    return _second_thoughts(problem, out), models
 
 
 def _rms(squares: Array, joints: Sequence[int], channel: int) -> float:
