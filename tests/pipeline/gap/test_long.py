@@ -162,8 +162,8 @@ def test_naming_on_stretches_gives_the_verdict_of_all_rows(
     assert all_
     for a, b in zip(few, all_, strict=True):
         for p, q in zip(a.parameters, b.parameters, strict=True):
-            assert p.ci_low <= q.ci_high
-            assert q.ci_low <= p.ci_high
+            assert p.low <= q.high
+            assert q.low <= p.high
     before, after = np.array(gaps[0])
     assert before == pytest.approx(gaps[1][0], rel=0.1)
     assert np.sqrt(np.mean(after**2)) < np.sqrt(np.mean(before**2))
