@@ -20,6 +20,7 @@ from actuators.arrays import FloatArray, require, require_non_negative
 
 COPPER: Final = 0.00393  # [1/K]
 MAGNET: Final = -0.0011  # [1/K]
+EXTREME: Final = 500.0  # warming or cooling beyond which neither law means anything [K]
 REFERENCE: Final = 25.0  # temperature for which data sheets hold [degC]
 
 
@@ -49,7 +50,7 @@ class Heating:
         """Return dT (N,) [K] over time (N,) [s], strictly increasing.
 
         With R = R0 (1 + COPPER dT) the node's equation stays linear in dT; it is stepped exactly
-        for a current held over each interval.
+        for a current held over each interval. A warming beyond `EXTREME` counts as that.
 
         Args:
             time: Shape (N,) [s].
@@ -68,7 +69,7 @@ class Heating:
         for factor, more in zip(keep.tolist(), drive, strict=True):
             level = factor * level + more
             result.append(level)
-        return np.asarray(result)
+        return np.clip(result, -EXTREME, EXTREME)
 
     def sensed(self, temperature: FloatArray) -> FloatArray:
         """Return the part of dT (...) [K] that a sensor at some temperature (...) [degC] tells."""

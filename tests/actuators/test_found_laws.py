@@ -112,3 +112,9 @@ def test_a_sensor_tells_warming_above_the_data_sheets_temperature() -> None:
 def test_unphysical_values_are_refused(make) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(UnphysicalElementError):
         make()
+
+
+def test_a_motor_that_would_melt_is_warmed_to_an_end() -> None:
+    rise = Heating(thermal_resistance=10.0).temperature_rise(np.arange(100.0), np.full(100, 400.0))
+    assert np.isfinite(rise).all()
+    assert warm_torque_constant(0.03, rise).min() > 0.0
