@@ -195,7 +195,9 @@ def acceptable(problem: Problem, t: Trial, tried: int) -> bool:
         # Tolerances explain a part already: the rest has to exceed them, and by its own size.
         least = tolerance_gain(max(t.freedom, 1))
         return t.gain > least and t.significance > alarm and t.held_out > 0.0
-    least = max(limits.LEAST_GAIN * t.scale, limits.LEAST_SHARE * t.expected)
+    # Of an effect that many joints feel a share of one of them is asked.
+    share = limits.LEAST_SHARE * t.expected / max(len(t.touched), 1)
+    least = max(limits.LEAST_GAIN * t.scale, share)
     return t.gain > least and t.held_out > 0.0 and t.significance > alarm
 
 

@@ -19,7 +19,7 @@ INDISTINGUISHABLE: Final = "indistinguishable from "
 FALSE_ALARM: Final = 0.002
 #: Least fall of the penalised misfit, in units of the noise's variance of one independent sample.
 LEAST_GAIN: Final = 30.0
-#: ... and as a share of the affected joints' misfit at noise level.
+#: ... and as a share of the misfit at noise level of one of the affected joints.
 LEAST_SHARE: Final = 0.02
 #: A tolerance is exceeded beyond this many of its standard deviations.
 TOLERANCE_SIGMAS: Final = 2.5
