@@ -23,9 +23,9 @@ from pipeline.gap.log import Log
 from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.model import MachineModel
 from pipeline.gap.model_file import apply_edits
-from pipeline.gap.name import refit
 from pipeline.gap.observe import observe
 from pipeline.gap.problem import Problem
+from pipeline.gap.refit import refit
 from reports.table import Table
 from reports.tables import forward as tables
 

@@ -17,8 +17,8 @@ from pipeline.gap.effects.base import CHANNEL_UNITS
 from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.model_file import apply_edits
-from pipeline.gap.name import refit
 from pipeline.gap.problem import Problem
+from pipeline.gap.refit import refit
 from pipeline.gap.remainder import remainders
 from pipeline.gap.verdict import Estimate, Found, Naming
 

@@ -15,8 +15,9 @@ from pipeline.gap.effects.base import CHANNEL_UNITS, Place
 from pipeline.gap.intervals import estimates
 from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement
 from pipeline.gap.model import MachineModel
-from pipeline.gap.name import Selection, refit, select
+from pipeline.gap.name import Selection, select
 from pipeline.gap.problem import Problem
+from pipeline.gap.refit import refit
 from pipeline.gap.remainder import errors, remainders
 from pipeline.gap.screen import Score
 from pipeline.gap.verdict import Candidate, Found, Naming
@@ -199,7 +200,7 @@ def _doubt(problem: Problem, number: int, certain: bool) -> str:
     ratio, excess = fit_quality(problem, number)
     contradicts = ratio > limits.LARGEST_SCATTER and excess > limits.LARGEST_EXCESS
     suspect = ratio > limits.SUSPECT_SCATTER and excess > limits.UNEXPLAINED
-    if contradicts or suspect:
+    if (contradicts or suspect) and not _dwarfs(problem, number):
         return (
             f"parts of the log contradict one another about its size {ratio:.0f} times more than "
             f"noise allows, and {excess:.1f} times the noise is left: its law is not that of the "
@@ -229,10 +230,31 @@ def _second_thoughts(problem: Problem, found: list[Found]) -> tuple[Found, ...]:
     for k, f in enumerate(out):
         _, excess = fit_quality(problem, k)
         near = shaken & set(_touched(problem, k))
-        if near and not f.doubtful and excess > limits.UNEXPLAINED:
+        small = excess > limits.UNEXPLAINED and not _dwarfs(problem, k)
+        if near and not f.doubtful and small:
             joints = ", ".join(problem.model.joints[j] for j in sorted(near))
             out[k] = replace(f, doubtful=f"what else was found in {joints} is doubtful itself")
     return tuple(out)
+
+
+def _dwarfs(problem: Problem, number: int) -> bool:
+    """Whether an effect is so much larger than what is left that its law holds well enough.
+
+    No law is the machine's to within a quiet sensor's noise: what is left is held against what the
+    effect itself does to the joints it touches, both in noise floors.
+    """
+    others = [o for k, o in enumerate(problem.accepted) if k != number]
+    without = problem.with_accepted(others).current()
+    touched = _touched(problem, number)
+    own, rows = 0.0, 0.0
+    for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
+        change = bench.simulator.difference(prediction, without)
+        columns = bench.whitened(change.effort, change.joints, problem.floor)
+        own += sum(float(np.sum(x**2)) for j, x in columns.items() if j in touched)
+        rows += float(bench.measurement.mask[bench.rows][:, touched].sum()) * bench.weight**2
+    squares, _ = errors(problem, (FIT, CHOOSE, PROVE))
+    left = float((squares / problem.floor**2)[touched].sum(axis=1).mean())
+    return left < limits.DWARFED**2 * own / max(rows, 1.0)
 
 
 def fit_quality(problem: Problem, number: int) -> tuple[float, float]:

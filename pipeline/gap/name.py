@@ -20,6 +20,7 @@ from pipeline.gap.effects.registry import catalogue, effect_named
 from pipeline.gap.effects.transmission_coupling import BareCoupling
 from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.problem import Accepted, Problem
+from pipeline.gap.refit import pruned, refit, runs_away
 from pipeline.gap.remainder import errors
 from pipeline.gap.screen import Score, Screen, refine, score_all
 from pipeline.gap.trial import Trial, joint_gain, try_candidate
@@ -27,15 +28,16 @@ from pipeline.gap.trial import Trial, joint_gain, try_candidate
 Array = NDArray[np.float64]
 Key = tuple[str, Place]
 _TRIED = 8  # candidates tried in earnest per round
-_NEWTON = 3  # refits after an acceptance
 _PASSES = 2  # through all accepted effects, to choose each anew
-_HELD = 3.0  # sigmas
+_COUPLES = 0.1  # least ratio of a coupling that couples anything
+#: Effects of a joint's own shaft: their coordinate, and that of a coupling that is the same.
+_SHAFT = {
+    "coulomb_friction": ("torque", "coulomb"),
+    "viscous_friction": ("coefficient", "viscous"),
+    "rotor_inertia": ("added", "inertia"),
+}
 _INFLATION = 10.0  # of gains, at most
-_CONTRIBUTION = 3.0  # largest part of an effort one effect may have, in its RMS
 _RESCALED = 1.15  # noise levels that differ by less are the same
-_BEND = 0.3  # largest relative change of a nonlinear parameter in one step
-#: Tolerances in which the prediction bends enough to be taken up into the model.
-_RELINEARISED = ("torque_constant", "resistance", "encoder", "mass", "inertia", "skew")
 
 
 @dataclass(frozen=True)
@@ -131,8 +133,8 @@ def select(problem: Problem) -> Selection:
         rivals = _rivals(problem, winner, made)
         added = _accepted(winner)
         candidate = refit(problem.with_accepted([*problem.accepted, added]).remasked())
-        candidate = _pruned(candidate)
-        if _runs_away(candidate):
+        candidate = pruned(candidate)
+        if runs_away(candidate):
             refused.add(winner.key)
             continue
         if not any(a.effect is added.effect and a.place == added.place for a in candidate.accepted):
@@ -141,6 +143,7 @@ def select(problem: Problem) -> Selection:
         rounds.append(Round(winner.key, winner, rivals))
         problem = candidate
     problem, rounds = _reconsidered(problem, rounds, tried)
+    problem, rounds = _dissolved(problem, rounds)
     nearest = None
     if (best := _nearest(problem, made)) is not None:
         nearest = best.key
@@ -245,74 +248,6 @@ def _related(a: Effect, b: Effect) -> bool:
     return a.name in b.contains or b.name in a.contains
 
 
-def refit(problem: Problem) -> Problem:
-    """Re-estimate all accepted effects together with the tolerances on *fit* and *choose*."""
-    for _ in range(_NEWTON):
-        sums, spans = problem.with_shapes()
-        theta = sums.solve(sums.blocks(FIT, CHOOSE))
-        moved, largest = [], 0.0
-        for number, a in enumerate(problem.accepted):
-            after = _stepped(problem, a, theta[problem.span(number)], theta[spans[number]])
-            for c in a.effect.coordinates:
-                change = abs(after.x[c.name] - a.x[c.name])
-                largest = max(largest, change / (abs(after.x[c.name]) + c.step))
-            moved.append(after)
-        count = len(problem.tolerances)
-        # Beyond a few sigmas a tolerance only stands in for an effect not yet found.
-        reach = np.array([_HELD if n.kind in _RELINEARISED else 0.0 for n in problem.tolerances])
-        held = np.clip(problem.held + theta[:count], -reach, reach)
-        largest = max(largest, 0.02 * float(np.abs(held - problem.held).max(initial=0.0)))
-        problem = problem.with_accepted(moved, held)
-        if largest < 2e-3:
-            break
-    return problem
-
-
-def _stepped(problem: Problem, a: Accepted, step: Array, bend: Array) -> Accepted:
-    """An effect moved by a Newton step, shortened until it stays inside what can be."""
-    for share in (1.0, 0.5, 0.25, 0.1, 0.02):
-        x = {}
-        for c, d in zip(a.effect.coordinates, step, strict=True):
-            value = a.x[c.name] + share * float(d)
-            x[c.name] = value if c.signed else max(value, 0.0)
-        shape = {}
-        for (name, value), d in zip(a.shape.items(), bend, strict=True):
-            most = _BEND * abs(value)
-            shape[name] = value + share * float(np.clip(d, -most, most))
-        seen = any(a.effect.shown(b.measurement, a.place, shape) for b in problem.benches)
-        if seen and a.effect.plausible(problem.model, a.place, x, shape):
-            return replace(a, x=x, shape=shape)
-    return a
-
-
-def _pruned(problem: Problem) -> Problem:
-    """Without effects that the others have made superfluous, one after another."""
-    while len(problem.accepted) > 1:
-        losses = [_needed(problem, number) for number in range(len(problem.accepted))]
-        weakest = int(np.argmin([loss / least for loss, least in losses]))
-        if losses[weakest][0] > losses[weakest][1]:
-            break
-        kept = [a for k, a in enumerate(problem.accepted) if k != weakest]
-        problem = refit(problem.with_accepted(kept))
-    return problem
-
-
-def _runs_away(problem: Problem) -> bool:
-    """Whether some effect takes what another gives: a direction that the log does not hold."""
-    for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
-        m = bench.measurement
-        size = np.sqrt(np.mean(m.effort**2, axis=0))  # (J, C)
-        for k in range(len(problem.accepted)):
-            others = [a for i, a in enumerate(problem.accepted) if i != k]
-            without = problem.with_accepted(others).current()
-            change = bench.simulator.difference(prediction, without)
-            for column, j in enumerate(change.joints):
-                part = np.sqrt(np.mean(change.effort[:, column] ** 2, axis=0))
-                if (part > _CONTRIBUTION * size[j]).any():
-                    return True
-    return False
-
-
 def _reconsidered(
     problem: Problem, rounds: Sequence[Round], tried: int
 ) -> tuple[Problem, list[Round]]:
@@ -337,7 +272,7 @@ def _reconsidered(
                 continue
             accepted = [*others[:number], _accepted(best), *others[number:]]
             candidate = refit(rest.with_accepted(accepted))
-            if _runs_away(candidate):
+            if runs_away(candidate):
                 continue
             problem, changed = candidate, True
             del chosen[key]
@@ -346,6 +281,36 @@ def _reconsidered(
             break
     order = [(a.effect.name, a.place) for a in problem.accepted]
     return problem, [chosen[key] for key in order if key in chosen]
+
+
+def _dissolved(problem: Problem, rounds: Sequence[Round]) -> tuple[Problem, list[Round]]:
+    """With the joint's own friction and inertia in place of a coupling that couples nothing.
+
+    A coupling brings a shaft along; where its ratio is next to none the shaft is the joint's own.
+    """
+    out = list(rounds)
+    for a in problem.accepted:
+        if not isinstance(a.effect, BareCoupling) or abs(a.shape["ratio"]) > _COUPLES:
+            continue
+        others = {(o.effect.name, o.place): o for o in problem.accepted if o is not a}
+        parts = {}
+        for name, (coordinate, own) in _SHAFT.items():
+            key = (name, a.place[:1])
+            if a.x[own] > 0.0:
+                held = others[key].x[coordinate] if key in others else 0.0
+                parts[key] = Accepted(effect_named(name), key[1], {coordinate: held + a.x[own]}, {})
+        accepted = []
+        for o in problem.accepted:
+            key = (o.effect.name, o.place)
+            if o is a:
+                accepted += [part for k, part in parts.items() if k not in others]
+            else:
+                accepted.append(parts.get(key, o))
+        problem = pruned(refit(problem.with_accepted(accepted)))
+        old = next(r for r in out if r.winner == (a.effect.name, a.place))
+        new = [replace(old, winner=key, rivals=()) for key in parts if key not in others]
+        out = [r for r in out if r is not old] + new
+    return problem, out
 
 
 def _again(screen: Screen, a: Accepted, others: Sequence[Accepted]) -> list[Score]:
@@ -358,31 +323,3 @@ def _again(screen: Screen, a: Accepted, others: Sequence[Accepted]) -> list[Scor
     every = [(a.effect, a.shape), *((effect_named(name), {}) for name in a.effect.contains)]
     scored = [screen.score(effect, a.place, shape) for effect, shape in every]
     return [s for s in scored if s is not None and s.gain > 0.0]
-
-
-def _needed(problem: Problem, number: int) -> tuple[float, float]:
-    """Rise of the penalised misfit without one effect, and the least that keeps it."""
-    own = problem.accepted[number]
-    if all(own.x[c.name] == 0.0 for c in own.effect.coordinates):
-        return 0.0, 1.0
-    sums = problem.sums()
-    both = sums.blocks(FIT, CHOOSE)
-    a, span = problem.accepted[number], problem.span(number)
-    x0 = np.array([a.x[c.name] for c in a.effect.coordinates])
-    theta = sums.solve(both)
-    # At the estimate the residual contains the effect: without it, its step is minus its size.
-    rest = np.setdiff1d(np.arange(problem.names), np.arange(span.start, span.stop))
-    A = sums.H[both].sum(axis=0) + np.diag(sums.precision)
-    b = sums.h[both].sum(axis=0) + sums.precision * sums.mean
-    fixed = np.zeros(problem.names)
-    fixed[span] = -x0
-    from pipeline.gap.block_sums import solve_spd
-
-    fixed[rest] = solve_spd(
-        A[np.ix_(rest, rest)], b[rest] - A[np.ix_(rest, np.arange(problem.names))] @ fixed
-    )
-    rise = sums.objective(fixed, both) - sums.objective(theta, both)
-    if a.effect.is_tolerance:
-        return rise, limits.TOLERANCE_SIGMAS**2
-    scale = float(sums.loss(theta, both).sum()) / max(float(sums.count[both].sum()), 1.0)
-    return rise, limits.LEAST_GAIN * scale

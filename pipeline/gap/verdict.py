@@ -39,6 +39,9 @@ LARGEST_SCATTER: Final = 8.0
 LARGEST_EXCESS: Final = 1.12
 #: ... or this scatter where so much is left that it counts as unexplained.
 SUSPECT_SCATTER: Final = 2.5
+#: A law is not doubted where what is left is less than this share of what the effect does, both
+#: root mean square.
+DWARFED: Final = 0.2
 #: Remaining error over the noise floor, in the naming channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
 #: A name that leaves more than this share of the gap on *prove* has closed nothing.
