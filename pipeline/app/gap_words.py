@@ -260,7 +260,7 @@ def left_words(remainders: Sequence[Remainder]) -> str:
         text = "**What is left** is noise: nothing significant stays unexplained."
         blind = list(dict.fromkeys(r.joint for r in remainders if not r.rows))
         if blind:
-            text += f" Of {_listed(blind)} no row is held out: there it is not proved."
+            text += f" Of {_listed(blind)} no row is held out: there only the fitted rows say so."
         return text
     parts = [
         f"{r.joint}: {number(r.error)} {r.unit}, {number(r.error / r.noise_floor, 2)} times the "

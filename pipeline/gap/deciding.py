@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.gap.effects.base import Effect, Place, Values
+from pipeline.gap.effects.torque_ripple import TorqueRipple
 from pipeline.gap.expected import Expected
 from pipeline.gap.measurement import FIT, Measurement
 from pipeline.gap.model import MachineModel
@@ -34,6 +35,7 @@ FREE_TRAVEL: Final = 1.0  # [rad]
 FREE_SPEED: Final = 2.0  # [rad/s]
 
 
+_ORDERS = 5  # of a ripple that imitates, the strongest ones
 _SHRINKINGS: Final = 12
 
 
@@ -123,11 +125,25 @@ def _misfit(model: MachineModel, m: Measurement, named: Rival, other: Rival) -> 
     base = simulator.predict(model)
     assert named.values is not None
     target = _whitened(simulator, base, named.effect.apply(model, named.place, named.values))
-    shapes = other.effect.shapes(model, m, other.place) or [{}]
+    shapes = _shapes(model, m, other, target)
     left = [target - _imitated(simulator, base, other, shape, target) for shape in shapes]
-    smallest = min(float((rest**2).sum()) for rest in left)
+    # A rival that this motion leaves without any shape imitates nothing.
+    smallest = min((float((rest**2).sum()) for rest in left), default=float((target**2).sum()))
     touched = int((np.abs(target).max(axis=0) > 0).any(axis=-1).sum())
     return float(np.sqrt(smallest / max(touched * len(m), 1)))
+
+
+def _shapes(
+    model: MachineModel, m: Measurement, other: Rival, target: Array
+) -> list[dict[str, float]]:
+    """Nonlinear parameters with which a rival may imitate; of a ripple the strongest orders."""
+    if not isinstance(other.effect, TorqueRipple):
+        return other.effect.shapes(model, m, other.place)
+    j = model.index(other.place[0])
+    orders = other.effect.orders(m, j)
+    q, series = m.q[:, j], target[:, j, 0]
+    power = np.array([abs(np.exp(-1j * order * q) @ series) for order in orders])
+    return [{"order": float(orders[k])} for k in np.argsort(power)[::-1][:_ORDERS]]
 
 
 def _imitated(

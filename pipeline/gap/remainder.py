@@ -60,21 +60,20 @@ def errors(problem: Problem, parts: Sequence[int]) -> tuple[Array, Array]:
 
 
 def remainders(problem: Problem, theta: Array) -> tuple[Remainder, ...]:
-    """What is left on *prove*, by joint and channel, with a description where it is significant."""
+    """What is left on *prove*, by joint and channel, with a description where it is significant.
+
+    Of a joint without rows there it is what is left on *fit* and *choose*.
+    """
     rests = remaining(problem, theta)
     first = problem.benches[0].measurement
     out = []
     for j, joint in enumerate(first.joints):
         for c, channel in enumerate(first.channels):
-            proved = np.concatenate(
-                [
-                    rest[bench.parts[PROVE], j, c]
-                    for rest, bench in zip(rests, problem.benches, strict=True)
-                ]
-            )
-            proved = proved[np.isfinite(proved)]
+            proved = _known(problem, rests, j, c, PROVE)
+            # Where no row proves, those that were fitted are better than none.
+            seen = proved if proved.size else _known(problem, rests, j, c, FIT, CHOOSE)
             floor = float(problem.floor[j, c])
-            error = float(np.sqrt(np.mean(proved**2)) * problem.sigma[j, c]) if proved.size else 0.0
+            error = float(np.sqrt(np.mean(seen**2)) * problem.sigma[j, c]) if seen.size else 0.0
             significant = error > limits.UNEXPLAINED * floor
             text = _describe(problem, rests, j, c) if significant else ""
             out.append(
@@ -90,6 +89,17 @@ def remainders(problem: Problem, theta: Array) -> tuple[Remainder, ...]:
                 )
             )
     return tuple(out)
+
+
+def _known(problem: Problem, rests: list[Array], j: int, c: int, *parts: int) -> Array:
+    """What is left of one joint and channel on some parts, masked rows left out."""
+    rows = [
+        rest[bench.parts[part], j, c]
+        for rest, bench in zip(rests, problem.benches, strict=True)
+        for part in parts
+    ]
+    every = np.concatenate(rows)
+    return np.asarray(every[np.isfinite(every)])
 
 
 def variables(m: Measurement, joint: int, load: Array) -> dict[str, Array]:

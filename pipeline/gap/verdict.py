@@ -155,7 +155,7 @@ class Remainder:
         unit: Unit.
         significant: Whether it is more than `UNEXPLAINED` times the noise floor.
         description: What it depends on, in words; empty where it is noise.
-        rows: Held-out rows that were compared.
+        rows: Held-out rows that were compared; without any the error is that of fitted rows.
     """
 
     joint: str
