@@ -45,8 +45,8 @@ def run(arguments: Sequence[str]) -> Run:
     split_items(options)
     given = setup(options)
     where = find_where(given, given.model, *take_in(given, options))
-    naming = identify(given.model, where.measurements).naming
-    return Run(given, where, naming, gap_stages(given.model, where, naming))
+    named = identify(given.model, where.measurements)
+    return Run(given, where, named.naming, gap_stages(given.model, where, named))
 
 
 def rms(values: Array) -> float:
@@ -66,6 +66,7 @@ def test_tx40_names_the_coupled_wrist(tx40: Run) -> None:
     assert wrist.place == ("joint_6", "joint_5")
     assert wrist.values["ratio"] == pytest.approx(1.0, abs=0.15)
     assert wrist.gap_after < 0.4 * wrist.gap_before
+    assert not wrist.doubtful
 
 
 @pytest.mark.slow
