@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from reports.atomic import replacing
 from reports.errors import FigureError
 from reports.figures.style import house_style
@@ -18,6 +20,20 @@ _METADATA = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None},
 }
+
+
+#: Decimals of a line's data: below what any picture shows, above what rounding differs in.
+_DECIMALS = 11
+
+
+def _steady(figure: Figure) -> None:
+    """Round lines' data, whose last bits may differ from process to process."""
+    from matplotlib.lines import Line2D
+
+    for line in figure.findobj(Line2D):
+        x, y = (np.asarray(values) for values in line.get_data(orig=False))
+        if x.dtype.kind == y.dtype.kind == "f":
+            line.set_data(np.round(x, _DECIMALS), np.round(y, _DECIMALS))
 
 
 def save_figure(
@@ -33,6 +49,7 @@ def save_figure(
     if unknown:
         raise FigureError(f"figure '{name}': format '{unknown[0]}' is unknown; use png or svg")
     targets = [out_dir / f"{name}.{fmt}" for fmt in formats]
+    _steady(figure)
     with house_style(), replacing(*targets) as temporary:
         # Lay out once: the layout costs more than the drawing, and both formats share it.
         figure.draw_without_rendering()
