@@ -26,7 +26,7 @@ from pipeline.gap.model import MachineModel
 from pipeline.gap.model_file import apply_edits
 from pipeline.gap.model_writer import edits_of, model_text
 from pipeline.gap.nuisance import Nuisance
-from pipeline.gap.verdict import Found, Naming
+from pipeline.gap.verdict import IDLE_NAME, Found, Naming
 from reports.table import Table
 
 AS_IT_WAS = "model as it was"
@@ -164,13 +164,17 @@ def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress
 def _proved(
     model: MachineModel, where: Whereabouts, naming: Naming, steps: Sequence[Stage]
 ) -> tuple[Found, ...]:
-    """Effects with the gap of the models with and without them, simulated anew."""
+    """Effects with the gap of the models with and without them, simulated anew.
+
+    Naming judges by a linear step; a name whose simulation makes the gap larger is doubted.
+    """
     first = len(steps) - len(naming.found)
     floor = noise_floor(where.measurements)
     out = []
     for k, f in enumerate(naming.found):
         before, after = steps[first + k - 1], steps[first + k]
         j = effect_column(model, f, before, after)
+        worse = bool(after.gap[j] > before.gap[j])
         out.append(
             replace(
                 f,
@@ -178,6 +182,7 @@ def _proved(
                 gap_after=float(after.gap[j]),
                 unit=naming.unit,
                 noise_floor=float(floor[j]),
+                doubtful=f.doubtful or (IDLE_NAME if worse else ""),
             )
         )
     return tuple(out)
