@@ -113,7 +113,7 @@ def write_in_time(
         traces,
         title="Measured and predicted, without and with what was found",
         subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: held out; "
-        "breaks: not compared",
+        "breaks: not compared; grey: noise, 2 sigma",
         channel=m.channels[0],
     )
     save_figure(figure, out, "in_time")

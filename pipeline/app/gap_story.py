@@ -36,7 +36,7 @@ MOST_SIGMAS = 4.0
 #: Joints that the figure in time shows.
 SHOWN = 3
 #: ... where the gap shrinks by this share at least.
-WORTH_SHOWING = 0.05
+WORTH_SHOWING = 0.25
 
 
 @dataclass(frozen=True, eq=False)

@@ -80,7 +80,7 @@ def gap_time_figure(
     for k, trace in enumerate(traces):
         _trace(axes[0, k], axes[1, k], _thinned(trace), channel, first=k == 0)
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    axes[0, -1].legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    axes[0, -1].legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.09), ncols=3)
     headline(figure, title, subtitle)
     return figure
 
@@ -117,7 +117,7 @@ def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: boo
                 ax.axvspan(t[start], t[stop - 1], color=YELLOW, alpha=0.18, linewidth=0, zorder=0)
     rms = [float(np.sqrt(np.nanmean(x[kept] ** 2))) for x in (left_before, left_after)]
     bottom.set_title(
-        f"{where}gap {number(rms[0])} without, {number(rms[1])} with; grey: noise, 2 sigma",
+        f"{where}gap {number(rms[0])} without, {number(rms[1])} with",
         fontsize=8,
         color=QUIET,
     )
