@@ -260,13 +260,10 @@ def _candidates(
 
 def _orders(bench: Bench, effect: TorqueRipple, joint: int, d: Column) -> list[dict[str, float]]:
     """Orders of the joint's angle that d holds most of."""
-    m = bench.measurement
-    orders = effect.orders(m, joint)
-    if joint not in d or orders.size == 0:
+    if joint not in d:
         return []
-    q, series = m.q[bench.rows, joint][::4], d[joint][::4, 0]
-    power = np.array([abs(np.exp(-1j * order * q) @ series) for order in orders])
-    return [{"order": float(orders[k])} for k in np.argsort(power)[::-1][:_ORDERS]]
+    series = d[joint][::4, 0]
+    return effect.strongest(bench.measurement, joint, bench.rows[::4], series, _ORDERS)
 
 
 def _near(model: MachineModel, part: str, felt: set[int]) -> bool:

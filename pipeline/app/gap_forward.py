@@ -15,17 +15,17 @@ from numpy.typing import NDArray
 
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
-from pipeline.app.gap_story import AS_IT_WAS, with_tolerances
+from pipeline.app.gap_story import AS_IT_WAS
 from pipeline.app.gap_words import place_text
 from pipeline.gap.columns import make_benches
 from pipeline.gap.forward import ForwardSimulator, Rollout, servo_input
 from pipeline.gap.log import Log
-from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.model import MachineModel
 from pipeline.gap.model_file import apply_edits
+from pipeline.gap.nuisance import with_tolerances
 from pipeline.gap.observe import observe
 from pipeline.gap.problem import Problem
-from pipeline.gap.refit import refit
+from pipeline.gap.refit import refit, tolerances_of
 from reports.table import Table
 from reports.tables import forward as tables
 
@@ -86,15 +86,7 @@ def _calibrated(model: MachineModel, where: Whereabouts) -> MachineModel:
     seen = observe(model, where.intake.prepared, where.parts)
     sigma = np.sqrt(np.mean([m.noise**2 for m in where.measurements], axis=0))
     problem = refit(Problem(model, make_benches(seen), sigma))
-    sums = problem.sums()
-    theta = problem.held + sums.solve(sums.blocks(FIT, CHOOSE))
-    return with_tolerances(
-        model,
-        {
-            (n.kind, n.place): (float(v) * n.sigma, n.sigma)
-            for n, v in zip(problem.tolerances, theta, strict=True)
-        },
-    )
+    return with_tolerances(model, tolerances_of(problem))
 
 
 def rms(drives: Sequence[Drive]) -> float:

@@ -10,15 +10,16 @@ import numpy as np
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
 from pipeline.app.gap_stages import Stage, noise_floor, stages
-from pipeline.app.gap_story import AS_IT_WAS, TOLERANCES, Told, cost, gathered, with_tolerances
+from pipeline.app.gap_story import AS_IT_WAS, TOLERANCES, Told, cost, gathered
 from pipeline.app.gap_words import place_text
 from pipeline.gap.columns import make_benches
 from pipeline.gap.effects.base import CHANNEL_UNITS
 from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.model_file import apply_edits
+from pipeline.gap.nuisance import with_tolerances
 from pipeline.gap.problem import Problem
-from pipeline.gap.refit import refit
+from pipeline.gap.refit import refit, tolerances_of
 from pipeline.gap.remainder import remainders
 from pipeline.gap.verdict import Estimate, Found, Naming
 
@@ -34,10 +35,7 @@ def check(given: Setup, where: Whereabouts, options: argparse.Namespace) -> Told
     naming = Naming(
         found=(),
         candidates=(),
-        tolerances={
-            (n.kind, n.place): (float(v) * n.sigma, n.sigma)
-            for n, v in zip(problem.tolerances, problem.held + theta, strict=True)
-        },
+        tolerances=tolerances_of(problem),
         remainders=remainders(problem, theta),
         tried=0,
         channel=channel,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from pathlib import Path
@@ -25,14 +25,11 @@ from pipeline.gap.identify import Identified, identify
 from pipeline.gap.model import MachineModel
 from pipeline.gap.model_file import apply_edits
 from pipeline.gap.model_writer import edits_of, model_text
-from pipeline.gap.nuisance import Nuisance
 from pipeline.gap.verdict import IDLE_NAME, Found, Naming
 from reports.table import Table
 
 AS_IT_WAS = "model as it was"
 TOLERANCES = "tolerances of its parts"
-#: Tolerances beyond this many sigmas would stand in for something else.
-MOST_SIGMAS = 4.0
 #: Joints that the figure in time shows.
 SHOWN = 3
 #: ... where the gap shrinks by this share at least.
@@ -56,16 +53,6 @@ class Told:
     model_file: str
     shown: tuple[int, ...]
     effect_joints: tuple[int, ...]
-
-
-def with_tolerances(
-    model: MachineModel, tolerances: Mapping[tuple[str, str], tuple[float, float]]
-) -> MachineModel:
-    """The model with estimated tolerances: (kind, place) to (value, sigma)."""
-    for (kind, place), (value, sigma) in tolerances.items():
-        limit = MOST_SIGMAS * sigma
-        model = Nuisance(kind, place, sigma, "").edit(model, min(max(value, -limit), limit))
-    return model
 
 
 def with_found(model: MachineModel, found: Sequence[Found]) -> MachineModel:

@@ -95,7 +95,7 @@ def what_words(naming: Naming) -> str:
     if nearest:
         joined = "come" if len(nearest) > 1 else "comes"
         text += f" Nearest to what is {'left ' if sure else ''}missing {joined} {_named(nearest)},"
-        text += " doubtful; `--keep-doubtful` takes it into the model file all the same."
+        text += " doubtful; `--keep-doubtful` writes doubtful names into the model file, too."
     return f"{text} {meaning(naming.found[0].effect)}" if len(naming.found) == 1 else text
 
 

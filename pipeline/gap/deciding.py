@@ -140,10 +140,7 @@ def _shapes(
     if not isinstance(other.effect, TorqueRipple):
         return other.effect.shapes(model, m, other.place)
     j = model.index(other.place[0])
-    orders = other.effect.orders(m, j)
-    q, series = m.q[:, j], target[:, j, 0]
-    power = np.array([abs(np.exp(-1j * order * q) @ series) for order in orders])
-    return [{"order": float(orders[k])} for k in np.argsort(power)[::-1][:_ORDERS]]
+    return other.effect.strongest(m, j, slice(None), target[:, j, 0], _ORDERS)
 
 
 def _imitated(

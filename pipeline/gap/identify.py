@@ -16,8 +16,9 @@ from pipeline.gap.intervals import estimates
 from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement
 from pipeline.gap.model import MachineModel
 from pipeline.gap.name import Selection, select
+from pipeline.gap.nuisance import with_tolerances
 from pipeline.gap.problem import Problem
-from pipeline.gap.refit import refit
+from pipeline.gap.refit import refit, tolerances_of
 from pipeline.gap.remainder import errors, remainders
 from pipeline.gap.screen import Score
 from pipeline.gap.verdict import Candidate, Found, Naming
@@ -64,16 +65,10 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
     problem = selection.problem
     sums = problem.sums()
     theta = sums.solve(sums.blocks(FIT, CHOOSE))
-    count = len(problem.tolerances)
-    held = problem.held + theta[:count]
-    tolerances = {
-        (n.kind, n.place): (float(v) * n.sigma, n.sigma)
-        for n, v in zip(problem.tolerances, held, strict=True)
-    }
     naming = Naming(
         found=found,
         candidates=_candidates(start, selection),
-        tolerances=tolerances,
+        tolerances=tolerances_of(problem),
         remainders=remainders(problem, theta),
         tried=selection.tried,
         channel=channel,
@@ -87,12 +82,7 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
 
 def _calibrated(problem: Problem) -> MachineModel:
     """The machine with the accepted effects and tolerances at their estimates."""
-    sums = problem.sums()
-    theta = sums.solve(sums.blocks(FIT, CHOOSE))
-    held = problem.held + theta[: len(problem.tolerances)]
-    model = problem.model
-    for n, value in zip(problem.tolerances, held, strict=True):
-        model = n.edit(model, float(np.clip(value, -4.0, 4.0)) * n.sigma)
+    model = with_tolerances(problem.model, tolerances_of(problem))
     for a in problem.accepted:
         model = a.apply(model)
     return model
@@ -159,9 +149,7 @@ def _rms(squares: Array, joints: Sequence[int], channel: int) -> float:
 
 def _touched(problem: Problem, number: int) -> list[int]:
     """Joints that an accepted effect changes."""
-    a = problem.accepted[number]
-    others = [o for k, o in enumerate(problem.accepted) if k != number]
-    without = problem.with_accepted(others).current()
+    a, without = problem.accepted[number], problem.without(number)
     out: set[int] = set()
     for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
         out |= set(bench.simulator.difference(prediction, without).joints)
@@ -243,9 +231,7 @@ def _dwarfs(problem: Problem, number: int) -> bool:
     No law is the machine's to within a quiet sensor's noise: what is left is held against what the
     effect itself does to the joints it touches, both in noise floors.
     """
-    others = [o for k, o in enumerate(problem.accepted) if k != number]
-    without = problem.with_accepted(others).current()
-    touched = _touched(problem, number)
+    without, touched = problem.without(number), _touched(problem, number)
     own, rows = 0.0, 0.0
     for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
         change = bench.simulator.difference(prediction, without)

@@ -268,7 +268,7 @@ def _reconsidered(
             if not good:
                 continue
             best = _preferred(rest, good)
-            if best.key == key or (best.score.effect.name, best.score.place) in chosen:
+            if best.key in chosen:
                 continue
             accepted = [*others[:number], _accepted(best), *others[number:]]
             candidate = refit(rest.with_accepted(accepted))

@@ -6,7 +6,7 @@ and the part beyond is what a candidate of the same kind is named for.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -33,6 +33,8 @@ INERTIA_TOLERANCE: Final = 0.10  # of a link's rotational inertia [1]
 RESISTANCE_TOLERANCE: Final = 0.02
 #: Friction that the actuator's files state already [1].
 FRICTION_TOLERANCE: Final = 0.005
+#: Tolerances beyond this many sigmas would stand in for something else.
+MOST_SIGMAS: Final = 4.0
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
 OFFSET_SIGMAS: Final = 0.75
 
@@ -106,6 +108,16 @@ class Nuisance:
             shift["xyz".index(self.kind[-1])] += value
             body = replace(body, shift=(shift[0], shift[1], shift[2]))
         return model.with_bodies(model.bodies.with_body(joint, body))
+
+
+def with_tolerances(
+    model: MachineModel, tolerances: Mapping[tuple[str, str], tuple[float, float]]
+) -> MachineModel:
+    """The model with estimated tolerances: (kind, place) to (value, sigma)."""
+    for (kind, place), (value, sigma) in tolerances.items():
+        limit = MOST_SIGMAS * sigma
+        model = Nuisance(kind, place, sigma, "").edit(model, min(max(value, -limit), limit))
+    return model
 
 
 def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple[Nuisance, ...]:

@@ -125,6 +125,13 @@ class Problem:
             model = a.apply(model)
         return model
 
+    def without(self, number: int) -> MachineModel:
+        """The present model without one of the accepted effects."""
+        model = self._start()
+        for k, a in enumerate(self.accepted):
+            model = model if k == number else a.apply(model)
+        return model
+
     def _start(self) -> MachineModel:
         """The model with tolerances as they are held."""
         if "start" not in self._cache:

@@ -44,6 +44,17 @@ def refit(problem: Problem) -> Problem:
     return problem
 
 
+def tolerances_of(problem: Problem) -> dict[tuple[str, str], tuple[float, float]]:
+    """Tolerances as *fit* and *choose* show them: (kind, place) to estimate and prior sigma."""
+    sums = problem.sums()
+    theta = sums.solve(sums.blocks(FIT, CHOOSE))
+    held = problem.held + theta[: len(problem.tolerances)]
+    return {
+        (n.kind, n.place): (float(v) * n.sigma, n.sigma)
+        for n, v in zip(problem.tolerances, held, strict=True)
+    }
+
+
 def _stepped(problem: Problem, a: Accepted, step: Array, bend: Array) -> Accepted:
     """An effect moved by a Newton step, shortened until it stays inside what can be."""
     for share in (1.0, 0.5, 0.25, 0.1, 0.02):
@@ -105,9 +116,7 @@ def runs_away(problem: Problem) -> bool:
         m = bench.measurement
         size = np.sqrt(np.mean(m.effort**2, axis=0))  # (J, C)
         for k in range(len(problem.accepted)):
-            others = [a for i, a in enumerate(problem.accepted) if i != k]
-            without = problem.with_accepted(others).current()
-            change = bench.simulator.difference(prediction, without)
+            change = bench.simulator.difference(prediction, problem.without(k))
             for column, j in enumerate(change.joints):
                 part = np.sqrt(np.mean(change.effort[:, column] ** 2, axis=0))
                 if (part > _CONTRIBUTION * size[j]).any():

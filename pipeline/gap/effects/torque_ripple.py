@@ -13,6 +13,7 @@ from pipeline.gap.effects.base import Coordinate, Effect, Parameter, Place, Valu
 from pipeline.gap.measurement import Measurement
 from pipeline.gap.model import MachineModel
 
+Array = NDArray[np.float64]
 _LEAST_ORDER = 4.0  # periods per turn; below it is a spring rather than a ripple
 _PERIODS = 1.5  # least number of periods inside the travel
 
@@ -47,6 +48,14 @@ class TorqueRipple(Effect):
         top = min(2 * np.pi * 0.6 * m.bandwidth / speed, 2000.0)
         low = max(_LEAST_ORDER, _PERIODS * 2 * np.pi / travel)
         return np.arange(low, max(top, low), 0.35 * 2 * np.pi / travel)
+
+    def strongest(
+        self, m: Measurement, joint: int, rows: slice | NDArray[np.intp], series: Array, count: int
+    ) -> list[dict[str, float]]:
+        """Orders of the joint's angle that a series (R,) on some rows holds most of."""
+        orders, q = self.orders(m, joint), m.q[rows, joint]
+        power = np.array([abs(np.exp(-1j * order * q) @ series) for order in orders])
+        return [{"order": float(orders[k])} for k in np.argsort(power)[::-1][:count]]
 
     def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
         """Whether it repeats inside the travel: else it is any function of the position."""
