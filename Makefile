@@ -9,6 +9,8 @@ LOG    ?= pipeline/gap/demo/walk.parquet
 # The demonstration is proved on the same machine at another speed.
 HOLDOUT := $(if $(filter file,$(origin LOG)),--holdout pipeline/gap/demo/walk_slow.parquet)
 ARGS   ?=
+# A name as one word of the shell, whatever is in it.
+word = '$(subst ','\'',$(1))'
 
 .DEFAULT_GOAL := help
 .PHONY: help env reports gap blind calibrate test test-slow lint check bench readme urdf lock clean
@@ -25,7 +27,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@touch $@
 
 reports: $(STAMP)  ## Compute standing and walking, write CSV and figures to reports/out (OUT=, ROBOT=, ARGS=)
-	$(PY) -m pipeline reports --robot $(ROBOT) --out $(OUT) $(ARGS)
+	$(PY) -m pipeline reports --robot $(call word,$(ROBOT)) --out $(call word,$(OUT)) $(ARGS)
 
 test: $(STAMP)  ## Run the tests (Table III among them)
 	$(PY) -m pytest -m "not slow"
@@ -39,7 +41,7 @@ lint: $(STAMP)  ## Check style and types
 	$(PY) -m mypy
 
 check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
-	$(PY) -m pipeline check $(ROBOT)
+	$(PY) -m pipeline check $(call word,$(ROBOT))
 
 bench: $(STAMP)  ## Print speed ratios measured in one run
 	$(PY) -m tests.bench
@@ -47,18 +49,21 @@ bench: $(STAMP)  ## Print speed ratios measured in one run
 readme: $(STAMP)  ## Renew the README's tables and pictures from a run
 	$(PY) -m tests.readme
 
-# Exit 1 is a finding (something stays unexplained), not an error of make.
+# Exit 1 is a finding (something stays unexplained), not an error of make. LOG= is one file, whose
+# name may hold spaces, or several.
 gap: $(STAMP)  ## Find what the model lacks, from a measured log (LOG=, ROBOT=, ARGS=); a demonstration by default
-	@$(PY) -m pipeline gap $(LOG) $(HOLDOUT) --robot $(ROBOT) --out $(OUT)/gap $(ARGS) || { code=$$?; \
+	@if [ -e $(call word,$(LOG)) ]; then set -- $(call word,$(LOG)); else set -- $(LOG); fi; \
+	$(PY) -m pipeline gap "$$@" $(HOLDOUT) --robot $(call word,$(ROBOT)) \
+	  --out $(call word,$(OUT)/gap) $(ARGS) || { code=$$?; \
 	  if [ $$code -eq 1 ]; then echo "finding: a significant part of the gap stays unexplained"; \
 	  else exit $$code; fi; }
 
 blind: $(STAMP)  ## Hide effects in simulated machines and see whether gap finds them (resumes; ARGS=)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline blind --out $(OUT)/blind --resume $(ARGS) \
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline blind --out $(call word,$(OUT)/blind) --resume $(ARGS) \
 	  || { code=$$?; if [ $$code -eq 1 ]; then echo "finding: an aim was not reached"; else exit $$code; fi; }
 
 calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 20 minutes, resumes)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline calibrate --robot $(ROBOT)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline calibrate --robot $(call word,$(ROBOT))
 
 urdf: $(STAMP)  ## Build the URDFs from their TOML
 	$(PY) -m pipeline urdf

@@ -31,6 +31,7 @@ from pipeline.app.blind_make import (
 from pipeline.app.blind_score import score
 from pipeline.app.blind_summary import Scored, confusion, rates, trial_rows
 from pipeline.app.blind_truth import hidden_truths
+from pipeline.app.staging import staged
 from pipeline.calibration.checkpoint import Checkpoint
 from pipeline.gap.errors import GapError
 from pipeline.gap.model import MachineModel, machine_of_robot
@@ -169,15 +170,17 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
         for r in reached
     ]
     meta = {"options": {"seed": seed, "trials": len(trials)}}
-    for table in (
+    every = (
         tables.blind_trials(trial_rows(trials)),
         tables.blind_rates(rows),
         tables.confusion(hidden, named, counts),
-    ):
-        write_table(table, out, meta=meta)
-    shown = int(counts.sum())
-    text = f"{shown} trials with one effect the log could show, or nothing hidden"
-    save_figure(draw(hidden, named, counts, text), out, "blind_confusion")
+    )
+    with staged(out, "blind") as folder:
+        for table in every:
+            write_table(table, folder, meta=meta)
+        shown = int(counts.sum())
+        text = f"{shown} trials with one effect the log could show, or nothing hidden"
+        save_figure(draw(hidden, named, counts, text), folder, "blind_confusion")
     for r in reached:
         if r.trials:
             low, high = r.interval
@@ -209,11 +212,12 @@ def _hash(*parts: object) -> str:
 
 
 def _clear(out: Path) -> None:
-    """Remove an earlier run's trials; anything else in the folder stays."""
-    for name in ("trials", "sealed", "answers"):
-        shutil.rmtree(out / name, ignore_errors=True)
+    """Remove an earlier run's trials; its tables stay until there are new ones."""
+    # What says that trials are done goes before them: a kill in between must not be gone on from.
     for name in ("sealed.jsonl", "answers.jsonl"):
         (out / name).unlink(missing_ok=True)
+    for name in ("trials", "sealed", "answers"):
+        shutil.rmtree(out / name, ignore_errors=True)
 
 
 @contextmanager

@@ -9,11 +9,13 @@ from __future__ import annotations
 import argparse
 import logging
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.app.blind_options import add_blind_options, add_twin_options
+from pipeline.app.decimal_option import add_decimal_option
 from pipeline.app.gap_options import add_gap_options
 from pipeline.errors import PipelineError, TippingError
 
@@ -103,12 +105,7 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
         metavar="POLICY",
         help="what becomes of returned electrical energy: none, bus, or a fraction such as 0.5",
     )
-    sub.add_argument(
-        "--decimal",
-        choices=["dot", "comma"],
-        default="dot",
-        help="comma: write copies for a decimal-comma spreadsheet beside the plain files",
-    )
+    add_decimal_option(sub)
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 
 
@@ -137,34 +134,53 @@ def _run_urdf(options: argparse.Namespace) -> int:
     return EXIT_OK
 
 
-def _run_reports(options: argparse.Namespace) -> int:
-    from pipeline.app.run import run
+@contextmanager
+def _folder_held(options: argparse.Namespace) -> Iterator[None]:
+    """Hold the folder of results from the start, and see that the model's folder is settled."""
+    from pipeline.app.staging import holding, settled
 
-    return run(options)
+    if getattr(options, "model", None):
+        settled(options.model.parent)
+    with holding(options.out):
+        yield
+
+
+def _run_reports(options: argparse.Namespace) -> int:
+    with _folder_held(options):
+        from pipeline.app.run import run
+
+        return run(options)
 
 
 def _run_gap(options: argparse.Namespace) -> int:
-    from pipeline.app.gap import run_gap
+    with _folder_held(options):
+        from pipeline.app.gap import run_gap
 
-    return run_gap(options)
+        return run_gap(options)
 
 
 def _run_twin(options: argparse.Namespace) -> int:
-    from pipeline.app.twin import run_twin
+    with _folder_held(options):
+        from pipeline.app.twin import run_twin
 
-    return run_twin(options)
+        return run_twin(options)
 
 
 def _run_blind(options: argparse.Namespace) -> int:
-    from pipeline.app.blind import run_blind
+    from pipeline.app.staging import told
 
-    return run_blind(options)
+    with _folder_held(options), told(options.out):
+        from pipeline.app.blind import run_blind
+
+        return run_blind(options)
 
 
 def _run_calibrate(options: argparse.Namespace) -> int:
-    from pipeline.app.calibrate import run_calibrate
+    from pipeline.app.calibrate import WORK, run_calibrate
+    from pipeline.app.staging import holding
 
-    return run_calibrate(options)
+    with holding(WORK):
+        return run_calibrate(options)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -195,5 +211,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return EXIT_UNUSABLE
     except KeyboardInterrupt:
-        print("interrupted; finished files are kept, nothing is half-written", file=sys.stderr)
+        print("interrupted; nothing is half-written", file=sys.stderr)
         return 130

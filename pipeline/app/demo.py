@@ -31,8 +31,9 @@ def write_demo(folder: Path = _FOLDER) -> tuple[Path, Path]:
     """Simulate and write both logs."""
     trial = make_trial(SEED, [HIDDEN], "walk", "low", logs=2, rate=RATE)
     paths = (folder / DEMO.name, folder / SLOW.name)
-    for path, log in zip(paths, ("log", "log_2"), strict=True):
-        _write(trial.logs[log], path)
+    with replacing(*paths) as temporary:
+        for path, log in zip(temporary, ("log", "log_2"), strict=True):
+            _write(trial.logs[log], path)
     return paths
 
 
@@ -44,15 +45,14 @@ def _write(log: dict[str, NDArray[np.float64]], path: Path) -> None:
         name: values if name == "time_s" else values.astype(np.float32)
         for name, values in log.items()
     }
-    with replacing(path) as (temporary,):
-        pq.write_table(
-            pa.table(columns),
-            temporary,
-            compression="zstd",
-            compression_level=19,
-            use_dictionary=False,
-            use_byte_stream_split=True,
-        )
+    pq.write_table(
+        pa.table(columns),
+        path,
+        compression="zstd",
+        compression_level=19,
+        use_dictionary=False,
+        use_byte_stream_split=True,
+    )
 
 
 if __name__ == "__main__":

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 import logging
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 from pipeline.app import gap_words as words
+from pipeline.app.decimal_option import decimal_of
 from pipeline.app.gap_figures import (
     write_in_time,
     write_signature,
@@ -34,10 +36,6 @@ from reports.writer import write_table, write_text
 
 logger = logging.getLogger("legwatt")
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
-#: Written last: whoever sees them sees a whole run.
-LAST = ("report.md", "index.html")
-#: Of earlier runs; a run without them takes them away.
-PASSING = ("effect_*.png", "effect_*.svg", "deciding_motion.*")
 EXPLAINED, UNEXPLAINED = 0, 1
 
 
@@ -68,7 +66,7 @@ def run_gap(options: argparse.Namespace) -> int:
         where = find_where(given, given.model, intake, parts, fitted)
         tables = [quality_table(where.intake.findings), where_table(where.rows)]
         if options.step == "where":
-            with staged(options.out) as folder:
+            with _staged(options, given) as folder:
                 _tables_into(folder, options, given, tables)
                 write_where_map(where.rows, given.model.joints, given.model.name, folder)
             _say_where(where)
@@ -92,13 +90,12 @@ def run_gap(options: argparse.Namespace) -> int:
         if options.step == "name":
             _write_tables(options, given, tables)
         else:
-            with staged(options.out, LAST) as folder:
+            with _staged(options, given) as folder:
                 _tables_into(folder, options, given, tables)
                 if told.model_file:
                     write_text(folder / "model.toml", told.model_file)
                 if options.step != "add":
                     _figures_and_page(told, tables, folder)
-            _take_away_stale(options.out, told, tables)
     _say_answer(told.story, options.out)
     return UNEXPLAINED if naming.unexplained else EXPLAINED
 
@@ -114,8 +111,14 @@ def _drive(given: Setup, where: Whereabouts, options: argparse.Namespace) -> int
     return UNEXPLAINED if rest and rest[-1] >= first else EXPLAINED
 
 
+def _staged(options: argparse.Namespace, given: Setup) -> AbstractContextManager[Path]:
+    """Every step writes what the steps before it do, so a step's files replace any other's."""
+    step = "" if options.step == "all" else f" {options.step}"
+    return staged(options.out, f"gap{step}", inputs=_inputs(options, given))
+
+
 def _write_tables(options: argparse.Namespace, given: Setup, tables: Sequence[Table]) -> None:
-    with staged(options.out) as folder:
+    with _staged(options, given) as folder:
         _tables_into(folder, options, given, tables)
 
 
@@ -124,7 +127,7 @@ def _tables_into(
 ) -> None:
     meta = metadata(options, given)
     for table in tables:
-        write_table(table, folder, meta=meta)
+        write_table(table, folder, meta=meta, decimal=decimal_of(options))
 
 
 def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None:
@@ -145,15 +148,6 @@ def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None
         "input hashes, versions."
     )
     write_report(story, tables, folder, footer)
-
-
-def _take_away_stale(out: Path, told: Told, tables: Sequence[Table]) -> None:
-    """Remove what an earlier run of this verb left and this one has not."""
-    keep = {Path(name).stem for name in told.story.signatures} | {t.name for t in tables}
-    for pattern in PASSING:
-        for path in out.glob(pattern):
-            if path.name.split(".")[0] not in keep:
-                path.unlink(missing_ok=True)
 
 
 def _say_findings(findings: Sequence[Finding]) -> None:
@@ -180,12 +174,16 @@ def _say_answer(story: Story, out: Path) -> None:
     print(f"written to {out}")
 
 
+def _inputs(options: argparse.Namespace, given: Setup) -> list[Path]:
+    """Every file that was read."""
+    files = [*options.logs, *options.holdout, *given.sources]
+    return files + [path for path in (options.mapping, options.model) if path]
+
+
 def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
     """What every sidecar says about the run: inputs by hash, versions, options."""
-    files = [*options.logs, *options.holdout, *given.sources]
-    files += [path for path in (options.mapping, options.model) if path]
     return {
-        "inputs_sha256": {path.name: sha256(path) for path in files},
+        "inputs_sha256": {path.name: sha256(path) for path in _inputs(options, given)},
         "versions": {name: version(name) for name in PACKAGES},
         "options": {
             "step": options.step,

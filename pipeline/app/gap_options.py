@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Final
 
+from pipeline.app.decimal_option import add_decimal_option
+
 #: The steps; without one all but `forward` run, which needs goals and the servos' law.
 STEPS: Final = {
     "read": "judge the logs: quality.csv",
@@ -74,6 +76,7 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         help="write effects whose name is doubted into the model file, too, marked as such",
     )
     sub.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder for everything written")
+    add_decimal_option(sub)
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 
 

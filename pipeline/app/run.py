@@ -11,7 +11,9 @@ from typing import Any
 
 from actuators.build import CATALOG
 from pipeline.app.compute import Standing, Walking, stand, walk
+from pipeline.app.decimal_option import decimal_of
 from pipeline.app.settings import Settings, settings
+from pipeline.app.staging import staged
 from pipeline.errors import RobotFileError
 from pipeline.robot_file import RobotSpec
 from reports.table import Table
@@ -71,19 +73,19 @@ def run(options: argparse.Namespace) -> int:
                 "numbers and these options"
             )
     meta = metadata(given)
-    for table in tables:
-        decimal = "," if options.decimal == "comma" else "."
-        write_table(table, options.out, meta=meta, decimal=decimal)
-    files = len(tables)
-    if options.verb == "reports":
-        from pipeline.app.figures import write_figures
+    with staged(options.out, options.verb, inputs=inputs_of(given)) as out:
+        for table in tables:
+            write_table(table, out, meta=meta, decimal=decimal_of(options))
+        files = len(tables)
+        if options.verb == "reports":
+            from pipeline.app.figures import write_figures
 
-        assert standing is not None
-        assert walking is not None
-        logger.info("drawing figures")
-        files += write_figures(given, standing, walking, options.out)
-        if judgement is not None:
-            files += judging.pages(given, judgement, tables, options.out)
+            assert standing is not None
+            assert walking is not None
+            logger.info("drawing figures")
+            files += write_figures(given, standing, walking, out)
+            if judgement is not None:
+                files += judging.pages(given, judgement, tables, out)
     print(f"{files} tables{' and figures' if options.verb == 'reports' else ''} in {options.out}")
     for line in findings(walking, given) if walking else ():
         print(line)
@@ -150,12 +152,18 @@ def table_of_parameters(given: Settings) -> Table:
     return parameter_tables.parameters(groups)
 
 
-def metadata(given: Settings) -> dict[str, Any]:
-    """What every sidecar says about the run: inputs by hash, versions, options."""
+def inputs_of(given: Settings) -> list[Path]:
+    """Every file that was read."""
     spec = given.robot.spec
     files = [*spec.sources, *([] if spec.build else [spec.urdf])]
     files += sorted(Path(CATALOG).glob("*.toml"))
-    files += [given.model] if given.model else []
+    return [*files, given.model] if given.model else files
+
+
+def metadata(given: Settings) -> dict[str, Any]:
+    """What every sidecar says about the run: inputs by hash, versions, options."""
+    spec = given.robot.spec
+    files = inputs_of(given)
     return {
         "inputs_sha256": {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in files},
         "urdf_sha256": hashlib.sha256(given.robot.urdf.encode()).hexdigest(),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +33,17 @@ class TrialFiles:
     catalog: Path
     sealed: Path
     sha256: str
+
+    def moved_to(self, folder: Path) -> TrialFiles:
+        """The same files once their folder has another place."""
+        here = self.folder
+        return replace(
+            self,
+            folder=folder,
+            logs=tuple(folder / log.relative_to(here) for log in self.logs),
+            robot=folder / self.robot.relative_to(here),
+            catalog=folder / self.catalog.relative_to(here),
+        )
 
 
 def sealed_bytes(truth: dict[str, Any]) -> bytes:
@@ -62,13 +73,10 @@ def write_trial(trial: Trial, folder: Path, sealed: Path) -> TrialFiles:
     Raises:
         TwinError: The seal would lie inside the folder, or the folder is not empty.
     """
-    if sealed.resolve().is_relative_to(folder.resolve()):
-        raise TwinError(f"{sealed.name} would lie in the trial's own folder; seal it elsewhere")
+    check_seal(folder, sealed)
     if folder.exists() and any(folder.iterdir()):
         raise TwinError(f"{folder}: not empty; give a new folder for the trial")
     truth = sealed_bytes(trial.truth)
-    sealed.parent.mkdir(parents=True, exist_ok=True)
-    _write(sealed, truth)
     robot_folder, catalog = folder / "urdf", folder / "actuators"
     robot_folder.mkdir(parents=True, exist_ok=True)
     catalog.mkdir(parents=True, exist_ok=True)
@@ -80,6 +88,8 @@ def write_trial(trial: Trial, folder: Path, sealed: Path) -> TrialFiles:
     for name, columns in trial.logs.items():
         logs.append(folder / f"{name}.csv")
         _write(logs[-1], csv_bytes(columns))
+    sealed.parent.mkdir(parents=True, exist_ok=True)
+    _write(sealed, truth)
     return TrialFiles(
         folder=folder,
         logs=tuple(logs),
@@ -88,6 +98,18 @@ def write_trial(trial: Trial, folder: Path, sealed: Path) -> TrialFiles:
         sealed=sealed,
         sha256=hashlib.sha256(truth).hexdigest(),
     )
+
+
+def check_seal(folder: Path, sealed: Path) -> None:
+    """Refuse a seal that whoever has the trial's folder could break.
+
+    Raises:
+        TwinError: The seal would lie inside the folder, or is one.
+    """
+    if sealed.resolve().is_relative_to(folder.resolve()):
+        raise TwinError(f"{sealed.name} would lie in the trial's own folder; seal it elsewhere")
+    if sealed.is_dir():
+        raise TwinError(f"{sealed}: is a folder; name a file for the sealed truth")
 
 
 def csv_bytes(columns: dict[str, Any]) -> bytes:
@@ -105,5 +127,8 @@ def csv_bytes(columns: dict[str, Any]) -> bytes:
 def _write(path: Path, content: bytes) -> None:
     # Complete or absent: an interrupted run leaves no half file.
     part = path.with_name(path.name + ".part")
-    part.write_bytes(content)
-    os.replace(part, path)
+    try:
+        part.write_bytes(content)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
