@@ -10,7 +10,7 @@ LOG    ?= pipeline/gap/demo/walk.parquet
 HOLDOUT := $(if $(filter file,$(origin LOG)),--holdout pipeline/gap/demo/walk_slow.parquet)
 ARGS   ?=
 # A name as one word of the shell, whatever is in it.
-word = '$(subst ','\'',$(1))'
+quoted = '$(subst ','\'',$(1))'
 
 .DEFAULT_GOAL := help
 .PHONY: help env reports gap blind calibrate test test-slow lint check bench readme urdf lock clean
@@ -27,7 +27,7 @@ $(STAMP): requirements.lock pyproject.toml
 	@touch $@
 
 reports: $(STAMP)  ## Compute standing and walking, write CSV and figures to reports/out (OUT=, ROBOT=, ARGS=)
-	$(PY) -m pipeline reports --robot $(call word,$(ROBOT)) --out $(call word,$(OUT)) $(ARGS)
+	$(PY) -m pipeline reports --robot $(call quoted,$(ROBOT)) --out $(call quoted,$(OUT)) $(ARGS)
 
 test: $(STAMP)  ## Run the tests (Table III among them)
 	$(PY) -m pytest -m "not slow"
@@ -41,7 +41,7 @@ lint: $(STAMP)  ## Check style and types
 	$(PY) -m mypy
 
 check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
-	$(PY) -m pipeline check $(call word,$(ROBOT))
+	$(PY) -m pipeline check $(call quoted,$(ROBOT))
 
 bench: $(STAMP)  ## Print speed ratios measured in one run
 	$(PY) -m tests.bench
@@ -52,18 +52,18 @@ readme: $(STAMP)  ## Renew the README's tables and pictures from a run
 # Exit 1 is a finding (something stays unexplained), not an error of make. LOG= is one file, whose
 # name may hold spaces, or several.
 gap: $(STAMP)  ## Find what the model lacks, from a measured log (LOG=, ROBOT=, ARGS=); a demonstration by default
-	@if [ -e $(call word,$(LOG)) ]; then set -- $(call word,$(LOG)); else set -- $(LOG); fi; \
-	$(PY) -m pipeline gap "$$@" $(HOLDOUT) --robot $(call word,$(ROBOT)) \
-	  --out $(call word,$(OUT)/gap) $(ARGS) || { code=$$?; \
+	@if [ -e $(call quoted,$(LOG)) ]; then set -- $(call quoted,$(LOG)); else set -- $(LOG); fi; \
+	$(PY) -m pipeline gap "$$@" $(HOLDOUT) --robot $(call quoted,$(ROBOT)) \
+	  --out $(call quoted,$(OUT)/gap) $(ARGS) || { code=$$?; \
 	  if [ $$code -eq 1 ]; then echo "finding: a significant part of the gap stays unexplained"; \
 	  else exit $$code; fi; }
 
 blind: $(STAMP)  ## Hide effects in simulated machines and see whether gap finds them (resumes; ARGS=)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline blind --out $(call word,$(OUT)/blind) --resume $(ARGS) \
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline blind --out $(call quoted,$(OUT)/blind) --resume $(ARGS) \
 	  || { code=$$?; if [ $$code -eq 1 ]; then echo "finding: an aim was not reached"; else exit $$code; fi; }
 
 calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 20 minutes, resumes)
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline calibrate --robot $(call word,$(ROBOT))
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pipeline calibrate --robot $(call quoted,$(ROBOT))
 
 urdf: $(STAMP)  ## Build the URDFs from their TOML
 	$(PY) -m pipeline urdf
