@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
 
+from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
 from actuators.element import Element
 from actuators.errors import CatalogError, closest, one_line
 from actuators.friction import Friction
@@ -14,6 +15,7 @@ from actuators.ratio import Ratio
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
 _ALTERNATIVE_KEYS: Final = ("title", "motor", "ratio", "element")
+_ELEMENT_KEYS: Final = ("name", "law", "stage", "shaft")  # what else it has are arguments
 
 # law -> class, arguments it must have, arguments it may have
 LAWS: Final[Mapping[str, tuple[Callable[..., Element], frozenset[str], frozenset[str]]]] = {
@@ -37,12 +39,14 @@ class ElementEntry:
         law: Key of the table of laws.
         arguments: Argument to `component.parameter`.
         stage: Name of the shaft on its motor side, or empty.
+        shaft: Where that shaft is, in words, or empty.
     """
 
     name: str
     law: str
     arguments: Mapping[str, str]
     stage: str
+    shaft: str = ""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,18 @@ class Alternative:
     motor: str
     ratio: str
     elements: tuple[ElementEntry, ...]
+
+    @property
+    def stage_names(self) -> Mapping[str, str]:
+        """Every stage from the joint to the supply in words, by its short name."""
+        *inner, last = [e for e in self.elements if e.stage]
+        names = {e.stage: e.shaft or f"motor side of {e.name}" for e in inner}
+        return {
+            JOINT_STAGE: "joint",
+            **names,
+            last.stage: last.shaft or "motor",
+            SUPPLY_STAGE: "supply",
+        }
 
     @property
     def references(self) -> tuple[str, ...]:
@@ -112,7 +128,7 @@ def _element(entry: object, where: str) -> ElementEntry:
     place, law = f"{where}: element '{one_line(entry['name'])}'", entry["law"]
     if law not in LAWS:
         raise CatalogError(f"{place}: unknown law '{one_line(law)}': {closest(law, list(LAWS))}")
-    arguments = {k: v for k, v in entry.items() if k not in ("name", "law", "stage")}
+    arguments = {k: v for k, v in entry.items() if k not in _ELEMENT_KEYS}
     _, needed, possible = LAWS[law]
     for argument in arguments:
         if argument not in needed | possible:
@@ -122,4 +138,7 @@ def _element(entry: object, where: str) -> ElementEntry:
             )
     for argument in sorted(needed - set(arguments)):
         raise CatalogError(f"{place}: law '{law}' lacks its argument '{argument}'")
-    return ElementEntry(entry["name"], law, MappingProxyType(arguments), entry.get("stage", ""))
+    stage, shaft = entry.get("stage", ""), entry.get("shaft", "")
+    if shaft and not stage:
+        raise CatalogError(f"{place}: 'shaft' says where a stage is; name the stage, too")
+    return ElementEntry(entry["name"], law, MappingProxyType(arguments), stage, shaft)

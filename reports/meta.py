@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from reports.dust import RULE
 from reports.errors import TableError
 from reports.table import Table
 
 #: An absolute path, in Unix or Windows writing, that starts a word.
 _PATH = re.compile(r"(?<![\w./])(?:/|[A-Za-z]:[\\/])(?:[^\s'\"/\\:;,()]+[/\\])+([^\s'\"/\\:;,()]*)")
-_RESERVED = ("table", "description", "columns", "rows", "sha256")
+_RESERVED = ("table", "description", "columns", "rows", "sha256", "zero")
 
 
 def sidecar(table: Table, sha256: str, meta: Mapping[str, Any]) -> str:
@@ -44,9 +45,11 @@ def sidecar(table: Table, sha256: str, meta: Mapping[str, Any]) -> str:
                 "name": header,
                 "meaning": table.meanings[header][0],
                 "unit": table.meanings[header][1],
+                **({"zero_below": table.zero_below[header]} if header in table.zero_below else {}),
             }
             for header in table.columns
         ],
+        **({"zero": RULE} if table.zero_below else {}),
     }
     rest = {str(key): _plain(meta[key], table.name) for key in sorted(meta, key=str)}
     return json.dumps({**head, **rest}, indent=1, ensure_ascii=False, allow_nan=False) + "\n"

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from reports.dust import without_dust
 from reports.errors import ReportError
 from reports.table import Table
 
@@ -141,6 +142,7 @@ def table_block(
     Raises:
         ReportError: A column that the table lacks.
     """
+    table = without_dust(table)
     shown = columns or {h: _titled(h, table.meanings[h][1]) for h in table.columns}
     for header in shown:
         if header not in table.columns:

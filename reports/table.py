@@ -28,12 +28,17 @@ class Table:
         meanings: Header to (meaning, unit); the unit is ``""`` for names and ``"1"`` for pure
             numbers.
         description: One sentence on what the table holds and its sign conventions.
+        exact: Whether the numbers were given and not computed, so that none is rounding's.
+        zero_below: Header to the magnitude up to which numbers were set to zero, by unit where
+            rows have units of their own; filled in by `reports.dust`.
     """
 
     name: str
     columns: Mapping[str, Column]
     meanings: Mapping[str, tuple[str, str]]
     description: str = ""
+    exact: bool = False
+    zero_below: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
     rows: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -97,6 +102,8 @@ def table_from_rows(
     rows: Sequence[Mapping[str, Any]],
     meanings: Mapping[str, tuple[str, str]],
     description: str = "",
+    *,
+    exact: bool = False,
 ) -> Table:
     """A tidy table from one mapping per row; the columns are those of `meanings`, in its order.
 
@@ -112,4 +119,4 @@ def table_from_rows(
                 "meanings, not in both"
             )
     columns = {header: [row[header] for row in rows] for header in meanings}
-    return Table(name, columns, meanings, description)
+    return Table(name, columns, meanings, description, exact)

@@ -1,19 +1,19 @@
 """Write tables as CSV with a sidecar, whole or not at all.
 
 Comma, dot decimal, UTF-8, LF, one header row. Floats are written with the shortest digits that
-read back to the same number; NaN and None are empty cells. The file holds no time stamp and no
-path: the same table gives the same bytes.
+read back to the same number; what rounding leaves of a zero is zero (`reports/dust.py`); NaN and
+None are empty cells. The file holds no time stamp and no path: the same table gives the same bytes.
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from reports.atomic import replacing, write_text
+from reports.dust import without_dust
 from reports.errors import OutputError, TableError
 from reports.meta import sidecar
 from reports.table import Table
@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 __all__ = ["csv_bytes", "write_table", "write_text"]
 
 _BOM = b"\xef\xbb\xbf"
+#: A text that is nothing but a number, as a paper's "2.04".
+_NUMBER = r"^[-+]?[0-9]+\.[0-9]*([eE][-+]?[0-9]+)?$"
+#: Rows that are laid out at once.
+_BLOCK = 1 << 16
 
 
 def write_table(
@@ -47,6 +51,7 @@ def write_table(
     """
     if decimal not in (".", ","):
         raise OutputError(f"decimal '{decimal}' is unknown; use '.' or ','")
+    table = without_dust(table)
     plain = csv_bytes(table)
     contents = {
         out_dir / f"{table.name}.csv": plain,
@@ -68,39 +73,40 @@ def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
     Args:
         table: What to write.
         decimal: ``"."``, or ``","`` for semicolons, decimal commas and a byte-order mark, by which
-            spreadsheets know UTF-8.
+            spreadsheets know UTF-8. A text that is a number gets its comma, too.
 
     Raises:
         TableError: A column whose values are of mixed types.
     """
+    import pyarrow.compute as pc
+
+    delimiter = ";" if decimal == "," else ","
+    arrays = [_array(table, header) for header in table.columns]
+    lines = [delimiter.join(table.columns)]
+    for start in range(0, table.rows, _BLOCK):
+        cells = [_cells(values.slice(start, _BLOCK), delimiter, decimal) for values in arrays]
+        lines += pc.binary_join_element_wise(*cells, delimiter).to_pylist()
+    text = "\n".join(lines) + "\n"
+    return (_BOM if decimal == "," else b"") + text.encode("utf-8")
+
+
+def _cells(values: pa.Array, delimiter: str, decimal: str) -> pa.Array:
+    """What stands between the delimiters: quotes around those texts only that need them."""
     import pyarrow as pa
     import pyarrow.compute as pc
-    import pyarrow.csv as pacsv
 
-    arrays = {header: _array(table, header) for header in table.columns}
-    delimiter = ";" if decimal == "," else ","
-    # pyarrow quotes every text of a file or none: none where no text needs it.
-    special = any(
-        pc.any(pc.match_substring_regex(values, r'[,;"\r\n]')).as_py()
-        for values in arrays.values()
-        if pa.types.is_string(values.type)
-    )
-    if decimal == ",":
-        arrays = {
-            header: pc.replace_substring(pc.cast(values, pa.string()), ".", ",")
-            if pa.types.is_floating(values.type)
-            else values
-            for header, values in arrays.items()
-        }
-    options = pacsv.WriteOptions(
-        delimiter=delimiter,
-        eol="\n",
-        quoting_style="needed" if special else "none",
-        quoting_header="none",
-    )
-    sink = io.BytesIO()
-    pacsv.write_csv(pa.table(arrays), sink, options)
-    return (_BOM if decimal == "," else b"") + sink.getvalue()
+    text = pc.cast(values, pa.string())
+    if pa.types.is_string(values.type):
+        if decimal != ".":
+            number = pc.match_substring_regex(text, _NUMBER)
+            text = pc.if_else(number, pc.replace_substring(text, ".", decimal), text)
+        special = pc.match_substring_regex(text, f'[{delimiter}"\r\n]')
+        if pc.any(special).as_py():
+            inner = pc.replace_substring(text, '"', '""')
+            text = pc.if_else(special, pc.binary_join_element_wise('"', inner, '"', ""), text)
+    elif decimal != "." and pa.types.is_floating(values.type):
+        text = pc.replace_substring(text, ".", decimal)
+    return pc.fill_null(text, "")
 
 
 def _array(table: Table, header: str) -> pa.Array:

@@ -118,7 +118,9 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
         walking_tables.walking_joint_demand(walking.demand),
         walking_tables.walking_contact_forces(walking.demand),
         walking_tables.walking_stability(walking.demand, walking.margins),
-        walking_tables.walking_stage_energy(walking.results),
+        walking_tables.walking_stage_energy(
+            walking.results, {n: a.stage_names for n, a in given.catalog.alternatives.items()}
+        ),
         walking_tables.walking_losses(walking.results, walking.supplies),
         walking_tables.walking_energy(walking.supplies, legs, IDEAL),
         walking_tables.robot_energy(

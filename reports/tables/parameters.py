@@ -49,4 +49,5 @@ def parameters(groups: Iterable[tuple[str, Iterable[Parameter]]]) -> Table:
             "interval_high": ("upper end", "see unit"),
             "reason": ("why this value, for an assumption", ""),
         },
+        exact=True,
     )

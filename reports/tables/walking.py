@@ -105,13 +105,21 @@ def walking_stability(demand: MotionDemand, margins: Sequence[Array]) -> Table:
     )
 
 
-def walking_stage_energy(results: Mapping[str, ChainResult]) -> Table:
-    """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20)."""
+def walking_stage_energy(
+    results: Mapping[str, ChainResult], stage_names: Mapping[str, Mapping[str, str]]
+) -> Table:
+    """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20).
+
+    Args:
+        results: By alternative.
+        stage_names: By alternative, every stage in words.
+    """
     rows = [
         {
             "alternative": name,
             "joint": joint,
             "stage": stage.stage,
+            "stage_name": stage_names[name][stage.stage],
             "forward_J": stage.forward[j],
             "reverse_J": stage.reverse[j],
         }
@@ -126,6 +134,7 @@ def walking_stage_energy(results: Mapping[str, ChainResult]) -> Table:
             "alternative": ALTERNATIVE,
             "joint": ("joint", ""),
             "stage": ("shaft, from the joint (out) to the motor (m) and the supply (el)", ""),
+            "stage_name": ("where that is, in words", ""),
             "forward_J": ("E(+): energy per cycle from the supply towards the joint", "J"),
             "reverse_J": ("E(-): energy per cycle the other way, as a positive number", "J"),
         },
