@@ -233,12 +233,9 @@ def _end(folder: Path) -> None:
 
 def _move(source: Path, target: Path) -> None:
     """Rename what is there; its folder is made."""
-    try:
-        os.rename(source, target)
-    except FileNotFoundError:
-        if not os.path.lexists(source):
-            return
-        target.parent.mkdir(parents=True, exist_ok=True)
+    if os.path.lexists(source):
+        if not target.parent.is_dir():
+            target.parent.mkdir(parents=True, exist_ok=True)
         os.rename(source, target)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,19 @@ def command(root: Path) -> Command:
 @pytest.fixture(scope="session")
 def out(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Path:
     """The tables of standing and walking with every option at its default."""
-    folder = tmp_path_factory.mktemp("out")
-    assert command("stand", folder) == 0
-    assert command("walk", folder) == 0
+    return stand_and_walk(tmp_path_factory.mktemp("out"), command)
+
+
+def stand_and_walk(folder: Path, command: Command, *more: str, **robot: Path) -> Path:
+    """The tables of both verbs, which write a folder each, side by side."""
+    for verb in ("stand", "walk"):
+        assert command(verb, folder / verb, *more, **robot) == 0
+        for path in results(folder / verb):
+            shutil.copyfile(path, folder / path.name)
+        shutil.rmtree(folder / verb)
     return folder
+
+
+def results(folder: Path) -> list[Path]:
+    """What a person sees in a folder."""
+    return sorted(path for path in folder.iterdir() if not path.name.startswith("."))

@@ -85,13 +85,13 @@ def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: 
     assert not Path(text["robot"]["file"]).is_absolute()
     model = ["--model", str(out / "model.toml")]
     for verb in ("walk", "stand"):
-        assert exit_code([verb, *model, "--out", str(tmp_path)]) == 0
-    losses = rows_of(tmp_path / "walking_losses.csv")
+        assert exit_code([verb, *model, "--out", str(tmp_path / verb)]) == 0
+    losses = rows_of(tmp_path / "walk" / "walking_losses.csv")
     added = [r for r in losses if r["element"] == HIDDEN.effect and float(r["loss_J"]) > 0]
     assert {(r["alternative"], r["joint"]) for r in added} == {
         (name, "rm_joint_1") for name in ("rotor", "reversible", "irreversible")
     }
-    assert "model.toml" in sidecar_of(tmp_path / "walking_losses.csv")["inputs_sha256"]
+    assert "model.toml" in sidecar_of(tmp_path / "walk" / "walking_losses.csv")["inputs_sha256"]
 
 
 @pytest.mark.slow

@@ -19,7 +19,7 @@ from actuators.units import to_si
 from pipeline.app.settings import Settings, settings
 from pipeline.errors import PipelineError
 from pipeline.robot_file import load_robot_file
-from tests.app.conftest import Command, exit_code, rows_of, sidecar_of
+from tests.app.conftest import Command, exit_code, rows_of, sidecar_of, stand_and_walk
 
 ROBOT = Path(__file__).parents[2] / "urdf" / "hexapod.toml"
 SPEC = load_robot_file(ROBOT)
@@ -167,8 +167,7 @@ def test_the_order_of_legs_changes_rows_not_numbers(
     assert block
     moved = text.replace(block[0], "").replace("[gait]\n", f"{block[0]}[gait]\n")
     (tmp_path / "moved.toml").write_text(moved, encoding="utf-8")
-    assert command("stand", tmp_path, robot=tmp_path / "moved.toml") == 0
-    assert command("walk", tmp_path, robot=tmp_path / "moved.toml") == 0
+    stand_and_walk(tmp_path, command, robot=tmp_path / "moved.toml")
     new, old = rows_of(tmp_path / "standing.csv"), rows_of(out / "standing.csv")
     assert new[17]["joint"] == "lf_joint_3"
     key = {(r["alternative"], r["joint"]): r for r in new}

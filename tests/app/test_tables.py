@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.conftest import Command, rows_of, sidecar_of
+from tests.app.conftest import Command, rows_of, sidecar_of, stand_and_walk
 
 LEGS = ("lf", "lm", "lr", "rf", "rm", "rr")
 JOINTS = tuple(f"{leg}_joint_{k}" for leg in LEGS for k in (1, 2, 3))
@@ -185,8 +185,7 @@ def test_losses_and_work_add_up_over_the_cycle(out: Path) -> None:
 
 
 def test_same_input_same_bytes(out: Path, tmp_path: Path, command: Command) -> None:
-    assert command("stand", tmp_path) == 0
-    assert command("walk", tmp_path) == 0
+    stand_and_walk(tmp_path, command)
     assert {p.name for p in tmp_path.iterdir()} == {p.name for p in out.iterdir()}
     for path in out.iterdir():
         assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
