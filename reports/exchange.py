@@ -2,7 +2,7 @@
 
 New files are gathered in a hidden folder inside the target, so that they lie on its disk before
 anything changes. Renaming that folder to `EXCHANGE` decides: from then on the new set is the run's.
-What is left is some hundred renames, about a millisecond: first the old files move away, then the
+What is left are two renames per file, some milliseconds: first the old files move away, then the
 new ones move in, so that files of two runs never stand side by side. A process killed before the
 decision leaves the old set; one killed after it leaves part of one set, and `settle`, with which
 every command that uses the folder begins, moves the rest in. A power cut is another matter: nothing
@@ -192,17 +192,16 @@ def _forward(folder: Path) -> None:
     """Move on from whatever was reached, any number of times, to the new set."""
     place = folder / EXCHANGE
     plan = _plan_of(place)
-    waiting = {name for name in plan.new if os.path.lexists(place / _NEW / name)}
-    moved_in = set(plan.new) - waiting
-    for name in plan.old:
-        if name not in moved_in:
-            _move(folder / name, place / _OLD / name)
-    for name, kept in plan.aside:
-        if name not in moved_in and not os.path.lexists(folder / kept):
-            _move(folder / name, folder / kept)
-    for name in plan.new:
-        if name in waiting:
-            _move(place / _NEW / name, folder / name)
+    waiting = [name for name in plan.new if os.path.lexists(place / _NEW / name)]
+    moved_in = set(plan.new).difference(waiting)
+    moves = [(folder / n, place / _OLD / n) for n in plan.old if n not in moved_in]
+    moves += [
+        (folder / name, folder / kept)
+        for name, kept in plan.aside
+        if name not in moved_in and not os.path.lexists(folder / kept)
+    ]
+    _move([pair for pair in moves if os.path.lexists(pair[0])])
+    _move([(place / _NEW / name, folder / name) for name in waiting])
     _remove_empty(folder, plan.old)
     _end(folder)
 
@@ -211,14 +210,14 @@ def _back(folder: Path) -> None:
     """Undo whatever was reached."""
     place = folder / EXCHANGE
     plan = _plan_of(place)
-    for name in plan.new:
-        if not os.path.lexists(place / _NEW / name):
-            _move(folder / name, place / _NEW / name)
-    for name, kept in plan.aside:
-        if not os.path.lexists(folder / name):
-            _move(folder / kept, folder / name)
-    for name in plan.old:
-        _move(place / _OLD / name, folder / name)
+    moves = [
+        (folder / name, place / _NEW / name)
+        for name in plan.new
+        if not os.path.lexists(place / _NEW / name)
+    ]
+    moves += [(folder / kept, folder / name) for name, kept in plan.aside]
+    moves += [(place / _OLD / n, folder / n) for n in plan.old]
+    _move([pair for pair in moves if os.path.lexists(pair[0])])
     _remove_empty(folder, plan.new)
     _end(folder)
 
@@ -231,11 +230,12 @@ def _end(folder: Path) -> None:
     shutil.rmtree(done, ignore_errors=True)
 
 
-def _move(source: Path, target: Path) -> None:
-    """Rename what is there; its folder is made."""
-    if os.path.lexists(source):
-        if not target.parent.is_dir():
-            target.parent.mkdir(parents=True, exist_ok=True)
+def _move(moves: Sequence[tuple[Path, Path]]) -> None:
+    """Rename one after another, as fast as can be; their folders are made before."""
+    for above in {target.parent for _, target in moves}:
+        if not above.is_dir():
+            above.mkdir(parents=True, exist_ok=True)
+    for source, target in [(str(source), str(target)) for source, target in moves]:
         os.rename(source, target)
 
 

@@ -59,6 +59,8 @@ def copy(tmp_path):
         ("alternatives.toml", "motor_re40_24v", "motor_re40_48v", "did you mean 'motor_re40_24v'"),
         ("alternatives.toml", 'stage = "ph"', 'stage = "mp"', "named twice"),
         ("alternatives.toml", 'viscous = "pinion.viscous"\n', "", "used by no alternative"),
+        ("alternatives.toml", 'stage = "ph"\n', "", "name the stage, too"),
+        ("alternatives.toml", "shaft = ", "shfat = ", "no argument 'shfat'"),
         (
             "alternatives.toml",
             'title = "Alternative 1: ideal actuator"\n',
@@ -107,6 +109,21 @@ def test_unused_component(copy):
     shutil.copy(copy / "output_bearing.toml", copy / "spare.toml")
     with pytest.raises(CatalogError, match=r"spare\.toml: parameter 'coulomb' is used by no"):
         load_catalog(copy)
+
+
+def test_a_stage_without_words_is_named_after_its_element(copy):
+    path = copy / "alternatives.toml"
+    path.write_text(re.sub(r"shaft = .*\n", "", path.read_text()))
+    stages = load_catalog(copy).alternatives["irreversible"].stage_names
+    assert list(stages) == list(load_catalog().alternatives["irreversible"].stage_names)
+    assert stages == {
+        "out": "joint",
+        "2": "motor side of output_bearing_friction",
+        "ph": "motor side of pinion_inertia",
+        "mp": "motor side of planetary_friction",
+        "m": "motor",
+        "el": "supply",
+    }
 
 
 def test_edits_do_not_touch_the_original():

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.app.conftest import Command, rows_of, sidecar_of, stand_and_walk
+from pipeline.app.demo import DEMO
+from tests.app.conftest import Command, exit_code, rows_of, sidecar_of, stand_and_walk
 
 LEGS = ("lf", "lm", "lr", "rf", "rm", "rr")
 JOINTS = tuple(f"{leg}_joint_{k}" for leg in LEGS for k in (1, 2, 3))
@@ -38,7 +39,7 @@ TABLES = {
         2 * 751,
     ),
     "walking_stage_energy": (
-        ["alternative", "joint", "stage", "forward_J", "reverse_J"],
+        ["alternative", "joint", "stage", "stage_name", "forward_J", "reverse_J"],
         18 * (3 + 4 + 4 + 6),  # out, m, el; out, mt, m, el; out, wg, m, el; out, 2, ph, mp, m, el
     ),
     "walking_losses": (["alternative", "joint", "element", "loss_J"], None),
@@ -111,6 +112,62 @@ def test_every_parameter_has_a_basis_and_a_source(out: Path) -> None:
             assert float(row["value"]) <= high * (1 + 1e-12)
         if row["basis"] == "assumed":
             assert row["reason"], row
+
+
+def test_no_dust(out: Path) -> None:
+    """Of all numbers with one unit in a table, none but zero is 1e-13 of the largest.
+
+    Standing still, a joint without a load shows 0 N*m where sums that cancel left 1e-32.
+    """
+    assert "0" in {row["joint_torque_Nm"] for row in rows_of(out / "standing.csv")}
+    for path in out.glob("*.csv"):
+        meta = sidecar_of(path)
+        units = {column["name"]: column["unit"] for column in meta["columns"]}
+        sizes: dict[str, list[float]] = {}
+        for row in rows_of(path):
+            for column, value in row.items():
+                unit = row[units[column][4:]] if units[column].startswith("see ") else units[column]
+                if unit and value and value not in ("true", "false"):
+                    key = unit if unit != "1" else column
+                    sizes.setdefault(key, []).append(abs(float(value)))
+        assert sizes, path.name
+        for key, values in sizes.items():
+            if path.name != "parameters.csv":  # what was given is written as it was given
+                assert min((v for v in values if v), default=1.0) > 1e-13 * max(values), (path, key)
+    stated = {c["name"]: c.get("zero_below") for c in sidecar_of(out / "standing.csv")["columns"]}
+    largest = max(abs(float(r["joint_torque_Nm"])) for r in rows_of(out / "standing.csv"))
+    assert stated["motor_torque_Nm"] == pytest.approx(1e-12 * largest)
+
+
+def test_stages_are_spelled_out_beside_their_codes(out: Path) -> None:
+    rows = rows_of(out / "walking_stage_energy.csv")
+    names = {(row["alternative"], row["stage"]): row["stage_name"] for row in rows}
+    assert names["ideal", "out"] == "joint"
+    assert names["rotor", "mt"] == "between rotor and transmission"
+    assert names["reversible", "wg"] == "between timing belt and Harmonic Drive (wave generator)"
+    assert names["irreversible", "ph"] == "between planetary and hypoid gear (pinion)"
+    assert {name for (_, stage), name in names.items() if stage == "el"} == {"supply"}
+    assert len(set(names)) == 17
+    for (_, stage), name in names.items():
+        assert name not in (stage, "")
+
+
+def test_comma_copies_of_a_run(out: Path, tmp_path: Path, command: Command) -> None:
+    """No quotes around numbers and no dot in them; the paper's 2.04 in a text column, too."""
+    assert command("reports", tmp_path / "reports", "--decimal", "comma") == 0
+    gap = ["gap", "where", str(DEMO), "--out", str(tmp_path / "gap"), "--decimal", "comma"]
+    assert exit_code(gap) == 0
+    number = re.compile(r"[-+]?[0-9]+\.[0-9]*(e[-+]?[0-9]+)?")
+    copies = sorted(tmp_path.glob("*/*.comma.csv"))
+    assert {"standing.comma.csv", "where.comma.csv"} <= {path.name for path in copies}
+    for path in copies:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        assert '"' not in lines[0]
+        for line in lines:
+            assert not re.search(r'(^|;)"[-+0-9.,e]*"(;|$)', line), (path.name, line)
+            assert not [cell for cell in line.split(";") if number.fullmatch(cell)], path.name
+    conclusions = (tmp_path / "reports" / "conclusions.comma.csv").read_text(encoding="utf-8-sig")
+    assert ";W;2,04;" in conclusions
 
 
 def test_legs_add_up_to_the_robot(out: Path) -> None:
