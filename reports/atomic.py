@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -15,7 +16,7 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
     """Hand out temporary files beside the targets and rename them when the block succeeds.
 
     Whatever stops the block, an exception or an interrupt, the old files stay as they were and
-    nothing half-written is left.
+    nothing half-written is left. What a killed process left goes when its file is next written.
 
     Args:
         targets: Files to write; their folder is made when it is missing.
@@ -32,6 +33,7 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
             _make_folder(target.parent)
             if target.is_dir():
                 raise OutputError(f"{target}: is a folder, a file was to be written; remove it")
+            _remove_left_over(target)
         yield temporary
         for source, target in zip(temporary, targets, strict=True):
             os.replace(source, target)
@@ -44,6 +46,25 @@ def replacing(*targets: Path) -> Iterator[tuple[Path, ...]]:
         for source in temporary:
             with suppress(OSError):
                 source.unlink(missing_ok=True)
+
+
+def _remove_left_over(target: Path) -> None:
+    """Temporary files of processes that were killed before they could rename or remove them."""
+    for path in target.parent.glob(f".{glob.escape(target.name)}.*.tmp"):
+        number = path.name.split(".")[-2]
+        if number.isdecimal() and not _runs(int(number)):
+            with suppress(OSError):
+                path.unlink()
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _make_folder(folder: Path) -> None:

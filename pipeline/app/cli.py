@@ -177,9 +177,9 @@ def _run_blind(options: argparse.Namespace) -> int:
 
 def _run_calibrate(options: argparse.Namespace) -> int:
     from pipeline.app.calibrate import WORK, run_calibrate
-    from pipeline.app.staging import holding
+    from pipeline.app.staging import holding, told
 
-    with holding(WORK):
+    with holding(WORK), told(WORK):
         return run_calibrate(options)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 import tomllib
 from pathlib import Path
 
@@ -105,6 +106,28 @@ def test_a_stored_model_is_checked_against_a_log(
     assert float(row["gap_after"]) < 0.1 * float(row["gap_before"])
     assert not (tmp_path / "model.toml").exists()
     assert "falls from" in capsys.readouterr().out
+
+
+@pytest.mark.slow
+def test_a_model_that_a_step_reads_from_its_own_folder_stays(
+    run: tuple[int, Path], tmp_path: Path
+) -> None:
+    """The report of `gap shrink` replaces that of the run that found the model, not the model."""
+    out = tmp_path  # as deep as the run's, for the model file names its robot from where it lies
+    shutil.copytree(run[1], out, dirs_exist_ok=True)
+    model = (out / "model.toml").read_bytes()
+    assert (
+        exit_code(
+            ["gap", "shrink", str(DEMO), "--model", str(out / "model.toml")] + ["--out", str(out)]
+        )
+        == 0
+    )
+    assert (out / "model.toml").read_bytes() == model
+    assert (out / "waterfall.svg").exists()
+    assert exit_code(["gap", "read", str(DEMO), "--out", str(out)]) == 0
+    assert {p.name for p in out.iterdir() if not p.name.startswith(".")} == {
+        *("quality.csv", "quality.meta.json")
+    }
 
 
 def test_where_gives_the_same_bytes_twice(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -214,6 +215,16 @@ def test_unknown_decimal(tmp_path: Path) -> None:
 def test_text_is_utf8_with_lf(tmp_path: Path) -> None:
     write_text(tmp_path / "new" / "a.md", "Γ\n")
     assert (tmp_path / "new" / "a.md").read_bytes() == "Γ\n".encode()
+
+
+def test_what_a_killed_process_left_goes_and_a_living_ones_stays(tmp_path: Path) -> None:
+    dead = subprocess.Popen(["true"])
+    dead.wait()
+    for name in (f".a.md.{dead.pid}.tmp", f".a.md.{os.getppid()}.tmp", ".a.md.notes.tmp"):
+        (tmp_path / name).write_text("half")
+    write_text(tmp_path / "a.md", "whole")
+    left = {f".a.md.{os.getppid()}.tmp", ".a.md.notes.tmp", "a.md"}
+    assert {path.name for path in tmp_path.iterdir()} == left
 
 
 def test_pyarrow_reads_it_back(tmp_path: Path) -> None:
