@@ -150,7 +150,7 @@ def _planned(
             raise OutputError(f"{path}: is a folder, a file was to be written; remove it")
         if name not in digests and path.resolve() in inputs:
             carried[name] = before.files[name]
-        elif not path.is_symlink() and sha256(path) in (before.files.get(name), digests.get(name)):
+        elif _plain(path) and sha256(path) in (before.files.get(name), digests.get(name)):
             old.append(name)
         else:
             aside.append((name, _free(folder, name)))
@@ -159,8 +159,13 @@ def _planned(
     return Exchange(old, aside, list(digests)), carried
 
 
+def _plain(path: Path) -> bool:
+    """Whether it is a file as a run writes it: no link, no pipe."""
+    return path.is_file() and not path.is_symlink()
+
+
 def _check_place(folder: Path, name: str) -> None:
-    for above in list((folder / name).parents):
+    for above in (folder / name).parents:
         if above == folder:
             return
         if os.path.lexists(above) and not above.is_dir():

@@ -26,7 +26,7 @@ logger = logging.getLogger("legwatt")
 _REFUSALS = {
     *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM),
     *(errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOENT),
-    *(errno.EBUSY, errno.EXDEV),
+    *(errno.EBUSY, errno.EXDEV, errno.ENOTEMPTY),
 }
 
 

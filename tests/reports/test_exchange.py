@@ -269,10 +269,12 @@ def test_a_second_hand_made_change_gets_a_name_of_its_own(tmp_path: Path) -> Non
 def test_a_link_is_moved_and_not_written_through(tmp_path: Path) -> None:
     write(tmp_path, {"elsewhere/table.csv": "mine"})
     (tmp_path / "out").mkdir()
+    os.mkfifo(tmp_path / "out" / "new_0.csv")  # reading it would wait for ever
     (tmp_path / "out" / "both.csv").symlink_to(tmp_path / "elsewhere" / "table.csv")
     run(tmp_path / "out", NEW)
     assert (tmp_path / "elsewhere" / "table.csv").read_text(encoding="utf-8") == "mine"
     assert (tmp_path / "out" / "both.csv.kept").is_symlink()
+    assert (tmp_path / "out" / "new_0.csv.kept").is_fifo()
     assert (tmp_path / "out" / "both.csv").read_text(encoding="utf-8") == "new"
 
 
