@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import wraps
 from typing import TYPE_CHECKING, Any, ParamSpec
+
+from reports.typeset import number_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,15 +65,25 @@ RC: dict[Any, Any] = {
 }
 
 
+_worn: ContextVar[bool] = ContextVar("house style", default=False)
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Matplotlib's defaults with our changes, for the length of a block."""
+    """Matplotlib's defaults with our changes, for the length of a block; blocks may be nested."""
     import matplotlib
 
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(RC)
+    if _worn.get():
         yield
+        return
+    token = _worn.set(True)
+    try:
+        with matplotlib.rc_context():
+            matplotlib.rcdefaults()
+            matplotlib.rcParams.update(RC)
+            yield
+    finally:
+        _worn.reset(token)
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
@@ -117,9 +130,5 @@ def zero_line(axes: Axes) -> None:
     axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=1)
 
 
-def number(value: float, digits: int = 3) -> str:
-    """A value for a label: significant digits kept, true minus sign, no exponent near 1."""
-    if value == 0:
-        return "0"
-    text = f"{value:#.{digits}g}".rstrip(".")
-    return text.replace("-", "\N{MINUS SIGN}")
+#: A value for a label, written as in the tables of a page.
+number = number_text
