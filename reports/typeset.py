@@ -12,7 +12,10 @@ _SYMBOLS = {"ohm": "Ω", "deg": "°", "degC": "°C"}
 _SMALL, _LARGE = 1e-4, 1e6
 
 _ATOM = r"(?:[kmcµ]?N|[kmc]?m|[kmµ]?g|m?s|m?rad|[kmµ]?A|[kmµ]?V|[kmµ]?W|[kmµ]?J|K|Hz|ohm)"
-_PRODUCT = re.compile(rf"(?<![\w*]){_ATOM}(?:\^[23]|(?:[*/]{_ATOM}(?:\^[23])?)+)(?![\w*])")
+# Beside a unit may stand the marks of bold text, two asterisks, but not one.
+_PRODUCT = re.compile(
+    rf"(?:(?<![\w*])|(?<=\*\*)){_ATOM}(?:\^[23]|(?:[*/]{_ATOM}(?:\^[23])?)+)(?!\w|\*(?!\*))"
+)
 _PERCENT = re.compile(r"(?<=\d)%")
 _OHM = re.compile(r"(?<=\d )ohm\b")
 _APART = re.compile(r"(`[^`]*`|\]\([^)\s]+\))")

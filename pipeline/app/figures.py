@@ -63,13 +63,16 @@ def write_figures(given: Settings, standing: Standing, walking: Walking, out: Pa
     Returns:
         How many.
     """
-    # The longest first, so that two processes end together.
-    drawings = (
+    return save_figures(drawings(given, standing, walking), out)
+
+
+def drawings(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
+    """Every figure of a run, the longest first, so that two processes end together."""
+    return [
         *_robot(given, standing, walking),
         *_energy(given, walking),
         *_demand(given, walking),
-    )
-    return save_figures(drawings, out)
+    ]
 
 
 def _joints(given: Settings) -> tuple[str, dict[str, str]]:
@@ -109,12 +112,12 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
     )
     stages = {name: stage_energies(result) for name, result in walking.results.items()}
     limits = energy_limits(stages.values(), labels)
-    drawings, electrical = [], {}
+    out, electrical = [], {}
     for name, result in walking.results.items():
         title = given.catalog.alternatives[name].title
         columns = [result.joint.joints.index(joint) for joint in labels]
         electrical[title.split(": ")[-1]] = stages[name][-1].forward[columns]
-        drawings += [
+        out += [
             Drawing(
                 f"motor_limits_{name}",
                 partial(
@@ -149,7 +152,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
         if given.regeneration.policy == "none"
         else "what the motors draw; robot_energy.csv has what their return saves",
     )
-    return [*drawings, Drawing("electrical_energy", figure)]
+    return [*out, Drawing("electrical_energy", figure)]
 
 
 def _scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Leg]]:
@@ -235,7 +238,7 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
     Returns:
         How many figures.
     """
-    drawings = []
+    every = []
     for row in judgement.break_even:
         curves = [c for c in judgement.per_minute if c.subject == row.subject]
         share = curves[0].fraction
@@ -252,5 +255,5 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
             subtitle=row.note if mark is None else "band: 95 % of the admissible parameter sets",
             break_even=mark,
         )
-        drawings.append(Drawing(f"energy_per_minute_{row.subject}", figure))
-    return save_figures(drawings, out)
+        every.append(Drawing(f"energy_per_minute_{row.subject}", figure))
+    return save_figures(every, out)

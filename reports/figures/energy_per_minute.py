@@ -89,7 +89,7 @@ def energy_per_minute_figure(
         for values in (line.energy, line.low, line.high):
             if values is not None and values.shape != share.shape:
                 raise FigureError(f"'{title}': '{line.name}' needs {share.size} values")
-    figure = new_figure(9.5, 4.8)
+    figure = new_figure(4.8)
     headline(figure, title, subtitle)
     if break_even is None:
         whole, near = figure.subplots(1, 1), None

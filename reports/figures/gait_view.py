@@ -81,7 +81,7 @@ def gait_figure(
     standing = [s for s in stretches if shown in s.stance]
     if not standing or len(standing) == len(stretches):
         raise FigureError(f"leg '{shown}' must both stand and swing in the gait drawn")
-    figure = new_figure(9.5, 8.8)
+    figure = new_figure(8.8)
     headline(figure, title, subtitle)
     grid = figure.add_gridspec(3, 6, height_ratios=[1.25, 1.15, 0.95])
     paths = figure.add_subplot(grid[0, :3])

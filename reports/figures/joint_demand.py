@@ -86,7 +86,7 @@ def joint_demand_figure(
     if not parts:
         raise FigureError(f"joint '{joint}': no stretch of motion to draw")
     enlarged = _hidden(parts)
-    figure = new_figure(7.6, 6.2 if enlarged else 4.6)
+    figure = new_figure(6.4 if enlarged else 4.8)
     headline(figure, title or f"{joint}: velocity and torque demand", subtitle)
     panels = figure.subplots(3 if enlarged else 2, 1, sharex=True)
     upper, middle = panels[:2]

@@ -113,7 +113,7 @@ def motor_limits_figure(
     scale = scale or common_scale([(series, motor)], joints)
     rms = rms_over_time(series.time, series.torque[:, columns])
     unit, factor = ("N·m", 1.0) if scale.torque >= _STRONG else ("mN·m", 1e3)
-    figure = new_figure(9.5, 4.6)
+    figure = new_figure(4.6)
     headline(figure, title, subtitle)
     whole, *panels = figure.subplots(1, 1 + len(joints), width_ratios=[0.8] + [1.0] * len(joints))
     _whole(whole, motor, columns[0], scale, factor)

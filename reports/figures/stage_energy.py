@@ -69,7 +69,7 @@ def stage_energy_figure(
         raise FigureError(f"'{title}': no stage or no joint to draw")
     forward, reverse = _energies(stages, joints)
     top, bottom = limits or energy_limits([stages], joints)
-    figure = new_figure(9.5, 4.5)
+    figure = new_figure(4.5)
     headline(figure, title, subtitle)
     panels = figure.subplots(1, len(joints), sharey=True, squeeze=False)[0]
     for j, (axes, joint) in enumerate(zip(panels, joints.values(), strict=True)):

@@ -25,6 +25,10 @@ BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 INK, QUIET, FAINT, SHADE_DARK, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#dde1e6", "#eef1f4"
 
+#: Of all figures alike [in], so that a page that shows them at its own width shows letters of one
+#: size.
+WIDTH = 9.5
+
 #: Colours in order, for things without a colour of their own.
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 #: Energy towards the joint, and energy that comes back.
@@ -97,12 +101,18 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return wrapper
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure with an Agg canvas and constrained layout; sizes in inches."""
+def new_figure(height: float, width: float = WIDTH, *, arranged: bool = True) -> Figure:
+    """An empty figure with an Agg canvas.
+
+    Args:
+        height: [in].
+        width: [in].
+        arranged: Whether a layout places the axes; otherwise the caller does.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height), layout="constrained" if arranged else None)
     FigureCanvasAgg(figure)
     return figure
 
@@ -110,11 +120,13 @@ def new_figure(width: float, height: float) -> Figure:
 def headline(figure: Figure, title: str, subtitle: str = "") -> None:
     """A title flush left, with a quiet second line."""
     text = f"{title}\n" if subtitle else title
-    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold")
+    height = figure.get_size_inches()[1]
+    look: dict[str, Any] = {"x": 0.012, "ha": "left", "fontsize": 11.5, "fontweight": "bold"}
+    if figure.get_layout_engine() is None:
+        look |= {"y": 1 - 0.06 / height, "va": "top"}  # where a layout would put it
+    figure.suptitle(text, **look)
     if subtitle:
         # In the second, empty line of the title, for which the layout keeps room.
-        figure.canvas.draw_idle()
-        height = figure.get_size_inches()[1]
         figure.text(0.012, 1 - 0.33 / height, subtitle, ha="left", va="center", color=QUIET)
 
 

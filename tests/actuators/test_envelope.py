@@ -46,7 +46,7 @@ def test_inside_is_where_no_limit_is_exceeded(motor: DCMotor) -> None:
         & (np.abs(motor.voltage(current, speed)) <= motor.supply_voltage)
     )
     np.testing.assert_array_equal(inside(corners, points), allowed)
-    assert 0 < allowed.sum()
+    assert allowed.sum() > 0
     assert allowed.all() == math.isinf(motor.max_speed)
 
 
