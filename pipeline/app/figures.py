@@ -217,12 +217,20 @@ def _gait_stretches(robot: Robot, walking: Walking) -> list[GaitStretch]:
         walking.motion.segments, walking.demand.contacts, walking.margins, strict=True
     ):
         assert contacts is not None
+        # As many as a picture can show, both ends and the middle among them.
+        rows = np.unique(np.linspace(0, segment.time.size - 1, 101).round().astype(int))
         centres = [
             pin.centerOfMass(robot.model, data, row).copy() - row[:3]
-            for row in segment.configuration
+            for row in segment.configuration[rows]
         ]
         out.append(
-            GaitStretch(segment.time, contacts.position, segment.stance, np.array(centres), margin)
+            GaitStretch(
+                segment.time[rows],
+                contacts.position[rows],
+                segment.stance,
+                np.array(centres),
+                margin[rows],
+            )
         )
     return out
 

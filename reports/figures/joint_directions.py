@@ -68,7 +68,8 @@ def joint_directions_figure(
 
 
 def _panel(axes: Axes, view: View, scene: Sequence[Primitive], title: str) -> None:
-    draw_scene(axes, view, scene, fade=0.45)
+    close_up = view is OBLIQUE
+    draw_scene(axes, view, scene, fade=0.45, pixels=700 if close_up else 450)
     axes.set_axis_off()
     axes.set_anchor("N")
     axes.set_title(title, color=QUIET)

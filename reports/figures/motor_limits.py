@@ -40,6 +40,8 @@ _RPM = 60 / (2 * np.pi)
 _CONTINUOUS = "#dff3ec"
 #: From here on torques are written in N·m.
 _STRONG = 10.0  # [N*m]
+#: Of a piece of the path; more than a picture can show.
+_POINTS = 201
 #: Least length of a piece of the path that gets an arrow, as a share of the panel.
 _ARROW = 0.06
 
@@ -241,11 +243,12 @@ def _path(
     breaks = np.flatnonzero(np.diff(series.time) <= 0) + 1
     blocks = [b for b in np.split(np.arange(series.time.size), breaks) if b.size > 1]
     for block, following in zip(blocks, [*blocks[1:], blocks[0]], strict=True):
+        shown = block[np.unique(np.linspace(0, block.size - 1, _POINTS).round().astype(int))]
         middle = 0.5 * float(series.time[block[0]] + series.time[block[-1]])
         stands = any(start <= middle <= end for start, end in support)
         color = BLUE if stands else VERMILION
-        axes.plot(*points[block].T, color=color, linewidth=1.7, zorder=3)
-        _arrow(axes, points[block], np.asarray(limits), color)
+        axes.plot(*points[shown].T, color=color, linewidth=1.7, zorder=3)
+        _arrow(axes, points[shown], np.asarray(limits), color)
         jump = points[[block[-1], following[0]]]
         axes.plot(*jump.T, color=QUIET, linewidth=1.0, linestyle=(0, (1.2, 1.2)), zorder=2)
     return [

@@ -21,6 +21,7 @@ _METADATA: dict[str, dict[str, Any]] = {
     "svg": {"Date": None, "Creator": None},
 }
 DOTS_PER_INCH = 150
+_PNG = {"compress_level": 4}  # half the time of the default, for a few per cent more bytes
 
 
 #: Decimals of a line's data: below what any picture shows, above what rounding differs in.
@@ -68,7 +69,9 @@ def save_figure(
             with path.open("wb") as stream:
                 # Not `savefig`: it draws every figure once more than it is written.
                 if fmt == "png":
-                    FigureCanvasAgg(figure).print_png(stream, metadata=_METADATA[fmt])
+                    FigureCanvasAgg(figure).print_png(
+                        stream, metadata=_METADATA[fmt], pil_kwargs=_PNG
+                    )
                 else:
                     FigureCanvasSVG(figure).print_svg(stream, metadata=_METADATA[fmt])
     return targets

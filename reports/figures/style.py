@@ -40,6 +40,7 @@ RC: dict[Any, Any] = {
     "mathtext.fontset": "dejavusans",
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # where it would be put, without measuring what lies there at every draw
     "axes.labelsize": 9.0,
     "axes.labelcolor": INK,
     "axes.edgecolor": QUIET,
