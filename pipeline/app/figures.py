@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from actuators.energy import stage_energies
 from pipeline.app.compute import Standing, Walking
+from pipeline.app.names import leg_words, shown_leg
 from pipeline.app.settings import Settings
 from pipeline.calibration.judge import Judgement
 from pipeline.robot import Robot
@@ -30,31 +31,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-#: The leg the paper follows; the first leg of a robot that has no such leg.
-SHOWN_LEG = "rm"
 #: File name of each subject's Fig. 21.
 SUBJECT_TITLES = {
     "middle_legs": "both middle legs, as in Fig. 21",
     "robot_on_3_feet": "whole robot, standing on three feet",
     "robot_on_6_feet": "whole robot, standing on six feet",
 }
-
-
-def shown_leg(robot: Robot) -> str:
-    """The leg whose figures are drawn."""
-    return SHOWN_LEG if SHOWN_LEG in robot.leg_names else robot.leg_names[0]
-
-
-#: What the letters of the paper's leg names stand for, the side first.
-_SIDES = {"l": "left", "r": "right"}
-_PLACES = {"f": "front", "m": "middle", "r": "rear"}
-
-
-def leg_words(leg: str) -> str:
-    """A leg's name with what it says: ``rm`` is the middle right leg."""
-    if len(leg) == 2 and leg[0] in _SIDES and leg[1] in _PLACES:
-        return f"{_PLACES[leg[1]]} {_SIDES[leg[0]]} leg ({leg})"
-    return f"leg {leg}"
 
 
 def write_figures(given: Settings, standing: Standing, walking: Walking, out: Path) -> int:

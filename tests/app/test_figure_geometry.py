@@ -8,7 +8,8 @@ import pytest
 
 from pipeline.app.cli import parser
 from pipeline.app.compute import stand, walk
-from pipeline.app.figures import drawings, leg_words
+from pipeline.app.figures import drawings
+from pipeline.app.names import leg_words, names_text
 from pipeline.app.settings import settings
 from reports.figures.several import Drawing
 from tests.reports import geometry
@@ -80,3 +81,10 @@ def test_leg_names_are_explained() -> None:
     assert leg_words("rm") == "middle right leg (rm)"
     assert leg_words("lf") == "front left leg (lf)"
     assert leg_words("leg3") == "leg leg3"
+
+
+def test_names_are_explained_where_the_page_first_uses_them(root: Path) -> None:
+    text = names_text(settings(parser().parse_args(["reports"])))
+    assert "`rm` is the middle right leg" in text
+    assert "`rotor` (actuator with ideal transmission)" in text
+    assert "`robot` is all 6 legs" in text
