@@ -22,6 +22,8 @@ _LINK = re.compile(r"\[([^\]]+)\]\(([^)\s]+)\)")
 _BOLD = re.compile(r"\*\*(.+?)\*\*")
 _EMPHASIS = re.compile(r"(?<!\w)\*(?=\S)(.+?)(?<=\S)\*(?!\w)")
 _CODE = re.compile(r"`([^`]+)`")
+#: The space between a number and its unit, at which no line ends.
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|[mk]?N·m|[kmµ]?[NAVWJ]|[ckm]?m|kg|g|s|rad|Hz|K|Ω)(?![\w·]))")
 _TAG = re.compile(r"(<[^>]*>)")
 _TARGET = re.compile(r"(?:https?://|#|(?![a-zA-Z][\w+.-]*:)(?!/))[^\s*<>]*")
 
@@ -101,7 +103,7 @@ def marked(text: str) -> Markup:
         # Anything but a relative or web address (a script, a machine's path) stays plain text.
         return f'<a href="{target}">{label}</a>' if _TARGET.fullmatch(target) else label
 
-    escaped = str(escape(prose(text)))
+    escaped = _UNIT.sub("\N{NO-BREAK SPACE}", str(escape(prose(text))))
     pieces = _CODE.split(escaped)  # every second piece is code and keeps its other marks
     for i in range(0, len(pieces), 2):
         bold = _BOLD.sub(r"<strong>\1</strong>", _LINK.sub(link, pieces[i]))
