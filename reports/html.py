@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from reports.atomic import write_text
 from reports.errors import ReportError
 from reports.page import Block, FigureBlock, Page, Points, TableBlock, Text, cell_text
+from reports.typeset import prose
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -21,6 +22,9 @@ _LINK = re.compile(r"\[([^\]]+)\]\(([^)\s]+)\)")
 _BOLD = re.compile(r"\*\*(.+?)\*\*")
 _EMPHASIS = re.compile(r"(?<!\w)\*(?=\S)(.+?)(?<=\S)\*(?!\w)")
 _CODE = re.compile(r"`([^`]+)`")
+#: The space between a number and its unit, at which no line ends.
+_UNIT = re.compile(r"(?<=\d) (?=(?:%|[mk]?N·m|[kmµ]?[NAVWJ]|[ckm]?m|kg|g|s|rad|Hz|K|Ω)(?![\w·]))")
+_TAG = re.compile(r"(<[^>]*>)")
 _TARGET = re.compile(r"(?:https?://|#|(?![a-zA-Z][\w+.-]*:)(?!/))[^\s*<>]*")
 
 
@@ -47,7 +51,7 @@ def html(page: Page, folder: Path) -> str:
         lstrip_blocks=True,
         keep_trailing_newline=True,
     )
-    environment.filters.update(marked=marked, cell=cell_text)
+    environment.filters.update(marked=marked, cell=cell_text, breakable=breakable, prose=prose)
     return environment.get_template("page.html").render(
         page=page,
         sections=[
@@ -99,11 +103,20 @@ def marked(text: str) -> Markup:
         # Anything but a relative or web address (a script, a machine's path) stays plain text.
         return f'<a href="{target}">{label}</a>' if _TARGET.fullmatch(target) else label
 
-    escaped = str(escape(text))
+    escaped = _UNIT.sub("\N{NO-BREAK SPACE}", str(escape(prose(text))))
     pieces = _CODE.split(escaped)  # every second piece is code and keeps its other marks
     for i in range(0, len(pieces), 2):
         bold = _BOLD.sub(r"<strong>\1</strong>", _LINK.sub(link, pieces[i]))
         pieces[i] = _EMPHASIS.sub(r"<em>\1</em>", bold)
     for i in range(1, len(pieces), 2):
         pieces[i] = f"<code>{pieces[i]}</code>"
+    return Markup("".join(pieces))
+
+
+def breakable(text: str) -> Markup:
+    """Marked text whose long names may break after an underscore, for the cells of a table."""
+    from markupsafe import Markup
+
+    pieces = _TAG.split(str(marked(text)))
+    pieces[::2] = [re.sub(r"(?<=\w)_(?=\w)", "_<wbr>", piece) for piece in pieces[::2]]
     return Markup("".join(pieces))

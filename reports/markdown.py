@@ -7,6 +7,7 @@ from pathlib import Path
 
 from reports.atomic import write_text
 from reports.page import Block, FigureBlock, Page, Points, TableBlock, Text, cell_text
+from reports.typeset import prose
 
 
 def write_markdown(page: Page, path: Path) -> Path:
@@ -21,13 +22,14 @@ def write_markdown(page: Page, path: Path) -> Path:
 
 def markdown(page: Page, folder: Path) -> str:
     """The text of a page; `folder` is where it will lie."""
-    parts = [f"# {page.title}", *page.answer]
+    parts = [f"# {prose(page.title)}", *map(prose, page.answer)]
     for section in page.sections:
-        parts.append(f"## {section.heading}")
+        parts.append(f"## {prose(section.heading)}")
         parts += [_block(block, folder) for block in section.blocks]
     if page.files:
         parts.append("## Files")
-        parts.append("\n".join(f"- [{name}]({name}): {text}" for name, text in page.files.items()))
+        listed = (f"- [{name}]({name}): {prose(text)}" for name, text in page.files.items())
+        parts.append("\n".join(listed))
     if page.footer:
         parts.append(page.footer)
     return "\n\n".join(parts) + "\n"
@@ -35,29 +37,30 @@ def markdown(page: Page, folder: Path) -> str:
 
 def _block(block: Block, folder: Path) -> str:
     if isinstance(block, Text):
-        return block.text
+        return prose(block.text)
     if isinstance(block, Points):
         return "\n".join(
             f"{i}. {item}" if block.numbered else f"- {item}"
-            for i, item in enumerate(block.items, 1)
+            for i, item in enumerate(map(prose, block.items), 1)
         )
     if isinstance(block, FigureBlock):
         picture = os.path.relpath(block.file, folder).replace(os.sep, "/")
-        return f"![{_cell(block.alt or block.caption)}]({picture})\n\n*{block.caption}*"
+        caption = prose(block.caption)
+        return f"![{_cell(prose(block.alt) or caption)}]({picture})\n\n*{caption}*"
     return _table(block)
 
 
 def _table(block: TableBlock) -> str:
     rule = " | ".join("---:" if numeric else "---" for numeric in block.numeric)
     lines = [
-        "| " + " | ".join(_cell(h) for h in block.headers) + " |",
+        "| " + " | ".join(_cell(prose(h)) for h in block.headers) + " |",
         f"| {rule} |",
         *(
             "| " + " | ".join(_cell(cell_text(v, block.digits)) for v in row) + " |"
             for row in block.rows
         ),
     ]
-    caption = block.caption
+    caption = prose(block.caption)
     if block.file:
         caption = f"{caption} Full numbers: [{block.file}]({block.file}).".strip()
     return "\n".join(lines) + (f"\n\n{caption}" if caption else "")

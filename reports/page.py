@@ -6,7 +6,6 @@ Texts may hold four marks of Markdown, which both forms understand: ``**bold**``
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 from reports.dust import without_dust
 from reports.errors import ReportError
 from reports.table import Table
+from reports.typeset import number_text, prose, unit_text
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class TableBlock:
         file: CSV with the full numbers, relative to the page; linked from the caption.
         tones: Text of a cell to ``good``, ``bad`` or ``quiet``, for verdicts.
         digits: Significant digits of numbers.
+        hints: What each column means, for a reader who points at its heading; empty for none.
     """
 
     headers: tuple[str, ...]
@@ -51,6 +52,7 @@ class TableBlock:
     file: str = ""
     tones: Mapping[str, str] = field(default_factory=dict)
     digits: int = 4
+    hints: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse ragged rows.
@@ -122,18 +124,18 @@ class Page:
 
 def table_block(
     table: Table,
-    columns: Mapping[str, str] | None = None,
+    columns: Sequence[str] | Mapping[str, str] | None = None,
     *,
     caption: str = "",
     keep: Sequence[bool] | None = None,
     tones: Mapping[str, str] | None = None,
     digits: int = 4,
 ) -> TableBlock:
-    """Show a table that is also written as CSV.
+    """Show a table that is also written as CSV, under the headings that it declares.
 
     Args:
         table: The table.
-        columns: Which columns, header to title; all with header and unit by default.
+        columns: Which columns, all by default; a mapping gives other headings than declared.
         caption: One sentence; the table's description by default.
         keep: Which rows, one flag per row; all by default.
         tones: See `TableBlock`.
@@ -143,27 +145,34 @@ def table_block(
         ReportError: A column that the table lacks.
     """
     table = without_dust(table)
-    shown = columns or {h: _titled(h, table.meanings[h][1]) for h in table.columns}
+    shown = list(columns if columns is not None else table.columns)
     for header in shown:
         if header not in table.columns:
             raise ReportError(f"table '{table.name}' has no column '{header}'")
+    given = columns if isinstance(columns, Mapping) else {}
+    units = table.unit_columns
     rows = tuple(
-        tuple(_plain(table.columns[header][i]) for header in shown)
+        tuple(
+            _unit(table.columns[header][i]) if header in units else _plain(table.columns[header][i])
+            for header in shown
+        )
         for i in range(table.rows)
         if keep is None or keep[i]
     )
     return TableBlock(
-        tuple(shown.values()),
+        tuple(given.get(header) or table.title(header) for header in shown),
         rows,
         caption or table.description,
         f"{table.name}.csv",
         tones or {},
         digits,
+        tuple(table.meanings[header][0] for header in shown),
     )
 
 
-def _titled(header: str, unit: str) -> str:
-    return f"{header} [{unit}]" if unit not in ("", "1") and not header.endswith(unit) else header
+def _unit(value: Any) -> str:
+    """A unit in a cell; a pure number has none."""
+    return "" if value in ("1", "", None) else unit_text(str(value))
 
 
 def _plain(value: Any) -> Any:
@@ -177,16 +186,10 @@ def is_number(value: Any) -> bool:
 
 def cell_text(value: Any, digits: int = 4) -> str:
     """A cell as a reader sees it: rounded, a true minus sign, a dash for no value."""
-    if value is None or (isinstance(value, float) and math.isnan(value)):
+    if value is None:
         return "\N{EN DASH}"
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        if math.isinf(value):
-            return "\N{INFINITY}" if value > 0 else "\N{MINUS SIGN}\N{INFINITY}"
-        text = f"{value:.{digits}g}"
-        if "e" in text:
-            mantissa, exponent = text.split("e")
-            text = f"{mantissa}e{int(exponent)}"
-        return ("0" if float(text) == 0 else text).replace("-", "\N{MINUS SIGN}")
-    return str(value).replace("-", "\N{MINUS SIGN}") if is_number(value) else str(value)
+        return number_text(value, digits)
+    return str(value).replace("-", "\N{MINUS SIGN}") if is_number(value) else prose(str(value))

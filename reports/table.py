@@ -11,10 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.errors import TableError
+from reports.typeset import unit_suffix, unit_text
 
 #: What a column may hold: a NumPy vector, or a sequence in which None stands for "no value".
 Column = Sequence[Any] | NDArray[Any]
+#: Of a column: (meaning, unit), and where the header's own words would not do, its title.
+Meaning = tuple[str, str] | tuple[str, str, str]
 _NAME = re.compile(r"[A-Za-z0-9_.-]+")
+_SEE = "see "
 _HEADER = re.compile(r"[A-Za-z0-9_]+")
 
 
@@ -25,8 +29,9 @@ class Table:
     Attributes:
         name: File name without ending, e.g. ``"standing"``.
         columns: Header to values, in the order of the file. NaN and None are empty cells.
-        meanings: Header to (meaning, unit); the unit is ``""`` for names and ``"1"`` for pure
-            numbers.
+        meanings: Header to (meaning, unit) or (meaning, unit, title). The unit is ``""`` for names,
+            ``"1"`` for pure numbers and ``"see unit"`` where another column, here ``unit``, holds
+            it. The title heads the column on a page; without one it is the header's own words.
         description: One sentence on what the table holds and its sign conventions.
         exact: Whether the numbers were given and not computed, so that none is rounding's.
         zero_below: Header to the magnitude up to which numbers were set to zero, by unit where
@@ -35,7 +40,7 @@ class Table:
 
     name: str
     columns: Mapping[str, Column]
-    meanings: Mapping[str, tuple[str, str]]
+    meanings: Mapping[str, Meaning]
     description: str = ""
     exact: bool = False
     zero_below: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
@@ -82,9 +87,33 @@ class Table:
                 )
         object.__setattr__(self, "rows", lengths[first])
 
+    @property
+    def unit_columns(self) -> frozenset[str]:
+        """Columns that hold the units of others."""
+        units = (meaning[1] for meaning in self.meanings.values())
+        named = {unit.removeprefix(_SEE) for unit in units if unit.startswith(_SEE)}
+        return frozenset({"unit", *named} & set(self.columns))
+
+    def title(self, header: str) -> str:
+        """Heading of a column on a page: words, with the unit in brackets."""
+        _, unit, *declared = self.meanings[header]
+        words = declared[0] if declared else _words(header, unit)
+        if unit in ("", "1") or unit.startswith(_SEE):
+            return words
+        return f"{words} [{unit_text(unit)}]"
+
     def _meaning(self, header: str) -> tuple[bool, bool]:
         entry = self.meanings.get(header)
         return (entry is not None and bool(entry[0].strip()), entry is not None)
+
+
+def _words(header: str, unit: str) -> str:
+    """The words of a header such as ``walking_speed_m_s`` without its unit."""
+    suffix = unit_suffix(unit)
+    words = header.removesuffix(f"_{suffix}") if suffix else header
+    owner, apart, quantity = words.partition("__")
+    # The owner of a column, a joint or a foot, keeps its name.
+    return f"{owner} {quantity.replace('_', ' ')}" if apart else owner.replace("_", " ")
 
 
 def _length(table: str, header: str, values: Column) -> int:
@@ -100,7 +129,7 @@ def _length(table: str, header: str, values: Column) -> int:
 def table_from_rows(
     name: str,
     rows: Sequence[Mapping[str, Any]],
-    meanings: Mapping[str, tuple[str, str]],
+    meanings: Mapping[str, Meaning],
     description: str = "",
     *,
     exact: bool = False,

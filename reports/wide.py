@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from reports.errors import TableError
 from reports.table import Column, Table
+from reports.typeset import unit_suffix
 
 Array = NDArray[np.float64]
 
@@ -29,13 +30,6 @@ class Quantity:
     unit: str
     meaning: str
     values: Array
-
-
-def unit_suffix(unit: str) -> str:
-    """A unit as a word in a header: ``"N*m"`` is ``Nm``, ``"rad/s^2"`` is ``rad_s2``."""
-    if unit in ("", "1"):
-        return ""
-    return unit.replace("*", "").replace("/", "_").replace("^", "")
 
 
 def header(owner: str, quantity: str, unit: str) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 
 from actuators.energy import stage_energies
 from pipeline.app.compute import Standing, Walking
+from pipeline.app.names import leg_words, shown_leg
 from pipeline.app.settings import Settings
 from pipeline.calibration.judge import Judgement
 from pipeline.robot import Robot
@@ -18,15 +21,16 @@ from reports.figures.energy_per_minute import BreakEven, EnergyLine, energy_per_
 from reports.figures.gait_view import GaitStretch, gait_figure
 from reports.figures.joint_demand import joint_demand_figure, stretches
 from reports.figures.joint_directions import joint_directions_figure
-from reports.figures.motor_limits import motor_limits_figure
+from reports.figures.motor_limits import common_scale, motor_limits_figure
 from reports.figures.robot_view import Leg, legs_of, robot_figure
-from reports.figures.save import save_figure
-from reports.figures.stage_energy import stage_energy_figure
+from reports.figures.several import Drawing, save_figures
+from reports.figures.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.visuals import Primitive, joint_marks, primitives
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Array = NDArray[np.float64]
-#: The leg the paper follows; the first leg of a robot that has no such leg.
-SHOWN_LEG = "rm"
 #: File name of each subject's Fig. 21.
 SUBJECT_TITLES = {
     "middle_legs": "both middle legs, as in Fig. 21",
@@ -35,67 +39,102 @@ SUBJECT_TITLES = {
 }
 
 
-def shown_leg(robot: Robot) -> str:
-    """The leg whose figures are drawn."""
-    return SHOWN_LEG if SHOWN_LEG in robot.leg_names else robot.leg_names[0]
-
-
 def write_figures(given: Settings, standing: Standing, walking: Walking, out: Path) -> int:
     """Draw and save every figure of a run.
 
     Returns:
         How many.
     """
-    count = _demand(given, walking, out)
-    count += _energy(given, walking, out)
-    return count + _robot(given, standing, walking, out)
+    return save_figures(drawings(given, standing, walking), out)
 
 
-def _demand(given: Settings, walking: Walking, out: Path) -> int:
+def drawings(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
+    """Every figure of a run, the longest first, so that two processes end together."""
+    return [
+        *_robot(given, standing, walking),
+        *_energy(given, walking),
+        *_demand(given, walking),
+    ]
+
+
+def _joints(given: Settings) -> tuple[str, dict[str, str]]:
+    """The leg that is shown, and its joints with their labels."""
     leg = shown_leg(given.robot)
     joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
-    for number, joint in enumerate(joints, start=1):
-        figure = joint_demand_figure(
-            joint,
-            stretches(walking.demand, joint, leg),
-            subtitle=f"one gait cycle, as in Fig. {number + 1} of the paper",
+    return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
+
+
+def _demand(given: Settings, walking: Walking) -> list[Drawing]:
+    leg, joints = _joints(given)
+    return [
+        Drawing(
+            f"joint_demand_{joint}",
+            partial(
+                joint_demand_figure,
+                joint,
+                stretches(walking.demand, joint, leg),
+                title=f"{label.capitalize()} of the {leg_words(leg)}: velocity and torque",
+                subtitle=f"demand over one gait cycle, as in Fig. {number} of the paper",
+            ),
         )
-        save_figure(figure, out, f"joint_demand_{joint}")
-    return len(joints)
+        for number, (joint, label) in enumerate(joints.items(), start=2)
+    ]
 
 
-def _energy(given: Settings, walking: Walking, out: Path) -> int:
-    leg = shown_leg(given.robot)
-    joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
-    labels = {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
-    electrical = {}
+def _energy(given: Settings, walking: Walking) -> list[Drawing]:
+    leg, labels = _joints(given)
+    support = [
+        (float(part.time[0]), float(part.time[-1]))
+        for part in walking.demand.contacts
+        if part is not None and leg in part.stance
+    ]
+    motors = {name: given.catalog.chain(name).motor for name in walking.results}
+    scale = common_scale(
+        [(result.motor, motors[name]) for name, result in walking.results.items()], labels
+    )
+    stages = {name: stage_energies(result) for name, result in walking.results.items()}
+    limits = energy_limits(stages.values(), labels)
+    out, electrical = [], {}
     for name, result in walking.results.items():
         title = given.catalog.alternatives[name].title
-        figure = stage_energy_figure(
-            stage_energies(result),
-            labels,
-            title=title,
-            subtitle=f"energy per cycle through each stage, leg {leg}",
-        )
-        save_figure(figure, out, f"stage_energy_{name}")
-        columns = [result.joint.joints.index(joint) for joint in joints]
-        electrical[title.split(": ")[-1]] = stage_energies(result)[-1].forward[columns]
-        chain = given.catalog.chain(name)
-        save_figure(
-            motor_limits_figure(result.motor, chain.motor, labels, title=title),
-            out,
-            f"motor_limits_{name}",
-        )
-    figure = electrical_energy_figure(
+        columns = [result.joint.joints.index(joint) for joint in labels]
+        electrical[title.split(": ")[-1]] = stages[name][-1].forward[columns]
+        out += [
+            Drawing(
+                f"motor_limits_{name}",
+                partial(
+                    motor_limits_figure,
+                    result.motor,
+                    motors[name],
+                    labels,
+                    support,
+                    title=f"{title}: its motors, {leg_words(leg)}",
+                    scale=scale,
+                ),
+            ),
+            Drawing(
+                f"stage_energy_{name}",
+                partial(
+                    stage_energy_figure,
+                    stages[name],
+                    labels,
+                    title=title,
+                    subtitle=f"energy per cycle through each stage, {leg_words(leg)}; "
+                    "one scale for all alternatives",
+                    limits=limits,
+                ),
+            ),
+        ]
+    figure = partial(
+        electrical_energy_figure,
         list(labels.values()),
         electrical,
-        title=f"Electrical energy per cycle, leg {leg}",
+        title=f"Electrical energy per cycle, {leg_words(leg)}",
         subtitle="returned energy is lost"
         if given.regeneration.policy == "none"
         else "what the motors draw; robot_energy.csv has what their return saves",
     )
-    save_figure(figure, out, "electrical_energy")
-    return 2 * len(walking.results) + 1
+    return [*out, Drawing("electrical_energy", figure)]
 
 
 def _scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Leg]]:
@@ -112,54 +151,70 @@ def _scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Le
     return primitives(robot.urdf, links), legs_of(legs, marks, links)
 
 
-def _robot(given: Settings, standing: Standing, walking: Walking, out: Path) -> int:
-    robot = given.robot
+def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
+    robot, leg = given.robot, shown_leg(given.robot)
     posture = standing.segment.configuration[0]
-    scene, legs = _scene(robot, posture)
-    data = robot.model.createData()
-    centre = pin.centerOfMass(robot.model, data, posture).copy()
-    figure = robot_figure(
-        scene,
-        legs,
-        title=f"{robot.spec.name}, {standing.segment.name}",
-        subtitle="the other feet are lifted to mid-transfer",
-        mass_centre=centre,
-    )
-    save_figure(figure, out, "robot")
     zero = robot.configuration(np.zeros((1, len(robot.joints))), np.zeros((1, 3)))[0]
-    scene, legs = _scene(robot, zero)
-    figure = joint_directions_figure(
-        scene,
-        legs,
-        shown_leg(robot),
-        title=f"{robot.spec.name}: zero pose and positive directions",
-        zero_pose=robot.spec.zero_pose,
-    )
-    save_figure(figure, out, "zero_pose")
-    stretches_ = []
+    data = robot.model.createData()
+
+    def standing_robot() -> Figure:
+        return robot_figure(
+            *_scene(robot, posture),
+            title=f"{robot.spec.name}, {standing.segment.name}",
+            subtitle="the other feet are lifted to mid-transfer",
+            mass_centre=pin.centerOfMass(robot.model, data, posture).copy(),
+        )
+
+    def zero_pose() -> Figure:
+        return joint_directions_figure(
+            *_scene(robot, zero),
+            leg,
+            title=f"{robot.spec.name}: zero pose and positive directions",
+            zero_pose=robot.spec.zero_pose,
+        )
+
+    def gait() -> Figure:
+        scene, _ = _scene(robot, zero)
+        trunk = next((p for p in scene if p.link == robot.spec.base_link), None)
+        return gait_figure(
+            robot.leg_names,
+            _gait_stretches(robot, walking),
+            shown=leg,
+            body=(0.0, 0.0) if trunk is None else (float(trunk.size[0]), float(trunk.size[1])),
+            title=f"{robot.spec.name}: tripod gait",
+            subtitle=f"transfer path '{robot.spec.transfer_path}'",
+        )
+
+    return [
+        Drawing("gait", gait),
+        Drawing("robot", standing_robot),
+        Drawing("zero_pose", zero_pose),
+    ]
+
+
+def _gait_stretches(robot: Robot, walking: Walking) -> list[GaitStretch]:
+    data = robot.model.createData()
+    out = []
     for segment, contacts, margin in zip(
         walking.motion.segments, walking.demand.contacts, walking.margins, strict=True
     ):
         assert contacts is not None
+        # As many as a picture can show, both ends and the middle among them.
+        rows = np.unique(np.linspace(0, segment.time.size - 1, 101).round().astype(int))
         centres = [
             pin.centerOfMass(robot.model, data, row).copy() - row[:3]
-            for row in segment.configuration
+            for row in segment.configuration[rows]
         ]
-        stretches_.append(
-            GaitStretch(segment.time, contacts.position, segment.stance, np.array(centres), margin)
+        out.append(
+            GaitStretch(
+                segment.time[rows],
+                contacts.position[rows],
+                segment.stance,
+                np.array(centres),
+                margin[rows],
+            )
         )
-    trunk = next((p for p in scene if p.link == robot.spec.base_link), None)
-    body = (0.0, 0.0) if trunk is None else (float(trunk.size[0]), float(trunk.size[1]))
-    figure = gait_figure(
-        robot.leg_names,
-        stretches_,
-        shown=shown_leg(robot),
-        body=body,
-        title=f"{robot.spec.name}: tripod gait",
-        subtitle=f"transfer path '{robot.spec.transfer_path}'",
-    )
-    save_figure(figure, out, "gait")
-    return 3
+    return out
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:
@@ -173,6 +228,7 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
     Returns:
         How many figures.
     """
+    every = []
     for row in judgement.break_even:
         curves = [c for c in judgement.per_minute if c.subject == row.subject]
         share = curves[0].fraction
@@ -181,12 +237,13 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
             reference = next(c for c in curves if c.alternative == "reversible")
             energy = float(np.interp(row.fraction, share, reference.energy))
             mark = BreakEven(row.fraction, energy, row.low, row.high)
-        figure = energy_per_minute_figure(
+        figure = partial(
+            energy_per_minute_figure,
             share,
             [EnergyLine(titles[c.alternative], c.energy, c.low, c.high) for c in curves],
             title=f"Energy in one minute: {SUBJECT_TITLES[row.subject]}",
             subtitle=row.note if mark is None else "band: 95 % of the admissible parameter sets",
             break_even=mark,
         )
-        save_figure(figure, out, f"energy_per_minute_{row.subject}")
-    return len(judgement.break_even)
+        every.append(Drawing(f"energy_per_minute_{row.subject}", figure))
+    return save_figures(every, out)

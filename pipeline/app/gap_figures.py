@@ -19,13 +19,14 @@ from reports.figures.gap_time import GapTrace, gap_time_figure
 from reports.figures.gap_waterfall import GapStep, gap_waterfall_figure
 from reports.figures.gap_where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
+from reports.typeset import unit_text
 
 Array = NDArray[np.float64]
 #: A stretch of time that a picture can show [s].
 _LONGEST = 8.0
 #: Ways of sorting in the order in which the map shows them.
 SHOWN = (WHOLE, "phase", "direction", "speed", "load", "power", "reversal", "position", "time")
-TITLES = {WHOLE: "all rows", "power": "joint is"}
+TITLES = {WHOLE: "all", "power": "joint is"}
 
 
 def write_where_map(rows: Sequence[Where], joints: Sequence[str], robot: str, out: Path) -> None:
@@ -66,13 +67,19 @@ def write_waterfall(
     first, *rest = stages
     figure = gap_waterfall_figure(
         overall(first.gap),
-        [GapStep(stage.label, overall(stage.gap)) for stage in rest],
+        [GapStep(_words(stage.label), overall(stage.gap)) for stage in rest],
         noise,
         unit,
         title=f"{robot}: the gap, effect by effect",
         subtitle="root mean square over all joints, on held-out data",
     )
     save_figure(figure, out, "waterfall")
+
+
+def _words(label: str) -> str:
+    """An effect's name in words; its place keeps the robot's own names."""
+    effect, at, place = label.partition(" at ")
+    return f"{effect.replace('_', ' ')}{at}{place}"
 
 
 def write_in_time(
@@ -96,12 +103,12 @@ def write_in_time(
     traces = []
     series = [m.lowpass(s.predictions[log].effort[..., 0]) for s in (before, after)]
     for j in joints:
-        measured = np.where(m.mask[rows, j], m.effort[rows, j, 0], np.nan)
         traces.append(
             GapTrace(
                 joint=m.joints[j],
                 time=m.time[rows],
-                measured=measured,
+                measured=m.effort[rows, j, 0],
+                compared=m.mask[rows, j],
                 before=series[0][rows, j],
                 after=series[1][rows, j],
                 noise_floor=float(m.noise[j, 0]),
@@ -113,7 +120,7 @@ def write_in_time(
         traces,
         title="Measured and predicted, without and with what was found",
         subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: held out; "
-        "breaks: not compared; grey: noise, 2 sigma",
+        "grey band: noise, 2 sigma",
         channel=m.channels[0],
     )
     save_figure(figure, out, "in_time")
@@ -174,7 +181,7 @@ def write_signature(
             float(first.noise[joint, 0]),
             CHANNEL_UNITS[first.channels[0]],
         ),
-        title=f"{effect} at {first.joints[joint]}",
+        title=_words(f"{effect[:1].upper()}{effect[1:]} at {first.joints[joint]}"),
         subtitle="all compared rows; line: running mean, band: noise, 2 sigma",
     )
     save_figure(figure, out, name)
@@ -196,15 +203,15 @@ def signature_variable(
     if variable == "position":
         return f"position of {name} [rad]", m.q[:, joint]
     if variable == "acceleration":
-        return f"acceleration of {name} [rad/s^2]", m.a[:, joint]
+        return f"acceleration of {name} [rad/s²]", m.a[:, joint]
     if variable in ("load", "support"):
-        return f"load on {name} [N*m]", load
+        return f"load on {name} [N·m]", load
     if variable == "torque rate":
-        return f"rate of the load on {name} [N*m/s]", m.derivative(load)
+        return f"rate of the load on {name} [N·m/s]", m.derivative(load)
     if variable == "effort rate":
         unit = CHANNEL_UNITS[m.channels[0]]
         rate = m.derivative(m.lowpass(prediction.effort[:, joint, 0]))
-        return f"rate of {name}'s {m.channels[0]} [{unit}/s]", rate
+        return f"rate of {name}'s {m.channels[0]} [{unit_text(unit)}/s]", rate
     if variable == "time":
         return "time [s]", m.time
     others = [m.joints.index(p) for p in place if p in m.joints and p != name]

@@ -14,6 +14,7 @@ from pipeline.app.gap_energy import EnergyChange
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
 from pipeline.app.gap_stages import Stage, noise_floor, overall
+from pipeline.app.names import legs_text
 from pipeline.gap.circumstances import WHOLE
 from pipeline.gap.verdict import ACCEPTED, REJECTED, UNEXPLAINED, Naming, Remainder
 from reports.html import write_html
@@ -137,18 +138,13 @@ def _whole(story: Story) -> tuple[float, float]:
 def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
     by = tables["where"].columns["by"]
     whole = [value == WHOLE for value in by]
-    shown = {
-        "joint": "joint",
-        "gap": "gap",
-        "mean": "mean",
-        "noise_floor": "noise floor",
-        "unit": "unit",
-        "share_of_total": "share of all",
-        "share_above_noise": "of it above noise",
-    }
+    shown = ("joint", "gap", "mean", "noise_floor", "unit", "share_of_total", "share_above_noise")
+    robot = story.given.robot
+    named = () if robot is None or not robot.floating else (Text(legs_text(robot)),)
     return Section(
         "Where model and machine disagree",
         (
+            *named,
             FigureBlock(
                 folder / "where_map.svg",
                 "Gap of the model as it was, by joint and circumstance, over the noise floor. A "
@@ -173,16 +169,7 @@ def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
         blocks.append(
             table_block(
                 tables["found"],
-                {
-                    "order": "no.",
-                    "effect": "effect",
-                    "joint": "joint",
-                    "parameter": "parameter",
-                    "value": "value",
-                    "ci_low": "95 % from",
-                    "ci_high": "to",
-                    "unit": "unit",
-                },
+                ("order", "effect", "joint", "parameter", "value", "ci_low", "ci_high", "unit"),
                 caption="What the model lacked; torques and frictions at the joint. The interval "
                 "holds what the log's scatter, the stated tolerances and one per cent for the law "
                 "leave open.",

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from pipeline.app.names import names_text
 from pipeline.app.settings import Settings
 from pipeline.calibration.judge import Judgement, headline
 from pipeline.calibration.readings import readings, verdict
@@ -55,7 +56,7 @@ def summary(
 ) -> Page:
     """The page; see `write_summary`."""
     sections = (
-        _energy(tables, out),
+        _energy(tables, out, names_text(given)),
         _reproduction(tables),
         _reading(results),
         _conclusions(judgement, results, tables, out),
@@ -120,12 +121,13 @@ def _answer(
     return first, second, third
 
 
-def _energy(tables: Mapping[str, Table], out: Path) -> Section:
+def _energy(tables: Mapping[str, Table], out: Path, names: str) -> Section:
     walking = tables["walking_energy"]
     keep = [leg in ("rm", "robot") for leg in walking.columns["leg"]]
     return Section(
         "What it costs",
         (
+            Text(names),
             FigureBlock(out / "electrical_energy.svg", "Electrical energy of one cycle by joint."),
             table_block(
                 walking, keep=keep, caption="Energy drawn from the supply in one walking cycle."

@@ -29,7 +29,7 @@ def confusion(
     """
     kept = [int(i) for i in np.flatnonzero(counts.sum(axis=1))]
     used = [k for k in range(len(named)) if counts[:, k].any()]
-    figure = new_figure(2.6 + 0.3 * max(len(used), 14), 2.2 + 0.25 * max(len(kept), 6))
+    figure = new_figure(2.2 + 0.25 * max(len(kept), 6), 2.6 + 0.3 * max(len(used), 14))
     headline(figure, "What was hidden, and what was named first", subtitle)
     axes = figure.add_subplot()
     for row, i in enumerate(kept):

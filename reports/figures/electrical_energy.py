@@ -43,7 +43,7 @@ def electrical_energy_figure(
     totals = [float(a.sum()) for a in alternatives.values()]
     first = next(iter(alternatives))
     widest = max(*totals, 1e-9)
-    figure = new_figure(9.0, 0.62 * len(alternatives) + 1.55)
+    figure = new_figure(0.62 * len(alternatives) + 1.55)
     headline(figure, title, subtitle)
     axes = figure.subplots()
     for row, parts in enumerate(alternatives.values()):

@@ -89,7 +89,7 @@ def energy_per_minute_figure(
         for values in (line.energy, line.low, line.high):
             if values is not None and values.shape != share.shape:
                 raise FigureError(f"'{title}': '{line.name}' needs {share.size} values")
-    figure = new_figure(9.0, 4.8)
+    figure = new_figure(4.8)
     headline(figure, title, subtitle)
     if break_even is None:
         whole, near = figure.subplots(1, 1), None
@@ -103,7 +103,7 @@ def energy_per_minute_figure(
     whole.set_xlim(float(share[0]) * 100, float(share[-1]) * 100)
     whole.set_ylim(bottom=0)
     whole.set_ylabel("energy per minute [J]")
-    _names(whole, share, lines)
+    _key(figure, lines)
     if break_even is not None and near is not None:
         _enlarge(near, share, lines, break_even)
     return figure
@@ -117,25 +117,16 @@ def _lines(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
         axes.plot(share * 100, line.energy, color=color)
 
 
-def _names(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
-    """Names above the lines near their left end, each in its line's colour."""
-    at = 0.04
-    x = float(share[0] + at * (share[-1] - share[0]))
-    tops = [line.energy if line.high is None else line.high for line in lines]
-    heights = [float(np.interp(x, share, top)) for top in tops]
-    gap = 0.055 * max(max(heights), 1e-9)
-    taken = -np.inf
-    for k in np.argsort(heights, kind="stable"):
-        y = max(heights[k] + 0.35 * gap, taken + gap)
-        taken = y
-        axes.text(
-            x * 100,
-            y,
-            lines[k].name,
-            color=CYCLE[k % len(CYCLE)],
-            fontweight="bold",
-            va="bottom",
-        )
+def _key(figure: Figure, lines: Sequence[EnergyLine]) -> None:
+    """Names below the panels, where no line crosses them, ordered as the lines at the left."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color=CYCLE[k % len(CYCLE)], label=lines[k].name)
+        for k in sorted(range(len(lines)), key=lambda k: -float(lines[k].energy[0]))
+    ]
+    columns = min(len(handles), 4)
+    figure.legend(handles=handles, loc="outside lower center", ncols=columns, columnspacing=1.6)
 
 
 def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: BreakEven) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+#: Feet nearer than this would have their names on one another [m].
+_NEAR = 0.08
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def gait_figure(
     standing = [s for s in stretches if shown in s.stance]
     if not standing or len(standing) == len(stretches):
         raise FigureError(f"leg '{shown}' must both stand and swing in the gait drawn")
-    figure = new_figure(9.5, 8.8)
+    figure = new_figure(8.8)
     headline(figure, title, subtitle)
     grid = figure.add_gridspec(3, 6, height_ratios=[1.25, 1.15, 0.95])
     paths = figure.add_subplot(grid[0, :3])
@@ -203,13 +205,14 @@ def _support(
             color=BLUE if stands else "white",
             markeredgecolor=BLUE if stands else VERMILION,
         )
+        align, aside = _beside(feet, i)
         axes.annotate(
             leg.upper(),
             feet[i],
-            # Standing feet are named outside, swinging ones inside: they may pass each other.
-            xytext=(0, (10 if stands else -10) * float(np.sign(feet[i, 1]))),
+            # Outside the polygon; from a foot that is passed at this instant to the other side.
+            xytext=(aside, 10 * (float(np.sign(feet[i, 1])) or 1.0)),
             textcoords="offset points",
-            ha="center",
+            ha=align,
             va="center",
             fontsize=7.5,
             color=INK if stands else QUIET,
@@ -225,6 +228,16 @@ def _support(
     reach = np.abs(stretch.feet[..., :2]).max(axis=(0, 1))
     axes.set_xlim(-reach[0] - 0.04, reach[0] + 0.04)
     axes.set_ylim(-reach[1] - 0.06, reach[1] + 0.06)
+
+
+def _beside(feet: Array, i: int) -> tuple[Literal["left", "center", "right"], float]:
+    """Alignment of a foot's name and its shift [points], away from a near foot of the same side."""
+    same = (np.sign(feet[:, 1]) == np.sign(feet[i, 1])) & (np.arange(len(feet)) != i)
+    away = feet[same, 0] - feet[i, 0]
+    near = away[np.abs(away) < _NEAR]
+    if near.size == 0:
+        return "center", 0.0
+    return ("right", 1.0) if near[np.argmin(np.abs(near))] >= 0 else ("left", -1.0)
 
 
 def _footfall(axes: Axes, legs: Sequence[str], stretches: Sequence[GaitStretch]) -> None:

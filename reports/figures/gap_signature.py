@@ -20,6 +20,7 @@ from reports.figures.style import (
     styled,
     zero_line,
 )
+from reports.typeset import unit_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,13 +65,13 @@ def gap_signature_figure(signature: Signature, *, title: str, subtitle: str = ""
     if not keep.any():
         raise FigureError(f"signature against {s.variable}: no rows; give at least 1")
     x, before, after = s.x[keep], s.before[keep], s.after[keep]
-    figure = new_figure(8.2, 3.9)
+    figure = new_figure(4.2)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     _half(left, x, before, s, "without the effect", ORANGE)
     _half(right, x, after, s, "with the effect", BLUE)
     limit = 1.1 * float(np.quantile(np.abs(np.concatenate([before, after])), 0.998))
     left.set_ylim(-limit, limit)
-    left.set_ylabel(f"measured less predicted [{s.unit}]")
+    left.set_ylabel(f"measured less predicted [{unit_text(s.unit)}]")
     headline(figure, title, subtitle)
     return figure
 

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from reports.errors import FigureError
 from reports.figures.style import (
     BLUE,
-    INK,
     ORANGE,
     QUIET,
     SHADE,
@@ -23,12 +22,14 @@ from reports.figures.style import (
     styled,
     zero_line,
 )
+from reports.typeset import unit_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+_PALE = "#b4bac1"
 #: More points than a picture can show.
 _MOST_POINTS = 2500
 
@@ -40,7 +41,8 @@ class GapTrace:
     Attributes:
         joint: Name.
         time: Shape (N,) [s].
-        measured: Shape (N,); NaN where it does not count.
+        measured: Shape (N,).
+        compared: Rows that count for the gap, shape (N,).
         before: Predicted by the model as it was, shape (N,).
         after: Predicted with everything found, shape (N,).
         noise_floor: Standard deviation of the noise.
@@ -51,6 +53,7 @@ class GapTrace:
     joint: str
     time: Array
     measured: Array
+    compared: NDArray[np.bool_]
     before: Array
     after: Array
     noise_floor: float
@@ -75,12 +78,12 @@ def gap_time_figure(
     """
     if not 1 <= len(traces) <= 3:
         raise FigureError(f"gap in time: {len(traces)} joints; give 1 to 3")
-    figure = new_figure(max(3.8 * len(traces) + 1.0, 8.6), 5.0)
+    figure = new_figure(5.2)
     axes = figure.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.0))
     for k, trace in enumerate(traces):
         _trace(axes[0, k], axes[1, k], _thinned(trace), channel, first=k == 0)
     handles, labels = axes[0, 0].get_legend_handles_labels()
-    axes[0, -1].legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.09), ncols=3)
+    figure.legend(handles, labels, loc="outside lower center", ncols=4)
     headline(figure, title, subtitle)
     return figure
 
@@ -91,6 +94,7 @@ def _thinned(trace: GapTrace) -> GapTrace:
         trace,
         time=trace.time[::every],
         measured=trace.measured[::every],
+        compared=trace.compared[::every],
         before=trace.before[::every],
         after=trace.after[::every],
         proves=None if trace.proves is None else trace.proves[::every],
@@ -99,13 +103,16 @@ def _thinned(trace: GapTrace) -> GapTrace:
 
 def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: bool) -> None:
     t = trace.time
-    top.plot(t, trace.measured, color=INK, linewidth=2.6, alpha=0.55, label="measured")
+    compared = np.where(trace.compared, trace.measured, np.nan)
+    # Wide, so that it stays in view below the predictions, compared or not.
+    top.plot(t, trace.measured, color=_PALE, linewidth=3.2, label="measured, not compared")
+    top.plot(t, compared, color=QUIET, linewidth=3.2, label="measured, compared")
     top.plot(t, trace.before, color=ORANGE, linewidth=1.1, label="without the effects")
     top.plot(t, trace.after, color=BLUE, linewidth=1.1, label="with them")
     top.set_title(trace.joint)
     bottom.axhspan(-2 * trace.noise_floor, 2 * trace.noise_floor, color=SHADE, zorder=0)
     zero_line(bottom)
-    left_before, left_after = trace.measured - trace.before, trace.measured - trace.after
+    left_before, left_after = compared - trace.before, compared - trace.after
     bottom.plot(t, left_before, color=ORANGE, linewidth=1.0)
     bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
     kept, where = np.ones(t.size, dtype=np.bool_), ""
@@ -121,7 +128,8 @@ def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: boo
         fontsize=8,
         color=QUIET,
     )
+    bottom.set_xlim(t[0], t[-1])
     bottom.set_xlabel("time [s]")
     if first:
-        top.set_ylabel(f"{channel} [{trace.unit}]")
-        bottom.set_ylabel(f"measured less predicted [{trace.unit}]")
+        top.set_ylabel(f"{channel} [{unit_text(trace.unit)}]")
+        bottom.set_ylabel(f"measured less predicted [{unit_text(trace.unit)}]")

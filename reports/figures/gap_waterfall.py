@@ -19,6 +19,7 @@ from reports.figures.style import (
     number,
     styled,
 )
+from reports.typeset import unit_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,7 +67,7 @@ def gap_waterfall_figure(
     if min([before, noise_floor, *(s.gap for s in steps)]) < 0:
         raise FigureError("waterfall: a gap is negative; give root mean squares")
     labels = ["model as it was", *(s.label for s in steps), "what is left"]
-    figure = new_figure(7.5, 0.42 * len(labels) + 1.5)
+    figure = new_figure(0.42 * len(labels) + 1.5)
     ax = figure.subplots()
     gaps = [before, *(s.gap for s in steps)]
     ax.barh(0, before, color=ORANGE, height=0.62)
@@ -89,7 +90,7 @@ def gap_waterfall_figure(
     ax.text(
         noise_floor,
         -0.62,
-        f" noise floor {number(noise_floor)} {unit}",
+        f" noise floor {number(noise_floor)} {unit_text(unit)}",
         va="bottom",
         fontsize=8,
         color=QUIET,
@@ -100,6 +101,6 @@ def gap_waterfall_figure(
     ax.set_ylim(last + 0.55, -1.05)
     ax.tick_params(axis="y", length=0)
     ax.spines["left"].set_visible(False)
-    ax.set_xlabel(f"gap on held-out data, root mean square [{unit}]")
+    ax.set_xlabel(f"gap on held-out data, root mean square [{unit_text(unit)}]")
     headline(figure, title, subtitle)
     return figure

@@ -47,7 +47,7 @@ def joint_directions_figure(
     if shown not in by_name:
         raise FigureError(f"leg '{shown}' is not among {', '.join(by_name)}")
     leg = by_name[shown]
-    figure = new_figure(9.5, 4.6)
+    figure = new_figure(4.6)
     headline(figure, title, "circular arrows: positive rotation, right-handed about the drawn axis")
     oblique, ahead, above = figure.subplots(1, 3, width_ratios=[1.0, 1.25, 1.15])
     _panel(oblique, OBLIQUE, scene, f"oblique, leg {shown.upper()}")
@@ -68,7 +68,8 @@ def joint_directions_figure(
 
 
 def _panel(axes: Axes, view: View, scene: Sequence[Primitive], title: str) -> None:
-    draw_scene(axes, view, scene, fade=0.45)
+    close_up = view is OBLIQUE
+    draw_scene(axes, view, scene, fade=0.45, pixels=700 if close_up else 450)
     axes.set_axis_off()
     axes.set_anchor("N")
     axes.set_title(title, color=QUIET)
@@ -89,7 +90,7 @@ def _oblique_leg(axes: Axes, leg: Leg) -> None:
         axes.annotate(
             joint.name,
             (x, y),
-            xytext=((24, 30), (0, 56), (-24, 44))[number % 3],
+            xytext=((44, 22), (-14, 62), (-30, 44))[number % 3],
             textcoords="offset points",
             ha="center",
             color=color,

@@ -86,7 +86,7 @@ def robot_figure(
     """
     if not scene or not legs:
         raise FigureError(f"'{title}': no visual primitive or no leg to draw")
-    figure = new_figure(9.5, 8.4)
+    figure = new_figure(8.4)
     headline(figure, title, subtitle)
     ((oblique, above), (ahead, beside)) = figure.subplots(
         2, 2, height_ratios=[1.25, 1.0], width_ratios=[1.0, 1.15]

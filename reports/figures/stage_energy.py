@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,8 +34,8 @@ STAGE_PLACES = {
     "out": "joint",
     "2": "hypoid",
     "ph": "pinion",
-    "mp": "planet.",
-    "wg": "wave g.",
+    "mp": "planetary",
+    "wg": "wave generator",
     "mt": "rotor",
     "m": "motor",
     "el": "supply",
@@ -49,7 +49,7 @@ def stage_energy_figure(
     *,
     title: str,
     subtitle: str = "",
-    upper: float | None = None,
+    limits: tuple[float, float] | None = None,
     places: Mapping[str, str] = STAGE_PLACES,
 ) -> Figure:
     """One panel per joint, one pair of bars per stage: E(+) upwards, E(-) downwards.
@@ -59,7 +59,7 @@ def stage_energy_figure(
         joints: Those to draw, name to label of the panel.
         title: Names the alternative.
         subtitle: Second line.
-        upper: Largest E(+) to scale for [J], to give several figures the same scale.
+        limits: Largest E(+) and E(-) to scale for [J], to give several figures the same scale.
         places: Stage to a word that says where it is, for the second line under a bar.
 
     Raises:
@@ -67,16 +67,9 @@ def stage_energy_figure(
     """
     if not stages or not joints:
         raise FigureError(f"'{title}': no stage or no joint to draw")
-    for stage in stages:
-        for joint in joints:
-            if joint not in stage.joints:
-                raise FigureError(f"'{title}': stage '{stage.stage}' has no joint '{joint}'")
-    columns = [[s.joints.index(joint) for joint in joints] for s in stages]
-    forward = np.array([s.forward[c] for s, c in zip(stages, columns, strict=True)])  # (S, J)
-    reverse = np.array([s.reverse[c] for s, c in zip(stages, columns, strict=True)])
-    top = max(float(forward.max()) if upper is None else upper, 1e-9)
-    bottom = float(reverse.max())
-    figure = new_figure(9.0, 4.3)
+    forward, reverse = _energies(stages, joints)
+    top, bottom = limits or energy_limits([stages], joints)
+    figure = new_figure(4.5)
     headline(figure, title, subtitle)
     panels = figure.subplots(1, len(joints), sharey=True, squeeze=False)[0]
     for j, (axes, joint) in enumerate(zip(panels, joints.values(), strict=True)):
@@ -86,12 +79,13 @@ def stage_energy_figure(
         axes.set_xticks(np.arange(len(stages)), symbols)
         for x, stage in enumerate(stages):
             axes.annotate(
-                places.get(stage.stage, ""),
+                "\n".join(places.get(stage.stage, "").split()),
                 (x, 0),
                 xycoords=axes.get_xaxis_transform(),
-                xytext=(0, -25),
+                xytext=(0, -18),
                 textcoords="offset points",
                 ha="center",
+                va="top",
                 color=QUIET,
                 fontsize=7.5,
             )
@@ -99,8 +93,35 @@ def stage_energy_figure(
     panels[0].set_ylim(-bottom - room, top + room)
     panels[0].set_ylabel("energy per cycle [J]")
     panels[0].yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
-    _key(panels[-1])
+    _key(figure)
     return figure
+
+
+def energy_limits(
+    every: Iterable[Sequence[StageEnergy]], joints: Iterable[str]
+) -> tuple[float, float]:
+    """Largest E(+) and largest E(-) of several alternatives at the joints shown [J].
+
+    Raises:
+        FigureError: A joint that is not among the stages' joints.
+    """
+    pairs = [_energies(stages, list(joints)) for stages in every]
+    forward = max((float(f.max()) for f, _ in pairs), default=0.0)
+    return max(forward, 1e-9), max((float(r.max()) for _, r in pairs), default=0.0)
+
+
+def _energies(stages: Sequence[StageEnergy], joints: Iterable[str]) -> tuple[Array, Array]:
+    """E(+) and E(-), each of shape (stages, joints) [J]."""
+    shown = list(joints)
+    for stage in stages:
+        for joint in shown:
+            if joint not in stage.joints:
+                raise FigureError(f"stage '{stage.stage}' has no joint '{joint}'")
+    columns = [[s.joints.index(joint) for joint in shown] for s in stages]
+    return (
+        np.array([s.forward[c] for s, c in zip(stages, columns, strict=True)]),
+        np.array([s.reverse[c] for s, c in zip(stages, columns, strict=True)]),
+    )
 
 
 def _bars(axes: Axes, forward: Array, reverse: Array) -> None:
@@ -118,6 +139,7 @@ def _bars(axes: Axes, forward: Array, reverse: Array) -> None:
                 va="bottom" if sign > 0 else "top",
                 fontsize=7.5,
                 color=INK,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.4},  # over the grid
             )
     zero_line(axes)
     horizontal_grid(axes)
@@ -130,20 +152,12 @@ def _joules(value: float) -> str:
     return "0" if value < 5e-4 else number(value, 3 if value >= 1 else 2)
 
 
-def _key(axes: Axes) -> None:
-    """What the two colours mean, in words of their own colour."""
-    for y, color, text in (
-        (0.98, FORWARD, "E(+)  from supply to joint"),
-        (0.92, REVERSE, "E(\N{MINUS SIGN})  from joint to supply"),
-    ):
-        axes.text(
-            0.99,
-            y,
-            text,
-            transform=axes.transAxes,
-            ha="right",
-            va="top",
-            color=color,
-            fontsize=8.5,
-            fontweight="bold",
-        )
+def _key(figure: Figure) -> None:
+    """What the two colours mean, below the panels, where no line crosses it."""
+    from matplotlib.patches import Patch
+
+    handles = [
+        Patch(color=FORWARD, label="E(+): from supply to joint"),
+        Patch(color=REVERSE, label="E(\N{MINUS SIGN}): from joint to supply"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)

@@ -8,8 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import wraps
 from typing import TYPE_CHECKING, Any, ParamSpec
+
+from reports.typeset import number_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,6 +25,10 @@ BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 INK, QUIET, FAINT, SHADE_DARK, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#dde1e6", "#eef1f4"
 
+#: Of all figures alike [in], so that a page that shows them at its own width shows letters of one
+#: size.
+WIDTH = 9.5
+
 #: Colours in order, for things without a colour of their own.
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
 #: Energy towards the joint, and energy that comes back.
@@ -33,6 +40,7 @@ RC: dict[Any, Any] = {
     "mathtext.fontset": "dejavusans",
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
+    "axes.titley": 1.0,  # where it would be put, without measuring what lies there at every draw
     "axes.labelsize": 9.0,
     "axes.labelcolor": INK,
     "axes.edgecolor": QUIET,
@@ -62,15 +70,25 @@ RC: dict[Any, Any] = {
 }
 
 
+_worn: ContextVar[bool] = ContextVar("house style", default=False)
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Matplotlib's defaults with our changes, for the length of a block."""
+    """Matplotlib's defaults with our changes, for the length of a block; blocks may be nested."""
     import matplotlib
 
-    with matplotlib.rc_context():
-        matplotlib.rcdefaults()
-        matplotlib.rcParams.update(RC)
+    if _worn.get():
         yield
+        return
+    token = _worn.set(True)
+    try:
+        with matplotlib.rc_context():
+            matplotlib.rcdefaults()
+            matplotlib.rcParams.update(RC)
+            yield
+    finally:
+        _worn.reset(token)
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
@@ -84,12 +102,18 @@ def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
     return wrapper
 
 
-def new_figure(width: float, height: float) -> Figure:
-    """An empty figure with an Agg canvas and constrained layout; sizes in inches."""
+def new_figure(height: float, width: float = WIDTH, *, arranged: bool = True) -> Figure:
+    """An empty figure with an Agg canvas.
+
+    Args:
+        height: [in].
+        width: [in].
+        arranged: Whether a layout places the axes; otherwise the caller does.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Figure(figsize=(width, height), layout="constrained" if arranged else None)
     FigureCanvasAgg(figure)
     return figure
 
@@ -97,11 +121,13 @@ def new_figure(width: float, height: float) -> Figure:
 def headline(figure: Figure, title: str, subtitle: str = "") -> None:
     """A title flush left, with a quiet second line."""
     text = f"{title}\n" if subtitle else title
-    figure.suptitle(text, x=0.012, ha="left", fontsize=11.5, fontweight="bold")
+    height = figure.get_size_inches()[1]
+    look: dict[str, Any] = {"x": 0.012, "ha": "left", "fontsize": 11.5, "fontweight": "bold"}
+    if figure.get_layout_engine() is None:
+        look |= {"y": 1 - 0.06 / height, "va": "top"}  # where a layout would put it
+    figure.suptitle(text, **look)
     if subtitle:
         # In the second, empty line of the title, for which the layout keeps room.
-        figure.canvas.draw_idle()
-        height = figure.get_size_inches()[1]
         figure.text(0.012, 1 - 0.33 / height, subtitle, ha="left", va="center", color=QUIET)
 
 
@@ -117,9 +143,5 @@ def zero_line(axes: Axes) -> None:
     axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=1)
 
 
-def number(value: float, digits: int = 3) -> str:
-    """A value for a label: significant digits kept, true minus sign, no exponent near 1."""
-    if value == 0:
-        return "0"
-    text = f"{value:#.{digits}g}".rstrip(".")
-    return text.replace("-", "\N{MINUS SIGN}")
+#: A value for a label, written as in the tables of a page.
+number = number_text

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.table import Table, table_from_rows
+from reports.table import Meaning, Table, table_from_rows
 
 Rows = Sequence[Mapping[str, Any]]
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ QUALITY = {
     "verdict": ("ok, masked (rows left out), warning or refused", ""),
     "detail": ("in words, with the remedy where there is one", ""),
 }
-WHERE = {
+WHERE: dict[str, Meaning] = {
     "rank": ("1 is the largest part of the gap above the noise floor", "1"),
     "joint": ("name of the joint", ""),
     "by": ("what the rows are sorted by", ""),
@@ -32,8 +32,8 @@ WHERE = {
     "mean": ("mean of measured less predicted", "see unit"),
     "noise_floor": ("standard deviation of the sensor's noise in the same bandwidth", "see unit"),
     "unit": ("unit of gap, mean and noise_floor", ""),
-    "share_of_total": ("share of the squared gap of all joints", "1"),
-    "share_above_noise": ("share of it beyond the squared noise floor", "1"),
+    "share_of_total": ("share of the squared gap of all joints", "1", "share of all"),
+    "share_above_noise": ("of it, beyond the squared noise floor", "1", "of it above noise"),
 }
 CANDIDATES = {
     "effect": ("name in the catalogue of effects", ""),
@@ -46,14 +46,14 @@ CANDIDATES = {
     "verdict": ("accepted, rejected, not identifiable on this motion, indistinguishable from", ""),
     "reason": ("in words", ""),
 }
-FOUND = {
-    "order": ("in which it was accepted; one row per parameter", "1"),
+FOUND: dict[str, Meaning] = {
+    "order": ("in which it was accepted; one row per parameter", "1", "no."),
     "effect": ("name in the catalogue of effects", ""),
     "joint": ("joint it acts at; empty where it acts on all", ""),
     "parameter": ("of the effect", ""),
     "value": ("best estimate", "see unit"),
-    "ci_low": ("lower end of the 95 % interval", "see unit"),
-    "ci_high": ("upper end of the 95 % interval", "see unit"),
+    "ci_low": ("lower end of the 95 % interval", "see unit", "95 % from"),
+    "ci_high": ("upper end of the 95 % interval", "see unit", "to"),
     "unit": ("unit of value and interval", ""),
     "gap_before": (
         "gap without it, held-out data, root mean square; empty without rows",

@@ -203,8 +203,8 @@ def walking_energy(
         {
             "alternative": ALTERNATIVE,
             "leg": ("leg, or the robot as a whole", ""),
-            "electrical_J": ("energy drawn from the supply per cycle", "J"),
-            "ratio_to_ideal": ("over that of the ideal actuator", "1"),
+            "electrical_J": ("energy drawn from the supply per cycle", "J", "electrical energy"),
+            "ratio_to_ideal": ("over that of the ideal actuator", "1", "ratio to the ideal"),
         },
     )
 
@@ -250,9 +250,21 @@ def robot_energy(
             "energy_per_cycle_J": ("energy drawn from the supply per cycle", "J"),
             "average_power_W": ("over one cycle", "W"),
             "cost_of_transport": ("average power over weight times speed", "1"),
-            "support_share": ("share of joints while their foot supports; empty on a bus", "1"),
-            "transfer_share": ("share of joints while their foot is in the air", "1"),
-            "dumped_J": ("electrical energy per cycle that flows back and is lost", "J"),
+            "support_share": (
+                "share of joints while their foot supports; empty on a bus",
+                "1",
+                "share of support",
+            ),
+            "transfer_share": (
+                "share of joints while their foot is in the air",
+                "1",
+                "share of transfer",
+            ),
+            "dumped_J": (
+                "electrical energy per cycle that flows back and is lost",
+                "J",
+                "returned and lost",
+            ),
         },
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
@@ -11,6 +12,7 @@ import pytest
 
 from tests.app.conftest import Command
 from tests.app.test_tables import TABLES
+from tests.reports.browser import layout, needs_chromium, needs_poppler, printed
 
 FIGURES = (
     *(f"joint_demand_rm_joint_{k}" for k in (1, 2, 3)),  # Fig. 2 to 4
@@ -55,6 +57,48 @@ def test_every_csv_has_a_sidecar_and_nothing_else_is_left(reports: Path) -> None
             assert path.with_suffix(".meta.json").exists()
         if path.suffix == ".png":
             assert path.with_suffix(".svg").exists()
+
+
+def test_headings_are_words_with_units(reports: Path) -> None:
+    """No identifier, no "[see unit]", N·m and no other way; each says on pointing what it means."""
+    page = (reports / "index.html").read_text(encoding="utf-8")
+    headings = re.findall(r'<th scope="col"([^>]*)>(.*?)</th>', page)
+    assert len(headings) > 30
+    for _, words in headings:
+        assert "_" not in words.replace("E_el/E_m", "")
+        assert "see " not in words
+        assert "*" not in words
+    assert sum("title=" in attributes for attributes, _ in headings) > 30
+    text = re.sub(r"<style>.*?</style>|<[^>]*>", " ", page, flags=re.DOTALL)
+    assert "N·m" in text
+    assert not re.search(r"N\*m|\d%|\de[-\N{MINUS SIGN}+]\d|(?<![\w.)\]-])-\d", text)
+
+
+@needs_chromium
+@pytest.mark.parametrize("width", [1280, 800, 400])
+def test_nothing_of_the_page_is_cut(reports: Path, tmp_path: Path, width: int) -> None:
+    """A table that is wider than the window scrolls in a frame that is not."""
+    seen = layout(reports / "index.html", width, tmp_path)
+    assert seen.page <= seen.window
+    assert seen.beyond == []
+    assert len(seen.tables) >= 6
+    assert len(seen.pictures) >= 10
+    for table in seen.tables:
+        assert table["table"] <= table["frame"] or table["scrolls"] == "auto"
+
+
+@needs_chromium
+@needs_poppler
+def test_print_cuts_no_table(reports: Path, tmp_path: Path) -> None:
+    words = printed(reports / "index.html", tmp_path)
+    assert all(word.right <= 1.0 and word.bottom <= 1.0 for word in words)
+    verdicts = re.findall(
+        r'<span class="tone[^>]*>(.*?)</span>', (reports / "index.html").read_text()
+    )
+    last = [verdict.split()[-1] for verdict in verdicts]
+    assert len(last) > 40
+    for word in set(last):
+        assert sum(w.text.rstrip(".,;:") == word for w in words) >= last.count(word)
 
 
 @pytest.mark.slow

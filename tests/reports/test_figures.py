@@ -6,11 +6,13 @@ Warnings are errors, so that a missing glyph or a failed layout is found here.
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.patches import Rectangle
 
 from actuators.energy import StageEnergy
 from actuators.motor import DCMotor
@@ -21,10 +23,11 @@ from reports.figures.electrical_energy import electrical_energy_figure
 from reports.figures.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
 from reports.figures.gait_view import GaitStretch, gait_figure
 from reports.figures.joint_demand import Stretch, joint_demand_figure, stretches
-from reports.figures.motor_limits import motor_limits_figure
+from reports.figures.motor_limits import common_scale, motor_limits_figure
 from reports.figures.save import save_figure
-from reports.figures.stage_energy import stage_energy_figure
-from reports.figures.style import number
+from reports.figures.several import Drawing, save_figures
+from reports.figures.stage_energy import energy_limits, stage_energy_figure
+from reports.figures.style import BLUE, VERMILION, number
 
 PARTS = (
     Stretch(np.linspace(0, 1.5, 5), np.full(5, -1.0), np.full(5, -30.0), True),
@@ -38,7 +41,8 @@ def texts(figure) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(0.0, "0"), (-38.0, "\N{MINUS SIGN}38.0"), (1.6, "1.60"), (250.0, "250")]
+    ("value", "text"),
+    [(0.0, "0"), (-38.04, "\N{MINUS SIGN}38.0"), (-38.0, "\N{MINUS SIGN}38"), (250.2, "250")],
 )
 def test_numbers_in_labels(value: float, text: str) -> None:
     assert number(value) == text
@@ -46,7 +50,7 @@ def test_numbers_in_labels(value: float, text: str) -> None:
 
 def test_joint_demand_draws_a_jump_as_a_jump() -> None:
     figure = joint_demand_figure("rm_joint_2", PARTS)
-    velocity, torque = figure.axes
+    velocity, torque, _ = figure.axes
     curves = [line for line in torque.lines if len(line.get_xdata()) == 5]
     assert len(curves) == 2
     assert {float(line.get_ydata()[0]) for line in curves} == {-30.0, 2.0}
@@ -63,6 +67,21 @@ def test_joint_demand_shades_support_only() -> None:
         (patch,) = axes.patches
         low, high = patch.get_x(), patch.get_x() + patch.get_width()
         assert (low, high) == (0.0, 1.5)
+
+
+def test_a_small_torque_in_transfer_has_a_panel_of_its_own_scale() -> None:
+    small = replace(PARTS[1], torque=np.linspace(0.01, 0.04, 5))
+    figure = joint_demand_figure("j", [PARTS[0], small])
+    assert len(figure.axes) == 3
+    lower = figure.axes[2]
+    (curve,) = (line for line in lower.lines if len(line.get_xdata()) == 5)
+    np.testing.assert_array_equal(curve.get_ydata(), small.torque)
+    low, high = lower.get_ylim()
+    assert high - low < 3 * 0.04
+    assert lower.get_xlim() == figure.axes[1].get_xlim()
+    as_large = replace(PARTS[1], torque=np.full(5, 20.0))
+    assert len(joint_demand_figure("j", [PARTS[0], as_large]).axes) == 2
+    assert len(joint_demand_figure("j", [PARTS[1]]).axes) == 2
 
 
 def test_stretches_come_from_the_demand(walk_demand: MotionDemand) -> None:
@@ -88,16 +107,23 @@ def test_stage_energy_bars_are_the_energies() -> None:
     heights = [p.get_height() for p in figure.axes[1].patches]
     assert heights == [2.6, 9.0, -2.6, -0.2]
     words = texts(figure)
-    assert "9.00" in words
+    assert "9" in words
     assert "supply" in words
 
 
-def test_stage_energy_takes_a_common_scale() -> None:
-    limits = [
-        stage_energy_figure(STAGES, {"a": "1"}, title="t", upper=50.0).axes[0].get_ylim()[1],
-        stage_energy_figure(STAGES, {"a": "1"}, title="t").axes[0].get_ylim()[1],
+def test_stage_energies_of_all_alternatives_share_one_scale() -> None:
+    smaller = [
+        replace(stage, forward=stage.forward / 9, reverse=4 * stage.reverse) for stage in STAGES
     ]
-    assert limits[0] > 50 > limits[1]
+    limits = energy_limits([STAGES, smaller], JOINTS)
+    assert limits == (9.0, 10.4)
+    ranges = {
+        stage_energy_figure(stages, JOINTS, title="t", limits=limits).axes[0].get_ylim()
+        for stages in (STAGES, smaller)
+    }
+    ((low, high),) = ranges
+    assert low < -10.4
+    assert high > 9.0
 
 
 def test_stage_energy_of_zeros_and_of_unknown_joints() -> None:
@@ -114,36 +140,96 @@ def test_electrical_energy_is_stacked_and_compared() -> None:
     figure = electrical_energy_figure(["joint 1", "joint 2"], energies, title="t")
     (axes,) = figure.axes
     assert [p.get_width() for p in axes.patches] == [1.0, 4.0, 20.0, 30.0]
-    assert any("10.0 \N{MULTIPLICATION SIGN} ideal" in word for word in texts(figure))
+    assert any("10 \N{MULTIPLICATION SIGN} ideal" in word for word in texts(figure))
     with pytest.raises(FigureError, match="needs 1 values"):
         electrical_energy_figure(["joint 1"], energies, title="t")
 
 
 MOTOR = DCMotor("m", 0.0302, 0.316, 1200.0, 24.0, 5.77, 75.0)
+SUPPORT = [(0.0, 1.0)]
 
 
-def shaft() -> ShaftSeries:
+def shaft(factor: float = 1.0) -> ShaftSeries:
     time = np.array([0.0, 1.0, 1.0, 2.0])
     zeros = np.zeros((4, 2))
     velocity = np.array([[100.0, 1.0], [200.0, 2.0], [-200.0, 1.0], [-100.0, 1.0]])
-    return ShaftSeries.at_joint(("a", "b"), time, zeros, velocity, zeros, 0.05 + zeros)
+    return ShaftSeries.at_joint(
+        ("a", "b"), time, zeros, factor * velocity, zeros, 0.05 * factor + zeros
+    )
 
 
-def test_motor_limits_draws_blocks_apart_and_says_the_limits() -> None:
-    figure = motor_limits_figure(shaft(), MOTOR, JOINTS, title="t")
-    assert len(figure.axes) == 2
+def colored(axes, color: str) -> list[np.ndarray]:
+    return [line.get_xydata() for line in axes.lines if line.get_color() == color]
+
+
+def test_motor_path_is_closed_and_its_phases_are_told_apart() -> None:
+    figure = motor_limits_figure(shaft(), MOTOR, JOINTS, SUPPORT, title="t")
+    panel = figure.axes[1]
+    ((support,), (transfer,)) = colored(panel, BLUE), colored(panel, VERMILION)
+    rpm = 60 / (2 * np.pi)
+    np.testing.assert_allclose(support, [[100 * rpm, 50.0], [200 * rpm, 50.0]])
+    np.testing.assert_allclose(transfer, [[-200 * rpm, 50.0], [-100 * rpm, 50.0]])
+    jumps = [line.get_xydata() for line in panel.lines if line.get_zorder() == 2]
+    ends = [(support[-1], transfer[0]), (transfer[-1], support[0])]
+    for jump, (start, end) in zip(jumps, ends, strict=True):
+        np.testing.assert_allclose(jump, [start, end])
+
+
+def test_arrows_on_the_motor_path_follow_time() -> None:
+    panel = motor_limits_figure(shaft(4.0), MOTOR, JOINTS, SUPPORT, title="t").axes[1]
+    arrows = [text for text in panel.texts if getattr(text, "arrow_patch", None)]
+    assert len(arrows) == 2
+    for arrow in arrows:
+        assert arrow.xy[0] > arrow.get_position()[0]  # both pieces run towards higher speed
+
+
+def test_motor_limits_states_every_limit_and_the_rms() -> None:
+    figure = motor_limits_figure(shaft(), MOTOR, JOINTS, SUPPORT, title="t")
+    assert len(figure.axes) == 3
     words = texts(figure)
-    for expected in ("24 V", "11459 rpm", "continuous: 174", "rms 50.0 mN·m"):
+    for expected in (
+        "supply: 24 V",
+        "permitted: 11460 rpm",
+        "continuous: 174 mN·m",
+        "peak: 2265 mN·m",
+        "rms 50 of 174 mN·m",
+    ):
         assert expected in words
-    paths = [line for line in figure.axes[0].lines if np.allclose(line.get_ydata(), 50.0)]
-    assert len(paths) == 2
     with pytest.raises(FigureError, match="no joint 'z'"):
-        motor_limits_figure(shaft(), MOTOR, {"z": "joint"}, title="t")
+        motor_limits_figure(shaft(), MOTOR, {"z": "joint"}, SUPPORT, title="t")
+    with pytest.raises(FigureError, match="no joint to draw"):
+        motor_limits_figure(shaft(), MOTOR, {}, SUPPORT, title="t")
+
+
+def test_motor_limits_of_all_alternatives_share_one_scale() -> None:
+    every = [shaft(), shaft(8.0)]
+    scale = common_scale([(series, MOTOR) for series in every], JOINTS)
+    figures = [
+        motor_limits_figure(series, MOTOR, JOINTS, SUPPORT, title="t", scale=scale)
+        for series in every
+    ]
+    for k in range(3):
+        first, second = (figure.axes[k] for figure in figures)
+        assert first.get_xlim() == second.get_xlim()
+        assert first.get_ylim() == second.get_ylim()
+    assert figures[0].axes[1].get_ylim()[1] > 8 * 50.0
+    # The frame in the panel of the whole region is what the other panels show.
+    (frame,) = (p for p in figures[0].axes[0].patches if isinstance(p, Rectangle))
+    assert frame.get_x() + frame.get_width() == pytest.approx(figures[0].axes[1].get_xlim()[1])
+    assert frame.get_y() + frame.get_height() == pytest.approx(figures[0].axes[1].get_ylim()[1])
 
 
 def test_motor_without_limits() -> None:
-    figure = motor_limits_figure(shaft(), DCMotor("m", 0.03, 0.3), JOINTS, title="t")
-    assert not any("V" in word or "continuous" in word for word in texts(figure))
+    figure = motor_limits_figure(shaft(), DCMotor("m", 0.03, 0.3), JOINTS, SUPPORT, title="t")
+    words = texts(figure)
+    assert not any(word.startswith(("supply", "peak", "permitted", "continuous")) for word in words)
+    assert "rms 50 mN·m" in words
+
+
+def test_strong_motors_are_drawn_in_newton_metres() -> None:
+    figure = motor_limits_figure(shaft(400.0), DCMotor("m", 0.03, 0.3), JOINTS, [], title="t")
+    assert figure.axes[0].get_ylabel() == "motor torque [N·m]"
+    assert "rms 20 N·m" in texts(figure)
 
 
 def gait(legs: tuple[str, ...]) -> list[GaitStretch]:
@@ -169,7 +255,7 @@ def test_gait_view_states_margins_and_measures_the_path() -> None:
     words = texts(figure)
     assert "200 mm" in words
     assert "50 mm" in words
-    assert sum("stability margin 50.0 mm" in word for word in words) == 3
+    assert sum("stability margin 50 mm" in word for word in words) == 3
     with pytest.raises(FigureError, match="both stand and swing"):
         gait_figure(legs, gait(legs), shown="rf", body=(0.6, 0.2), title="t")
     with pytest.raises(FigureError, match="'xx'"):
@@ -201,6 +287,39 @@ def test_same_figure_same_bytes_and_no_trace_of_the_machine(tmp_path: Path) -> N
     assert b"<dc:date>" not in (tmp_path / "one" / "f.svg").read_bytes()
     with pytest.raises(FigureError, match="format 'bmp'"):
         save_figure(joint_demand_figure("j", PARTS), tmp_path, "f", formats=("bmp",))
+
+
+DRAWINGS = [
+    Drawing("demand", lambda: joint_demand_figure("j", PARTS)),
+    Drawing("stages", lambda: stage_energy_figure(STAGES, JOINTS, title="t")),
+    Drawing("motors", lambda: motor_limits_figure(shaft(), MOTOR, JOINTS, SUPPORT, title="t")),
+]
+
+
+def test_two_processes_leave_the_bytes_of_one(tmp_path: Path) -> None:
+    for processes, order in ((1, 1), (2, 1), (2, -1)):
+        folder = tmp_path / f"{processes}{order}"
+        assert save_figures(DRAWINGS[::order], folder, processes=processes) == 3
+        names = sorted(path.name for path in folder.iterdir())
+        assert names == sorted(f"{d.name}.{end}" for d in DRAWINGS for end in ("png", "svg"))
+        for name in names:
+            assert (folder / name).read_bytes() == (tmp_path / "11" / name).read_bytes()
+
+
+def fail() -> None:
+    raise FigureError("nothing to draw")
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_an_error_in_either_process_is_that_error(tmp_path: Path, processes: int) -> None:
+    every = [Drawing("bad", fail)] * 5
+    with pytest.raises(FigureError, match="nothing to draw"):
+        save_figures(every, tmp_path, processes=processes)
+    # Slow for this process, so that the other one meets the error.
+    one_bad = [*DRAWINGS[:1], Drawing("bad", fail), *DRAWINGS[1:]]
+    with pytest.raises(FigureError, match="nothing to draw"):
+        save_figures(one_bad, tmp_path, processes=processes)
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
 def test_drawing_leaves_global_settings_alone() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from reports.figures.gap_waterfall import GapStep, gap_waterfall_figure
 from reports.figures.gap_where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
 from reports.tables.gap import deciding_motion, found
+from tests.reports import geometry
 
 
 def trace(rows: int = 400) -> GapTrace:
@@ -21,9 +23,10 @@ def trace(rows: int = 400) -> GapTrace:
     truth = np.sin(3 * t)
     noise = 0.02 * np.random.default_rng(3).standard_normal(rows)
     measured = truth + 0.2 * np.sign(np.cos(3 * t)) + noise
-    measured[100:120] = np.nan
+    compared = np.ones(rows, dtype=bool)
+    compared[100:120] = False
     after = truth + 0.2 * np.sign(np.cos(3 * t))
-    return GapTrace("rm_joint_2", t, measured, truth, after, 0.02, "A")
+    return GapTrace("rm_joint_2", t, measured, compared, truth, after, 0.02, "A")
 
 
 def test_gap_in_time_tells_what_is_left() -> None:
@@ -34,6 +37,19 @@ def test_gap_in_time_tells_what_is_left() -> None:
     assert np.sqrt(np.nanmean(gap**2)) == pytest.approx(0.02, rel=0.2)
     with pytest.raises(FigureError, match="1 to 3"):
         gap_time_figure([], title="t")
+
+
+def test_measured_signal_stays_visible_where_it_is_not_compared() -> None:
+    figure = gap_time_figure([trace()], title="t", channel="current")
+    top, bottom = figure.axes
+    lines = {line.get_label(): np.asarray(line.get_ydata(), float) for line in top.lines}
+    left_out = np.isnan(lines["measured, compared"])
+    assert left_out.sum() == 20
+    assert np.isfinite(lines["measured, not compared"]).all()
+    wide = next(line for line in top.lines if line.get_label() == "measured, not compared")
+    above = [line for line in top.lines if line.get_label() in ("with them", "without the effects")]
+    assert all(wide.get_linewidth() > 2 * line.get_linewidth() for line in above)
+    assert np.isnan(np.asarray(bottom.lines[2].get_ydata(), float)[left_out]).all()
 
 
 def test_signature_means_are_those_of_the_bins() -> None:
@@ -68,6 +84,42 @@ def test_where_map_shows_every_known_cell() -> None:
     assert sorted(text.get_text() for text in figure.axes[0].texts) == ["1.0", "30", "5.0"]
     with pytest.raises(FigureError, match="shape"):
         where_map_figure(["a"], [WhereGroup("x", ("y",), table)], title="t")
+
+
+def groups(rng: np.random.Generator, joints: int, bands: list[int]) -> list[WhereGroup]:
+    return [
+        WhereGroup(
+            f"sort {k}", tuple(f"band {b}" for b in range(n)), rng.uniform(0.5, 300, (joints, n))
+        )
+        for k, n in enumerate(bands)
+    ]
+
+
+@pytest.mark.parametrize("bands", [[1], [1, 2, 2, 3, 3, 2, 2, 3, 3], [3] * 15])
+@pytest.mark.parametrize("count", [2, 18])
+def test_where_map_is_readable_at_the_width_of_a_page(bands: list[int], count: int) -> None:
+    """Letters of 11 px at least, cells of one size, no text on another, whatever the number."""
+    joints = [f"rm_joint_{k}" for k in range(count)]
+    figure = where_map_figure(
+        joints, groups(np.random.default_rng(2), count, bands), title="t", subtitle="s"
+    )
+    assert geometry.smallest_letters(figure) >= 11.0
+    assert not geometry.outside(figure)
+    assert not geometry.overlapping(figure)
+    maps = [axes for axes in figure.axes if len(axes.texts)]
+    assert len(maps) == len(bands)
+    widths = [axes.get_window_extent().width / n for axes, n in zip(maps, bands, strict=True)]
+    np.testing.assert_allclose(widths, widths[0])
+    assert sum(len(axes.texts) for axes in maps) == count * sum(bands)
+
+
+@pytest.mark.parametrize("joints", [1, 2, 3])
+def test_words_of_the_gap_in_time_lie_on_nothing(joints: int) -> None:
+    traces = [replace(trace(), joint=f"rm_joint_{k}") for k in range(joints)]
+    figure = gap_time_figure(traces, title="t", subtitle="s", channel="current")
+    assert not geometry.outside(figure)
+    assert not geometry.overlapping(figure)
+    assert not geometry.crossed(figure)
 
 
 def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:

@@ -83,3 +83,28 @@ def test_wide_series_refuses_wrong_shapes_and_doubled_headers() -> None:
         wide_series("w", np.zeros(3), ["a"], [good])
     with pytest.raises(TableError, match="occurs twice"):
         wide_series("w", np.zeros(2), ["a"], [good, good])
+
+
+def test_heading_is_the_declared_title_or_the_header_in_words() -> None:
+    table = Table(
+        "t",
+        {
+            h: [1.0]
+            for h in ("peak_torque_Nm", "ci_low", "value", "unit", "rm_joint_2__torque_rate_Nm_s")
+        },
+        {
+            "peak_torque_Nm": ("largest magnitude", "N*m"),
+            "ci_low": ("lower end", "see unit", "95 % from"),
+            "value": ("best estimate", "see unit"),
+            "unit": ("unit of value", ""),
+            "rm_joint_2__torque_rate_Nm_s": ("rate", "N*m/s"),
+        },
+    )
+    assert [table.title(header) for header in table.columns] == [
+        "peak torque [N·m]",
+        "95 % from",
+        "value",
+        "unit",
+        "rm_joint_2 torque rate [N·m/s]",
+    ]
+    assert table.unit_columns == {"unit"}

@@ -1,0 +1,78 @@
+"""One way to write numbers and units: for readers on pages and figures, as words in headers."""
+
+from __future__ import annotations
+
+import math
+import re
+
+MINUS, DOT, TIMES = "\N{MINUS SIGN}", "\N{MIDDLE DOT}", "\N{MULTIPLICATION SIGN}"
+_RAISED = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")
+_SYMBOLS = {"ohm": "Ω", "deg": "°", "degC": "°C"}
+#: Below and from here on a power of ten is written out.
+_SMALL, _LARGE = 1e-4, 1e6
+
+_ATOM = r"(?:[kmcµ]?N|[kmc]?m|[kmµ]?g|m?s|m?rad|[kmµ]?A|[kmµ]?V|[kmµ]?W|[kmµ]?J|K|Hz|ohm)"
+# Beside a unit may stand the marks of bold text, two asterisks, but not one.
+_PRODUCT = re.compile(
+    rf"(?:(?<![\w*])|(?<=\*\*)){_ATOM}(?:\^[23]|(?:[*/]{_ATOM}(?:\^[23])?)+)(?!\w|\*(?!\*))"
+)
+_PERCENT = re.compile(r"(?<=\d)%")
+_OHM = re.compile(r"(?<=\d )ohm\b")
+_APART = re.compile(r"(`[^`]*`|\]\([^)\s]+\))")
+_NEGATIVE = re.compile(r"(?<![\w.)\]\-])-(?=\d)")
+
+
+def number_text(value: float, digits: int = 3) -> str:
+    """A number as it is where it is short, else rounded to significant digits, zeros kept.
+
+    A true minus sign; a power of ten only far from 1. So 0.6, as it stands in a file, is ``0.6``,
+    and 0.59996 with three digits is ``0.600``: who sees zeros at the end sees a rounded number.
+    """
+    if not math.isfinite(value):
+        return "\N{EN DASH}" if math.isnan(value) else f"{MINUS if value < 0 else ''}\N{INFINITY}"
+    if value == 0:
+        return "0"
+    short = f"{value:.{digits}g}"
+    rounded = short if float(short) == value else f"{value:#.{digits}g}"
+    size = abs(float(rounded))
+    if size < _SMALL or size >= _LARGE:
+        mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
+        if float(short) == value and "." in mantissa:
+            mantissa = mantissa.rstrip("0").rstrip(".")
+        text = f"{mantissa}{TIMES}10{str(int(exponent)).translate(_RAISED)}"
+    elif "e" in rounded:  # more digits before the point than are significant
+        text = f"{float(rounded):.0f}"
+    else:
+        text = rounded.rstrip(".")
+    return text.replace("-", MINUS)
+
+
+def unit_text(unit: str) -> str:
+    """A unit as people write it: ``N*m`` is ``N·m``, ``rad/s^2`` is ``rad/s²``."""
+    text = re.sub(r"\^(-?\d)", lambda match: match[1].translate(_RAISED), unit)
+    text = re.sub(r"[A-Za-z]+", lambda match: _SYMBOLS.get(match[0], match[0]), text)
+    return text.replace("*", DOT)
+
+
+def unit_suffix(unit: str) -> str:
+    """A unit as a word in a header: ``"N*m"`` is ``Nm``, ``"rad/s^2"`` is ``rad_s2``."""
+    if unit in ("", "1"):
+        return ""
+    return unit.replace("*", "").replace("/", "_").replace("^", "")
+
+
+def prose(text: str) -> str:
+    """A sentence with its units, percentages and negative numbers written the same one way.
+
+    Code between backquotes and the targets of links stay as they are.
+    """
+    pieces = _APART.split(text)  # every second piece is code or a target
+    pieces[::2] = [_prose(piece) for piece in pieces[::2]]
+    return "".join(pieces)
+
+
+def _prose(text: str) -> str:
+    text = _PRODUCT.sub(lambda match: unit_text(match[0]), text)
+    text = _OHM.sub("Ω", text)
+    text = _PERCENT.sub(" %", text)
+    return _NEGATIVE.sub(MINUS, text)

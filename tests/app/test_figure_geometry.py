@@ -1,0 +1,90 @@
+"""Every figure of a run: no text cut, on another, or crossed by a line; letters large enough."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipeline.app.cli import parser
+from pipeline.app.compute import stand, walk
+from pipeline.app.figures import drawings
+from pipeline.app.names import leg_words, names_text
+from pipeline.app.settings import settings
+from reports.figures.several import Drawing
+from tests.reports import geometry
+
+NAMES = (
+    *("gait", "robot", "zero_pose", "electrical_energy"),
+    *(
+        f"{kind}_{alternative}"
+        for kind in ("motor_limits", "stage_energy")
+        for alternative in ("ideal", "rotor", "reversible", "irreversible")
+    ),
+    *(f"joint_demand_rm_joint_{k}" for k in (1, 2, 3)),
+)
+
+
+def run(robot: Path) -> dict[str, Drawing]:
+    given = settings(parser().parse_args(["reports", "--robot", str(robot), "--samples", "151"]))
+    standing = stand(given.machine, given.chains())
+    walking = walk(given.machine, given.chains(), samples=given.samples)
+    return {drawing.name: drawing for drawing in drawings(given, standing, walking)}
+
+
+@pytest.fixture(scope="module")
+def figures(root: Path) -> dict[str, Drawing]:
+    return run(root / "urdf" / "hexapod.toml")
+
+
+def objections(drawing: Drawing) -> list[object]:
+    figure = drawing.draw()
+    small = geometry.smallest_letters(figure)
+    return [
+        *geometry.outside(figure),
+        *geometry.overlapping(figure),
+        *geometry.crossed(figure),
+        *([f"letters of {small:.1f} px"] if small < 11.0 else []),
+    ]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_to_object_to(figures: dict[str, Drawing], name: str) -> None:
+    assert objections(figures[name]) == []
+
+
+def test_every_figure_is_measured(figures: dict[str, Drawing]) -> None:
+    assert set(figures) == set(NAMES)
+
+
+@pytest.mark.slow
+def test_nothing_to_object_to_with_the_other_axis(root: Path) -> None:
+    for drawing in run(root / "urdf" / "hexapod_axis90.toml").values():
+        assert objections(drawing) == [], drawing.name
+
+
+def test_motor_and_stage_panels_have_one_scale_in_all_alternatives(
+    figures: dict[str, Drawing],
+) -> None:
+    for kind in ("motor_limits", "stage_energy"):
+        limits = {
+            tuple((axes.get_xlim(), axes.get_ylim()) for axes in drawing.draw().axes)
+            if kind == "motor_limits"
+            else drawing.draw().axes[0].get_ylim()
+            for name, drawing in figures.items()
+            if name.startswith(kind)
+        }
+        assert len(limits) == 1
+
+
+def test_leg_names_are_explained() -> None:
+    assert leg_words("rm") == "middle right leg (rm)"
+    assert leg_words("lf") == "front left leg (lf)"
+    assert leg_words("leg3") == "leg leg3"
+
+
+def test_names_are_explained_where_the_page_first_uses_them(root: Path) -> None:
+    text = names_text(settings(parser().parse_args(["reports"])))
+    assert "`rm` is the middle right leg" in text
+    assert "`rotor` (actuator with ideal transmission)" in text
+    assert "`robot` is all 6 legs" in text
