@@ -191,7 +191,7 @@ def _links(body: Body, where: str) -> list[Finding]:
     for link in body.links:
         mass, name = _mass(link, where), _name(link)
         if mass < 0:
-            findings.append(Finding(name, "mass not negative", False, f"{mass:.6g} kg"))
+            findings.append(Finding(name, "mass positive", False, f"{mass:.6g} kg"))
             continue
         if len(body.links) > 1:
             excess, detail = _excess(mass, _moments(link, where))

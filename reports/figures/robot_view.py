@@ -169,17 +169,19 @@ def _in_plane(leg: Leg, view: View) -> bool:
 
 
 def _side_dimensions(axes: Axes, scene: Sequence[Primitive], legs: Sequence[Leg]) -> None:
+    """Length of the trunk and distances of the hips; the trunk is a box that carries them all."""
     hips = sorted({round(float(leg.joints[0].position[0]), 6) for leg in legs})
-    for_hips = [p for p in scene if not p.sphere and p.size[0] >= hips[-1] - hips[0]]
-    if not for_hips:
-        return  # the trunk, which carries all hips, is a mesh
-    trunk = max(for_hips, key=lambda p: float(np.prod(p.size)))
-    half = trunk.placement[:3, :3] @ np.array([trunk.size[0] / 2, 0, trunk.size[2] / 2])
-    front = SIDE.project(trunk.placement[:3, 3] + half)[:2]
-    length = np.array([trunk.size[0], 0.0])
-    dimension(axes, front - length, front, (0, 0.15), f"{1e3 * trunk.size[0]:.0f} mm")
+    top = max(float(leg.joints[0].position[2]) for leg in legs)
+    trunks = [p for p in scene if not p.sphere and p.size[0] >= hips[-1] - hips[0] > 0]
+    if trunks:
+        trunk = max(trunks, key=lambda p: float(np.prod(p.size)))
+        half = trunk.placement[:3, :3] @ np.array([trunk.size[0] / 2, 0, trunk.size[2] / 2])
+        front = SIDE.project(trunk.placement[:3, 3] + half)[:2]
+        length = np.array([trunk.size[0], 0.0])
+        dimension(axes, front - length, front, (0, 0.15), f"{1e3 * trunk.size[0]:.0f} mm")
+        top = float(front[1])
     for a, b in pairwise(hips):
-        start, end = np.array([a, front[1]]), np.array([b, front[1]])
+        start, end = np.array([a, top]), np.array([b, top])
         dimension(axes, start, end, (0, 0.07), _millimetres(start, end))
 
 

@@ -166,7 +166,7 @@ def test_option(
         (
             r'(<link name="lf_femur_link">.*?<mass value=")',
             r"\1-",
-            r"lf_femur_link: mass not negative fails",
+            r"lf_femur_link: mass positive fails",
         ),
         (r'ixx="[^"]*"', 'ixx="-0.1"', r"inertia possible fails \(moments .*none may be negative"),
         (r'ixx="[^"]*"', 'ixx="9"', r"inertia possible fails \(moments .*may not exceed the sum"),

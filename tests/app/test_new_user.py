@@ -13,6 +13,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.app.cli import parser
+from pipeline.app.judgement import applies
+from pipeline.app.settings import settings
 from tests.app.conftest import Command, exit_code, rows_of
 from tests.app.robots import changed, edited_robot, own_robot
 from tests.app.test_bad_input import refused
@@ -423,32 +426,49 @@ def test_cost_of_transport_has_the_mass_of_the_forces(
         assert float(row["cost_of_transport"]) == pytest.approx(transport, rel=1e-6)
 
 
-@pytest.mark.parametrize("verb", ["stand", "walk", "reports"])
-def test_actuators_of_ones_own(root: Path, tmp_path: Path, command: Command, verb: str) -> None:
-    """`--actuators` as for `gap`: another folder, here without the ideal actuator."""
-    folder = tmp_path / "actuators"
+def without_ideal(root: Path, folder: Path) -> Path:
+    """The project's actuators without the ideal one, as a catalogue of one's own."""
     shutil.copytree(root / "actuators" / "catalog", folder)
     file = folder / "alternatives.toml"
     text = changed(file.read_text(encoding="utf-8"), r"^\[ideal\].*?(?=^\[rotor\])", "")
     file.write_text(text, encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize("verb", ["stand", "walk"])
+def test_actuators_of_ones_own(root: Path, tmp_path: Path, command: Command, verb: str) -> None:
+    """`--actuators` as for `gap`: another folder, here without the ideal actuator."""
+    folder = without_ideal(root, tmp_path / "actuators")
     assert command(verb, tmp_path / "out", "--actuators", str(folder)) == 0
-    name = "walking_energy.csv" if verb != "stand" else "standing_energy.csv"
+    name = "walking_energy.csv" if verb == "walk" else "standing_energy.csv"
     rows = rows_of(tmp_path / "out" / name)
     assert {row["alternative"] for row in rows} == {"rotor", "reversible", "irreversible"}
-    # Held against the paper is the project's own catalogue alone.
-    assert not (tmp_path / "out" / "reproduction.csv").exists()
 
 
-def test_meshes_are_skipped_in_figures(
+def test_a_robot_and_actuators_of_ones_own_are_reported(
     root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A robot shown by meshes that are nowhere is computed and drawn as sticks."""
+    """Meshes that are nowhere are skipped, legs drawn as sticks; nothing is held against a paper."""
     robot = own_robot(root, tmp_path, "</robot>", "</robot>")
     urdf = tmp_path / "own.urdf"
     mesh = '<mesh filename="package://nowhere/link.stl"/>'
     text = re.sub(r"<(box|sphere) [^>]*/>", mesh, urdf.read_text(encoding="utf-8"))
     urdf.write_text(text, encoding="utf-8")
-    assert command("reports", tmp_path / "out", robot=robot) == 0
+    folder = without_ideal(root, tmp_path / "actuators")
+    assert command("reports", tmp_path / "out", "--actuators", str(folder), robot=robot) == 0
     assert capsys.readouterr().err == ""
     for figure in ("robot", "zero_pose", "gait"):
         assert (tmp_path / "out" / f"{figure}.png").stat().st_size > 10_000
+    assert not (tmp_path / "out" / "reproduction.csv").exists()
+
+
+def test_the_projects_robot_with_other_actuators_is_not_held_against_the_paper(
+    root: Path, tmp_path: Path
+) -> None:
+    options = parser().parse_args(
+        ["reports", "--actuators", str(without_ideal(root, tmp_path / "actuators"))]
+    )
+    options.robot = root / "urdf" / "hexapod.toml"
+    assert not applies(settings(options))
+    options.actuators = None
+    assert applies(settings(options))

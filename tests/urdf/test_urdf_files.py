@@ -73,7 +73,7 @@ def failures(findings: list[Finding]) -> set[str]:
 @pytest.mark.parametrize(
     ("pattern", "replacement", "check"),
     [
-        (r'(<link name="lf_femur_link">.*?<mass value=")', r"\1-", "mass not negative"),
+        (r'(<link name="lf_femur_link">.*?<mass value=")', r"\1-", "mass positive"),
         (r'ixx="[^"]*"', 'ixx="-0.1"', "inertia possible"),
         (r'ixx="[^"]*"', 'ixx="9"', "inertia possible"),
         (r'<limit lower="[^"]*"', '<limit lower="9"', "lower limit below the upper"),
