@@ -448,7 +448,7 @@ def test_actuators_of_ones_own(root: Path, tmp_path: Path, command: Command, ver
 def test_a_robot_and_actuators_of_ones_own_are_reported(
     root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Meshes that are nowhere are skipped, legs drawn as sticks; nothing is held against a paper."""
+    """Meshes that are nowhere are skipped, legs are sticks; nothing is held against a paper."""
     robot = own_robot(root, tmp_path, "</robot>", "</robot>")
     urdf = tmp_path / "own.urdf"
     mesh = '<mesh filename="package://nowhere/link.stl"/>'
