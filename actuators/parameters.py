@@ -2,18 +2,20 @@
 
 import dataclasses
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from actuators.errors import ParameterError, UnitError, closest, one_line
+from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, from_si, si_unit, to_si
 
 BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified", "assumed")
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
 _KEYS: Final = ("value", "unit", "basis", "source", "interval", "bounds", "reason")
+#: Without these a number cannot be judged.
+REQUIRED_KEYS: Final = ("value", "unit", "basis", "source")
 _SIGMAS_95: Final = 1.96
 
 Interval = tuple[float, float]
@@ -164,14 +166,11 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     Raises:
         ParameterError: The file is missing, unreadable or not TOML.
     """
-    name = Path(path).name
     try:
-        return tomllib.loads(Path(path).read_bytes().decode("utf-8"))
-    except (OSError, ValueError) as error:  # TOML and UTF-8 errors are ValueErrors
-        detail = error.strerror if isinstance(error, OSError) else error
-        raise ParameterError(f"{one_line(name)}: cannot be read: {one_line(detail)}") from None
-    except RecursionError:
-        raise ParameterError(f"{one_line(name)}: tables are nested too deeply") from None
+        return read_toml_file(Path(path))
+    except UnreadableTextError as error:
+        # The folder, too: it is what is wrong with `--actuators` when a file is not there.
+        raise ParameterError(f"{one_line(path)}: {error}") from None
 
 
 def parameters_from_table(
@@ -198,8 +197,10 @@ def parameters_from_table(
                 f"{where}: unknown parameter '{one_line(name)}': {closest(name, list(schema))}"
             )
     missing = [name for name in schema if name not in table and name not in optional]
-    if missing:
-        raise ParameterError(f"{where}: missing parameter '{missing[0]}': add it with its basis")
+    if missing:  # all at once: whoever writes a file sees the whole list
+        what = "parameter" if len(missing) == 1 else "parameters"
+        names = ", ".join(f"'{name}'" for name in missing)
+        raise ParameterError(f"{where}: missing {what} {names}: add each with its basis")
     rows = tuple(
         _parameter(name, table[name], schema[name], where) for name in schema if name in table
     )
@@ -234,9 +235,9 @@ def _parameter(name: str, entry: object, expected: str, where: str) -> Parameter
     for key in entry:
         if key not in _KEYS:
             raise ParameterError(f"{place}: unknown key '{one_line(key)}': {closest(key, _KEYS)}")
-    for key in ("value", "unit", "basis", "source"):
-        if key not in entry:
-            raise ParameterError(f"{place}: missing key '{key}'")
+    missing = ", ".join(f"'{key}'" for key in REQUIRED_KEYS if key not in entry)
+    if missing:
+        raise ParameterError(f"{place}: missing key{'s' if ',' in missing else ''} {missing}")
     for key in ("unit", "basis", "source", "reason"):
         if not isinstance(entry.get(key, ""), str):
             raise ParameterError(f"{place}: '{key}' must be text in quotation marks")

@@ -15,7 +15,7 @@ _TABLE: Final[Mapping[str, Mapping[str, float]]] = {
     "ratio": {"1": 1.0, "%": 1e-2},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     "mass": {"kg": 1.0, "g": 1e-3},
-    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "frequency": {"Hz": 1.0},
     "angle": {"rad": 1.0, "deg": _DEG},
     "angular velocity": {"rad/s": 1.0, "deg/s": _DEG, "rpm": _RPM},

@@ -15,6 +15,7 @@ from pipeline.errors import GaitError
 from pipeline.inverse_kinematics import solve_positions, solve_rates
 from pipeline.motion import Motion, Segment
 from pipeline.robot import Robot
+from pipeline.start_posture import neutral_postures
 from pipeline.transfer_path import transfer_path
 
 Array = NDArray[np.float64]
@@ -62,8 +63,7 @@ def tripod_gait(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     half = period / 2
     phase = np.linspace(0.0, 1.0, samples)
     neutral = np.array([leg.neutral_foot for leg in spec.legs])  # (L, 3)
-    start = np.array([leg.start_posture for leg in spec.legs])
-    start = solve_positions(robot.chains, neutral[None], start, np.zeros(1))[0]
+    start = neutral_postures(robot)
     segments = []
     for k, stance in enumerate(spec.tripods):
         position = np.repeat(neutral[None], samples, axis=0)
@@ -118,16 +118,21 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
 
     Raises:
         OutOfReachError: A foot target lies outside a leg's reach.
+        GaitError: Fewer than three feet stand, or a joint's limits forbid it.
     """
     spec = robot.spec
     stance = spec.standing_feet if feet is None else feet
+    if len(stance) < 3:
+        raise GaitError(
+            f"{spec.path}: standing.feet: the robot stands on {len(stance)} feet; a statically "
+            "stable stance needs at least 3"
+        )
     target = np.array([leg.neutral_foot for leg in spec.legs])[None]
     for i, leg in enumerate(robot.leg_names):
         if leg not in stance:
             target[:, i, 2] += spec.parameters["foot_lift"]
-    start = np.array([leg.start_posture for leg in spec.legs])
     time = np.zeros(1)
-    q = solve_positions(robot.chains, target, start, time)
+    q = solve_positions(robot.chains, target, neutral_postures(robot), time)
     _within_limits(robot, q, time)
     still = robot.tangent(np.zeros((1, len(robot.joints))))
     return Segment(

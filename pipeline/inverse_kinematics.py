@@ -17,7 +17,35 @@ Array = NDArray[np.float64]
 _ITERATIONS = 60
 _MAX_STEP = 0.35  # [rad] per iteration, keeps the knee on the branch of the start posture
 _CONVERGED = 1e-12  # [m]
-_ACCEPTED = 1e-9  # [m]
+ACCEPTED = 1e-9  # [m]
+
+
+def approach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Array]:
+    """Joint positions that bring the feet as close to their targets as the iteration gets.
+
+    Args:
+        chains: The legs.
+        target: Foot positions in the base frame [m], shape (N, L, 3).
+        start: Posture that names the branch (knee up or down) [rad], shape (L, 3) or (N, L, 3).
+
+    Returns:
+        Joint positions [rad], shape (N, L, 3), and what is left to the targets [m], shape (N, L).
+    """
+    q = np.broadcast_to(start, target.shape).copy()
+    damping = 1e-2  # [m], relaxed as the iteration comes close
+    for _ in range(_ITERATIONS):
+        foot, jacobian = foot_jacobians(chains, q)
+        error = target - foot
+        size = np.abs(error).max()
+        if size < _CONVERGED:
+            break
+        damping = min(1e-2, 0.1 * float(size))
+        normal = jacobian @ jacobian.swapaxes(-1, -2) + damping**2 * np.eye(3)
+        step = jacobian.swapaxes(-1, -2) @ np.linalg.solve(normal, error[..., None])
+        largest = np.abs(step).max(axis=(-1, -2), keepdims=True)
+        q += (step * np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300)))[..., 0]
+    foot, _ = foot_jacobians(chains, q)
+    return q, np.linalg.norm(target - foot, axis=-1)
 
 
 def solve_positions(chains: LegChains, target: Array, start: Array, time: Array) -> Array:
@@ -35,30 +63,30 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
     Raises:
         OutOfReachError: A target is not reached; names leg, instant and how far it is off.
     """
-    q = np.broadcast_to(start, target.shape).copy()
-    damping = 1e-2  # [m], relaxed as the iteration comes close
-    for _ in range(_ITERATIONS):
-        foot, jacobian = foot_jacobians(chains, q)
-        error = target - foot
-        size = np.abs(error).max()
-        if size < _CONVERGED:
-            break
-        damping = min(1e-2, 0.1 * float(size))
-        normal = jacobian @ jacobian.swapaxes(-1, -2) + damping**2 * np.eye(3)
-        step = jacobian.swapaxes(-1, -2) @ np.linalg.solve(normal, error[..., None])
-        largest = np.abs(step).max(axis=(-1, -2), keepdims=True)
-        q += (step * np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300)))[..., 0]
-    foot, _ = foot_jacobians(chains, q)
-    miss = np.linalg.norm(target - foot, axis=-1)  # (N, L)
-    if miss.max() > _ACCEPTED:
+    q, miss = approach(chains, target, start)
+    if miss.max() > ACCEPTED:
         sample, leg = np.unravel_index(int(miss.argmax()), miss.shape)
-        x, y, z = target[sample, leg]
-        raise OutOfReachError(
-            f"leg '{chains.names[leg]}' at t = {time[sample]:.4g} s: the foot target "
-            f"({x:.3f}, {y:.3f}, {z:.3f}) m in the base frame lies {1e3 * miss.max():.1f} mm "
-            "beyond its reach; shorten the stroke or the lift, or move the neutral foot"
+        raise beyond_reach(
+            chains.names[leg], target[sample, leg], float(miss.max()), float(time[sample])
         )
     return q
+
+
+def beyond_reach(leg: str, target: Array, miss: float, time: float) -> OutOfReachError:
+    """What to say of a target that no posture reaches.
+
+    Args:
+        leg: Its name.
+        target: Of its foot in the base frame [m], shape (3,).
+        miss: What is left [m].
+        time: In the motion [s].
+    """
+    x, y, z = target
+    return OutOfReachError(
+        f"leg '{leg}' at t = {time:.4g} s: the foot target "
+        f"({x:.3f}, {y:.3f}, {z:.3f}) m in the base frame lies {1e3 * miss:.1f} mm "
+        "beyond its reach; shorten the stroke or the lift, or move the neutral foot"
+    )
 
 
 def solve_rates(

@@ -109,7 +109,11 @@ def leg_chains(
                     f"not on '{model.names[parent]}'; list the joints from the base outward"
                 )
             if model.joints[index].nq != 1 or model.joints[index].nv != 1:
-                raise UrdfError(f"leg '{leg}': joint '{joint}' is not a revolute joint")
+                found = "continuous" if model.joints[index].nv == 1 else "of several coordinates"
+                raise UrdfError(
+                    f"leg '{leg}': joint '{joint}' is {found}; a leg's are of type revolute, "
+                    "with limits"
+                )
             placement = model.jointPlacements[index]
             rotation[j, i] = placement.rotation
             offset[j, i] = placement.translation
@@ -135,5 +139,5 @@ def _axis(model: pin.Model, index: int, leg: str, joint: str) -> Array:
     model.joints[index].calc(data, q[model.joints[index].idx_q :][:1])
     subspace = np.asarray(data.S).reshape(6)
     if np.any(np.abs(subspace[:3]) > 0) or abs(np.linalg.norm(subspace[3:]) - 1) > 1e-9:
-        raise UrdfError(f"leg '{leg}': joint '{joint}' is not a revolute joint")
+        raise UrdfError(f"leg '{leg}': joint '{joint}' slides; a leg's are of type revolute")
     return subspace[3:]

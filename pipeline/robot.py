@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -13,11 +14,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from actuators.errors import closest
+from actuators.errors import closest, one_line
 from pipeline.errors import UrdfError
 from pipeline.leg_chains import LegChains, leg_chains
 from pipeline.robot_file import RobotSpec
 from pipeline.urdf_builder import build_urdf
+from pipeline.urdf_source import read_elements, read_urdf
 
 Array = NDArray[np.float64]
 
@@ -47,6 +49,11 @@ class Robot:
     def joints(self) -> tuple[str, ...]:
         """Actuated joints in the robot file's order; the order of every column."""
         return self.spec.joints
+
+    @property
+    def mass(self) -> float:
+        """Of all bodies, the fixed one at the root included [kg]: what every force rests on."""
+        return float(sum(inertia.mass for inertia in self.model.inertias))
 
     @cached_property
     def leg_names(self) -> tuple[str, ...]:
@@ -156,14 +163,21 @@ def load_robot(spec: RobotSpec) -> Robot:
         text = build_urdf(spec)
     else:
         try:
-            text = spec.urdf.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError):
-            raise UrdfError(f"{spec.urdf}: cannot be read; {spec.path} names it as urdf") from None
-    model = parse_urdf(text, str(spec.urdf), floating=spec.floating)
+            text = read_urdf(spec.urdf)
+        except UrdfError as error:
+            raise UrdfError(f"{error}; {spec.path} names it as robot.urdf") from None
+        read_elements(text, str(spec.urdf))
+    where = str(spec.path if spec.build else spec.urdf)
+    model = parse_urdf(text, where, floating=spec.floating)
     model.gravity.linear = np.array([0.0, 0.0, -spec.parameters["gravity"]])
     robot = Robot(spec, text, model)
+    _refuse_other_base(robot)
     # Resolve every name now, so that a wrong one is an error on loading and not in the middle.
-    _ = robot.position_index, robot.velocity_index, robot.chains
+    _ = robot.position_index, robot.velocity_index
+    try:
+        _ = robot.chains
+    except UrdfError as error:
+        raise UrdfError(f"{spec.path}: {error}") from None
     actuated = set(robot.joints)
     for name in list(model.names)[2 if spec.floating else 1 :]:
         if name not in actuated:
@@ -173,31 +187,58 @@ def load_robot(spec: RobotSpec) -> Robot:
     return robot
 
 
+def _refuse_other_base(robot: Robot) -> None:
+    """Feet are placed in the frame of the base link, which Pinocchio takes to be the root.
+
+    Raises:
+        UrdfError: The robot file names another link.
+    """
+    first = 2 if robot.floating else 1  # after the universe and the free flyer
+    root = next(
+        str(frame.name)
+        for frame in robot.model.frames[first - 1 :]
+        if frame.type == pin.FrameType.BODY
+    )
+    if robot.spec.base_link != root:
+        raise UrdfError(
+            f"{robot.spec.path}: robot.base_link = '{one_line(robot.spec.base_link)}', the root of "
+            f"{robot.spec.urdf.name} is '{root}'; name that, and place the feet in its frame"
+        )
+
+
 @contextmanager
-def _parser_silenced() -> Iterator[None]:
-    """Keep the C++ parser from writing to the process's standard error: one line is ours."""
+def _parser_heard() -> Iterator[list[str]]:
+    """Keep the C++ parser from writing to the process's standard error; gather what it says."""
     sys.stderr.flush()
     saved = os.dup(2)
-    with open(os.devnull, "wb") as sink:
+    said: list[str] = []
+    with tempfile.TemporaryFile() as sink:
         os.dup2(sink.fileno(), 2)
-    try:
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
+        try:
+            yield said
+        finally:
+            os.dup2(saved, 2)
+            os.close(saved)
+            sink.seek(0)
+            for line in sink.read().decode("utf-8", "replace").splitlines():
+                if line.startswith("Error:"):
+                    said.append(" ".join(line.removeprefix("Error:").split()))
 
 
 def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:
     """A Pinocchio model from URDF text.
 
+    Pinocchio reads on where a number is none; `pipeline.urdf_source.read_elements` looks first.
+
     Raises:
-        UrdfError: The text is not a URDF; one line.
+        UrdfError: The text is not a URDF; one line with what Pinocchio's parser said.
     """
+    said: list[str] = []
     try:
-        with _parser_silenced():
+        with _parser_heard() as said:
             if floating:
                 return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
             return pin.buildModelFromXML(text)
     except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split())[:160]
+        reason = one_line(said[0] if said else error)[:160]
         raise UrdfError(f"{where}: not a URDF that Pinocchio can read ({reason})") from None

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import tomllib
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from actuators.errors import closest, one_line
-from actuators.parameters import ParameterSet, parameters_from_table
+from actuators.parameters import REQUIRED_KEYS, ParameterSet, parameters_from_table
+from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.units import si_unit
 from pipeline.errors import RobotFileError
 
 #: Numbers every walking robot needs, with their dimension.
@@ -53,6 +55,12 @@ BUILDS = ("hexapod", "leg_stand")
 BUILT_JOINTS = 3
 #: SI values beyond this overflow somewhere between here and the energies.
 LARGEST = 1e9
+#: Lengths of walking robots lie between these; outside, a unit is wrong by a thousand [m].
+SMALLEST_LENGTH, LARGEST_LENGTH = 1e-3, 10.0
+#: No planet pulls more [m/s^2].
+LARGEST_GRAVITY = 30.0
+#: Lengths that may be nothing, or lie on either side.
+_ANY_LENGTH = ("coxa_length", "joint_2_lateral", "trunk_com_left")
 STATIONS = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 
 _TOP_KEYS = {"extends", "robot", "parameters", "legs", "gait", "standing"}
@@ -60,6 +68,7 @@ _ROBOT_KEYS = {"name", "urdf", "base_link", "base", "build", "zero_pose", "note"
 _LEG_KEYS = {"joints", "foot", "side", "station", "neutral_foot", "start_posture"}
 _GAIT_KEYS = {"transfer_path", "tripods"}
 _STANDING_KEYS = {"feet"}
+_MOST_EXTENDED = 20
 
 
 @dataclass(frozen=True)
@@ -73,7 +82,8 @@ class LegSpec:
         side: ``"left"`` or ``"right"``.
         station: ``"front"``, ``"middle"`` or ``"rear"``; empty for a URDF of the user's own.
         neutral_foot: Foot at mid-stroke in the base frame [m].
-        start_posture: Joint positions that name the knee's branch [rad].
+        start_posture: Joint positions that name the knee's branch [rad]; zero where none is stated.
+        start_stated: Whether the robot file states them.
     """
 
     name: str
@@ -83,6 +93,7 @@ class LegSpec:
     station: str
     neutral_foot: tuple[float, float, float]
     start_posture: tuple[float, float, float]
+    start_stated: bool = False
 
 
 @dataclass(frozen=True)
@@ -168,14 +179,10 @@ def read_toml(path: Path) -> dict[str, Any]:
         RobotFileError: Missing, unreadable or malformed; the message names file and line.
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise RobotFileError(f"{path}: no such file; give the robot file with --robot") from None
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "not UTF-8 text"
-        raise RobotFileError(f"{path}: cannot be read ({reason})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise RobotFileError(f"{path}: malformed TOML: {error}") from None
+        return read_toml_file(path)
+    except UnreadableTextError as error:
+        hint = "; give the robot file with --robot" if str(error) == "no such file" else ""
+        raise RobotFileError(f"{path}: {error}{hint}") from None
 
 
 def load_robot_file(path: Path) -> RobotSpec:
@@ -197,6 +204,7 @@ def load_robot_file(path: Path) -> RobotSpec:
     table, sources = _extended(path, ())
     where = str(path)
     _known_keys(table, _TOP_KEYS, where, "table")
+    _refuse_missing(table, where)
     robot = _table(table, "robot", where)
     _known_keys(robot, _ROBOT_KEYS, where, "key of [robot]")
     build = robot.get("build")
@@ -214,7 +222,7 @@ def load_robot_file(path: Path) -> RobotSpec:
     names = [leg.name for leg in legs]
     gait = _table(table, "gait", where)
     _known_keys(gait, _GAIT_KEYS, where, "key of [gait]")
-    standing = _table(table, "standing", where)
+    standing = _table(table, "standing", where) if "standing" in table else {}
     _known_keys(standing, _STANDING_KEYS, where, "key of [standing]")
     groups = gait.get("tripods", [])
     if not isinstance(groups, list):
@@ -238,9 +246,11 @@ def load_robot_file(path: Path) -> RobotSpec:
 
 
 def _extended(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], tuple[Path, ...]]:
+    table = read_toml(path)  # first, so that a name that is no file's is told as such
     if path.resolve() in [p.resolve() for p in seen]:
         raise RobotFileError(f"{path}: extends itself through {seen[-1]}")
-    table = read_toml(path)
+    if len(seen) >= _MOST_EXTENDED:
+        raise RobotFileError(f"{path}: extends a chain of more than {_MOST_EXTENDED} files")
     if "extends" not in table:
         return table, (path,)
     if not isinstance(table["extends"], str):
@@ -257,6 +267,45 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
         deep = key != "legs" and isinstance(value, dict) and isinstance(out.get(key), dict)
         out[key] = _merged(out[key], value) if deep else value
     return out
+
+
+def _refuse_missing(table: Mapping[str, Any], where: str) -> None:
+    """All keys that are missing, in one line: whoever writes a file need not run it for each.
+
+    Raises:
+        RobotFileError: At least one is missing.
+    """
+
+    def under(key: str) -> Mapping[str, Any]:
+        value = table.get(key, {})
+        return value if isinstance(value, dict) else {}
+
+    built = "build" in under("robot")
+    schema = GAIT_SCHEMA | (BUILD_SCHEMA if built else {})
+    leg_keys = ("joints", "foot", "side", "station" if built else "neutral_foot")
+    missing = [f"robot.{key}" for key in ("name", "urdf", "base_link") if key not in under("robot")]
+    if not under("legs"):
+        missing.append(f"[legs.NAME] with {', '.join(leg_keys)}")
+    for leg, entry in under("legs").items():
+        if isinstance(entry, dict):
+            missing += [f"legs.{leg}.{key}" for key in leg_keys if key not in entry]
+    missing += [] if "transfer_path" in under("gait") else ["gait.transfer_path"]
+    missing += [
+        f"parameters.{name} [{si_unit(kind)}]"
+        for name, kind in schema.items()
+        if name not in under("parameters")
+    ]
+    for name, entry in under("parameters").items():
+        if isinstance(entry, dict):
+            missing += [f"parameters.{name}.{key}" for key in REQUIRED_KEYS if key not in entry]
+    # A table of the wrong kind is told below, where its keys are read.
+    wrong = [
+        k for k in ("robot", "legs", "gait", "parameters") if not isinstance(table.get(k, {}), dict)
+    ]
+    if wrong:
+        raise RobotFileError(f"{where}: {wrong[0]} must be a table, [{wrong[0]}]")
+    if missing:
+        raise RobotFileError(f"{where}: missing: {', '.join(missing)}; see urdf/hexapod.toml")
 
 
 def _known_keys(table: Mapping[str, Any], known: set[str], where: str, what: str) -> None:
@@ -295,13 +344,16 @@ def _legs(
 ) -> tuple[LegSpec, ...]:
     legs = []
     for name, entry in table.items():
-        place = f"{where}: legs.{name}"
+        place = f"{where}: legs.{one_line(name)}"
+        _refuse_name(name, place)
         if not isinstance(entry, dict):
             raise RobotFileError(f"{place}: expected a table with joints, foot and side")
         _known_keys(entry, _LEG_KEYS, where, f"key of [legs.{name}]")
         joints = entry.get("joints")
         if not isinstance(joints, list) or not all(isinstance(j, str) for j in joints):
             raise RobotFileError(f"{place}: joints must be a list of names, base outward")
+        for joint in joints:
+            _refuse_name(joint, f"{place}: joints")
         side = entry.get("side")
         if side not in ("left", "right"):
             raise RobotFileError(f"{place}: side = '{side}'; expected 'left' or 'right'")
@@ -319,9 +371,30 @@ def _legs(
             neutral = built_neutral_foot(parameters, side, station)
         else:
             neutral = _triple(entry, "neutral_foot", None, place)
+        for k, at in enumerate(neutral):
+            if abs(at) > LARGEST_LENGTH:
+                raise RobotFileError(
+                    f"{place}: neutral_foot has {at:g} at place {k + 1}; it is written in metres, "
+                    "are these millimetres?"
+                )
         start = _triple(entry, "start_posture", (0.0, 0.0, 0.0), place)
+        for k, angle in enumerate(start):
+            if abs(angle) > 2 * math.pi:
+                raise RobotFileError(
+                    f"{place}: start_posture has {angle:g} at place {k + 1}; it is written in "
+                    f"radians, are these degrees ({math.radians(angle):.4g} rad)?"
+                )
         legs.append(
-            LegSpec(name, tuple(joints), _text(entry, "foot", place), side, station, neutral, start)
+            LegSpec(
+                name,
+                tuple(joints),
+                _text(entry, "foot", place),
+                side,
+                station,
+                neutral,
+                start,
+                "start_posture" in entry,
+            )
         )
     if not legs:
         raise RobotFileError(f"{where}: [legs] names no leg")
@@ -330,6 +403,18 @@ def _legs(
         if joints_seen.count(joint) > 1:
             raise RobotFileError(f"{where}: joint '{joint}' belongs to two legs")
     return tuple(legs)
+
+
+def _refuse_name(name: str, place: str) -> None:
+    """Names become columns and files: no separators, nothing invisible.
+
+    Raises:
+        RobotFileError: It holds one.
+    """
+    bad = [c for c in name if c in '/\\,;"' or not c.isprintable()]
+    if not name.strip() or bad:
+        what = f"holds {bad[0]!r}" if bad else "is empty"
+        raise RobotFileError(f"{place}: a name {what}; names become columns and file names")
 
 
 def _triple(
@@ -341,7 +426,12 @@ def _triple(
     )
     if not numbers or len(value) != 3:
         raise RobotFileError(f"{where}: {key} must be three numbers")
-    x, y, z = (float(component) for component in value)
+    try:
+        x, y, z = (float(component) for component in value)
+    except OverflowError:
+        x = y = z = math.inf
+    if not all(math.isfinite(component) for component in (x, y, z)):
+        raise RobotFileError(f"{where}: {key} must be three finite numbers")
     return (x, y, z)
 
 
@@ -366,8 +456,29 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
             raise RobotFileError(f"{where}: parameters.{name} is beyond any robot; check its unit")
     if parameters["foot_lift"] < 0:
         raise RobotFileError(f"{where}: parameters.foot_lift must not be negative")
+    if parameters["gravity"] > LARGEST_GRAVITY:
+        raise RobotFileError(f"{where}: parameters.gravity is beyond any planet; check its unit")
     if build:
         _check_build(parameters, where)
+    _check_lengths(parameters, where)
+
+
+def _check_lengths(parameters: ParameterSet, where: str) -> None:
+    """Refuse metres written for millimetres and the reverse."""
+    for name, kind in (GAIT_SCHEMA | BUILD_SCHEMA).items():
+        if kind != "length" or name not in parameters:
+            continue
+        size, row = abs(parameters[name]), parameters.parameter(name)
+        small = 0 < size < SMALLEST_LENGTH and name not in _ANY_LENGTH
+        if small or size > LARGEST_LENGTH:
+            what = "shorter" if small else "longer"
+            number = f"{row.value_as_written:g}"
+            other = {("mm", True): "m", ("m", False): "mm"}.get((row.unit, small))
+            hint = f"is {number} {other} meant?" if other else "check its unit"
+            raise RobotFileError(
+                f"{where}: parameters.{name} = {number} {row.unit} is {what} than in any walking "
+                f"robot; {hint}"
+            )
 
 
 def _positive(parameters: ParameterSet, names: tuple[str, ...], where: str) -> None:

@@ -22,6 +22,8 @@ from pipeline.robot_file import STATIONS, LegSpec, RobotSpec
 
 Array = NDArray[np.float64]
 FOOT_RADIUS = 0.012  # [m] visual only; the foot point is the sphere's centre
+#: Osmium's: no link is denser [kg/m^3].
+DENSEST = 22600.0
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,8 @@ def build_urdf(spec: RobotSpec) -> str:
         spec: A robot file with ``build``.
 
     Raises:
-        RobotFileError: The masses of the legs leave nothing for the trunk.
+        RobotFileError: The masses of the legs leave nothing for the trunk, or a link would be
+            denser than any metal.
     """
     root = ET.Element("robot", name=spec.name)
     root.append(
@@ -216,6 +219,12 @@ _COLOURS = {
 
 
 def _link(root: ET.Element, name: str, box: Box, material: str) -> None:
+    volume = math.prod(box.size)
+    if box.mass > DENSEST * volume:
+        raise RobotFileError(
+            f"link '{name}' has {box.mass:.4g} kg in {1e3 * volume:.3g} litres, denser than any "
+            "metal; masses in kg, lengths in the unit stated?"
+        )
     link = ET.SubElement(root, "link", name=name)
     inertial = ET.SubElement(link, "inertial")
     ET.SubElement(inertial, "origin", xyz=_numbers(box.com), rpy="0 0 0")

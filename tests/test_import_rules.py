@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 #: Units, parameters and their errors use the standard library only; every room may read them.
-LEAVES = {"actuators.units", "actuators.parameters", "actuators.errors"}
+LEAVES = {"actuators.units", "actuators.parameters", "actuators.errors", "actuators.text_file"}
 ROOMS = {"actuators", "pipeline", "reports"}
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from pipeline.app.named_path import named_path
+
 
 def add_twin_options(sub: argparse.ArgumentParser) -> None:
     """Declare the options of `twin`."""
@@ -15,8 +17,8 @@ def add_twin_options(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--motion", default="leg", help="leg (on a stand) or walk (hexapod)")
     sub.add_argument("--noise", default="low", help="low or high")
     sub.add_argument("--logs", type=int, default=1, help="logs of the same machine")
-    sub.add_argument("--out", type=Path, required=True, help="new folder for the trial")
-    sub.add_argument("--sealed", type=Path, help="file for the truth, outside of that folder")
+    sub.add_argument("--out", type=named_path, required=True, help="new folder for the trial")
+    sub.add_argument("--sealed", type=named_path, help="file for the truth, outside of that folder")
 
 
 def add_blind_options(sub: argparse.ArgumentParser) -> None:
@@ -28,5 +30,8 @@ def add_blind_options(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--workers", type=int, default=2, help="processes")
     sub.add_argument("--resume", action="store_true", help="go on where a run was stopped")
     sub.add_argument(
-        "--out", type=Path, default=Path("reports/out/blind"), help="folder for everything written"
+        "--out",
+        type=named_path,
+        default=Path("reports/out/blind"),
+        help="folder for everything written",
     )

@@ -8,8 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.calibration.calibrate import Effort, calibrate
+from pipeline.calibration.errors import CalibrationError
+from pipeline.calibration.machine import MIDDLE_LEGS, POSTURE, ROBOT
 from pipeline.calibration.prior import load_prior
 from pipeline.calibration.store import calibrated_numbers, save
+from pipeline.robot_file import load_robot_file, read_toml
 
 WORK = Path(".calibration")
 
@@ -20,6 +23,8 @@ def run_calibrate(options: argparse.Namespace) -> int:
     Raises:
         PipelineError: Unusable robot, prior or target file, or no admissible point.
     """
+    _refuse_options(options)
+    refuse_other_robot(options.robot)
     results = calibrate(
         options.robot,
         Effort(workers=options.workers, seed=options.seed),
@@ -37,6 +42,43 @@ def run_calibrate(options: argparse.Namespace) -> int:
     print(f"at a bound: {', '.join(bound) or 'none'}")
     print("run `make urdf` to build the URDFs from the calibrated robot file")
     return 0
+
+
+def _refuse_options(options: argparse.Namespace) -> None:
+    if options.workers < 1:
+        raise CalibrationError(f"--workers {options.workers}: at least one process is needed")
+    if options.seed < 0:
+        raise CalibrationError(f"--seed {options.seed}: expected zero or a positive number")
+
+
+def refuse_other_robot(path: Path) -> None:
+    """Refuse a robot that the paper does not print numbers of, before twenty minutes are spent.
+
+    Args:
+        path: Robot file.
+
+    Raises:
+        RobotFileError: It cannot be used at all.
+        CalibrationError: It does not walk, lacks the middle legs, or holds no numbers of its own
+            to write the result into.
+    """
+    spec = load_robot_file(path)
+    such = "calibrate fits the paper's hexapod; give urdf/hexapod.toml or a copy of it"
+    if not spec.floating:
+        raise CalibrationError(f"{path}: its base is fixed, so it does not walk; {such}")
+    names = [leg.name for leg in spec.legs]
+    lacking = [leg for leg in MIDDLE_LEGS if leg not in names]
+    if lacking:
+        raise CalibrationError(f"{path}: has no leg '{lacking[0]}'; {such}")
+    keys = (key.split(".") for key in load_prior().keys)
+    wanted = [*POSTURE, *(name for component, name in keys if component == ROBOT)]
+    own = read_toml(path).get("parameters", {})
+    lacking = [name for name in dict.fromkeys(wanted) if name not in own]
+    if lacking:
+        raise CalibrationError(
+            f"{path}: the result is written into this file, which does not hold "
+            f"{', '.join(lacking)}; {such}"
+        )
 
 
 def _progress(title: str, total: int) -> Callable[[int], None]:

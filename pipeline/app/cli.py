@@ -17,6 +17,7 @@ from pathlib import Path
 from pipeline.app.blind_options import add_blind_options, add_twin_options
 from pipeline.app.decimal_option import add_decimal_option
 from pipeline.app.gap_options import add_gap_options
+from pipeline.app.named_path import named_path
 from pipeline.errors import PipelineError, TippingError
 
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
@@ -40,12 +41,14 @@ def parser() -> argparse.ArgumentParser:
     verbs = root.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=_Parser)
 
     check = verbs.add_parser("check", help="judge a robot file or URDF for physical sense")
-    check.add_argument("file", type=Path, help="robot file (.toml) or URDF")
+    check.add_argument("file", type=named_path, help="robot file (.toml) or URDF")
     check.add_argument("-v", "--verbose", action="store_true", help="list what passed, too")
     check.set_defaults(run=_run_check)
 
     urdf = verbs.add_parser("urdf", help="build the URDFs from their robot files")
-    urdf.add_argument("files", type=Path, nargs="*", help="robot files; all in urdf/ by default")
+    urdf.add_argument(
+        "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
+    )
     urdf.set_defaults(run=_run_urdf)
 
     for verb, text in (
@@ -74,7 +77,7 @@ def parser() -> argparse.ArgumentParser:
     calibrate = verbs.add_parser(
         "calibrate", help="fit the unpublished numbers to the paper's figures and store them"
     )
-    calibrate.add_argument("--robot", type=Path, default=DEFAULT_ROBOT, help="robot file")
+    calibrate.add_argument("--robot", type=named_path, default=DEFAULT_ROBOT, help="robot file")
     calibrate.add_argument("--workers", type=int, default=2, help="processes")
     calibrate.add_argument("--seed", type=int, default=1, help="of everything random")
     calibrate.set_defaults(run=_run_calibrate)
@@ -83,10 +86,20 @@ def parser() -> argparse.ArgumentParser:
 
 def _run_options(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
-        "--robot", type=Path, help="robot file; the model file's or the hexapod by default"
+        "--robot", type=named_path, help="robot file; the model file's or the hexapod by default"
     )
-    sub.add_argument("--model", type=Path, help="model file: include the effects that `gap` found")
-    sub.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder for CSV and figures")
+    sub.add_argument(
+        "--model", type=named_path, help="model file: include the effects that `gap` found"
+    )
+    sub.add_argument(
+        "--actuators",
+        type=named_path,
+        metavar="DIR",
+        help="folder of actuator files of your own; actuators/catalog by default",
+    )
+    sub.add_argument(
+        "--out", type=named_path, default=DEFAULT_OUT, help="folder for CSV and figures"
+    )
     sub.add_argument(
         "--set",
         action="append",
@@ -114,8 +127,10 @@ def _run_check(options: argparse.Namespace) -> int:
 
     findings = check_file(options.file)
     failed = [finding for finding in findings if not finding.passed]
-    for finding in findings if options.verbose else failed:
-        mark = "ok  " if finding.passed else "FAIL"
+    for finding in findings:
+        if finding.passed and not finding.note and not options.verbose:
+            continue
+        mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
         print(f"{mark} {finding.subject}: {finding.check}: {finding.detail}")
     print(f"{options.file}: {len(findings) - len(failed)} of {len(findings)} checks passed")
     return EXIT_NEGATIVE if failed else EXIT_OK

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Final
 
 from pipeline.app.decimal_option import add_decimal_option
+from pipeline.app.named_path import named_path
 
 #: The steps; without one all but `forward` run, which needs goals and the servos' law.
 STEPS: Final = {
@@ -32,12 +33,17 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
     )
     sub.add_argument(
         "--robot",
-        type=Path,
+        type=named_path,
         help="robot file, or URDF of a fixed robot; the model file's or the hexapod by default",
     )
-    sub.add_argument("--model", type=Path, help="model file with effects found earlier")
+    sub.add_argument("--model", type=named_path, help="model file with effects found earlier")
     sub.add_argument(
-        "--holdout", type=Path, nargs="+", default=[], metavar="LOG", help="logs that only prove"
+        "--holdout",
+        type=named_path,
+        nargs="+",
+        default=[],
+        metavar="LOG",
+        help="logs that only prove",
     )
     sub.add_argument(
         "--base",
@@ -52,7 +58,7 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         help="time in the log at which a period of the robot file's gait begins: tells which feet "
         "stand where the log has neither foot forces nor contacts; the lowest feet without it",
     )
-    sub.add_argument("--mapping", type=Path, help="mapping file (TOML) for foreign columns")
+    sub.add_argument("--mapping", type=named_path, help="mapping file (TOML) for foreign columns")
     sub.add_argument(
         "--alternative",
         metavar="NAME",
@@ -60,7 +66,7 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         "irreversible, or one of --actuators; a bare URDF has none by default",
     )
     sub.add_argument(
-        "--actuators", type=Path, metavar="DIR", help="folder of actuator files of your own"
+        "--actuators", type=named_path, metavar="DIR", help="folder of actuator files of your own"
     )
     sub.add_argument("--effort", metavar="CHANNEL", help="torque, current, voltage or power")
     sub.add_argument("--cutoff", type=float, metavar="HZ", help="bandwidth of the comparison")
@@ -75,7 +81,9 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         action="store_true",
         help="write effects whose name is doubted into the model file, too, marked as such",
     )
-    sub.add_argument("--out", type=Path, default=DEFAULT_OUT, help="folder for everything written")
+    sub.add_argument(
+        "--out", type=named_path, default=DEFAULT_OUT, help="folder for everything written"
+    )
     add_decimal_option(sub)
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 

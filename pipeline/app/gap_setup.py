@@ -13,6 +13,7 @@ import numpy as np
 from actuators.build import CATALOG, Catalog, load_catalog
 from actuators.chain import Chain
 from pipeline.app.gap_options import DEFAULT_ROBOT
+from pipeline.check import refuse_impossible
 from pipeline.errors import RobotFileError
 from pipeline.gap.bandwidth import lowered, naming_cutoff
 from pipeline.gap.contact import Contact, find_contact
@@ -83,7 +84,8 @@ def setup(options: argparse.Namespace) -> Setup:
         alternative = alternative or DEFAULT_ALTERNATIVE
     chain = catalog.chain(alternative) if alternative else None
     if not path.is_file():
-        raise RobotFileError(f"{path}: no such robot file; name it with --robot")
+        fact = "is a folder" if path.is_dir() else "no such robot file"
+        raise RobotFileError(f"{path}: {fact}; name a robot file or URDF with --robot")
     robot = _robot(path, options.base)
     if robot is None:
         bare = machine_of_urdf(path, chain=chain)
@@ -122,7 +124,9 @@ def _robot(path: Path, base: str | None) -> Robot | None:
         spec = replace(spec, floating=False)
     if base in ("level", "measured") and not spec.floating:
         raise GapError(f"{path}: its base is fixed; leave --base {base} out")
-    return load_robot(spec)
+    robot = load_robot(spec)
+    refuse_impossible(robot)
+    return robot
 
 
 def _catalog_files(folder: Path) -> tuple[Path, ...]:
@@ -240,12 +244,17 @@ def check_options(options: argparse.Namespace) -> None:
     if not options.logs:
         raise LogContentError(f"gap {options.step}: no log given; name a CSV or Parquet file")
     for path in (*options.logs, *options.holdout):
+        if path.is_dir():
+            raise LogContentError(f"{path}: is a folder; name its CSV or Parquet files")
         if not path.is_file():
             raise LogContentError(f"{path}: no such log; name a CSV or Parquet file")
-    if options.mapping and not options.mapping.is_file():
-        raise MappingError(f"{options.mapping}: no such mapping file")
-    if options.model and not options.model.is_file():
-        raise ModelFileError(f"{options.model}: no such model file")
+    for file, what, error in (
+        (options.mapping, "mapping", MappingError),
+        (options.model, "model", ModelFileError),
+    ):
+        if file and not file.is_file():
+            fact = "is a folder, expected a" if file.is_dir() else "no such"
+            raise error(f"{file}: {fact} {what} file")
     if options.step == "shrink" and not options.model:
         raise ModelFileError("gap shrink: name the model file to check with --model")
     if options.gait_start is not None and not math.isfinite(options.gait_start):

@@ -19,6 +19,7 @@ def applies(given: Settings) -> bool:
         RESULTS_FILE.exists()
         and not given.changes
         and given.effects is None
+        and given.actuators is None
         and not given.quasi_static
         and given.regeneration.policy == "none"
         and given.robot.spec.path.name == load_results().get("robot")

@@ -87,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
             if judgement is not None:
                 files += judging.pages(given, judgement, tables, out)
     print(f"{files} tables{' and figures' if options.verb == 'reports' else ''} in {options.out}")
-    for line in findings(walking, given) if walking else ():
+    for line in (*given.remarks, *(findings(walking, given) if walking else ())):
         print(line)
     return 0
 
@@ -127,7 +127,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
             walking.demand,
             walking.supplies,
             legs,
-            p["total_mass"] * p["gravity"],
+            given.machine.mass * p["gravity"],  # the mass that the forces rest on
             p["walking_speed"],
         ),
         walking_tables.motor_limits(walking.results, chains),
@@ -158,7 +158,7 @@ def inputs_of(given: Settings) -> list[Path]:
     """Every file that was read."""
     spec = given.robot.spec
     files = [*spec.sources, *([] if spec.build else [spec.urdf])]
-    files += sorted(Path(CATALOG).glob("*.toml"))
+    files += sorted((given.actuators or Path(CATALOG)).glob("*.toml"))
     return [*files, given.model] if given.model else files
 
 
@@ -182,7 +182,7 @@ def metadata(given: Settings) -> dict[str, Any]:
         "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
         "joint's direction; electrical power positive from supply to motor",
         "zero_pose": spec.zero_pose,
-        "warnings": list(given.effects.remarks) if given.effects else [],
+        "warnings": [*given.remarks, *(given.effects.remarks if given.effects else ())],
     }
 
 

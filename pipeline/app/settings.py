@@ -7,15 +7,17 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from actuators.build import Catalog, load_catalog
+from actuators.build import CATALOG, Catalog, load_catalog
 from actuators.chain import Chain
-from actuators.errors import ActuatorError, closest, one_line
+from actuators.errors import ActuatorError, CatalogError, closest, one_line
+from actuators.parameters import ParameterSet
 from actuators.units import to_si
 from pipeline.app.compute import Adjust, Regeneration
 from pipeline.app.effects import IDEAL, Effects, effects
 from pipeline.app.gap_options import DEFAULT_ROBOT
-from pipeline.check import check_urdf
-from pipeline.errors import GaitError, RobotFileError, UnphysicalModelError
+from pipeline.app.memory import refuse_beyond_memory
+from pipeline.check import refuse_impossible
+from pipeline.errors import GaitError, RobotFileError
 from pipeline.gap.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.robot import Robot, load_robot
 from pipeline.robot_file import RobotSpec, check_parameters, load_robot_file
@@ -24,6 +26,8 @@ from pipeline.transfer_path import transfer_path
 TRANSFER_PATH_KEY = "gait.transfer_path"
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES = 51
+#: Between these a ratio looks like a slip by a prefix of the unit, the value itself a little off.
+_THOUSAND = (200.0, 5000.0)
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,8 @@ class Settings:
         samples: Per segment of the gait.
         quasi_static: Whether the links' inertial terms are left out.
         changes: What ``--set`` changed, as written.
+        remarks: What a reader of the numbers should know of the robot and the changes.
+        actuators: Folder of the user's own actuator files; None for the project's catalogue.
         effects: Of the model file; None without one.
         model: The model file; None without one.
     """
@@ -47,6 +53,8 @@ class Settings:
     samples: int
     quasi_static: bool
     changes: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+    actuators: Path | None = None
     effects: Effects | None = None
     model: Path | None = None
 
@@ -77,22 +85,28 @@ def settings(options: argparse.Namespace) -> Settings:
     model: Path | None = getattr(options, "model", None)
     file = read_model_file(model) if model else None
     spec = load_robot_file(options.robot or (file.robot if file else DEFAULT_ROBOT))
-    catalog = load_catalog()
+    actuators: Path | None = getattr(options, "actuators", None)
+    catalog = load_catalog(actuators or CATALOG)
     if options.samples < LEAST_SAMPLES:
         raise GaitError(
             f"--samples {options.samples}: at least {LEAST_SAMPLES} samples per segment are needed "
             "for energies within 1 %"
         )
+    remarks = []
     for change in options.set:
         key, equals, value = (part.strip() for part in change.partition("="))
         if not equals or not key or not value:
             raise RobotFileError(f"--set {one_line(change)}: expected KEY=VALUE")
+        before = spec.parameters
         spec, catalog = _changed(spec, catalog, key, value)
+        remarks += _thousandfold(before, spec.parameters, key)
     if options.set:
         # After all changes: two numbers that bind each other may be changed together.
         check_parameters(spec.parameters, spec.build, "--set")
     robot = load_robot(spec)
-    refuse_impossible(robot)
+    remarks += refuse_impossible(robot)
+    if getattr(options, "verb", "walk") != "stand":
+        refuse_beyond_memory(options.samples, len(robot.joints), len(catalog.alternatives))
     return Settings(
         robot=robot,
         catalog=catalog,
@@ -100,6 +114,8 @@ def settings(options: argparse.Namespace) -> Settings:
         samples=options.samples,
         quasi_static=options.quasi_static,
         changes=tuple(options.set),
+        remarks=tuple(remarks),
+        actuators=actuators,
         effects=_effects(file, model, robot, catalog) if file and model else None,
         model=model,
     )
@@ -108,23 +124,12 @@ def settings(options: argparse.Namespace) -> Settings:
 def _effects(file: ModelFile, path: Path, robot: Robot, catalog: Catalog) -> Effects:
     """A model file's effects on this robot."""
     names = tuple(edit.effect for edit in file.edits)
-    alternative = file.alternative or next(name for name in catalog.alternatives if name != IDEAL)
+    others = [name for name in catalog.alternatives if name != IDEAL]
+    if not (file.alternative or others):
+        raise CatalogError("effects need an actuator with a motor of its own; add an alternative")
+    alternative = file.alternative or others[0]
     chain = catalog.chain(alternative)
     return effects(robot, chain, lambda m: apply_edits(m, file.edits), names, path.name)
-
-
-def refuse_impossible(robot: Robot) -> None:
-    """Stop before a body that cannot exist gives numbers that look like any other.
-
-    Raises:
-        UnphysicalModelError: A link's mass or inertia is impossible, or a limit missing.
-    """
-    for finding in check_urdf(robot.urdf, str(robot.spec.urdf)):
-        if not finding.passed:
-            raise UnphysicalModelError(
-                f"{robot.spec.urdf}: {finding.subject}: {finding.check} fails ({finding.detail}); "
-                "correct it, `python -m pipeline check FILE` lists every finding"
-            )
 
 
 def _changed(spec: RobotSpec, catalog: Catalog, key: str, value: str) -> tuple[RobotSpec, Catalog]:
@@ -147,6 +152,21 @@ def _changed(spec: RobotSpec, catalog: Catalog, key: str, value: str) -> tuple[R
         return spec, catalog.replaced(key, to_si(_number(place, value), unit))
     except ActuatorError as error:
         raise RobotFileError(f"{place}: {error}") from None
+
+
+def _thousandfold(before: ParameterSet, after: ParameterSet, key: str) -> list[str]:
+    """Say when a change looks like another unit: about a thousand times more or less."""
+    if key not in before or before[key] == 0 or after[key] == 0:
+        return []
+    ratio = abs(after[key] / before[key])
+    if not (_THOUSAND[0] < max(ratio, 1 / ratio) < _THOUSAND[1]):
+        return []
+    old, new = before.parameter(key), after.parameter(key)
+    return [
+        f"{key} = {new.value_as_written:g} {new.unit} is about a thousand times "
+        f"{'more' if ratio > 1 else 'less'} than the file's {old.value_as_written:g}; --set takes "
+        f"it in {new.unit}"
+    ]
 
 
 def _hint(key: str, known: list[str]) -> str:

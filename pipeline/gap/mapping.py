@@ -51,7 +51,6 @@ All tables are optional::
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -59,6 +58,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from actuators.errors import UnitError, closest, one_line
+from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, from_si, to_si
 from pipeline.gap.errors import MappingError
 from pipeline.gap.log import EFFORTS
@@ -165,16 +165,9 @@ def load_mapping(path: Path) -> Mapping:
     """
     where = one_line(path.name)
     try:
-        table = tomllib.loads(path.read_bytes().decode("utf-8"))
-    except OSError as error:
-        reason = error.strerror or "no such file"
-        raise MappingError(
-            f"{one_line(path)}: cannot be read ({reason}); give a mapping file"
-        ) from None
-    except UnicodeDecodeError:
-        raise MappingError(f"{where}: not UTF-8 text; save it as UTF-8") from None
-    except (tomllib.TOMLDecodeError, ValueError, RecursionError, OverflowError) as error:
-        raise MappingError(f"{where}: malformed TOML: {one_line(error)}") from None
+        table = read_toml_file(path)
+    except UnreadableTextError as error:
+        raise MappingError(f"{where}: {error}; give a mapping file") from None
     return parse_mapping(table, where)
 
 

@@ -20,9 +20,11 @@ from actuators.errors import closest
 from actuators.heating import Heating
 from actuators.motor import DCMotor
 from actuators.position_torque import PositionTorque
+from pipeline.check import refuse_urdf
 from pipeline.gap.errors import ModelError
 from pipeline.kinematics import LegChains
 from pipeline.robot import Robot, parse_urdf
+from pipeline.urdf_source import read_urdf
 
 Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
@@ -240,13 +242,12 @@ def machine_of_urdf(
         chain: As for `machine_of_robot`.
 
     Raises:
-        ModelError: The file cannot be read, or moves in joints that are not columns.
-        pipeline.errors.UrdfError: It is no URDF.
+        ModelError: It moves in joints that are not columns.
+        pipeline.errors.UrdfError: The file cannot be read, or is no URDF.
+        pipeline.errors.UnphysicalModelError: Its bodies or joints cannot be.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        raise ModelError(f"{path}: cannot be read; give a URDF") from None
+    text = read_urdf(path)
+    refuse_urdf(text, str(path))
     model = parse_urdf(text, str(path), floating=False)
     found = tuple(str(n) for n in list(model.names)[1:])
     names = tuple(joints) if joints is not None else found

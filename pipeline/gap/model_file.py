@@ -28,7 +28,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,6 +35,7 @@ from typing import Any, Final
 
 from actuators.build import CATALOG, load_catalog
 from actuators.errors import closest, one_line
+from actuators.text_file import UnreadableTextError, read_toml_file
 from pipeline.gap.effects.base import CHANNEL_UNITS, Effect
 from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.errors import EffectError, ModelFileError
@@ -203,13 +203,9 @@ def read_model_file(path: Path) -> ModelFile:
     """
     where = one_line(path.name)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ModelFileError(f"{one_line(path)}: cannot be read ({error.strerror})") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
-        raise ModelFileError(f"{where}: malformed TOML: {one_line(error)}") from None
-    except ValueError as error:
-        raise ModelFileError(f"{one_line(path)}: cannot be read: {one_line(error)}") from None
+        table = read_toml_file(path)
+    except UnreadableTextError as error:
+        raise ModelFileError(f"{one_line(path)}: {error}") from None
     _known(table, _TOP, where)
     if table.get("schema") != SCHEMA or isinstance(table["schema"], bool):
         raise ModelFileError(f"{where}: schema must be {SCHEMA}")

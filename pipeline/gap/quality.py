@@ -108,11 +108,20 @@ def _bridged(x: Array) -> Array:
     return np.nan_to_num(out)
 
 
+def _unit(rate: float) -> str:
+    """The unit in which a time column of too low a rate [Hz] was written: the first that fits."""
+    names = {1e3: ("milliseconds", "ms"), 1e6: ("microseconds", "us"), 1e9: ("nanoseconds", "ns")}
+    for factor, (name, unit) in names.items():
+        if rate * factor >= SLOWEST:
+            return f'{name}, write [time] unit = "{unit}"'
+    return "no time, name the column under [time]"
+
+
 def _rate(log: Log, found: _Findings) -> float:
     beat = clock(log.time)
     rate = 1.0 / beat.dt
     slow = rate < SLOWEST
-    hint = "; time_s looks like milliseconds, give its unit in a mapping file" if slow else ""
+    hint = f"; time_s looks like {_unit(rate)} in a mapping file" if slow else ""
     found.note(
         "time_s",
         "rate",

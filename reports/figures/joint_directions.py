@@ -12,6 +12,7 @@ from reports.errors import FigureError
 from reports.figures.marks import axis_line, rotation_arrow
 from reports.figures.projection import FRONT, OBLIQUE, SIDE, TOP, View, draw_scene, extent
 from reports.figures.robot_view import Leg, frame_arrows
+from reports.figures.sticks import with_sticks
 from reports.figures.style import BLUE, GREEN, QUIET, VERMILION, headline, new_figure, styled
 from reports.figures.visuals import Primitive
 
@@ -47,6 +48,7 @@ def joint_directions_figure(
     if shown not in by_name:
         raise FigureError(f"leg '{shown}' is not among {', '.join(by_name)}")
     leg = by_name[shown]
+    scene, _ = with_sticks(scene, legs)
     figure = new_figure(4.6)
     headline(figure, title, "circular arrows: positive rotation, right-handed about the drawn axis")
     oblique, ahead, above = figure.subplots(1, 3, width_ratios=[1.0, 1.25, 1.15])

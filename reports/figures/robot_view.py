@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from reports.errors import FigureError
 from reports.figures.marks import dimension
 from reports.figures.projection import FRONT, OBLIQUE, SIDE, TOP, View, draw_scene, extent
+from reports.figures.sticks import with_sticks
 from reports.figures.style import BLUE, GREEN, INK, QUIET, VERMILION, headline, new_figure, styled
 from reports.figures.visuals import JointMark, Primitive
 
@@ -84,10 +85,11 @@ def robot_figure(
     Raises:
         FigureError: Nothing to draw.
     """
-    if not scene or not legs:
-        raise FigureError(f"'{title}': no visual primitive or no leg to draw")
+    if not legs:
+        raise FigureError(f"'{title}': no leg to draw")
+    scene, remark = with_sticks(scene, legs)
     figure = new_figure(8.4)
-    headline(figure, title, subtitle)
+    headline(figure, title, "; ".join(words for words in (subtitle, remark) if words))
     ((oblique, above), (ahead, beside)) = figure.subplots(
         2, 2, height_ratios=[1.25, 1.0], width_ratios=[1.0, 1.15]
     )
@@ -167,14 +169,19 @@ def _in_plane(leg: Leg, view: View) -> bool:
 
 
 def _side_dimensions(axes: Axes, scene: Sequence[Primitive], legs: Sequence[Leg]) -> None:
-    trunk = max(scene, key=lambda p: float(np.prod(p.size)))
-    half = trunk.placement[:3, :3] @ np.array([trunk.size[0] / 2, 0, trunk.size[2] / 2])
-    front = SIDE.project(trunk.placement[:3, 3] + half)[:2]
-    length = np.array([trunk.size[0], 0.0])
-    dimension(axes, front - length, front, (0, 0.15), f"{1e3 * trunk.size[0]:.0f} mm")
+    """Length of the trunk and distances of the hips; the trunk is a box that carries them all."""
     hips = sorted({round(float(leg.joints[0].position[0]), 6) for leg in legs})
+    top = max(float(leg.joints[0].position[2]) for leg in legs)
+    trunks = [p for p in scene if not p.sphere and p.size[0] >= hips[-1] - hips[0] > 0]
+    if trunks:
+        trunk = max(trunks, key=lambda p: float(np.prod(p.size)))
+        half = trunk.placement[:3, :3] @ np.array([trunk.size[0] / 2, 0, trunk.size[2] / 2])
+        front = SIDE.project(trunk.placement[:3, 3] + half)[:2]
+        length = np.array([trunk.size[0], 0.0])
+        dimension(axes, front - length, front, (0, 0.15), f"{1e3 * trunk.size[0]:.0f} mm")
+        top = float(front[1])
     for a, b in pairwise(hips):
-        start, end = np.array([a, front[1]]), np.array([b, front[1]])
+        start, end = np.array([a, top]), np.array([b, top])
         dimension(axes, start, end, (0, 0.07), _millimetres(start, end))
 
 

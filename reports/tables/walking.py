@@ -185,14 +185,14 @@ def leg_energies(supply: Supply, legs: Mapping[str, Sequence[str]]) -> dict[str,
 def walking_energy(
     supplies: Mapping[str, Supply], legs: Mapping[str, Sequence[str]], ideal: str
 ) -> Table:
-    """Electrical energy per cycle, and its ratio to the ideal actuator's."""
-    base = leg_energies(supplies[ideal], legs)
+    """Electrical energy per cycle, and its ratio to the ideal actuator's where there is one."""
+    base = leg_energies(supplies[ideal], legs) if ideal in supplies else {}
     rows = [
         {
             "alternative": name,
             "leg": leg,
             "electrical_J": energy,
-            "ratio_to_ideal": energy / base[leg] if base[leg] > 0 else None,
+            "ratio_to_ideal": energy / base[leg] if base.get(leg, 0.0) > 0 else None,
         }
         for name, supply in supplies.items()
         for leg, energy in leg_energies(supply, legs).items()

@@ -101,8 +101,8 @@ def test_odd_toml(tmp_path, content):
 
 
 def test_missing_file_and_directory(tmp_path):
-    for path in (tmp_path / "none.toml", tmp_path):
-        with pytest.raises(ParameterError, match="cannot be read"):
+    for path, fact in ((tmp_path / "none.toml", "no such file"), (tmp_path, "is a folder")):
+        with pytest.raises(ParameterError, match=fact):
             load_parameters(path, SCHEMA)
 
 

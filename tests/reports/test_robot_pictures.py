@@ -69,8 +69,25 @@ def test_robot_figure_states_the_dimensions_of_table_one(hexapod: Robot) -> None
     for expected in ("600 mm", "520 mm", "180 mm", "340 mm", "270 mm", "RM", "LF"):
         assert expected in words
     assert len(figure.axes) == 4
-    with pytest.raises(FigureError, match="no visual primitive"):
-        robot_figure([], legs, title="t")
+    with pytest.raises(FigureError, match="no leg"):
+        robot_figure(scene, [], title="t")
+
+
+def test_a_robot_without_boxes_is_drawn_as_sticks_and_its_trunk_not_measured(
+    hexapod: Robot,
+) -> None:
+    """Spheres alone, as of a URDF whose links are meshes: no sphere is taken for the trunk."""
+    scene, legs = standing(hexapod)
+    spheres = [primitive for primitive in scene if primitive.sphere]
+    words = texts(robot_figure(spheres, legs, title="t"))
+    assert any("the URDF shows no boxes: legs are drawn as sticks" in word for word in words)
+    assert "600 mm" not in words
+    for expected in ("520 mm", "180 mm", "340 mm", "270 mm", "RM"):
+        assert expected in words
+    links = [primitive for primitive in scene if primitive.link != "base_link"]
+    words = texts(robot_figure(links, legs, title="t"))
+    assert not any("sticks" in word for word in words)
+    assert "600 mm" not in words
 
 
 def test_joint_directions_names_the_joints(hexapod: Robot) -> None:

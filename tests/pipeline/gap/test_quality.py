@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from actuators.units import to_si
 from pipeline.gap.errors import GapError
 from pipeline.gap.expected import Expected
 from pipeline.gap.finding import Quality
@@ -115,9 +116,17 @@ def test_milliamperes_and_millinewtonmetres(two_joints: Expected) -> None:
         judge(log, two_joints, largest={"current": np.array([60.0, 60.0])}).refuse()
 
 
-def test_milliseconds_for_seconds(two_joints: Expected) -> None:
+@pytest.mark.parametrize(
+    ("factor", "name", "unit"),
+    [(1e3, "milliseconds", "ms"), (1e6, "microseconds", "us"), (1e9, "nanoseconds", "ns")],
+)
+def test_time_in_another_unit_is_told_by_its_name(
+    two_joints: Expected, factor: float, name: str, unit: str
+) -> None:
     q, _, e = good()
-    assert "milliseconds" in refused(made_log(q, e, rate=0.5), two_joints)
+    message = refused(made_log(q, e, rate=500 / factor), two_joints)
+    assert f'time_s looks like {name}, write [time] unit = "{unit}" in a mapping file' in message
+    assert to_si(factor, unit) == pytest.approx(1.0)
 
 
 def test_positions_of_another_robot(two_joints: Expected) -> None:
