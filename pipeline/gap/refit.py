@@ -13,7 +13,7 @@ from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.problem import Accepted, Problem
 
 Array = NDArray[np.float64]
-_NEWTON = 3  # refits after an acceptance
+_NEWTON = 6  # refits after an acceptance, at most
 _HELD = 3.0  # sigmas
 _CONTRIBUTION = 3.0  # largest part of an effort one effect may have, in its RMS
 _BEND = 0.3  # largest relative change of a nonlinear parameter in one step

@@ -35,6 +35,7 @@ HIDDEN = {
         {"rise": 40.0, "thermal_resistance": 6.0, "time_constant": 4.0},
     ),
     "effort_offset": (J2, {"offset": 0.05}),
+    "effort_gain": (("rm_joint_2__current_A",), {"gain": 1.3}),
     "position_offset": (J2, {"angle": 0.08}),
     "time_delay": (("effort channels",), {"delay": 0.008}),
 }
