@@ -22,7 +22,6 @@ from pipeline.app.gap_report import Story, write_report
 from pipeline.app.gap_run import Progress, Whereabouts, find_where, judged
 from pipeline.app.gap_setup import Setup, check_options, setup, take_in
 from pipeline.app.gap_shrink import check
-from pipeline.app.gap_stages import noise_floor, overall
 from pipeline.app.gap_story import Told, tell
 from pipeline.app.gap_tables import candidates_table, found_table, quality_table, where_table
 from pipeline.app.staging import staged
@@ -78,7 +77,7 @@ def run_gap(options: argparse.Namespace) -> int:
             return _drive(given, where, options)
         if options.step == "shrink":
             progress.step("weighing the model file's effects")
-            told = check(given, where, options)
+            told = check(given, where)
         else:
             progress.step("letting effects compete")
             told = tell(given, where, options, progress)
@@ -100,7 +99,7 @@ def run_gap(options: argparse.Namespace) -> int:
                     _figures_and_page(told, tables, folder)
             _take_away_stale(options.out, told, tables)
     _say_answer(told.story, options.out)
-    return UNEXPLAINED if naming.unexplained else EXPLAINED
+    return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
 
 
 def _drive(given: Setup, where: Whereabouts, options: argparse.Namespace) -> int:
@@ -129,16 +128,14 @@ def _tables_into(
 
 def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None:
     story, where = told.story, told.story.where
-    model, stages = story.given.model, story.stages
+    model, weighed = story.given.model, told.story.weighed
     write_where_map(where.rows, model.joints, model.name, folder)
-    floor = noise_floor(where.measurements)
-    write_waterfall(stages, overall(floor), story.naming.unit, model.name, folder)
-    first = len(stages) - len(story.naming.found)
-    write_in_time(where.measurements, stages[first - 1], stages[-1], told.shown, folder)
-    for k, (found, name) in enumerate(zip(story.naming.found, story.signatures, strict=True)):
-        joint = told.effect_joints[k]
+    unit = story.naming.unit
+    write_waterfall(weighed.stages, story.noise, unit, model.name, folder)
+    write_in_time(where.measurements, weighed.stages[1], weighed.stages[-1], told.shown, folder)
+    shown = zip(story.naming.found, story.signatures, weighed.pairs, weighed.joints, strict=True)
+    for found, name, pair, joint in shown:
         stem = Path(name).stem
-        pair = (stages[first + k - 1], stages[first + k])
         write_signature(where.measurements, *pair, joint, found.effect, found.place, stem, folder)
     footer = (
         f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "

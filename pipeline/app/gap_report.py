@@ -13,7 +13,8 @@ from pipeline.app.gap_constants import voltage_remarks
 from pipeline.app.gap_energy import EnergyChange
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
-from pipeline.app.gap_stages import Stage, noise_floor, overall
+from pipeline.app.gap_stages import noise_floor, overall
+from pipeline.app.gap_written import Weighed
 from pipeline.gap.circumstances import WHOLE
 from pipeline.gap.verdict import ACCEPTED, REJECTED, UNEXPLAINED, Naming, Remainder
 from reports.html import write_html
@@ -52,26 +53,27 @@ class Story:
     Attributes:
         given: Robot and actuators.
         where: Steps 1 and 2.
-        naming: Step 3; None where a model file was checked without naming.
-        stages: The gap effect by effect; the first without effects.
+        naming: Step 3; without candidates where a model file was checked.
+        weighed: The model as written against the logs, effect by effect.
         energy: With and without the effects; None for a robot that does not walk.
         signatures: File name to caption, one per effect.
         decides: What the deciding motion is, in words; empty without one.
         remarks: What else a reader should know.
-        joints: Per effect, the column at which it shows.
-        writes_model: Whether ``model.toml`` is written.
     """
 
     given: Setup
     where: Whereabouts
     naming: Naming
-    stages: tuple[Stage, ...]
+    weighed: Weighed
     energy: EnergyChange | None
     signatures: dict[str, str]
     decides: str
     remarks: tuple[str, ...]
-    joints: tuple[int, ...] = ()
-    writes_model: bool = False
+
+    @property
+    def noise(self) -> float:
+        """Noise floor of all joints in the compared channel, of the logs that prove."""
+        return overall(noise_floor(self.where.measurements))
 
 
 def write_report(story: Story, tables: Sequence[Table], folder: Path, footer: str) -> None:
@@ -85,7 +87,7 @@ def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) ->
     """The page; see `write_report`."""
     names = ", ".join(m.name for m in story.where.measurements)
     files = {f"{t.name}.csv": t.description for t in tables.values()}
-    if story.writes_model:
+    if story.weighed.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     return Page(
         title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
@@ -105,33 +107,29 @@ def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) ->
 
 def answer(story: Story) -> tuple[str, ...]:
     """The first lines: where, what, how much smaller, what it costs, what is left."""
-    naming = story.naming
-    out = [words.where_words(story.where.rows), words.what_words(naming)]
-    if naming.found:
-        out.append(words.shrink_words(_falls(story), _whole(story)))
+    naming, weighed = story.naming, story.weighed
+    out = [
+        words.where_words(story.where.rows),
+        words.what_words(naming, unexplained=weighed.unexplained),
+        words.shrink_words(naming.found, _joints(story), _whole(story), naming.unit, story.noise),
+    ]
     if story.energy is not None:
         out.append(words.energy_words(story.energy, story.given.alternative))
-    out.append(words.left_words(naming.remainders))
     undecided = words.rival_words(naming.found, bool(story.decides))
-    return (*out, undecided) if undecided else tuple(out)
+    out += [undecided] if undecided else []
+    return (*out, words.left_words(weighed.left))
 
 
-def _falls(story: Story) -> list[tuple[str, str, float, float, float, str]]:
-    """Gap before and after each effect at the joint where it shows."""
-    floor = noise_floor(story.where.measurements)
-    first = len(story.stages) - len(story.naming.found)
-    out = []
-    for k, (f, j) in enumerate(zip(story.naming.found, story.joints, strict=True)):
-        before, after = (float(story.stages[first + i].gap[j]) for i in (k - 1, k))
-        name = f"{f.effect} at {words.place_text(f.place)}"
-        joint = story.given.model.joints[j]
-        out.append((name, joint, before, after, float(floor[j]), story.naming.unit))
-    return out
+def _joints(story: Story) -> list[str]:
+    """Per effect, the joint at which it shows."""
+    return [story.given.model.joints[j] for j in story.weighed.joints]
 
 
-def _whole(story: Story) -> tuple[float, float]:
-    """Gap of all joints of the model as it was and with everything estimated."""
-    return overall(story.stages[0].gap), overall(story.stages[-1].gap)
+def _whole(story: Story) -> tuple[float, float, float]:
+    """Gap of all joints of the model as it was, with tolerances, and as written."""
+    first, tolerances, *_ = story.weighed.stages
+    last = story.weighed.stages[-1]
+    return overall(first.gap), overall(tolerances.gap), overall(last.gap)
 
 
 def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
@@ -207,10 +205,10 @@ def _candidates(story: Story) -> TableBlock:
         for c in every[:SHOWN_CANDIDATES]
     )
     return TableBlock(
-        ("effect", "place", "held out without", "with", "unit", "verdict", "why"),
+        ("effect", "place", "validation without", "with", "unit", "verdict", "why"),
         rows,
         f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried. "
-        "Without and with: gap on data that did not fit the candidate, tolerances estimated anew "
+        "Without and with: gap on rows that choose, by estimates from others, tolerances anew "
         "for either, so that what they take up speaks for no candidate; a dash: left out after "
         "screening.",
         "candidates.csv",
@@ -220,8 +218,8 @@ def _candidates(story: Story) -> TableBlock:
 
 
 def _smaller(story: Story, folder: Path) -> Section:
-    last = story.stages[-1]
-    first, parts = story.stages[0], story.stages[-1 - len(story.naming.found)]
+    first, parts, *_ = story.weighed.stages
+    last = story.weighed.stages[-1]
     floor = noise_floor(story.where.measurements)
     joints = story.given.model.joints
     unit = story.naming.unit
@@ -241,14 +239,14 @@ def _smaller(story: Story, folder: Path) -> Section:
         FigureBlock(folder / "waterfall.svg", "The gap of all joints, effect by effect."),
         FigureBlock(
             folder / "in_time.svg",
-            "Measured and predicted, and what is left, without and with what was found.",
+            "Measured and predicted, and what is left, without and with what the model file holds.",
         ),
         TableBlock(
-            ("joint", "as it was", "with tolerances", "with effects", "noise floor", "unit"),
+            ("joint", "as it was", "with tolerances", "as written", "noise floor", "unit"),
             rows,
             "Gap, root mean square, on held-out data. Tolerances are what every machine "
             "differs in from its files: masses, torque constants, encoder zeros, each within its "
-            "stated uncertainty.",
+            "stated uncertainty. As written: with the effects of the model file, read back.",
             digits=3,
         ),
     ]
@@ -289,7 +287,7 @@ def _energy(story: Story) -> tuple[Section, ...]:
 
 
 def _left(story: Story) -> Section:
-    every = sorted(story.naming.remainders, key=_ratio, reverse=True)
+    every = sorted(story.weighed.left, key=_ratio, reverse=True)
     shown = [r for r in every if r.significant] or every[:5]
     rows = tuple(
         (
@@ -306,8 +304,8 @@ def _left(story: Story) -> Section:
     block = TableBlock(
         ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like"),
         rows,
-        f"What is left on held-out data; {len(every) - len(shown)} pairs of joint and channel "
-        f"are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as noise.",
+        f"What the model as written leaves on held-out data; {len(every) - len(shown)} pairs of "
+        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as noise.",
         "",
         TONES,
         3,
@@ -340,7 +338,7 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
         f"{parts.guard:.2g} s apart, so that none holds a trace of another. "
         + words.held_out_words(story.where.measurements),
     ]
-    texts += words.one_way_words(story.where.measurements, story.joints)
+    texts += words.one_way_words(story.where.measurements, story.weighed.joints)
     if parts.warning:
         texts.append(f"**Note:** {parts.warning}.")
     odd = [value != "ok" for value in tables["quality"].columns["verdict"]]

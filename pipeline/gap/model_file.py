@@ -203,13 +203,14 @@ def read_model_file(path: Path) -> ModelFile:
     """
     where = one_line(path.name)
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ModelFileError(f"{one_line(path)}: cannot be read ({error.strerror})") from None
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except UnicodeDecodeError as error:
         raise ModelFileError(f"{where}: malformed TOML: {one_line(error)}") from None
     except ValueError as error:
         raise ModelFileError(f"{one_line(path)}: cannot be read: {one_line(error)}") from None
+    table = _parsed(text, where)
     _known(table, _TOP, where)
     if table.get("schema") != SCHEMA or isinstance(table["schema"], bool):
         raise ModelFileError(f"{where}: schema must be {SCHEMA}")
@@ -220,9 +221,6 @@ def read_model_file(path: Path) -> ModelFile:
     hashes = actuators.get("sha256", {})
     if not isinstance(hashes, dict) or not all(isinstance(v, str) for v in hashes.values()):
         raise ModelFileError(f"{where} [actuators.sha256]: expected file = hash")
-    edits = table.get("edit", [])
-    if not isinstance(edits, list):
-        raise ModelFileError(f"{where}: edits are written [[edit]]")
     robot_path = path.parent / _text(robot, "file", f"{where} [robot]")
     robot_hash = _text(robot, "sha256", f"{where} [robot]")
     alternative = actuators.get("alternative", "")
@@ -233,9 +231,32 @@ def read_model_file(path: Path) -> ModelFile:
         robot_sha256=robot_hash,
         alternative=alternative,
         actuators_sha256=hashes,
-        edits=tuple(_edit(e, f"{where}: edit {k}") for k, e in enumerate(edits, start=1)),
+        edits=_edits(table, where),
         changed=_changed(robot_path, robot_hash, hashes),
     )
+
+
+def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
+    """The edits of a model file's text.
+
+    Raises:
+        ModelFileError: As for `read_model_file`.
+    """
+    return _edits(_parsed(text, where), where)
+
+
+def _parsed(text: str, where: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise ModelFileError(f"{where}: malformed TOML: {one_line(error)}") from None
+
+
+def _edits(table: Mapping[str, Any], where: str) -> tuple[Edit, ...]:
+    edits = table.get("edit", [])
+    if not isinstance(edits, list):
+        raise ModelFileError(f"{where}: edits are written [[edit]]")
+    return tuple(_edit(e, f"{where}: edit {k}") for k, e in enumerate(edits, start=1))
 
 
 def _changed(robot: Path, robot_hash: str, hashes: Mapping[str, str]) -> tuple[str, ...]:

@@ -15,10 +15,10 @@ from tests.app.conftest import exit_code, rows_of, sidecar_of
 
 COLUMNS = {
     "quality": "log column check value unit verdict detail",
-    "candidates": "effect joint place heldout_before heldout_after unit identifiable verdict "
+    "candidates": "effect joint place validation_before validation_after unit identifiable verdict "
     "reason",
     "found": "order effect joint parameter value ci_low ci_high unit gap_before gap_after gap_unit "
-    "noise_floor doubt",
+    "noise_floor doubt written",
 }
 SAME_FOR = 3.0  # [s] of the shipped logs
 SAME_SHARE = 0.95  # of all samples

@@ -68,7 +68,7 @@ class Effect(ABC):
 
     Attributes:
         name: In the field's terms; key of the registry.
-        place_kind: What it acts on: joint, joint pair, link, ground, effort channels, effort column.
+        place_kind: What it acts on: joint, joint pair, link, ground, effort channels or column.
         parameters: As written to results and model files.
         coordinates: As fitted.
         signature: Variable against which its residual shows, a key of `signature.VARIABLES`.
@@ -76,6 +76,7 @@ class Effect(ABC):
         is_tolerance: Whether every machine has it in small, as a tolerance that is always free.
         reaches: Multiples of the coordinates' steps to look across, where the prediction bends.
         contains: Effects that are special cases of this one at the same place.
+        rescales: Whether what bodies do to a channel is multiplied by it.
     """
 
     name: ClassVar[str]
@@ -87,6 +88,7 @@ class Effect(ABC):
     is_tolerance: ClassVar[bool] = False
     reaches: ClassVar[tuple[float, ...]] = (1.0,)
     contains: ClassVar[tuple[str, ...]] = ()
+    rescales: ClassVar[bool] = False
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Where in this machine and log the effect could be."""

@@ -31,6 +31,7 @@ class EffortGain(Effect):
     coordinates: ClassVar = (Coordinate("more", 1e-3, signed=True),)
     signature = "load"
     is_tolerance = True
+    rescales = True
     #: Gains 1, 2, 5, 1/2 and 1/5: what a voltage makes of a wrong current is not linear in it.
     reaches: ClassVar = (1.0, 1000.0, 4000.0, -500.0, -800.0)
     excitation = "carries clearly different known loads"

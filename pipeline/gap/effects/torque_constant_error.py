@@ -28,6 +28,7 @@ class TorqueConstantError(Effect):
     coordinates: ClassVar = (Coordinate("more", 1e-3, signed=True),)
     signature = "load"
     is_tolerance = True
+    rescales = True
     excitation = "carries clearly different known loads"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
