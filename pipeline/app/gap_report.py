@@ -261,9 +261,9 @@ def _energy(story: Story) -> tuple[Section, ...]:
         (
             name,
             change.before[name].cycle,
-            change.after[name].cycle,
+            change.after[name].cycle if name in change.after else None,
             change.before[name].standing,
-            change.after[name].standing,
+            change.after[name].standing if name in change.after else None,
         )
         for name in change.before
     )
@@ -271,7 +271,8 @@ def _energy(story: Story) -> tuple[Section, ...]:
         ("alternative", "cycle before [J]", "after [J]", "standing before [W]", "after [W]"),
         rows,
         "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
-        "energy lost, and power to stand as the robot file says, without and with what was found.",
+        "energy lost, and power to stand as the robot file says, without and with what the model "
+        "file holds; a dash: it cannot be told.",
     )
     catalog = story.given.catalog
     titles = [
@@ -281,7 +282,9 @@ def _energy(story: Story) -> tuple[Section, ...]:
     ]
     told = Text(
         f"The log was compared with `{story.given.alternative}`. The actuators: "
-        f"{'; '.join(titles)}. What was found counts in all of them but the ideal one."
+        f"{'; '.join(titles)}. Bodies, ground, springs, ripples and motors that were found count "
+        "in all of them; friction, inertia and coupling of a drivetrain in the one they were found "
+        "against."
     )
     return (Section("What it costs", (block, told, *map(Text, story.remarks))),)
 

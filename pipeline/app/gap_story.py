@@ -60,14 +60,15 @@ def with_found(model: MachineModel, found: Sequence[Found]) -> MachineModel:
 def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -> Effects:
     """Found effects on top of the model file's, ready for standing and walking."""
     assert given.robot is not None
-    names = tuple(f.effect for f in found)
-    chain = given.catalog.chain(given.alternative)
     edits = given.file.edits if known else ()
+    names = (*(edit.effect for edit in edits), *(f.effect for f in found))
+    # A log that was compared without an actuator: what bodies and ground change needs none.
+    chain = given.catalog.chain(given.alternative or next(iter(given.catalog.alternatives)))
 
     def apply(model: MachineModel) -> MachineModel:
         return with_found(apply_edits(model, edits), found)
 
-    return effects(given.robot, chain, apply, names, "model.toml")
+    return effects(given.robot, chain, apply, names, "model.toml", found_with=given.alternative)
 
 
 def cost(

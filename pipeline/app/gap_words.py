@@ -242,10 +242,10 @@ def removed(before: float, after: float, noise: float) -> float | None:
 
 def energy_words(change: EnergyChange, alternative: str) -> str:
     """What it costs in joules, and the break-even."""
-    names = list(dict.fromkeys((*PAIR, alternative)))
+    names = [n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before]
     parts = []
     for name in names:
-        if name not in change.before:
+        if name not in change.after:
             continue
         old, new = change.before[name].cycle, change.after[name].cycle
         if abs(new - old) <= NO_CHANGE * old:
@@ -253,10 +253,20 @@ def energy_words(change: EnergyChange, alternative: str) -> str:
         else:
             share = f"{100 * (new - old) / old:+.1f}".replace("-", "\N{MINUS SIGN}")
             parts.append(f"{name} {old:.1f} to {new:.1f} J ({share} %)")
-    text = (
-        "**What it costs:** electrical energy of one gait cycle of the whole robot, by actuator: "
-        f"{'; '.join(parts)}."
-    )
+    text = "**What it costs:** "
+    if parts:
+        text += (
+            "electrical energy of one gait cycle of the whole robot, by actuator: "
+            f"{'; '.join(parts)}."
+        )
+    silent = [name for name in names if name not in change.after]
+    if silent:
+        against = f"against `{alternative}`" if alternative else "against a joint without actuator"
+        return f"{text}{' ' * bool(parts)}" + (
+            f"No number is given for {_listed(silent)}, nor a break-even: friction and inertia "
+            f"were found {against}, other actuators have gears with losses of their own in the "
+            "catalogue, and the one cannot be added to the other."
+        )
     before, after = change.break_even_before, change.break_even_after
     if math.isnan(before) and math.isnan(after):
         return text + (

@@ -85,6 +85,8 @@ def run(options: argparse.Namespace) -> int:
         if judgement is not None:
             files += judging.pages(given, judgement, tables, options.out)
     print(f"{files} tables{' and figures' if options.verb == 'reports' else ''} in {options.out}")
+    for line in given.effects.remarks if given.effects else ():
+        print(line)
     for line in findings(walking, given) if walking else ():
         print(line)
     return 0

@@ -110,7 +110,14 @@ def _effects(file: ModelFile, path: Path, robot: Robot, catalog: Catalog) -> Eff
     names = tuple(edit.effect for edit in file.edits)
     alternative = file.alternative or next(name for name in catalog.alternatives if name != IDEAL)
     chain = catalog.chain(alternative)
-    return effects(robot, chain, lambda m: apply_edits(m, file.edits), names, path.name)
+    return effects(
+        robot,
+        chain,
+        lambda m: apply_edits(m, file.edits),
+        names,
+        path.name,
+        found_with=file.alternative,
+    )
 
 
 def refuse_impossible(robot: Robot) -> None:
