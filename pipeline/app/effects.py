@@ -49,6 +49,7 @@ class Effects:
         names: Of the effects in order.
         found_with: Alternative against which they were found; empty for none.
         apply: Puts them into a machine.
+        warnings: What of the model file a reader should know.
     """
 
     robot: Robot
@@ -58,6 +59,7 @@ class Effects:
     apply: Callable[[MachineModel], MachineModel]
     _bare: MachineModel
     _machine: MachineModel
+    warnings: tuple[str, ...] = ()
 
     @property
     def of_drivetrain(self) -> tuple[str, ...]:
@@ -114,8 +116,9 @@ class Effects:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Which effects leave standing and walking as they are, and why."""
-        out = [
+        """What of the file does not hold, and which effects leave standing and walking be."""
+        out = [*self.warnings]
+        out += [
             f"{name} acts on a sensor: standing and walking stay as they are"
             for name in self.names
             if name in SENSORS
@@ -144,6 +147,7 @@ def effects(
     file: str,
     *,
     found_with: str | None = None,
+    warnings: tuple[str, ...] = (),
 ) -> Effects:
     """Effects on a robot.
 
@@ -155,6 +159,7 @@ def effects(
         file: The model file's name.
         found_with: Alternative against which they were found, empty for none; the chain's by
             default.
+        warnings: What of the model file a reader should know.
 
     Raises:
         GapError: An effect does not fit the robot.
@@ -164,4 +169,4 @@ def effects(
     model = changed_model(robot.model, machine.bodies)
     edited = robot if model is robot.model else replace(robot, model=model)
     own = chain.name if found_with is None else found_with
-    return Effects(edited, file, names, own, apply, bare, machine)
+    return Effects(edited, file, names, own, apply, bare, machine, warnings)

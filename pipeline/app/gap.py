@@ -38,6 +38,8 @@ LAST = ("report.md", "index.html")
 #: Of earlier runs; a run without them takes them away.
 PASSING = ("effect_*.png", "effect_*.svg", "deciding_motion.*")
 EXPLAINED, UNEXPLAINED = 0, 1
+#: Remarks on the data that the terminal shows.
+SAID = 5
 
 
 def run_gap(options: argparse.Namespace) -> int:
@@ -70,6 +72,7 @@ def run_gap(options: argparse.Namespace) -> int:
             with staged(options.out) as folder:
                 _tables_into(folder, options, given, tables)
                 write_where_map(where.rows, given.model.joints, given.model.name, folder)
+            _say_warnings(given, where.intake.findings)
             _say_where(where)
             return EXPLAINED
         if options.step == "forward":
@@ -98,6 +101,7 @@ def run_gap(options: argparse.Namespace) -> int:
                 if options.step != "add":
                     _figures_and_page(told, tables, folder)
             _take_away_stale(options.out, told, tables)
+    _say_warnings(given, where.intake.findings)
     _say_answer(told.story, options.out)
     return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
 
@@ -161,6 +165,18 @@ def _say_findings(findings: Sequence[Finding]) -> None:
     print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
 
 
+def _say_warnings(given: Setup, findings: Sequence[Finding]) -> None:
+    """What a reader of the answer should know about files and logs, the first few."""
+    lines = list(given.warnings)
+    for f in findings:
+        if f.verdict == "warning":
+            lines.append(f"{f.log}{' ' if f.column else ''}{f.column}: {f.detail}")
+    for line in lines[:SAID]:
+        print(f"note: {line}")
+    if len(lines) > SAID:
+        print(f"note: {len(lines) - SAID} more remarks of this kind in quality.csv")
+
+
 def _say_where(where: Whereabouts) -> None:
     for row in [r for r in where.rows if r.by == WHOLE][:3]:
         print(
@@ -187,7 +203,7 @@ def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
         "options": {
             "step": options.step,
             "base": options.base or "as the log and the robot say",
-            "alternative": given.alternative,
+            "alternative": given.alternative or "none: the torque is the joint's",
             "effort": options.effort or "the log's most direct",
             "cutoff_Hz": options.cutoff,
             "gait_start_s": options.gait_start,
@@ -195,5 +211,5 @@ def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
         },
         "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "
         "direction; gap is measured less predicted",
-        "warnings": [],
+        "warnings": list(given.warnings),
     }

@@ -280,8 +280,10 @@ def _energy(story: Story) -> tuple[Section, ...]:
         for name in change.before
         if name in catalog.alternatives
     ]
+    own = story.given.alternative
+    against = f"`{own}`" if own else "no actuator: its torque is the joint's"
     told = Text(
-        f"The log was compared with `{story.given.alternative}`. The actuators: "
+        f"The log was compared with {against}. The actuators: "
         f"{'; '.join(titles)}. Bodies, ground, springs, ripples and motors that were found count "
         "in all of them; friction, inertia and coupling of a drivetrain in the one they were found "
         "against."
@@ -332,7 +334,8 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
     parts = story.where.parts
     settings = story.where.intake.settings
     shares = [float(m.mask.mean()) for m in story.where.measurements]
-    texts = [
+    texts = [f"**Note:** {warning}." for warning in story.given.warnings]
+    texts += [
         f"Compared at a bandwidth of {settings.cutoff:.3g} Hz ({settings.reason}). "
         f"{words.percent(float(np.mean(shares)))} of the rows count, by joint: not those whose "
         "filter sees the joint stop or turn back, where friction takes any value, nor the ends of "

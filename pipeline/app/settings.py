@@ -117,6 +117,7 @@ def _effects(file: ModelFile, path: Path, robot: Robot, catalog: Catalog) -> Eff
         names,
         path.name,
         found_with=file.alternative,
+        warnings=file.changed,
     )
 
 

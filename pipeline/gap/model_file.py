@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -49,6 +50,7 @@ _ROBOT: Final = ("file", "sha256")
 _ACTUATORS: Final = ("alternative", "sha256")
 _EDIT: Final = ("effect", "place", "basis", "source", "parameters")
 _PARAMETER: Final = ("value", "unit", "interval")
+_HASH: Final = re.compile(r"[0-9a-f]{64}")
 _BASES: Final = ("identified", "doubtful", "assumed")
 
 
@@ -194,8 +196,12 @@ def load_model(path: Path) -> MachineModel:
     return apply_edits(base_model(file), file.edits)
 
 
-def read_model_file(path: Path) -> ModelFile:
+def read_model_file(path: Path, catalog: Path = CATALOG) -> ModelFile:
     """Read and check a model file.
+
+    Args:
+        path: The file.
+        catalog: Folder of the actuator files, to compare their hashes.
 
     Raises:
         ModelFileError: It cannot be read, is no TOML, or a key or value is wrong; the message names
@@ -223,6 +229,12 @@ def read_model_file(path: Path) -> ModelFile:
         raise ModelFileError(f"{where} [actuators.sha256]: expected file = hash")
     robot_path = path.parent / _text(robot, "file", f"{where} [robot]")
     robot_hash = _text(robot, "sha256", f"{where} [robot]")
+    for name, value in {"robot": robot_hash, **hashes}.items():
+        if not _HASH.fullmatch(value):
+            raise ModelFileError(
+                f"{where}: sha256 of {one_line(name)}: '{one_line(value)}' is no SHA-256; expected "
+                "64 hexadecimal digits"
+            )
     alternative = actuators.get("alternative", "")
     if not isinstance(alternative, str):
         raise ModelFileError(f"{where} [actuators]: alternative must be a text")
@@ -232,7 +244,7 @@ def read_model_file(path: Path) -> ModelFile:
         alternative=alternative,
         actuators_sha256=hashes,
         edits=_edits(table, where),
-        changed=_changed(robot_path, robot_hash, hashes),
+        changed=_changed(where, robot_path, robot_hash, hashes, catalog),
     )
 
 
@@ -259,16 +271,18 @@ def _edits(table: Mapping[str, Any], where: str) -> tuple[Edit, ...]:
     return tuple(_edit(e, f"{where}: edit {k}") for k, e in enumerate(edits, start=1))
 
 
-def _changed(robot: Path, robot_hash: str, hashes: Mapping[str, str]) -> tuple[str, ...]:
+def _changed(
+    where: str, robot: Path, robot_hash: str, hashes: Mapping[str, str], catalog: Path
+) -> tuple[str, ...]:
+    """Files that are not those of the hashes, in words."""
     out = []
+    since = "is not the one its effects were found with (other SHA-256)"
     if file_sha256(robot) != robot_hash:
-        out.append(f"{robot.name} has changed since the edits were identified")
+        out.append(f"{where}: {one_line(robot.name)} {since}: they may not fit it any more")
     for name, written in hashes.items():
-        file = CATALOG / Path(name).name
+        file = catalog / Path(name).name
         if not file.exists() or file_sha256(file) != written:
-            out.append(
-                f"actuator file {one_line(name)} has changed since the edits were identified"
-            )
+            out.append(f"{where}: actuator file {one_line(name)} {since}")
     return tuple(out)
 
 
