@@ -310,7 +310,8 @@ def _left(story: Story) -> Section:
         ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like"),
         rows,
         f"What the model as written leaves on held-out data; {len(every) - len(shown)} pairs of "
-        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as noise.",
+        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as "
+        "noise.",
         "",
         TONES,
         3,
