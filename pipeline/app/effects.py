@@ -1,8 +1,12 @@
 """What a model file's effects change in standing and walking.
 
 Bodies and ground change what is demanded of the joints; so do springs and ripples, which act beside
-the actuators. Friction, inertia and motors change the actuators of the joints they sit in, in every
-alternative but the ideal one, which has none by definition.
+the actuators. They count in every alternative, and so does what is found of the motor, which all of
+them share. Friction, inertia and coupling of a drivetrain belong to the alternative they were found
+against: what was found beside a motor's data sheet alone is all that the machine's gears lose.
+Another alternative has gears, and losses of their own in the catalogue; to add one to the other
+would count gears twice, and to put one in place of the other would make a self-locking gear lock no
+more. So there they do not count, and it is said.
 """
 
 from __future__ import annotations
@@ -15,7 +19,7 @@ from numpy.typing import NDArray
 
 from actuators.chain import Chain
 from pipeline.app.edited_chain import edited_chain
-from pipeline.gap.model import MachineModel, machine_of_robot
+from pipeline.gap.model import JointModel, MachineModel, machine_of_robot
 from pipeline.gap.rigid import changed_model
 from pipeline.joint_demand import JointDemand
 from pipeline.kinematics import foot_force_torques
@@ -26,7 +30,7 @@ Array = NDArray[np.float64]
 #: The alternative that stays without losses.
 IDEAL = "ideal"
 #: What acts on sensors alone.
-SENSORS = ("effort_offset", "position_offset", "time_delay")
+SENSORS = ("effort_offset", "effort_gain", "position_offset", "time_delay")
 #: What moves the motor by so little, or changes so slowly, that one cycle does not see it.
 LEFT_OUT = {
     "joint_elasticity": "the motor's own motion differs by the wind-up only",
@@ -43,21 +47,43 @@ class Effects:
         robot: With the bodies and the ground that the effects change.
         file: The model file's name.
         names: Of the effects in order.
+        found_with: Alternative against which they were found; empty for none.
         apply: Puts them into a machine.
+        warnings: What of the model file a reader should know.
     """
 
     robot: Robot
     file: str
     names: tuple[str, ...]
+    found_with: str
     apply: Callable[[MachineModel], MachineModel]
+    _bare: MachineModel
     _machine: MachineModel
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def of_drivetrain(self) -> tuple[str, ...]:
+        """Joints whose drivetrain the effects change."""
+        pairs = zip(self._bare.actuators, self._machine.actuators, strict=True)
+        return tuple(new.name for old, new in pairs if _drivetrain(old) != _drivetrain(new))
+
+    def counts_in(self, alternative: str) -> bool:
+        """Whether all that the effects change in actuators counts in an alternative.
+
+        The ideal one has no losses by definition; there is nothing to tell about it.
+        """
+        return alternative in (IDEAL, self.found_with) or not self.of_drivetrain
 
     def chain(self, chain: Chain) -> Chain:
-        """The chain of one alternative with the effects in it."""
+        """The chain of one alternative with the effects in it that count there."""
         if chain.name == IDEAL:
             return chain
-        edited = self.apply(machine_of_robot(self.robot, chain))
-        return edited_chain(chain, edited.actuators)
+        edited = self.apply(machine_of_robot(self.robot, chain)).actuators
+        if not self.counts_in(chain.name):
+            edited = tuple(
+                replace(a, elements=chain.elements, coupled_to="", coupling=0.0) for a in edited
+            )
+        return edited_chain(chain, edited)
 
     def chains(self, chains: Mapping[str, Chain]) -> dict[str, Chain]:
         """Every alternative with the effects in it."""
@@ -90,14 +116,27 @@ class Effects:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """Which effects leave standing and walking as they are, and why."""
-        out = [
+        """What of the file does not hold, and which effects leave standing and walking be."""
+        out = [*self.warnings]
+        out += [
             f"{name} acts on a sensor: standing and walking stay as they are"
             for name in self.names
             if name in SENSORS
         ]
         out += [f"{n} is left out: {LEFT_OUT[n]}" for n in self.names if n in LEFT_OUT]
+        if self.of_drivetrain:
+            against = f"'{self.found_with}'" if self.found_with else "no actuator at all"
+            out.append(
+                f"what was found of the drivetrain of {', '.join(self.of_drivetrain)} was found "
+                f"against {against} and counts there alone: other actuators have gears with losses "
+                "of their own, to which it cannot be added"
+            )
         return tuple(dict.fromkeys(out))
+
+
+def _drivetrain(actuator: JointModel) -> tuple[object, ...]:
+    """What stands between joint and motor."""
+    return (*map(id, actuator.elements), actuator.coupled_to, actuator.coupling)
 
 
 def effects(
@@ -106,20 +145,28 @@ def effects(
     apply: Callable[[MachineModel], MachineModel],
     names: tuple[str, ...],
     file: str,
+    *,
+    found_with: str | None = None,
+    warnings: tuple[str, ...] = (),
 ) -> Effects:
     """Effects on a robot.
 
     Args:
         robot: As its file states it.
-        chain: Of any alternative with a motor.
+        chain: Of the alternative they were found against, or of any with a motor.
         apply: Puts the effects into a machine.
         names: Of the effects in order.
         file: The model file's name.
+        found_with: Alternative against which they were found, empty for none; the chain's by
+            default.
+        warnings: What of the model file a reader should know.
 
     Raises:
         GapError: An effect does not fit the robot.
     """
-    machine = apply(machine_of_robot(robot, chain))
+    bare = machine_of_robot(robot, chain)
+    machine = apply(bare)
     model = changed_model(robot.model, machine.bodies)
     edited = robot if model is robot.model else replace(robot, model=model)
-    return Effects(edited, file, names, apply, machine)
+    own = chain.name if found_with is None else found_with
+    return Effects(edited, file, names, own, apply, bare, machine, warnings)

@@ -24,7 +24,6 @@ from pipeline.app.gap_report import Story, write_report
 from pipeline.app.gap_run import Progress, Whereabouts, find_where, judged
 from pipeline.app.gap_setup import Setup, check_options, setup, take_in
 from pipeline.app.gap_shrink import check
-from pipeline.app.gap_stages import noise_floor, overall
 from pipeline.app.gap_story import Told, tell
 from pipeline.app.gap_tables import candidates_table, found_table, quality_table, where_table
 from pipeline.app.staging import staged
@@ -37,6 +36,8 @@ from reports.writer import write_table, write_text
 logger = logging.getLogger("legwatt")
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 EXPLAINED, UNEXPLAINED = 0, 1
+#: Remarks on the data that the terminal shows.
+SAID = 5
 
 
 def run_gap(options: argparse.Namespace) -> int:
@@ -69,6 +70,7 @@ def run_gap(options: argparse.Namespace) -> int:
             with _staged(options, given) as folder:
                 _tables_into(folder, options, given, tables)
                 write_where_map(where.rows, given.model.joints, given.model.name, folder)
+            _say_warnings(given, where.intake.findings)
             _say_where(where)
             return EXPLAINED
         if options.step == "forward":
@@ -76,7 +78,7 @@ def run_gap(options: argparse.Namespace) -> int:
             return _drive(given, where, options)
         if options.step == "shrink":
             progress.step("weighing the model file's effects")
-            told = check(given, where, options)
+            told = check(given, where)
         else:
             progress.step("letting effects compete")
             told = tell(given, where, options, progress)
@@ -96,8 +98,9 @@ def run_gap(options: argparse.Namespace) -> int:
                     write_text(folder / "model.toml", told.model_file)
                 if options.step != "add":
                     _figures_and_page(told, tables, folder)
+    _say_warnings(given, where.intake.findings)
     _say_answer(told.story, options.out)
-    return UNEXPLAINED if naming.unexplained else EXPLAINED
+    return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
 
 
 def _drive(given: Setup, where: Whereabouts, options: argparse.Namespace) -> int:
@@ -132,16 +135,14 @@ def _tables_into(
 
 def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None:
     story, where = told.story, told.story.where
-    model, stages = story.given.model, story.stages
+    model, weighed = story.given.model, told.story.weighed
     write_where_map(where.rows, model.joints, model.name, folder)
-    floor = noise_floor(where.measurements)
-    write_waterfall(stages, overall(floor), story.naming.unit, model.name, folder)
-    first = len(stages) - len(story.naming.found)
-    write_in_time(where.measurements, stages[first - 1], stages[-1], told.shown, folder)
-    for k, (found, name) in enumerate(zip(story.naming.found, story.signatures, strict=True)):
-        joint = told.effect_joints[k]
+    unit = story.naming.unit
+    write_waterfall(weighed.stages, story.noise, unit, model.name, folder)
+    write_in_time(where.measurements, weighed.stages[1], weighed.stages[-1], told.shown, folder)
+    shown = zip(story.naming.found, story.signatures, weighed.pairs, weighed.joints, strict=True)
+    for found, name, pair, joint in shown:
         stem = Path(name).stem
-        pair = (stages[first + k - 1], stages[first + k])
         write_signature(where.measurements, *pair, joint, found.effect, found.place, stem, folder)
     footer = (
         f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "
@@ -156,6 +157,18 @@ def _say_findings(findings: Sequence[Finding]) -> None:
         place = f" {finding.column}" if finding.column else ""
         print(f"{finding.log}{place}: {finding.verdict}: {finding.detail}")
     print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
+
+
+def _say_warnings(given: Setup, findings: Sequence[Finding]) -> None:
+    """What a reader of the answer should know about files and logs, the first few."""
+    lines = list(given.warnings)
+    for f in findings:
+        if f.verdict == "warning":
+            lines.append(f"{f.log}{' ' if f.column else ''}{f.column}: {f.detail}")
+    for line in lines[:SAID]:
+        print(f"note: {line}")
+    if len(lines) > SAID:
+        print(f"note: {len(lines) - SAID} more remarks of this kind in quality.csv")
 
 
 def _say_where(where: Whereabouts) -> None:
@@ -188,7 +201,7 @@ def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
         "options": {
             "step": options.step,
             "base": options.base or "as the log and the robot say",
-            "alternative": given.alternative,
+            "alternative": given.alternative or "none: the torque is the joint's",
             "effort": options.effort or "the log's most direct",
             "cutoff_Hz": options.cutoff,
             "gait_start_s": options.gait_start,
@@ -196,5 +209,5 @@ def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
         },
         "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "
         "direction; gap is measured less predicted",
-        "warnings": [],
+        "warnings": list(given.warnings),
     }

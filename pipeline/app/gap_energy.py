@@ -39,7 +39,7 @@ class EnergyChange:
 
     Attributes:
         before: By alternative.
-        after: By alternative.
+        after: By alternative; of those alone in which all the effects count.
         break_even_before: Fraction of time standing above which the irreversible actuator uses
             less in the middle legs (Fig. 21 of the paper); NaN where there is none.
         break_even_after: The same with the effects.
@@ -69,7 +69,8 @@ def energy_change(
     before = _costs(robot, chains, None)
     if known is not None:
         before = _costs(known.robot, known.chains(chains), known.demand)
-    after = _costs(effects.robot, effects.chains(chains), effects.demand)
+    told = {name: chain for name, chain in chains.items() if effects.counts_in(name)}
+    after = _costs(effects.robot, effects.chains(told), effects.demand)
     return EnergyChange(before, after, break_even(before, period), break_even(after, period))
 
 

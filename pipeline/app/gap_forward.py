@@ -15,17 +15,12 @@ from numpy.typing import NDArray
 
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
-from pipeline.app.gap_story import AS_IT_WAS
 from pipeline.app.gap_words import place_text
-from pipeline.gap.columns import make_benches
+from pipeline.app.gap_written import AS_IT_WAS
 from pipeline.gap.forward import ForwardSimulator, Rollout, servo_input
 from pipeline.gap.log import Log
-from pipeline.gap.model import MachineModel
 from pipeline.gap.model_file import apply_edits
-from pipeline.gap.nuisance import with_tolerances
-from pipeline.gap.observe import observe
-from pipeline.gap.problem import Problem
-from pipeline.gap.refit import refit, tolerances_of
+from pipeline.gap.weigh import Weighing
 from reports.table import Table
 from reports.tables import forward as tables
 
@@ -73,20 +68,13 @@ def forward(given: Setup, where: Whereabouts, options: argparse.Namespace) -> tu
         label = f"{edit.effect} at {place_text(edit.place)}"
         models.append((label, apply_edits(models[-1][1], [edit])))
     out = []
+    weighing = Weighing(given.bare, where.measurements)
     for label, model in models:
-        machine = ForwardSimulator(_calibrated(model, where))
+        machine = ForwardSimulator(weighing.calibrated(model))
         out += [
             Drive(log, label, machine.run(servo)) for log, servo in zip(logs, servos, strict=True)
         ]
     return tuple(out)
-
-
-def _calibrated(model: MachineModel, where: Whereabouts) -> MachineModel:
-    """The model with its tolerances as *fit* and *choose* show them."""
-    seen = observe(model, where.intake.prepared, where.parts)
-    sigma = np.sqrt(np.mean([m.noise**2 for m in where.measurements], axis=0))
-    problem = refit(Problem(model, make_benches(seen), sigma))
-    return with_tolerances(model, tolerances_of(problem))
 
 
 def rms(drives: Sequence[Drive]) -> float:

@@ -13,7 +13,8 @@ from pipeline.app.gap_constants import voltage_remarks
 from pipeline.app.gap_energy import EnergyChange
 from pipeline.app.gap_run import Whereabouts
 from pipeline.app.gap_setup import Setup
-from pipeline.app.gap_stages import Stage, noise_floor, overall
+from pipeline.app.gap_stages import noise_floor, overall
+from pipeline.app.gap_written import Weighed
 from pipeline.app.names import legs_text
 from pipeline.gap.circumstances import WHOLE
 from pipeline.gap.verdict import ACCEPTED, REJECTED, UNEXPLAINED, Naming, Remainder
@@ -53,26 +54,27 @@ class Story:
     Attributes:
         given: Robot and actuators.
         where: Steps 1 and 2.
-        naming: Step 3; None where a model file was checked without naming.
-        stages: The gap effect by effect; the first without effects.
+        naming: Step 3; without candidates where a model file was checked.
+        weighed: The model as written against the logs, effect by effect.
         energy: With and without the effects; None for a robot that does not walk.
         signatures: File name to caption, one per effect.
         decides: What the deciding motion is, in words; empty without one.
         remarks: What else a reader should know.
-        joints: Per effect, the column at which it shows.
-        writes_model: Whether ``model.toml`` is written.
     """
 
     given: Setup
     where: Whereabouts
     naming: Naming
-    stages: tuple[Stage, ...]
+    weighed: Weighed
     energy: EnergyChange | None
     signatures: dict[str, str]
     decides: str
     remarks: tuple[str, ...]
-    joints: tuple[int, ...] = ()
-    writes_model: bool = False
+
+    @property
+    def noise(self) -> float:
+        """Noise floor of all joints in the compared channel, of the logs that prove."""
+        return overall(noise_floor(self.where.measurements))
 
 
 def write_report(story: Story, tables: Sequence[Table], folder: Path, footer: str) -> None:
@@ -86,7 +88,7 @@ def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) ->
     """The page; see `write_report`."""
     names = ", ".join(m.name for m in story.where.measurements)
     files = {f"{t.name}.csv": t.description for t in tables.values()}
-    if story.writes_model:
+    if story.weighed.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     return Page(
         title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
@@ -106,33 +108,29 @@ def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) ->
 
 def answer(story: Story) -> tuple[str, ...]:
     """The first lines: where, what, how much smaller, what it costs, what is left."""
-    naming = story.naming
-    out = [words.where_words(story.where.rows), words.what_words(naming)]
-    if naming.found:
-        out.append(words.shrink_words(_falls(story), _whole(story)))
+    naming, weighed = story.naming, story.weighed
+    out = [
+        words.where_words(story.where.rows),
+        words.what_words(naming, unexplained=weighed.unexplained),
+        words.shrink_words(naming.found, _joints(story), _whole(story), naming.unit, story.noise),
+    ]
     if story.energy is not None:
         out.append(words.energy_words(story.energy, story.given.alternative))
-    out.append(words.left_words(naming.remainders))
     undecided = words.rival_words(naming.found, bool(story.decides))
-    return (*out, undecided) if undecided else tuple(out)
+    out += [undecided] if undecided else []
+    return (*out, words.left_words(weighed.left))
 
 
-def _falls(story: Story) -> list[tuple[str, str, float, float, float, str]]:
-    """Gap before and after each effect at the joint where it shows."""
-    floor = noise_floor(story.where.measurements)
-    first = len(story.stages) - len(story.naming.found)
-    out = []
-    for k, (f, j) in enumerate(zip(story.naming.found, story.joints, strict=True)):
-        before, after = (float(story.stages[first + i].gap[j]) for i in (k - 1, k))
-        name = f"{f.effect} at {words.place_text(f.place)}"
-        joint = story.given.model.joints[j]
-        out.append((name, joint, before, after, float(floor[j]), story.naming.unit))
-    return out
+def _joints(story: Story) -> list[str]:
+    """Per effect, the joint at which it shows."""
+    return [story.given.model.joints[j] for j in story.weighed.joints]
 
 
-def _whole(story: Story) -> tuple[float, float]:
-    """Gap of all joints of the model as it was and with everything estimated."""
-    return overall(story.stages[0].gap), overall(story.stages[-1].gap)
+def _whole(story: Story) -> tuple[float, float, float]:
+    """Gap of all joints of the model as it was, with tolerances, and as written."""
+    first, tolerances, *_ = story.weighed.stages
+    last = story.weighed.stages[-1]
+    return overall(first.gap), overall(tolerances.gap), overall(last.gap)
 
 
 def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
@@ -194,10 +192,10 @@ def _candidates(story: Story) -> TableBlock:
         for c in every[:SHOWN_CANDIDATES]
     )
     return TableBlock(
-        ("effect", "place", "held out without", "with", "unit", "verdict", "why"),
+        ("effect", "place", "validation without", "with", "unit", "verdict", "why"),
         rows,
         f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried. "
-        "Without and with: gap on data that did not fit the candidate, tolerances estimated anew "
+        "Without and with: gap on rows that choose, by estimates from others, tolerances anew "
         "for either, so that what they take up speaks for no candidate; a dash: left out after "
         "screening.",
         "candidates.csv",
@@ -207,8 +205,8 @@ def _candidates(story: Story) -> TableBlock:
 
 
 def _smaller(story: Story, folder: Path) -> Section:
-    last = story.stages[-1]
-    first, parts = story.stages[0], story.stages[-1 - len(story.naming.found)]
+    first, parts, *_ = story.weighed.stages
+    last = story.weighed.stages[-1]
     floor = noise_floor(story.where.measurements)
     joints = story.given.model.joints
     unit = story.naming.unit
@@ -228,14 +226,14 @@ def _smaller(story: Story, folder: Path) -> Section:
         FigureBlock(folder / "waterfall.svg", "The gap of all joints, effect by effect."),
         FigureBlock(
             folder / "in_time.svg",
-            "Measured and predicted, and what is left, without and with what was found.",
+            "Measured and predicted, and what is left, without and with what the model file holds.",
         ),
         TableBlock(
-            ("joint", "as it was", "with tolerances", "with effects", "noise floor", "unit"),
+            ("joint", "as it was", "with tolerances", "as written", "noise floor", "unit"),
             rows,
             "Gap, root mean square, on held-out data. Tolerances are what every machine "
             "differs in from its files: masses, torque constants, encoder zeros, each within its "
-            "stated uncertainty.",
+            "stated uncertainty. As written: with the effects of the model file, read back.",
             digits=3,
         ),
     ]
@@ -250,9 +248,9 @@ def _energy(story: Story) -> tuple[Section, ...]:
         (
             name,
             change.before[name].cycle,
-            change.after[name].cycle,
+            change.after[name].cycle if name in change.after else None,
             change.before[name].standing,
-            change.after[name].standing,
+            change.after[name].standing if name in change.after else None,
         )
         for name in change.before
     )
@@ -260,7 +258,8 @@ def _energy(story: Story) -> tuple[Section, ...]:
         ("alternative", "cycle before [J]", "after [J]", "standing before [W]", "after [W]"),
         rows,
         "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
-        "energy lost, and power to stand as the robot file says, without and with what was found.",
+        "energy lost, and power to stand as the robot file says, without and with what the model "
+        "file holds; a dash: it cannot be told.",
     )
     catalog = story.given.catalog
     titles = [
@@ -268,15 +267,19 @@ def _energy(story: Story) -> tuple[Section, ...]:
         for name in change.before
         if name in catalog.alternatives
     ]
+    own = story.given.alternative
+    against = f"`{own}`" if own else "no actuator: its torque is the joint's"
     told = Text(
-        f"The log was compared with `{story.given.alternative}`. The actuators: "
-        f"{'; '.join(titles)}. What was found counts in all of them but the ideal one."
+        f"The log was compared with {against}. The actuators: "
+        f"{'; '.join(titles)}. Bodies, ground, springs, ripples and motors that were found count "
+        "in all of them; friction, inertia and coupling of a drivetrain in the one they were found "
+        "against."
     )
     return (Section("What it costs", (block, told, *map(Text, story.remarks))),)
 
 
 def _left(story: Story) -> Section:
-    every = sorted(story.naming.remainders, key=_ratio, reverse=True)
+    every = sorted(story.weighed.left, key=_ratio, reverse=True)
     shown = [r for r in every if r.significant] or every[:5]
     rows = tuple(
         (
@@ -293,8 +296,9 @@ def _left(story: Story) -> Section:
     block = TableBlock(
         ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like"),
         rows,
-        f"What is left on held-out data; {len(every) - len(shown)} pairs of joint and channel "
-        f"are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as noise.",
+        f"What the model as written leaves on held-out data; {len(every) - len(shown)} pairs of "
+        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as "
+        "noise.",
         "",
         TONES,
         3,
@@ -318,7 +322,8 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
     parts = story.where.parts
     settings = story.where.intake.settings
     shares = [float(m.mask.mean()) for m in story.where.measurements]
-    texts = [
+    texts = [f"**Note:** {warning}." for warning in story.given.warnings]
+    texts += [
         f"Compared at a bandwidth of {settings.cutoff:.3g} Hz ({settings.reason}). "
         f"{words.percent(float(np.mean(shares)))} of the rows count, by joint: not those whose "
         "filter sees the joint stop or turn back, where friction takes any value, nor the ends of "
@@ -327,7 +332,7 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
         f"{parts.guard:.2g} s apart, so that none holds a trace of another. "
         + words.held_out_words(story.where.measurements),
     ]
-    texts += words.one_way_words(story.where.measurements, story.joints)
+    texts += words.one_way_words(story.where.measurements, story.weighed.joints)
     if parts.warning:
         texts.append(f"**Note:** {parts.warning}.")
     odd = [value != "ok" for value in tables["quality"].columns["verdict"]]

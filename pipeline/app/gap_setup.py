@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -26,12 +26,17 @@ from pipeline.gap.mapping import load_mapping
 from pipeline.gap.model import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.gap.model_file import ModelFile, apply_edits, new_model_file, read_model_file
 from pipeline.gap.parts import Parts, split
+from pipeline.gap.read import plan_reading
+from pipeline.gap.repeats import refuse_repeats
 from pipeline.gap.stream import Stream, Survey, survey
+from pipeline.gap.table_file import sha256
 from pipeline.robot import Robot, load_robot
 from pipeline.robot_file import load_robot_file
 
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
 DEFAULT_ALTERNATIVE = "rotor"
+#: The channel that is compared without an actuator, for a robot file as for a bare URDF.
+AT_JOINT = "torque"
 BASES = ("fixed", "level", "measured")
 
 
@@ -49,6 +54,7 @@ class Setup:
         alternative: Name of the actuator chain; empty without one.
         file: The model file whose edits are in `model`; without edits where none was given.
         bare: The model before those edits.
+        warnings: What of the files a reader should know, in words.
     """
 
     path: Path
@@ -60,6 +66,7 @@ class Setup:
     alternative: str
     file: ModelFile
     bare: MachineModel
+    warnings: tuple[str, ...] = ()
 
     @property
     def legged(self) -> bool:
@@ -77,24 +84,27 @@ def setup(options: argparse.Namespace) -> Setup:
     """
     folder = options.actuators or Path(CATALOG)
     catalog = load_catalog(folder)
-    given_file = read_model_file(options.model) if options.model else None
+    given_file = read_model_file(options.model, folder) if options.model else None
     path: Path = options.robot or (given_file.robot if given_file else DEFAULT_ROBOT)
-    alternative = options.alternative or (given_file.alternative if given_file else "")
-    if path.suffix.lower() == ".toml":
-        alternative = alternative or DEFAULT_ALTERNATIVE
-    chain = catalog.chain(alternative) if alternative else None
+    alternative = _alternative(options, given_file)
     if not path.is_file():
         fact = "is a folder" if path.is_dir() else "no such robot file"
         raise RobotFileError(f"{path}: {fact}; name a robot file or URDF with --robot")
     robot = _robot(path, options.base)
     if robot is None:
+        chain = catalog.chain(alternative) if alternative else None
         bare = machine_of_urdf(path, chain=chain)
         ratio = _ratio(chain, len(bare.joints))
         expected = expected_of_model(bare.rigid, bare.name, joints=bare.joints, ratio=ratio)
         sources: tuple[Path, ...] = (path,)
     else:
+        # Motor-side positions need a ratio whatever channel is compared.
+        usual = catalog.chain(alternative or DEFAULT_ALTERNATIVE)
+        expected = expected_of_robot(robot, ratio=_ratio(usual, len(robot.joints)))
+        if not alternative and _channel(options, expected) != AT_JOINT:
+            alternative = DEFAULT_ALTERNATIVE
+        chain = usual if alternative else None
         bare = machine_of_robot(robot, chain)
-        expected = expected_of_robot(robot, ratio=_ratio(chain, len(robot.joints)))
         sources = (*robot.spec.sources, *(() if robot.spec.build else (robot.spec.urdf,)))
     edits = given_file.edits if given_file else ()
     file = replace(new_model_file(path, alternative, folder), edits=edits)
@@ -108,7 +118,33 @@ def setup(options: argparse.Namespace) -> Setup:
         alternative=alternative,
         file=file,
         bare=bare,
+        warnings=given_file.changed if given_file else (),
     )
+
+
+def _alternative(options: argparse.Namespace, file: ModelFile | None) -> str:
+    """The actuator that options or model file name; empty where neither does.
+
+    Raises:
+        GapError: They name different ones, and the file holds effects.
+    """
+    asked: str = options.alternative or ""
+    if file is None:
+        return asked
+    if asked and file.edits and file.alternative and asked != file.alternative:
+        raise ModelFileError(
+            f"{options.model}: its effects were found against '{file.alternative}', which "
+            f"--alternative {asked} contradicts; leave one of the two out"
+        )
+    return asked or file.alternative
+
+
+def _channel(options: argparse.Namespace, expected: Expected) -> str:
+    """The effort channel that will be compared, by the first log's header."""
+    if options.effort:
+        return str(options.effort)
+    mapping = load_mapping(options.mapping) if options.mapping else None
+    return plan_reading(options.logs[0], expected, mapping).channel
 
 
 def _robot(path: Path, base: str | None) -> Robot | None:
@@ -196,6 +232,7 @@ def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, i
         lasts = [options.prove_last if k < count else None for k in range(len(streams))]
         surveys = tuple(survey(s, prove_last=t) for s, t in zip(streams, lasts, strict=True))
     logs = [s.log for s in surveys] or [stream.whole for stream in streams]
+    refuse_repeats(logs)
     largest, contact = _largest(given), _contact(given, options.gait_start)
     intake = prepare_logs(
         logs, given.expected, cutoff=options.cutoff, largest=largest, contact=contact
@@ -248,6 +285,7 @@ def check_options(options: argparse.Namespace) -> None:
             raise LogContentError(f"{path}: is a folder; name its CSV or Parquet files")
         if not path.is_file():
             raise LogContentError(f"{path}: no such log; name a CSV or Parquet file")
+    _refuse_twice((*options.logs, *options.holdout))
     for file, what, error in (
         (options.mapping, "mapping", MappingError),
         (options.model, "model", ModelFileError),
@@ -261,3 +299,20 @@ def check_options(options: argparse.Namespace) -> None:
         raise GapError(f"--gait-start {options.gait_start}: expected a time in the log [s]")
     if options.effort and options.effort not in EFFORTS:
         raise GapError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")
+
+
+def _refuse_twice(paths: Sequence[Path]) -> None:
+    """Refuse a file that is given twice, under whatever name.
+
+    Raises:
+        LogContentError: Names both.
+    """
+    seen: dict[str, Path] = {}
+    for path in paths:
+        digest = sha256(path)
+        if digest in seen:
+            raise LogContentError(
+                f"{path}: the same data as {seen[digest]}; what proves must be data of its own, "
+                "and data given twice count twice; leave one out"
+            )
+        seen[digest] = path

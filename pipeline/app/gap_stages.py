@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from pipeline.gap.circumstances import gap_of
 from pipeline.gap.long import LongLogs
-from pipeline.gap.measurement import PROVE, Measurement
+from pipeline.gap.measurement import CHOOSE, PROVE, Measurement
 from pipeline.gap.model import MachineModel
 from pipeline.gap.simulate import Prediction, Simulator
+from pipeline.gap.weigh import floor_of
 
 Array = NDArray[np.float64]
 
@@ -24,12 +25,20 @@ class Stage:
     Attributes:
         label: What it has that the one before has not.
         predictions: One per log.
-        gap: Root mean square on *prove* by joint, shape (J,), NaN where no row counts.
+        gaps: Root mean square on *prove* by joint and channel, shape (J, C), NaN where no row
+            counts.
+        valid: The same on *choose*, of the compared channel, shape (J,).
     """
 
     label: str
     predictions: tuple[Prediction, ...]
-    gap: Array
+    gaps: Array
+    valid: Array
+
+    @property
+    def gap(self) -> Array:
+        """On *prove*, of the compared channel, by joint, shape (J,)."""
+        return np.asarray(self.gaps[:, 0])
 
 
 def stages(
@@ -46,20 +55,20 @@ def stages(
             that of every row that proves.
     """
     by_log = [_along(models, Simulator(m)) for m in measurements]
+    held = list(zip(measurements, by_log, strict=True))
+    chosen = _root([_squares(m, predictions, CHOOSE) for m, predictions in held])
     if long is None:
-        proving = list(zip(measurements, by_log, strict=True))
-        squares = [_squares(m, predictions) for m, predictions in proving]
+        proved = _root([_squares(m, predictions, PROVE) for m, predictions in held])
     else:
-        squares = [
-            _squares(simulator.measurement, _along(models, simulator))
-            for _, simulator in long.chunks(models[0][1], measurements)
-            if (simulator.measurement.part == PROVE).any()
-        ]
-    total = np.sum(squares, axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        gaps = np.sqrt(total[0] / total[1])
+        proved = _root(
+            [
+                _squares(simulator.measurement, _along(models, simulator), PROVE)
+                for _, simulator in long.chunks(models[0][1], measurements)
+                if (simulator.measurement.part == PROVE).any()
+            ]
+        )
     return tuple(
-        Stage(label, tuple(predictions[k] for predictions in by_log), gaps[k])
+        Stage(label, tuple(predictions[k] for predictions in by_log), proved[k], chosen[k, :, 0])
         for k, (label, _) in enumerate(models)
     )
 
@@ -72,16 +81,24 @@ def _along(models: Sequence[tuple[str, MachineModel]], simulator: Simulator) -> 
     return out
 
 
-def _squares(m: Measurement, predictions: Sequence[Prediction]) -> Array:
-    """Squared gaps and rows on *prove*, by model and joint, shape (2, M, J)."""
-    proves = m.part == PROVE
-    out = np.zeros((2, len(predictions), len(m.joints)))
+def _squares(m: Measurement, predictions: Sequence[Prediction], part: int) -> Array:
+    """Squared gaps and rows on a part, by model, joint and channel, shape (2, M, J, C)."""
+    inside = m.part == part
+    out = np.zeros((2, len(predictions), len(m.joints), len(m.channels)))
     for k, prediction in enumerate(predictions):
-        rest = gap_of(m, prediction)[proves]
-        good = np.isfinite(rest)
-        out[0, k] = (np.where(good, rest, 0.0) ** 2).sum(axis=0)
-        out[1, k] = good.sum(axis=0)
+        for c in range(len(m.channels)):
+            rest = gap_of(m, prediction, c)[inside]
+            good = np.isfinite(rest)
+            out[0, k, :, c] = (np.where(good, rest, 0.0) ** 2).sum(axis=0)
+            out[1, k, :, c] = good.sum(axis=0)
     return out
+
+
+def _root(squares: Sequence[Array]) -> Array:
+    """Root mean square by model, joint and channel, shape (M, J, C); NaN without rows."""
+    total = np.sum(squares, axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.sqrt(total[0] / total[1]))
 
 
 def overall(gap: Array) -> float:
@@ -91,5 +108,5 @@ def overall(gap: Array) -> float:
 
 
 def noise_floor(measurements: Sequence[Measurement]) -> Array:
-    """Of the compared channel by joint, shape (J,)."""
-    return np.sqrt(np.mean([m.noise[:, 0] ** 2 for m in measurements], axis=0))
+    """Of the compared channel by joint, of the logs that prove, shape (J,)."""
+    return np.asarray(floor_of(measurements, PROVE)[:, 0])

@@ -39,8 +39,8 @@ def candidates_table(
             "effect": c.effect,
             "joint": joint_of(model, c.effect, c.place),
             "place": JOINED.join(c.place),
-            "heldout_before": _known(c.before),
-            "heldout_after": _known(c.after),
+            "validation_before": _known(c.before),
+            "validation_after": _known(c.after),
             "unit": c.unit,
             "identifiable": c.identifiable,
             "verdict": _verdict(c, rivals.get((c.effect, c.place), ())),
@@ -77,6 +77,7 @@ def found_table(found: Sequence[Found], model: MachineModel) -> Table:
                     "gap_unit": f.unit,
                     "noise_floor": f.noise_floor,
                     "doubt": f.doubtful,
+                    "written": f.written,
                 }
             )
     return tables.found(rows)
@@ -97,4 +98,7 @@ def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
         kind = "joint"
     if kind == "link":
         return model.links.get(place[0], "")
+    if kind == "effort column":
+        owner = place[0].partition("__")[0]
+        return owner if owner in model.joints else ""
     return JOINED.join(name for name in place if name in model.joints)

@@ -11,6 +11,7 @@ import numpy as np
 
 from pipeline.app.gap_energy import PAIR, EnergyChange
 from pipeline.gap.circumstances import WHOLE, Where
+from pipeline.gap.effects.effort_gain import EffortGain
 from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.errors import EffectError
 from pipeline.gap.measurement import PROVE, Measurement
@@ -20,6 +21,8 @@ from reports.page import cell_text
 _LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 #: A band is worth a word when its gap is this many times the joint's.
 STANDS_OUT = 1.25
+#: Name of a column's wrong scale.
+GAIN = EffortGain.name
 #: Effects that the first lines tell in full.
 TOLD = 3
 #: Held-out rows turn one way where less than this share turns the other way.
@@ -76,11 +79,18 @@ def _circumstance(row: Where) -> str:
     }.get(row.by, f"by {row.by}: {row.band}")
 
 
-def what_words(naming: Naming) -> str:
-    """What is missing."""
+def what_words(naming: Naming, *, unexplained: bool) -> str:
+    """What is missing.
+
+    Args:
+        naming: What was found.
+        unexplained: Whether the model as written leaves more than noise.
+    """
     if not naming.found:
-        if naming.unexplained:
+        if unexplained:
             return "**What:** no effect of the catalogue explains it."
+        if not naming.tried:
+            return "**What:** the model file holds no effect."
         return (
             f"**What:** nothing is missing. {naming.tried} candidates were tried and none is "
             "needed beyond the stated tolerances of the machine's parts."
@@ -96,7 +106,21 @@ def what_words(naming: Naming) -> str:
         joined = "come" if len(nearest) > 1 else "comes"
         text += f" Nearest to what is {'left ' if sure else ''}missing {joined} {_named(nearest)},"
         text += " doubtful; `--keep-doubtful` writes doubtful names into the model file, too."
-    return f"{text} {meaning(naming.found[0].effect)}" if len(naming.found) == 1 else text
+    if len(naming.found) == 1:
+        text += f" {meaning(naming.found[0].effect)}"
+    return text + scale_words(naming.found)
+
+
+def scale_words(found: Sequence[Found]) -> str:
+    """What to do about columns that read a multiple of what they should; empty without any."""
+    gains = [f for f in found if f.effect == GAIN]
+    if not gains:
+        return ""
+    hints = [f'[columns."{f.place[0]}"] scale = {1.0 / f.values["gain"]:.3g}' for f in gains[:TOLD]]
+    return (
+        f" A column that reads a multiple is usually the log's: {'; '.join(hints)} in a mapping "
+        "file brings it to what the model expects."
+    )
 
 
 def _named(found: Sequence[Found]) -> str:
@@ -144,38 +168,63 @@ def _sized(value: float, p: Estimate) -> str:
 
 
 def shrink_words(
-    falls: Sequence[tuple[str, str, float, float, float, str]], whole: tuple[float, float]
+    found: Sequence[Found],
+    joints: Sequence[str],
+    whole: tuple[float, float, float],
+    unit: str,
+    noise: float,
 ) -> str:
-    """How much smaller the gap is on held-out data.
+    """How much smaller the gap of the model as written is, on held-out data.
 
     Args:
-        whole: Gap of all joints of the model as it was and with everything found.
-        falls: Per effect: its words, the joint, gap before, gap after, noise floor, unit.
+        found: Effects with their proof.
+        joints: Per effect, the joint at which it shows.
+        whole: Gap of all joints of the model as it was, with tolerances, and as written.
+        unit: Of the gap.
+        noise: Noise floor of all joints.
     """
-    parts = []
-    for effect, joint, before, after, floor, unit in falls[:TOLD]:
-        share = removed(before, after, floor)
-        closed = "" if share is None else f", {percent(share)} of what lies above the noise"
-        if math.isnan(before):
-            parts.append(f"{effect} cannot be proved: no row of {joint} is held out")
-            continue
-        parts.append(
-            f"with {effect} the gap of {joint} {_moves(before, after)} from {number(before)} to "
-            f"{number(after)} {unit}{closed} (noise floor {number(floor)} {unit})"
-        )
+    before, tolerances, after = whole
+    pairs = [(f, joint) for f, joint in zip(found, joints, strict=True) if f.written]
+    left_out = len(found) - len(pairs)
     text = (
-        "**How much smaller:** on held-out data, which had no say in what is named or with which "
-        f"value, {'; '.join(parts)}"
+        "**How much smaller:** on held-out data, which had no say in what is named, how far it is "
+        "trusted or with which value, "
     )
-    if len(falls) > TOLD:
-        text += f"; and so on with {len(falls) - TOLD} more"
-    unit = falls[0][5]
-    moves = _moves(*whole)
-    text += (
-        f". Over all joints it {moves} from {number(whole[0])} {unit} of the model as it was to "
-        f"{number(whole[1])} {unit}"
+    if not pairs:
+        text += (
+            f"the gap over all joints is {number(before)} {unit} of the model as it was and "
+            f"{number(tolerances)} {unit} with the tolerances of its parts"
+        )
+        if left_out:
+            text += "; no name is sure enough to be written into the model file"
+    else:
+        parts = [_fall(f, joint) for f, joint in pairs[:TOLD]]
+        text += "; ".join(parts)
+        if len(pairs) > TOLD:
+            text += f"; and so on with {len(pairs) - TOLD} more"
+        text += (
+            f". Over all joints it {_moves(before, after)} from {number(before)} {unit} of the "
+            f"model as it was to {number(after)} {unit} of the model file as written"
+        )
+    text += f", root mean square (noise floor {number(noise)} {unit})."
+    if left_out and pairs:
+        names = "doubtful name is" if left_out == 1 else "doubtful names are"
+        text += f" {left_out} {names} not in that file, nor in that number."
+    return text
+
+
+def _fall(f: Found, joint: str) -> str:
+    """What one effect closes at the joint where it shows."""
+    effect = f"{f.effect} at {place_text(f.place)}"
+    if math.isnan(f.gap_before):
+        return f"{effect} cannot be proved: no row of {joint} is held out"
+    share = removed(f.gap_before, f.gap_after, f.noise_floor)
+    closed = "" if share is None else f", {percent(share)} of what lies above the noise"
+    return (
+        f"with {effect} the gap of {joint} {_moves(f.gap_before, f.gap_after)} from "
+        f"{number(f.gap_before)} to {number(f.gap_after)} {f.unit}{closed} (noise floor "
+        f"{number(f.noise_floor)} {f.unit})"
     )
-    return text + ", root mean square."
 
 
 def _moves(before: float, after: float) -> str:
@@ -193,10 +242,10 @@ def removed(before: float, after: float, noise: float) -> float | None:
 
 def energy_words(change: EnergyChange, alternative: str) -> str:
     """What it costs in joules, and the break-even."""
-    names = list(dict.fromkeys((*PAIR, alternative)))
+    names = [n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before]
     parts = []
     for name in names:
-        if name not in change.before:
+        if name not in change.after:
             continue
         old, new = change.before[name].cycle, change.after[name].cycle
         if abs(new - old) <= NO_CHANGE * old:
@@ -204,10 +253,20 @@ def energy_words(change: EnergyChange, alternative: str) -> str:
         else:
             share = f"{100 * (new - old) / old:+.1f}".replace("-", "\N{MINUS SIGN}")
             parts.append(f"{name} {old:.1f} to {new:.1f} J ({share} %)")
-    text = (
-        "**What it costs:** electrical energy of one gait cycle of the whole robot, by actuator: "
-        f"{'; '.join(parts)}."
-    )
+    text = "**What it costs:** "
+    if parts:
+        text += (
+            "electrical energy of one gait cycle of the whole robot, by actuator: "
+            f"{'; '.join(parts)}."
+        )
+    silent = [name for name in names if name not in change.after]
+    if silent:
+        against = f"against `{alternative}`" if alternative else "against a joint without actuator"
+        return f"{text}{' ' * bool(parts)}" + (
+            f"No number is given for {_listed(silent)}, nor a break-even: friction and inertia "
+            f"were found {against}, other actuators have gears with losses of their own in the "
+            "catalogue, and the one cannot be added to the other."
+        )
     before, after = change.break_even_before, change.break_even_after
     if math.isnan(before) and math.isnan(after):
         return text + (
@@ -257,7 +316,10 @@ def left_words(remainders: Sequence[Remainder]) -> str:
     """What stays unexplained and what it looks like."""
     left = [r for r in remainders if r.significant]
     if not left:
-        text = "**What is left** is noise: nothing significant stays unexplained."
+        text = (
+            "**What is left** by the model as written is noise: nothing significant stays "
+            "unexplained."
+        )
         blind = list(dict.fromkeys(r.joint for r in remainders if not r.rows))
         if blind:
             text += f" Of {_listed(blind)} no row is held out: there only the fitted rows say so."
@@ -268,7 +330,7 @@ def left_words(remainders: Sequence[Remainder]) -> str:
         for r in sorted(left, key=lambda r: -r.error / max(r.noise_floor, 1e-300))
     ]
     more = f" and {len(parts) - 3} more joints" if len(parts) > 3 else ""
-    return f"**What stays unexplained:** {'. '.join(parts[:3])}{more}."
+    return f"**What stays unexplained** by the model as written: {'. '.join(parts[:3])}{more}."
 
 
 def doubts(found: Sequence[Found]) -> list[str]:

@@ -87,7 +87,11 @@ def run(options: argparse.Namespace) -> int:
             if judgement is not None:
                 files += judging.pages(given, judgement, tables, out)
     print(f"{files} tables{' and figures' if options.verb == 'reports' else ''} in {options.out}")
-    for line in (*given.remarks, *(findings(walking, given) if walking else ())):
+    for line in (
+        *given.remarks,
+        *(given.effects.remarks if given.effects else ()),
+        *(findings(walking, given) if walking else ()),
+    ):
         print(line)
     return 0
 

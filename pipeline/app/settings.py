@@ -129,7 +129,15 @@ def _effects(file: ModelFile, path: Path, robot: Robot, catalog: Catalog) -> Eff
         raise CatalogError("effects need an actuator with a motor of its own; add an alternative")
     alternative = file.alternative or others[0]
     chain = catalog.chain(alternative)
-    return effects(robot, chain, lambda m: apply_edits(m, file.edits), names, path.name)
+    return effects(
+        robot,
+        chain,
+        lambda m: apply_edits(m, file.edits),
+        names,
+        path.name,
+        found_with=file.alternative,
+        warnings=file.changed,
+    )
 
 
 def _changed(spec: RobotSpec, catalog: Catalog, key: str, value: str) -> tuple[RobotSpec, Catalog]:

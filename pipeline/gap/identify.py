@@ -1,4 +1,8 @@
-"""Steps 3 and 5 in one call: name what is missing, with intervals, verdicts and the proof."""
+"""Step 3 in one call: name what is missing, with values, intervals, rivals and doubts.
+
+All of it rests on *fit* and *choose*. What only proves (*prove*) has no say in any of it and is not
+looked at here: `weigh` holds the model that came of it against those rows.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +17,15 @@ from pipeline.gap.block_sums import BlockSums
 from pipeline.gap.columns import make_benches
 from pipeline.gap.effects.base import CHANNEL_UNITS, Place
 from pipeline.gap.intervals import estimates
-from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement
+from pipeline.gap.measurement import CHOOSE, FIT, Measurement
 from pipeline.gap.model import MachineModel
 from pipeline.gap.name import Selection, select
-from pipeline.gap.nuisance import with_tolerances
 from pipeline.gap.problem import Problem
 from pipeline.gap.refit import refit, tolerances_of
-from pipeline.gap.remainder import errors, remainders
+from pipeline.gap.remainder import errors
 from pipeline.gap.screen import Score
 from pipeline.gap.verdict import Candidate, Found, Naming
+from pipeline.gap.weigh import floor_of
 
 Array = NDArray[np.float64]
 
@@ -33,14 +37,11 @@ class Identified:
     Attributes:
         naming: Results.
         model: With the accepted effects, tolerances as the files state them.
-        stages: With no effect, the first, the first two, ...: tolerances at their estimates beside
-            those effects.
         problem: The least-squares problem at the end.
     """
 
     naming: Naming
     model: MachineModel
-    stages: tuple[MachineModel, ...]
     problem: Problem
 
 
@@ -55,21 +56,17 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
         NamingError: A part of the data has no usable row.
         ModelError: Model and logs do not fit.
     """
-    sigma = np.sqrt(np.mean([m.noise**2 for m in measurements], axis=0))
-    start = Problem(model, make_benches(measurements), sigma)
+    start = Problem(model, make_benches(measurements), floor_of(measurements))
     selection = select(start)
     channel = measurements[0].channels[0]
-    found, models = _found(start, selection, channel)
-    if selection.nearest and found[-1].gap_after > limits.IDLE * found[-1].gap_before:
-        selection, found, models = selection.without_nearest(), found[:-1], models[:-1]
+    found = _found(selection, channel)
+    if selection.nearest and found[-1].valid_after > limits.IDLE * found[-1].valid_before:
+        selection, found = selection.without_nearest(), found[:-1]
     problem = selection.problem
-    sums = problem.sums()
-    theta = sums.solve(sums.blocks(FIT, CHOOSE))
     naming = Naming(
         found=found,
         candidates=_candidates(start, selection),
         tolerances=tolerances_of(problem),
-        remainders=remainders(problem, theta),
         tried=selection.tried,
         channel=channel,
         unit=CHANNEL_UNITS[channel],
@@ -77,21 +74,11 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
     plain = model
     for a in problem.accepted:
         plain = a.apply(plain)
-    return Identified(naming, plain, (*models[:-1], _calibrated(problem)), problem)
+    return Identified(naming, plain, problem)
 
 
-def _calibrated(problem: Problem) -> MachineModel:
-    """The machine with the accepted effects and tolerances at their estimates."""
-    model = with_tolerances(problem.model, tolerances_of(problem))
-    for a in problem.accepted:
-        model = a.apply(model)
-    return model
-
-
-def _found(
-    start: Problem, selection: Selection, channel: str
-) -> tuple[tuple[Found, ...], list[MachineModel]]:
-    """Accepted effects with their proof, in order, and the machine before and after each."""
+def _found(selection: Selection, channel: str) -> tuple[Found, ...]:
+    """Accepted effects in order, each with what it closes on *choose* by estimates from *fit*."""
     problem = selection.problem
     intervals = estimates(problem, channel)
     rivals = {r.winner: r.rivals for r in selection.rounds}
@@ -104,15 +91,16 @@ def _found(
         floor=problem.floor,
     )
     before = refit(bare)
-    models = [_calibrated(before)]
     for number, a in enumerate(problem.accepted):
         after = refit(bare.with_accepted(problem.accepted[: number + 1]))
         touched = _touched(problem, number)
-        old, rows = errors(before, (PROVE,))
-        new, _ = errors(after, (PROVE,))
-        proved = [j for j in touched if rows[j]]
-        gain = ((old - new) / problem.sigma**2)[proved].sum(axis=0)
+        old, rows = errors(before, (CHOOSE,), by=(FIT,))
+        new, _ = errors(after, (CHOOSE,), by=(FIT,))
+        judged = [j for j in touched if rows[j]]
+        gain = ((old - new) / problem.sigma**2)[judged].sum(axis=0)
         c = int(np.argmax(gain))
+        # What a tolerance would have taken up is its own merit: the gap alone does not show it.
+        idle = bool(judged) and gain.sum() <= 0.0 and not a.effect.is_tolerance
         unit = CHANNEL_UNITS[problem.benches[0].measurement.channels[c]]
         key = (a.effect.name, a.place)
         out.append(
@@ -122,8 +110,8 @@ def _found(
                 place=a.place,
                 parameters=intervals[number].parameters,
                 rivals=tuple(rivals.get(key, ())) + _unseen(problem, number),
-                gap_before=_rms(old, proved, c),
-                gap_after=_rms(new, proved, c),
+                valid_before=_rms(old, judged, c),
+                valid_after=_rms(new, judged, c),
                 unit=unit,
                 noise_floor=_rms(problem.floor**2, touched, c),
                 excitation=a.effect.excitation,
@@ -131,13 +119,12 @@ def _found(
                     limits.NEAREST
                     if key == selection.nearest
                     else _doubt(problem, number, intervals[number].certain)
-                    or (limits.IDLE_NAME if proved and gain.sum() <= 0.0 else "")
+                    or (limits.IDLE_NAME if idle else "")
                 ),
             )
         )
         before = after
-        models.append(_calibrated(after))
-    return _second_thoughts(problem, out), models
+    return _second_thoughts(problem, out)
 
 
 def _rms(squares: Array, joints: Sequence[int], channel: int) -> float:
@@ -208,7 +195,7 @@ def _second_thoughts(problem: Problem, found: list[Found]) -> tuple[Found, ...]:
     out = []
     for number, f in enumerate(found):
         effect = problem.accepted[number].effect
-        idle = f.gap_after > limits.IDLE * f.gap_before and not effect.is_tolerance
+        idle = f.valid_after > limits.IDLE * f.valid_before and not effect.is_tolerance
         _, excess = fit_quality(problem, number)
         if not f.doubtful and idle and excess > limits.UNEXPLAINED:
             f = replace(f, doubtful=limits.IDLE_NAME)
@@ -236,9 +223,10 @@ def _dwarfs(problem: Problem, number: int) -> bool:
     for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
         change = bench.simulator.difference(prediction, without)
         columns = bench.whitened(change.effort, change.joints, problem.floor)
-        own += sum(float(np.sum(x**2)) for j, x in columns.items() if j in touched)
-        rows += float(bench.measurement.mask[bench.rows][:, touched].sum()) * bench.weight**2
-    squares, _ = errors(problem, (FIT, CHOOSE, PROVE))
+        said = slice(bench.parts[FIT].start, bench.parts[CHOOSE].stop)
+        own += sum(float(np.sum(x[said] ** 2)) for j, x in columns.items() if j in touched)
+        rows += float(bench.measurement.mask[bench.rows[said]][:, touched].sum()) * bench.weight**2
+    squares, _ = errors(problem, (FIT, CHOOSE))
     left = float((squares / problem.floor**2)[touched].sum(axis=1).mean())
     return left < limits.DWARFED**2 * own / max(rows, 1.0)
 
@@ -253,7 +241,7 @@ def fit_quality(problem: Problem, number: int) -> tuple[float, float]:
     gradient = (sums.h[blocks] - np.einsum("bij,j->bi", sums.H[blocks], theta))[:, index]
     own = np.array([np.diag(sums.H[b])[index] for b in blocks])
     scatter = (gradient**2).sum(axis=0) / np.maximum(own.sum(axis=0), 1e-300)
-    squares, _ = errors(problem, (FIT, CHOOSE, PROVE))
+    squares, _ = errors(problem, (FIT, CHOOSE))
     excess = np.sqrt((squares / problem.floor**2)[_touched(problem, number)].mean(axis=0)).max()
     return float(scatter.max()), float(excess)
 
@@ -267,8 +255,8 @@ def _candidates(start: Problem, selection: Selection) -> tuple[Candidate, ...]:
             rivals.setdefault(key, []).append(f"{r.winner[0]} at {', '.join(r.winner[1])}")
     base = refit(start)
     last = {(s.effect.name, s.place): s for s in selection.last}
-    old, rows = errors(base, (CHOOSE,))
-    new, _ = errors(selection.problem, (CHOOSE,))
+    old, rows = errors(base, (CHOOSE,), by=(FIT,))
+    new, _ = errors(selection.problem, (CHOOSE,), by=(FIT,))
     old[rows == 0], new[rows == 0] = np.nan, np.nan
     out = [
         _candidate(start, s, accepted, rivals, last, selection, (old, new)) for s in selection.first
@@ -313,11 +301,11 @@ def _candidate(
                 f"{limits.LEAST_GAIN:.0f} are asked)"
             )
         elif after > before:
-            reason = "makes held-out data worse"
+            reason = "makes validation data worse"
         elif left < limits.LEAST_GAIN:
             reason = "the accepted effects explain what it would have explained"
         else:
-            reason = "what it explains does not hold over all blocks or on held-out ones"
+            reason = "what it explains does not hold over all blocks, or not on those that choose"
     return Candidate(
         effect=s.effect.name,
         place=s.place,

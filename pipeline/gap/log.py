@@ -71,6 +71,8 @@ class Log:
         condition: What distinguishes this log from others, e.g. ``{"payload": 0.5}``.
         extra: Numeric columns the mapping keeps under their own names, each shape (N,).
         ignored: Columns of the file that were not used.
+        misspelt: Columns that were not used though they are nearly ones of the log format, and
+            those.
         chosen_effort: Channel to compare, overriding the order of `EFFORTS`.
         derived: Channels that were computed from others by the mapping, with the formula.
         sha256: Of the file.
@@ -104,6 +106,7 @@ class Log:
     condition: Mapping[str, float | str] = field(default_factory=dict)
     extra: Mapping[str, Array] = field(default_factory=dict)
     ignored: tuple[str, ...] = ()
+    misspelt: Mapping[str, str] = field(default_factory=dict)
     chosen_effort: str | None = None
     derived: Mapping[str, str] = field(default_factory=dict)
     sha256: str = ""

@@ -30,6 +30,8 @@ FOOT_COLUMNS: Final = {
     "contact": ("contact", "1"),
 }
 BASE_COLUMNS: Final = {"roll_rad": ("base_roll", "rad"), "pitch_rad": ("base_pitch", "rad")}
+#: Letters that may be off in a header for it to be taken for a slip of the pen.
+_SLIPS: Final = 2
 #: Units as they are written at the end of a header, and none at all.
 _UNIT_SUFFIXES: Final = frozenset(
     {"", "degrees", "radians", "Ncm", "nm"}
@@ -89,6 +91,45 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
             if quantity.startswith(attribute) and written in _UNIT_SUFFIXES:
                 raise LogFormatError(_unit_message(column, f"{owner}__{known}", where))
     return None
+
+
+def misspelt(column: str, expected: Expected) -> str:
+    """The column of the log format that a header nearly is; empty where it is none.
+
+    One or two letters off in the quantity of a joint, foot or base count as a slip of the pen.
+    """
+    owner, separator, quantity = column.rpartition("__")
+    owner = expected.foot_alias.get(owner, owner)
+    if not separator:
+        return TIME if _slips(column.lower(), TIME) <= 1 else ""
+    for owners, table in (
+        (expected.joints, JOINT_COLUMNS),
+        (expected.feet, FOOT_COLUMNS),
+        (("base",), BASE_COLUMNS),
+    ):
+        if owner in owners and quantity not in table:
+            slips = {known: _slips(quantity.lower(), known.lower()) for known in table}
+            best = min(slips, key=lambda known: slips[known])
+            if slips[best] <= _SLIPS:
+                return f"{owner}__{best}"
+    return ""
+
+
+def _slips(a: str, b: str) -> int:
+    """Letters to insert, drop, replace or exchange with their neighbour (Damerau, restricted)."""
+    if abs(len(a) - len(b)) > _SLIPS:
+        return _SLIPS + 1
+    before: list[int] = []
+    row = list(range(len(b) + 1))
+    for i, x in enumerate(a, start=1):
+        now = [i]
+        for j, y in enumerate(b, start=1):
+            best = min(row[j] + 1, now[j - 1] + 1, row[j - 1] + (x != y))
+            if i > 1 and j > 1 and x == b[j - 2] and a[i - 2] == y:
+                best = min(best, before[j - 2] + 1)
+            now.append(best)
+        before, row = row, now
+    return row[-1]
 
 
 def _unit_message(column: str, known: str, where: str) -> str:

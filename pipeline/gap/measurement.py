@@ -126,6 +126,12 @@ class Measurement:
         """Samples per second [Hz]."""
         return 1.0 / float(np.median(np.diff(self.time)))
 
+    @property
+    def has_say(self) -> Mask:
+        """Rows that estimate and choose; all where none does (to look, not to judge), (N,)."""
+        rows = np.isin(self.part, (FIT, CHOOSE))
+        return rows if rows.any() else np.ones_like(rows)
+
     def smooth(self, x: Array) -> Array:
         """A series (N, ...) at the bandwidth; quick for short kernels, the same but at the ends."""
         if self.kernel is None or self.kernel.size > _SHORT:

@@ -91,6 +91,7 @@ class JointModel:
         encoder_offset: The position sensor reads high by this [rad].
         effort_offset: The effort sensor reads high by this, in the unit of its channel.
         delay: The effort channels lag behind the position by this [s].
+        gains: Channel to how many times what it should its column reads; once where absent.
     """
 
     name: str
@@ -106,6 +107,7 @@ class JointModel:
     encoder_offset: float = 0.0
     effort_offset: float = 0.0
     delay: float = 0.0
+    gains: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def ratio(self) -> float:

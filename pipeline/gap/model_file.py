@@ -28,6 +28,8 @@ from __future__ import annotations
 
 import hashlib
 import math
+import re
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -49,6 +51,7 @@ _ROBOT: Final = ("file", "sha256")
 _ACTUATORS: Final = ("alternative", "sha256")
 _EDIT: Final = ("effect", "place", "basis", "source", "parameters")
 _PARAMETER: Final = ("value", "unit", "interval")
+_HASH: Final = re.compile(r"[0-9a-f]{64}")
 _BASES: Final = ("identified", "doubtful", "assumed")
 
 
@@ -194,8 +197,12 @@ def load_model(path: Path) -> MachineModel:
     return apply_edits(base_model(file), file.edits)
 
 
-def read_model_file(path: Path) -> ModelFile:
+def read_model_file(path: Path, catalog: Path = CATALOG) -> ModelFile:
     """Read and check a model file.
+
+    Args:
+        path: The file.
+        catalog: Folder of the actuator files, to compare their hashes.
 
     Raises:
         ModelFileError: It cannot be read, is no TOML, or a key or value is wrong; the message names
@@ -216,11 +223,14 @@ def read_model_file(path: Path) -> ModelFile:
     hashes = actuators.get("sha256", {})
     if not isinstance(hashes, dict) or not all(isinstance(v, str) for v in hashes.values()):
         raise ModelFileError(f"{where} [actuators.sha256]: expected file = hash")
-    edits = table.get("edit", [])
-    if not isinstance(edits, list):
-        raise ModelFileError(f"{where}: edits are written [[edit]]")
     robot_path = path.parent / _text(robot, "file", f"{where} [robot]")
     robot_hash = _text(robot, "sha256", f"{where} [robot]")
+    for name, value in {"robot": robot_hash, **hashes}.items():
+        if not _HASH.fullmatch(value):
+            raise ModelFileError(
+                f"{where}: sha256 of {one_line(name)}: '{one_line(value)}' is no SHA-256; expected "
+                "64 hexadecimal digits"
+            )
     alternative = actuators.get("alternative", "")
     if not isinstance(alternative, str):
         raise ModelFileError(f"{where} [actuators]: alternative must be a text")
@@ -229,21 +239,46 @@ def read_model_file(path: Path) -> ModelFile:
         robot_sha256=robot_hash,
         alternative=alternative,
         actuators_sha256=hashes,
-        edits=tuple(_edit(e, f"{where}: edit {k}") for k, e in enumerate(edits, start=1)),
-        changed=_changed(robot_path, robot_hash, hashes),
+        edits=_edits(table, where),
+        changed=_changed(where, robot_path, robot_hash, hashes, catalog),
     )
 
 
-def _changed(robot: Path, robot_hash: str, hashes: Mapping[str, str]) -> tuple[str, ...]:
+def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
+    """The edits of a model file's text.
+
+    Raises:
+        ModelFileError: As for `read_model_file`.
+    """
+    return _edits(_parsed(text, where), where)
+
+
+def _parsed(text: str, where: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
+        raise ModelFileError(f"{where}: malformed TOML: {one_line(error)}") from None
+
+
+def _edits(table: Mapping[str, Any], where: str) -> tuple[Edit, ...]:
+    edits = table.get("edit", [])
+    if not isinstance(edits, list):
+        raise ModelFileError(f"{where}: edits are written [[edit]]")
+    return tuple(_edit(e, f"{where}: edit {k}") for k, e in enumerate(edits, start=1))
+
+
+def _changed(
+    where: str, robot: Path, robot_hash: str, hashes: Mapping[str, str], catalog: Path
+) -> tuple[str, ...]:
+    """Files that are not those of the hashes, in words."""
     out = []
+    since = "is not the one its effects were found with (other SHA-256)"
     if file_sha256(robot) != robot_hash:
-        out.append(f"{robot.name} has changed since the edits were identified")
+        out.append(f"{where}: {one_line(robot.name)} {since}: they may not fit it any more")
     for name, written in hashes.items():
-        file = CATALOG / Path(name).name
+        file = catalog / Path(name).name
         if not file.exists() or file_sha256(file) != written:
-            out.append(
-                f"actuator file {one_line(name)} has changed since the edits were identified"
-            )
+            out.append(f"{where}: actuator file {one_line(name)} {since}")
     return tuple(out)
 
 

@@ -179,18 +179,57 @@ class Problem:
         after = {id(a) for a in other.accepted}
         moved = [a for a in (*self.accepted, *other.accepted) if id(a) not in (before & after)]
         touched = {joint for a in moved for joint in self._touched(a)}
-        for n, old, new in zip(self.tolerances, self.held, other.held, strict=True):
-            if n.kind in ("torque_constant", "resistance") and abs(new - old) > _STALE:
-                touched.add(self.model.index(n.place))
+        scaled = {joint for a in moved if a.effect.rescales for joint in self._touched(a)}
+        touched |= self._shifted(self.held, other.held)
         for key, per_log in self._columns.items():
             joints = {j for column in per_log for j in column}
-            if joints & touched and not _is_body(key):
+            if joints & scaled or (joints & touched and not _is_body(key)):
+                del other._columns[key]
+        return other
+
+    def _shifted(self, old: Array, new: Array) -> set[int]:
+        """Joints whose columns another hold of their motor's tolerances makes stale."""
+        return {
+            self.model.index(n.place)
+            for n, before, after in zip(self.tolerances, old, new, strict=True)
+            if n.kind in ("torque_constant", "resistance") and abs(after - before) > _STALE
+        }
+
+    def with_model(self, model: MachineModel) -> Problem:
+        """The same logs with another model of the machine, no effect and no tolerance taken up.
+
+        Columns at untouched joints are kept.
+        """
+        before = self.model
+        other = replace(
+            self,
+            model=model,
+            accepted=(),
+            held=np.zeros_like(self.held),
+            _columns=dict(self._columns),
+            _cache={},
+        )
+        other._cache["near"] = self.predictions()
+        moved = model.rigid is not before.rigid or model.bodies != before.bodies
+        pairs = zip(before.actuators, model.actuators, strict=True)
+        touched = {k for k, (old, new) in enumerate(pairs) if moved or old is not new}
+        pairs = zip(before.actuators, model.actuators, strict=True)
+        scaled = {
+            k
+            for k, (old, new) in enumerate(pairs)
+            if old.motor is not new.motor or old.gains != new.gains
+        }
+        touched |= self._shifted(self.held, other.held)
+        for key, per_log in self._columns.items():
+            joints = {j for column in per_log for j in column}
+            if joints & scaled or (joints & touched and not _is_body(key)):
                 del other._columns[key]
         return other
 
     def _touched(self, a: Accepted) -> set[int]:
-        if a.place and all(p in self.model.joints for p in a.place):
-            return {self.model.index(p) for p in a.place}
+        owners = [p.partition("__")[0] for p in a.place]  # of a column of the log
+        if owners and all(p in self.model.joints for p in owners):
+            return {self.model.index(p) for p in owners}
         return set(range(len(self.model.joints)))
 
     def columns(

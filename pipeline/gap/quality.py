@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.gap.expected import Expected
 from pipeline.gap.finding import Finding, Quality
+from pipeline.gap.glitches import glitches
 from pipeline.gap.log import EFFORTS, Log
 from pipeline.gap.sampling import clock, held, quantum, saturated, standstill
 from pipeline.gap.unit_check import column_name, effort_units, position_units, velocity_units
@@ -65,7 +66,7 @@ def judge(log: Log, expected: Expected, *, largest: Mapping[str, Array] | None =
     still = standstill(_bridged(log.position), beat)
     dead = _presence(log, still, found)
     stale = _positions(log, position_ok, still, found)
-    position_ok = position_ok & ~stale
+    position_ok = position_ok & ~stale & ~_jumps(log, found)
     effort_ok = _efforts(log, still, found)
     _repeated_rows(log, still, found)
     if not dead:
@@ -73,6 +74,9 @@ def judge(log: Log, expected: Expected, *, largest: Mapping[str, Array] | None =
         found += velocity_units(log, expected, position_ok, beat)
     found += effort_units(log, {"torque": expected.effort_limit, **(largest or {})})
     _feet(log, found)
+    for column, meant in log.misspelt.items():
+        detail = f"is ignored: no column of the log format; did you mean '{meant}'?"
+        found.note(column, "misspelt", 1, "1", "warning", detail)
     if log.ignored:
         found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
     for channel, formula in log.derived.items():
@@ -243,6 +247,29 @@ def _positions(log: Log, ok: Mask, still: Mask, found: _Findings) -> Mask:
     return stale
 
 
+def _jumps(log: Log, found: _Findings) -> Mask:
+    """Positions that jump away and back. Returns the samples."""
+    quantity = "motor_position" if log.position_source == "motor" else "position"
+    out = np.zeros(log.position.shape, dtype=np.bool_)
+    for j, joint in enumerate(log.joints):
+        rows = glitches(log.position[:, j])
+        if rows.any():
+            out[:, j] = rows
+            _note_jumps(log, found, column_name(joint, quantity), log.position[:, j], rows, "rad")
+    return out
+
+
+def _note_jumps(log: Log, found: _Findings, column: str, x: Array, rows: Mask, unit: str) -> None:
+    count = int(rows.sum())
+    first = int(np.argmax(rows))
+    many = f"{count} rows jump away and back, the first" if count > 1 else "one row jumps away"
+    detail = (
+        f"{many} at {log.time[first]:.6g} s to {x[first]:.5g} {unit}: no motion does that; "
+        f"bridged as if {'they were' if count > 1 else 'it were'} empty"
+    )
+    found.note(column, "glitches", count, "1", "warning", detail)
+
+
 def _efforts(log: Log, still: Mask, found: _Findings) -> Mask:
     """Quantisation, held values, saturation and missing cells of the compared effort."""
     effort = log.effort
@@ -270,6 +297,10 @@ def _efforts(log: Log, still: Mask, found: _Findings) -> Mask:
                 f"value in {1 / max(1 - share, 1e-3):.1f} rows; repeats are bridged "
                 f"({int(repeats.sum())} rows)",
             )
+        jumps = glitches(x)
+        if jumps.any():
+            ok[:, j] &= ~jumps
+            _note_jumps(log, found, column, x, jumps, effort.unit)
         fresh = ~repeats if share > HELD else np.ones_like(repeats)
         limit = saturated(x, ~still[:, j] & fresh, step)
         if limit.any():

@@ -15,7 +15,14 @@ from actuators.units import dimension, from_si
 from pipeline.gap.errors import GapError, LogContentError, LogFormatError, WrongRobotError
 from pipeline.gap.expected import Expected
 from pipeline.gap.log import EFFORTS, Log
-from pipeline.gap.log_format import JOINT_COLUMNS, TIME, Target, parse_column, suggest_column
+from pipeline.gap.log_format import (
+    JOINT_COLUMNS,
+    TIME,
+    Target,
+    misspelt,
+    parse_column,
+    suggest_column,
+)
 from pipeline.gap.mapping import ColumnRule, LogRule, Mapping
 from pipeline.gap.table_file import (
     TableFile,
@@ -50,6 +57,7 @@ class ReadingPlan:
         rule: What holds for this log.
         sources: Target to column.
         ignored: Columns that mean nothing to the log format.
+        misspelt: Those among them that are nearly one of it, and that one.
     """
 
     table: TableFile
@@ -58,6 +66,13 @@ class ReadingPlan:
     rule: LogRule
     sources: dict[Target, _Source]
     ignored: tuple[str, ...]
+    misspelt: dict[str, str]
+
+    @property
+    def channel(self) -> str:
+        """The effort channel that is compared, as far as mapping and header say."""
+        have = {t.quantity for t in self.sources}
+        return self.mapping.effort or next((c for c in EFFORTS if c in have), "voltage")
 
     @property
     def columns(self) -> list[str]:
@@ -129,7 +144,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     mapping = mapping or Mapping()
     table = open_table(path, mapping.dialect)
     sources: dict[Target, _Source] = {}
-    ignored = []
+    ignored: dict[str, str] = {}
     used_rules: set[ColumnRule] = set()
     for column in table.header:
         rule, name = _resolve(column, mapping)
@@ -142,7 +157,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
                     f"which the log format does not know; "
                     f"{closest(name, _known_columns(expected))}"
                 )
-            ignored.append(column)
+            ignored[column] = name
             continue
         if target in sources:
             raise LogFormatError(
@@ -157,11 +172,29 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
                 f"{mapping.where}: no column of {table.where} matches '{one_line(rule.pattern)}'; "
                 f"{suggest_column(rule.pattern, table.header)}"
             )
+    near = {
+        column: meant
+        for column, name in ignored.items()
+        if column not in mapping.keep and (meant := misspelt(name, expected))
+    }
     plan = ReadingPlan(
-        table, expected, mapping, mapping.rule_for(path.stem), sources, tuple(ignored)
+        table, expected, mapping, mapping.rule_for(path.stem), sources, tuple(ignored), near
     )
+    _check_misspelt(plan)
     _check_columns(plan)
     return plan
+
+
+def _check_misspelt(plan: ReadingPlan) -> None:
+    """Refuse a slip of the pen that costs a channel: it would be left out without a word."""
+    for column, meant in plan.misspelt.items():
+        if parse_column(meant, plan.expected, plan.table.where) in plan.sources:
+            continue
+        raise LogFormatError(
+            f"{plan.table.where}: column '{one_line(column)}' is none of the log format and would "
+            f"be ignored; did you mean '{meant}'? Rename it, or list it under keep in a mapping "
+            "file"
+        )
 
 
 def _known_columns(expected: Expected) -> list[str]:
@@ -276,9 +309,12 @@ def _check_efforts(plan: ReadingPlan, have: set[tuple[str, str]]) -> None:
     for channel in found:
         for joint in joints:
             if (joint, channel) not in have and joint not in mapping.locked:
+                column = next(
+                    f"{joint}__{s}" for s, (q, _) in JOINT_COLUMNS.items() if q == channel
+                )
                 raise WrongRobotError(
-                    f"{where}: joint '{joint}' has no {channel}, other joints have; log it, or "
-                    "list the joint under locked in a mapping file"
+                    f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; log "
+                    "it, or list the joint under locked in a mapping file"
                 )
     if not found and _derives_voltage(plan, have):
         found = ["voltage"]
@@ -373,6 +409,7 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
         locked=tuple(mapping.locked),
         extra={column: data[column] for column in mapping.keep},
         ignored=(*plan.ignored, *ignored),
+        misspelt=dict(plan.misspelt),
         chosen_effort=mapping.effort,
         sha256=digest,
         source=plan.table.path,

@@ -13,7 +13,7 @@ from pipeline.gap.measurement import CHOOSE, FIT
 from pipeline.gap.problem import Accepted, Problem
 
 Array = NDArray[np.float64]
-_NEWTON = 3  # refits after an acceptance
+_NEWTON = 6  # refits after an acceptance, at most
 _HELD = 3.0  # sigmas
 _CONTRIBUTION = 3.0  # largest part of an effort one effect may have, in its RMS
 _BEND = 0.3  # largest relative change of a nonlinear parameter in one step
@@ -114,11 +114,14 @@ def runs_away(problem: Problem) -> bool:
     """Whether some effect takes what another gives: a direction that the log does not hold."""
     for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
         m = bench.measurement
-        size = np.sqrt(np.mean(m.effort**2, axis=0))  # (J, C)
+        said = np.isin(m.part, (FIT, CHOOSE))
+        if not said.any():
+            continue
+        size = np.sqrt(np.mean(m.effort[said] ** 2, axis=0))  # (J, C)
         for k in range(len(problem.accepted)):
             change = bench.simulator.difference(prediction, problem.without(k))
             for column, j in enumerate(change.joints):
-                part = np.sqrt(np.mean(change.effort[:, column] ** 2, axis=0))
+                part = np.sqrt(np.mean(change.effort[said, column] ** 2, axis=0))
                 if (part > _CONTRIBUTION * size[j]).any():
                     return True
     return False

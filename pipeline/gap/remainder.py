@@ -1,4 +1,4 @@
-"""What is left when everything with a name is in the model, and what it looks like."""
+"""What a model leaves of the gap, and what it looks like."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.gap import verdict as limits
+from pipeline.gap.circumstances import gap_of
 from pipeline.gap.effects.base import CHANNEL_UNITS
 from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement
 from pipeline.gap.problem import Problem
+from pipeline.gap.simulate import Prediction
 from pipeline.gap.verdict import Remainder
 
 Array = NDArray[np.float64]
@@ -40,15 +42,18 @@ def remaining(problem: Problem, theta: Array) -> list[Array]:
     return out
 
 
-def errors(problem: Problem, parts: Sequence[int]) -> tuple[Array, Array]:
-    """Mean square error by joint and channel (J, C), and rows (J,), tolerances at their estimate.
+def errors(
+    problem: Problem, parts: Sequence[int], by: Sequence[int] = (FIT, CHOOSE)
+) -> tuple[Array, Array]:
+    """Mean square error by joint and channel (J, C), and rows (J,), unknowns at their estimate.
 
     Args:
         problem: With some effects accepted.
         parts: Parts of the data to judge on.
+        by: Parts that estimate.
     """
     sums = problem.sums()
-    theta = sums.solve(sums.blocks(FIT, CHOOSE))
+    theta = sums.solve(sums.blocks(*by))
     squares = np.zeros(problem.sigma.shape)
     rows = np.zeros(problem.sigma.shape)
     for rest, bench in zip(remaining(problem, theta), problem.benches, strict=True):
@@ -59,46 +64,50 @@ def errors(problem: Problem, parts: Sequence[int]) -> tuple[Array, Array]:
     return squares / np.maximum(rows, 1), rows[:, 0]
 
 
-def remainders(problem: Problem, theta: Array) -> tuple[Remainder, ...]:
-    """What is left on *prove*, by joint and channel, with a description where it is significant.
+def remainders(
+    measurements: Sequence[Measurement],
+    predictions: Sequence[Prediction],
+    floor: Array,
+    proved: Array | None = None,
+) -> tuple[Remainder, ...]:
+    """What a model leaves on *prove*, by joint and channel, described where it is significant.
 
     Of a joint without rows there it is what is left on *fit* and *choose*.
+
+    Args:
+        measurements: One per log.
+        predictions: Of the model, one per log.
+        floor: Standard deviation of the noise, shape (J, C).
+        proved: Root mean square on *prove* by joint and channel, shape (J, C), NaN without a row,
+            where it is known from more rows than the measurements hold.
     """
-    rests = remaining(problem, theta)
-    first = problem.benches[0].measurement
+    first = measurements[0]
     out = []
-    for j, joint in enumerate(first.joints):
-        for c, channel in enumerate(first.channels):
-            proved = _known(problem, rests, j, c, PROVE)
+    for c, channel in enumerate(first.channels):
+        rests = [gap_of(m, p, c) for m, p in zip(measurements, predictions, strict=True)]
+        for j, joint in enumerate(first.joints):
+            held = _known(measurements, rests, j, PROVE)
             # Where no row proves, those that were fitted are better than none.
-            seen = proved if proved.size else _known(problem, rests, j, c, FIT, CHOOSE)
-            floor = float(problem.floor[j, c])
-            error = float(np.sqrt(np.mean(seen**2)) * problem.sigma[j, c]) if seen.size else 0.0
-            significant = error > limits.UNEXPLAINED * floor
-            text = _describe(problem, rests, j, c) if significant else ""
+            seen = held if held.size else _known(measurements, rests, j, FIT, CHOOSE)
+            error = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
+            if proved is not None and np.isfinite(proved[j, c]):
+                error = float(proved[j, c])
+            level = float(floor[j, c])
+            significant = error > limits.UNEXPLAINED * level
+            text = _describe(measurements, predictions, rests, j) if significant else ""
+            unit = CHANNEL_UNITS[channel]
             out.append(
-                Remainder(
-                    joint,
-                    channel,
-                    error,
-                    floor,
-                    CHANNEL_UNITS[channel],
-                    significant,
-                    text,
-                    int(proved.size),
-                )
+                Remainder(joint, channel, error, level, unit, significant, text, int(held.size))
             )
-    return tuple(out)
+    return tuple(sorted(out, key=lambda r: first.joints.index(r.joint)))
 
 
-def _known(problem: Problem, rests: list[Array], j: int, c: int, *parts: int) -> Array:
-    """What is left of one joint and channel on some parts, masked rows left out."""
-    rows = [
-        rest[bench.parts[part], j, c]
-        for rest, bench in zip(rests, problem.benches, strict=True)
-        for part in parts
-    ]
-    every = np.concatenate(rows)
+def _known(
+    measurements: Sequence[Measurement], rests: Sequence[Array], j: int, *parts: int
+) -> Array:
+    """What is left of one joint on some parts, masked rows left out."""
+    pairs = zip(measurements, rests, strict=True)
+    every = np.concatenate([rest[np.isin(m.part, parts), j] for m, rest in pairs])
     return np.asarray(every[np.isfinite(every)])
 
 
@@ -136,19 +145,21 @@ def explained(rest: Array, variable: Array) -> float:
     return 1.0 - within / max(total, 1e-300) - _BINS / y.size
 
 
-def _describe(problem: Problem, rests: list[Array], j: int, c: int) -> str:
+def _describe(
+    measurements: Sequence[Measurement],
+    predictions: Sequence[Prediction],
+    rests: Sequence[Array],
+    j: int,
+) -> str:
     """In words: what the remainder depends on most."""
     series: dict[str, list[Array]] = {}
-    values = []
-    for rest, bench, prediction in zip(rests, problem.benches, problem.predictions(), strict=True):
-        m = bench.measurement
-        values.append(rest[:, j, c])
+    for m, prediction in zip(measurements, predictions, strict=True):
         for name, x in variables(m, j, prediction.torque[:, j]).items():
-            series.setdefault(name, []).append(x[bench.rows])
-    y = np.concatenate(values)
+            series.setdefault(name, []).append(x)
+    y = np.concatenate([rest[:, j] for rest in rests])
     shares = {name: explained(y, np.concatenate(x)) for name, x in series.items()}
     best = max(shares, key=lambda name: shares[name])
-    joint = problem.model.joints[j]
+    joint = measurements[0].joints[j]
     if shares[best] < _TELLING:
         return f"what is left in {joint} depends on no single variable of the motion"
     text = f"what is left in {joint} depends on the {best} ({100 * shares[best]:.0f} % of it)"

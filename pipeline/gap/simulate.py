@@ -215,24 +215,23 @@ class Simulator:
             side = element.moving(side)
         shaft_torque, speed = side.torque[:, 0], side.velocity[:, 0]
         at_joint = shaft_torque * a.ratio
-        return at_joint, self._channels(a, k, load, at_joint + carried, shaft_torque, speed)
+        return at_joint, self._channels(a, k, at_joint + carried, shaft_torque, speed)
 
     def _channels(
-        self, a: JointModel, k: int, load: Array, brought: Array, torque: Array, speed: Array
+        self, a: JointModel, k: int, brought: Array, torque: Array, speed: Array
     ) -> Array:
         """Effort channels of one joint, (N, C)."""
         m = self.measurement
         out = np.empty((torque.size, len(m.channels)))
-        if a.motor is None:
-            if m.channels != ("torque",):
-                raise ModelError(
-                    f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
-                    "motor; name the actuator with --actuator"
-                )
+        if "torque" in m.channels:
+            # What the motor supplies, brought to the joint side, as drives tell it: with every
+            # friction and inertia of the elements that the model has, of which there may be none.
             out[:, 0] = brought
-        elif "torque" in m.channels:
-            # A torque sensor sits at the joint: it sees nothing of the chain behind it.
-            out[:, 0] = load
+        elif a.motor is None:
+            raise ModelError(
+                f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
+                "motor; name the actuator with --alternative"
+            )
         else:
             self._electrical(out, a, k, torque, speed)
         if a.delay:
@@ -241,16 +240,25 @@ class Simulator:
                 for c in range(out.shape[1]):
                     out[piece, c] = _delayed(t, out[piece, c], a.delay)
         if "voltage" in m.channels and "current" in m.channels and a.motor is not None:
-            c, i = m.channels.index("voltage"), m.channels.index("current")
+            c = m.channels.index("voltage")
             cold = float(np.asarray(a.motor.resistance))
             resistance: Array | float = cold
-            current = m.effort[:, k, i] - a.effort_offset
+            current = self._drawn(a, k)
             if a.heating is not None:
                 rise = self._rise(a.heating, k, cold * current**2)
                 resistance = warm_resistance(cold, rise)
             out[:, c] += resistance * current
+        for c, channel in enumerate(m.channels):
+            if channel in a.gains:
+                out[:, c] *= a.gains[channel]
         out[:, 0] += a.effort_offset
         return out
+
+    def _drawn(self, a: JointModel, k: int) -> Array:
+        """Current that a motor draws by its sensor, the sensor's zero and gain taken out, (N,)."""
+        m = self.measurement
+        seen = m.effort[:, k, m.channels.index("current")] - a.effort_offset
+        return np.asarray(seen / a.gains.get("current", 1.0))
 
     def _rise(self, heating: Heating, k: int, loss: Array) -> Array:
         """How much warmer than its data sheet one motor is, (N,) [K]."""
@@ -274,7 +282,7 @@ class Simulator:
         resistance: Array | float = r0
         if a.heating is not None:
             measured = "current" in m.channels
-            drawn = m.effort[:, k, m.channels.index("current")] if measured else torque / k0
+            drawn = self._drawn(a, k) if measured else torque / k0
             rise = self._rise(a.heating, k, r0 * drawn**2)
             resistance = warm_resistance(r0, rise)
             constant = warm_torque_constant(k0, rise)

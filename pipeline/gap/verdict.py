@@ -44,17 +44,17 @@ SUSPECT_SCATTER: Final = 2.5
 DWARFED: Final = 0.2
 #: Remaining error over the noise floor, in the naming channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
-#: A name that leaves more than this share of the gap on *prove* has closed nothing.
+#: A name that leaves more than this share of the gap on *choose* has closed nothing.
 IDLE: Final = 0.95
-IDLE_NAME: Final = "it closes none of the gap on held-out data"
+IDLE_NAME: Final = "it closes none of the gap on validation data"
 #: What is not acceptable is offered as the nearest, with doubt, where it takes this share of an
-#: unexplained gap on held-out data ...
+#: unexplained gap on *choose* ...
 NEAREST_SHARE: Final = 0.2
 #: ... and its size would come out as large by chance in this share of logs.
 NEAREST_ALARM: Final = 0.01
 NEAREST: Final = (
-    "it takes a fifth or more of the gap on held-out data, but parts of the log disagree about its "
-    "size too much to be sure of the law"
+    "it takes a fifth or more of the gap on validation data, but parts of the log disagree about "
+    "its size too much to be sure of the law"
 )
 #: Effects that one log may be found to lack, per joint.
 MOST_EFFECTS: Final = 4
@@ -86,7 +86,8 @@ class Candidate:
     Attributes:
         effect: Name.
         place: Joints, link, ground or effort channels.
-        before: Held-out error (*choose*) of the joints it touches without it, in `unit`.
+        before: Error on *choose*, by estimates from *fit*, of the joints it touches without it, in
+            `unit`.
         after: The same with it; NaN where it was not tried in earnest.
         unit: Of the compared channel.
         identifiable: Whether this motion could show it.
@@ -116,13 +117,17 @@ class Found:
         place: Where.
         parameters: Estimates.
         rivals: Effects at places that explain the log as well.
-        gap_before: Error on *prove* without it (with those before it), RMS of the joints it
-            touches, in `unit`; NaN where none of them has a row there.
-        gap_after: The same with it.
+        valid_before: Error on *choose* by estimates from *fit* without it (with those before it),
+            RMS of the joints it touches, in `unit`; NaN where none of them has a row there.
+        valid_after: The same with it.
         unit: Of the compared channel.
         noise_floor: Of the same joints, in `unit`.
         excitation: The motion that would tell it from its rivals.
         doubtful: Why the name is not trusted, or empty.
+        gap_before: Error on *prove* without it, where it shows most; NaN until the written model
+            was held against those rows, and where there is no row.
+        gap_after: The same with it.
+        written: Whether the model file holds it.
     """
 
     order: int
@@ -130,12 +135,15 @@ class Found:
     place: tuple[str, ...]
     parameters: tuple[Estimate, ...]
     rivals: tuple[tuple[str, tuple[str, ...]], ...]
-    gap_before: float
-    gap_after: float
+    valid_before: float
+    valid_after: float
     unit: str
     noise_floor: float
     excitation: str
     doubtful: str = ""
+    gap_before: float = float("nan")
+    gap_after: float = float("nan")
+    written: bool = False
 
     @property
     def values(self) -> dict[str, float]:
@@ -145,7 +153,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What is left at one joint on *prove* after everything accepted.
+    """What a model leaves at one joint on *prove*.
 
     Attributes:
         joint: Name.
@@ -176,7 +184,6 @@ class Naming:
         found: Accepted effects in the order of acceptance.
         candidates: Every candidate once.
         tolerances: Nuisances with estimate and prior sigma: (kind, place) to (value, sigma).
-        remainders: Per joint and channel.
         tried: Number of candidates tried.
         channel: The compared channel.
         unit: Its unit.
@@ -186,14 +193,7 @@ class Naming:
     found: tuple[Found, ...]
     candidates: tuple[Candidate, ...]
     tolerances: Mapping[tuple[str, str], tuple[float, float]]
-    remainders: tuple[Remainder, ...]
     tried: int
     channel: str
     unit: str
     notes: tuple[str, ...] = field(default=())
-
-    @property
-    def unexplained(self) -> bool:
-        """Whether a significant part of the gap has no name."""
-        doubted = any(f.doubtful not in ("", IDLE_NAME) for f in self.found)
-        return doubted or any(r.significant for r in self.remainders)

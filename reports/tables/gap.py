@@ -39,8 +39,8 @@ CANDIDATES = {
     "effect": ("name in the catalogue of effects", ""),
     "joint": ("joint it acts at; empty where it acts on all", ""),
     "place": ("joints, link or ground it acts on", ""),
-    "heldout_before": ("gap without it on data that did not fit it; empty: no rows", "see unit"),
-    "heldout_after": ("the same with it; empty where it was not tried in earnest", "see unit"),
+    "validation_before": ("gap without it on rows that choose, by the others", "see unit"),
+    "validation_after": ("the same with it; empty where it was not tried in earnest", "see unit"),
     "unit": ("unit of both", ""),
     "identifiable": ("whether this motion could show it", ""),
     "verdict": ("accepted, rejected, not identifiable on this motion, indistinguishable from", ""),
@@ -63,6 +63,7 @@ FOUND: dict[str, Meaning] = {
     "gap_unit": ("unit of both gaps and the noise floor", ""),
     "noise_floor": ("of the joints it acts on", "see gap_unit"),
     "doubt": ("why the name is not trusted; empty where it is", ""),
+    "written": ("whether model.toml holds it; one that it leaves out: gap beside the file's", ""),
 }
 
 

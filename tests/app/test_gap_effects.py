@@ -12,6 +12,7 @@ from pipeline.app.compute import stand, walk
 from pipeline.app.edited_chain import EditedChain, edited_chain
 from pipeline.app.effects import Effects, effects
 from pipeline.app.gap_energy import Cost, break_even, energy_change
+from pipeline.app.gap_words import energy_words
 from pipeline.gap.effects.registry import effect_named
 from pipeline.gap.model import MachineModel, machine_of_robot
 from pipeline.robot import Robot
@@ -26,17 +27,23 @@ def catalog() -> Catalog:
 
 
 def with_effect(
-    robot: Robot, catalog: Catalog, name: str, place: str, values: Mapping[str, float]
+    robot: Robot,
+    catalog: Catalog,
+    name: str,
+    place: str,
+    values: Mapping[str, float],
+    against: str = "reversible",
 ) -> Effects:
     def apply(model: MachineModel) -> MachineModel:
         return effect_named(name).apply(model, (place,), values)
 
-    return effects(robot, catalog.chain("rotor"), apply, (name,), "model.toml")
+    return effects(robot, catalog.chain(against), apply, (name,), "model.toml")
 
 
 def test_a_friction_of_nothing_changes_nothing(hexapod: Robot, catalog: Catalog) -> None:
     chain = catalog.chain("irreversible")
-    edit = with_effect(hexapod, catalog, "coulomb_friction", JOINT, {"torque": 0.0})
+    friction = ("coulomb_friction", JOINT, {"torque": 0.0}, "irreversible")
+    edit = with_effect(hexapod, catalog, *friction)
     edited = edit.chain(chain)
     assert isinstance(edited, EditedChain)
     walking = walk(hexapod, {"as it was": chain, "edited": edited}, samples=SAMPLES)
@@ -118,13 +125,49 @@ def test_sensors_cost_nothing_and_say_so(hexapod: Robot, catalog: Catalog) -> No
     assert "sensor" in edit.remarks[0]
 
 
-def test_energy_changes_by_what_the_friction_asks(hexapod: Robot, catalog: Catalog) -> None:
-    edit = with_effect(hexapod, catalog, "coulomb_friction", JOINT, {"torque": 4.0})
+def test_a_found_friction_costs_in_the_actuator_it_was_found_against(
+    hexapod: Robot, catalog: Catalog
+) -> None:
+    friction = ("coulomb_friction", JOINT, {"torque": 4.0})
+    edit = with_effect(hexapod, catalog, *friction, against="reversible")
     change = energy_change(hexapod, catalog.chains(), edit)
+    assert set(change.after) == {"ideal", "reversible"}
     assert change.after["ideal"].cycle == change.before["ideal"].cycle
     assert change.after["reversible"].cycle > change.before["reversible"].cycle
     assert change.after["reversible"].standing < change.before["reversible"].standing
     assert change.after["reversible"].middle_cycle > change.before["reversible"].middle_cycle
+    assert np.isnan(change.break_even_after)
+    words = energy_words(change, "reversible")
+    assert "No number is given for irreversible, nor a break-even" in words
+
+
+@pytest.mark.parametrize("against", ["rotor", ""])
+def test_gears_with_losses_of_their_own_do_not_get_a_found_friction_besides(
+    hexapod: Robot, catalog: Catalog, against: str
+) -> None:
+    def apply(model: MachineModel) -> MachineModel:
+        return effect_named("coulomb_friction").apply(model, (JOINT,), {"torque": 4.0})
+
+    chains = catalog.chains()
+    edit = effects(
+        hexapod, chains["rotor"], apply, ("coulomb_friction",), "model.toml", found_with=against
+    )
+    for name, chain in chains.items():
+        assert (edit.chain(chain) is chain) == (name != against)
+    assert edit.of_drivetrain == (JOINT,)
+    assert "counts there alone" in edit.remarks[-1]
+
+
+def test_bodies_and_motors_count_in_every_alternative(hexapod: Robot, catalog: Catalog) -> None:
+    payload = ("link_mass", "base_link", {"mass": 5.0}, "rotor")
+    change = energy_change(hexapod, catalog.chains(), with_effect(hexapod, catalog, *payload))
+    assert set(change.after) == set(catalog.chains())
+    weak = ("torque_constant_error", JOINT, {"relative": -0.2}, "rotor")
+    edit = with_effect(hexapod, catalog, *weak)
+    assert not edit.of_drivetrain
+    change = energy_change(hexapod, catalog.chains(), edit)
+    for name in ("rotor", "reversible", "irreversible"):
+        assert change.after[name].cycle > change.before[name].cycle
 
 
 def test_at_the_break_even_both_cost_the_same() -> None:

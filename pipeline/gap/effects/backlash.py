@@ -82,10 +82,8 @@ class Backlash(Effect):
 def _torque_scale(model: MachineModel, m: Measurement, joint: str) -> float:
     """RMS torque of a joint's actuator by the measured channel, transmission without loss [N*m]."""
     actuator = model.actuator(joint)
-    channel, size = (
-        m.channels[0],
-        float(np.sqrt(np.nanmean(m.effort[:, model.index(joint), 0] ** 2))),
-    )
+    channel, rows = m.channels[0], m.effort[m.has_say, model.index(joint), 0]
+    size = float(np.sqrt(np.nanmean(rows**2)))
     if channel == "torque" or actuator.motor is None:
         return max(size, 1e-9)
     constant = float(np.asarray(actuator.motor.torque_constant))

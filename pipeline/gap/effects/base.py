@@ -15,6 +15,13 @@ from pipeline.gap.model import MachineModel
 Place = tuple[str, ...]
 Values = Mapping[str, float]
 CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
+#: What a joint's column of a channel is called in the log format.
+CHANNEL_COLUMNS: Final = {
+    "torque": "torque_Nm",
+    "current": "current_A",
+    "voltage": "voltage_V",
+    "power": "power_W",
+}
 
 
 @dataclass(frozen=True)
@@ -61,7 +68,7 @@ class Effect(ABC):
 
     Attributes:
         name: In the field's terms; key of the registry.
-        place_kind: What it acts on: joint, joint pair, link, ground, effort channels.
+        place_kind: What it acts on: joint, joint pair, link, ground, effort channels or column.
         parameters: As written to results and model files.
         coordinates: As fitted.
         signature: Variable against which its residual shows, a key of `signature.VARIABLES`.
@@ -69,6 +76,7 @@ class Effect(ABC):
         is_tolerance: Whether every machine has it in small, as a tolerance that is always free.
         reaches: Multiples of the coordinates' steps to look across, where the prediction bends.
         contains: Effects that are special cases of this one at the same place.
+        rescales: Whether what bodies do to a channel is multiplied by it.
     """
 
     name: ClassVar[str]
@@ -80,6 +88,7 @@ class Effect(ABC):
     is_tolerance: ClassVar[bool] = False
     reaches: ClassVar[tuple[float, ...]] = (1.0,)
     contains: ClassVar[tuple[str, ...]] = ()
+    rescales: ClassVar[bool] = False
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Where in this machine and log the effect could be."""

@@ -14,6 +14,7 @@ from pipeline.gap.effects.base_tilt import BaseTilt
 from pipeline.gap.effects.center_of_mass_offset import CenterOfMassOffset
 from pipeline.gap.effects.coulomb_friction import CoulombFriction
 from pipeline.gap.effects.direction_dependent_friction import DirectionDependentFriction
+from pipeline.gap.effects.effort_gain import EffortGain
 from pipeline.gap.effects.effort_offset import EffortOffset
 from pipeline.gap.effects.internal_foot_force import InternalFootForce
 from pipeline.gap.effects.joint_elasticity import JointElasticity
@@ -54,6 +55,7 @@ EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
             TorqueConstantError(),
             WindingHeating(),
             EffortOffset(),
+            EffortGain(),
             PositionOffset(),
             TimeDelay(),
             InternalFootForce(),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,10 @@ import numpy as np
 from actuators.build import load_catalog
 from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement, near_rest
 from pipeline.gap.model import MachineModel, machine_of_robot
+from pipeline.gap.remainder import remainders
 from pipeline.gap.simulate import Simulator
+from pipeline.gap.verdict import Remainder
+from pipeline.gap.weigh import Weighing, floor_of
 from pipeline.robot import load_robot
 from pipeline.robot_file import load_robot_file
 
@@ -74,3 +78,23 @@ def measured(truth: MachineModel, motion: Measurement, seed: int = 1) -> Measure
     voltage = Simulator(with_current).predict(truth).effort[..., 1]
     effort[..., 1] = voltage + VOLTAGE * rng.standard_normal(current.shape)
     return replace(motion, effort=effort)
+
+
+def only(log: Measurement, channels: tuple[str, ...]) -> Measurement:
+    """The same log with some of its channels."""
+    keep = [log.channels.index(c) for c in channels]
+    model = leg_model()
+    effort = log.effort[..., keep].copy()
+    if channels == ("voltage",):
+        # Without a current beside it, voltage has the part of the current too.
+        bare = replace(log, channels=channels, effort=effort, noise=log.noise[:, keep])
+        noise = VOLTAGE * np.random.default_rng(5).standard_normal(effort.shape)
+        effort = Simulator(bare).predict(model).effort + noise
+    return replace(log, channels=channels, effort=effort, noise=log.noise[:, keep])
+
+
+def left_by(model: MachineModel, logs: Sequence[Measurement]) -> tuple[Remainder, ...]:
+    """What a model leaves once the tolerances of its parts are estimated."""
+    calibrated = Weighing(model, logs).calibrated(model)
+    predictions = [Simulator(m).predict(calibrated) for m in logs]
+    return remainders(logs, predictions, floor_of(logs, PROVE))

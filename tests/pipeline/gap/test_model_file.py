@@ -83,7 +83,7 @@ def test_changed_sources_are_told(tmp_path: Path, root: Path) -> None:
     text = path.read_text(encoding="utf-8")
     file = read_model_file(path)
     path.write_text(text.replace(file.robot_sha256, "0" * 64), encoding="utf-8")
-    assert "has changed" in read_model_file(path).changed[0]
+    assert "other SHA-256" in read_model_file(path).changed[0]
 
 
 def test_unknown_place_is_refused(root: Path) -> None:

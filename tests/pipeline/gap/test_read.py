@@ -183,7 +183,7 @@ def infinite_time(c: Columns) -> Columns:
         (repeated, ("row 53", "repeats")),
         (no_time, ("time_s",)),
         (one_joint_missing, ("'b'", "b__position_rad")),
-        (misspelt_joint, ("'b'", "did you mean 'b__postion_rad'")),
+        (misspelt_joint, ("b__postion_rad", "did you mean 'b__position_rad'")),
         (another_robot, ("another robot", "wheel_1")),
         (other_unit, ("a__position_deg", "a__position_rad", "mapping")),
         (no_effort, ("no effort", "a__torque_Nm")),
