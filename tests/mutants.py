@@ -8,17 +8,12 @@ their tests stand in `mutants.toml`.
 
 from __future__ import annotations
 
-import os
-
-for _library in ("OMP", "OPENBLAS", "MKL"):
-    os.environ[f"{_library}_NUM_THREADS"] = "1"  # a forked process must not inherit threads
-os.environ["MPLBACKEND"] = "Agg"
-
 import argparse
 import ast
 import contextlib
 import importlib
 import json
+import os
 import random
 import shutil
 import signal
@@ -130,6 +125,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{missing}: install the extra, pip install -e '.[mutants]'", file=sys.stderr)
         return 2
     config = tomllib.loads(CONFIG.read_text(encoding="utf-8"))
+    for library in ("OMP", "OPENBLAS", "MKL"):
+        os.environ[f"{library}_NUM_THREADS"] = "1"  # a forked process must not inherit threads
+    os.environ["MPLBACKEND"] = "Agg"
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # as Ctrl-C: the copy goes
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copy = Path(folder) / "copy"
@@ -137,10 +135,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name in LIBRARIES:
             importlib.import_module(name)
         tallies: dict[str, Tally] = {}
-        survivors: list[Mutant] = []
         for room in config["room"]:
-            run_room(copy, room, config.get("equivalent", []), options, tallies, survivors)
-    report(tallies, survivors, options)
+            run_room(copy, room, config.get("equivalent", []), options, tallies)
+    report(tallies, options)
     return 0
 
 
@@ -164,9 +161,8 @@ def run_room(
     equivalent: Sequence[Mapping[str, str]],
     options: argparse.Namespace,
     tallies: dict[str, Tally],
-    survivors: list[Mutant],
 ) -> None:
-    """Run a room's mutants; adds to the tallies and the survivors."""
+    """Run a room's mutants: adds to the tallies, prints survivors as they are found."""
     sources = [str(p.relative_to(copy)) for g in room["sources"] for p in sorted(copy.glob(g))]
     sources = [s for s in sources if not options.files or any(f in s for f in options.files)]
     tests = [str(p.relative_to(copy)) for g in room["tests"] for p in sorted(copy.glob(g))]
@@ -194,7 +190,9 @@ def run_room(
         verdict = verdict_on(copy, mutant, sum(seconds[t] for t in mutant.tests))
         tallies[mutant.path].add(verdict)
         if verdict == SURVIVED:
-            survivors.append(mutant)
+            place = f"{mutant.path}:{mutant.line}"
+            tqdm.write(f"survived: {place}\n  - {mutant.was}\n  + {mutant.now}", sys.stdout)
+            sys.stdout.flush()
 
 
 def is_named(mutant: Mutant, known: Mapping[str, str]) -> bool:
@@ -381,10 +379,8 @@ def wait(child: int, limit: float) -> int:
     return 124
 
 
-def report(
-    tallies: Mapping[str, Tally], survivors: Sequence[Mutant], options: argparse.Namespace
-) -> None:
-    """Print counts by file, the share killed, and the survivors."""
+def report(tallies: Mapping[str, Tally], options: argparse.Namespace) -> None:
+    """Print counts by file and the share killed."""
     verdicts = (KILLED, SURVIVED, UNCOVERED, EQUIVALENT)
     total = Tally(sum(t.made for t in tallies.values()))
     wide = max((len(p) for p in tallies), default=10)
@@ -405,8 +401,6 @@ def report(
             spread = 1.96 * (total[KILLED] * total[SURVIVED] / run**3) ** 0.5
             print(f" +- {spread:.1%} (a share of {options.share:g}, seed {options.seed})", end="")
         print()
-    for mutant in survivors:
-        print(f"\nsurvived: {mutant.path}:{mutant.line}\n  - {mutant.was}\n  + {mutant.now}")
 
 
 if __name__ == "__main__":

@@ -84,9 +84,7 @@ def test_a_sensor_at_the_joint_sees_what_the_joint_needs(
 
 def test_walking_with_a_coupling_keeps_the_balance_of_power(motion: Measurement) -> None:
     torque = np.random.default_rng(0).normal(size=motion.q.shape) * 20.0
-    joint = ShaftSeries.at_joint(
-        motion.joints, motion.time, motion.q, motion.v, motion.a, torque
-    )
+    joint = ShaftSeries.at_joint(motion.joints, motion.time, motion.q, motion.v, motion.a, torque)
     result = edited_chain(LOSSLESS, actuators()).moving(joint)
     for name in ("position", "velocity", "acceleration"):
         np.testing.assert_allclose(

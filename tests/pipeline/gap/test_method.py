@@ -64,9 +64,9 @@ def test_screening_tells_what_a_full_solve_would_gain(motion: Measurement, hidde
 
 
 def test_noise_does_not_put_the_truth_outside_its_class(friction: Problem) -> None:
-    """Of two effects alike but for d standard deviations on a log, noise alone prefers the wrong one
-    by more than T with chance Q((T + d^2) / 2 d), at most Q(sqrt(T)). That stays below 1e-5 for any
-    d; and what is worth a name at all is no class with nothing.
+    """Of two effects that differ by d standard deviations on a log, noise prefers the wrong one by
+    more than T with chance Q((T + d^2) / 2 d), at most Q(sqrt(T)): below 1e-5 for any d. And what
+    is worth a name at all is no class with nothing.
     """
     faint = replace(_friction_trial(friction), gain=100.0, significance=100.0, scale=1.0)
     threshold = _threshold(faint)
