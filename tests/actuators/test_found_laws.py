@@ -16,6 +16,7 @@ from actuators.heating import Heating, warm_resistance, warm_torque_constant
 from actuators.inertia import Inertia
 from actuators.position_torque import ParallelSpring, Ripple
 from actuators.quadrant import QuadrantFriction
+from actuators.ratio import Ratio
 from actuators.shaft import ShaftSeries
 from actuators.stribeck import Stribeck
 
@@ -78,7 +79,10 @@ def test_holding_ends_where_motion_sets_in(law: Element) -> None:
 
 @pytest.mark.parametrize(
     "law",
-    [Stribeck("s"), DirectionalFriction("d"), QuadrantFriction("q"), Friction("f"), Inertia("i")],
+    [
+        *(Stribeck("s"), DirectionalFriction("d"), QuadrantFriction("q")),
+        *(Friction("f"), Inertia("i"), Ratio("r")),
+    ],
     ids=lambda e: e.name,
 )
 def test_a_law_without_parameters_is_absent(law: Element) -> None:
