@@ -116,6 +116,7 @@ def test_parameters_may_differ_by_joint():
         lambda: Hypoid("h", 10.0, 0.5, 0.6, 0.03, 0.1),
         lambda: Hypoid("h", 10.0, 1.5, 1.4, 0.03, 0.5),
         lambda: Hypoid("h", 10.0, 1.6, 0.4, 0.03, 0.1),
+        lambda: Hypoid("h", ratio=2.0),
         lambda: Hypoid("h", 0.0, 1.4, 0.4, 0.03, 0.1),
         lambda: Hypoid("h", 10.0, 1.4, 0.4, 0.0, 0.1),
         lambda: Hypoid("h", 10.0, 1.4, -0.1, 0.03, 0.1),
