@@ -11,9 +11,11 @@ HOLDOUT := $(if $(filter file,$(origin LOG)),--holdout pipeline/gap/demo/walk_sl
 ARGS   ?=
 # A name as one word of the shell, whatever is in it.
 quoted = '$(subst ','\'',$(1))'
+# Of the faults that tests reach; all of them take about two hours.
+SHARE  ?= 0.15
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports gap blind calibrate test test-slow lint check bench readme urdf lock clean
+.PHONY: help env reports gap blind calibrate test test-slow lint check bench mutants readme urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -46,6 +48,9 @@ check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
 bench: $(STAMP)  ## Print speed ratios measured in one run
 	$(PY) -m tests.bench
 
+mutants: $(STAMP)  ## Put faults into the code and see whether tests notice (SHARE=, ARGS=; extra `mutants`)
+	$(PY) -m tests.mutants --share $(SHARE) $(ARGS)
+
 readme: $(STAMP)  ## Renew the README's tables and pictures from a run
 	$(PY) -m tests.readme
 
@@ -70,7 +75,7 @@ urdf: $(STAMP)  ## Build the URDFs from their TOML
 
 lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
-	  --no-emit-trusted-host --strip-extras --extra dev --allow-unsafe \
+	  --no-emit-trusted-host --strip-extras --extra dev --extra mutants --allow-unsafe \
 	  -o requirements.lock pyproject.toml
 
 clean:  ## Remove what a run wrote

@@ -4,7 +4,7 @@ import shutil
 import pytest
 
 from actuators.build import CATALOG, load_catalog
-from actuators.errors import ActuatorError, CatalogError, ParameterError
+from actuators.errors import ActuatorError, CatalogError, ParameterError, closest, one_line
 from tests.actuators.motions import ALTERNATIVES
 
 
@@ -50,7 +50,12 @@ def copy(tmp_path):
 @pytest.mark.parametrize(
     ("file", "old", "new", "message"),
     [
-        ("alternatives.toml", '"hypoid.ratio"', '"hypod.ratio"', "did you mean 'hypoid'"),
+        (
+            "alternatives.toml",
+            '"hypoid.ratio"',
+            '"hypod.ratio"',
+            "'irreversible': no component 'hypod'",
+        ),
         ("alternatives.toml", '"hypoid.ratio"', '"hypoid.rato"', "did you mean 'ratio'"),
         ("alternatives.toml", '"hypoid.ratio"', '"hypoid"', "expected component.parameter"),
         ("alternatives.toml", 'law = "hypoid"', 'law = "hipoid"', "unknown law 'hipoid'"),
@@ -73,6 +78,14 @@ def copy(tmp_path):
             "[[ideal.elements]]",
             "did you mean 'element'",
         ),
+        ("alternatives.toml", 'law = "hypoid"\n', "", "an element lacks its 'law'"),
+        ("alternatives.toml", 'name = "hypoid"\n', "", "an element lacks its 'name'"),
+        ("alternatives.toml", r'name = "hypoid"', "name = 3", "a table of texts"),
+        ("alternatives.toml", r'\ntitle = "[^"]*"', "\ntitle = 3", "'title' must be text"),
+        ("alternatives.toml", r'\nmotor = "[^"]*"', "\nmotor = 3", "'motor' must be text"),
+        ("alternatives.toml", r'\nratio = "[^"]*"', "\nratio = 3", "'ratio' must be text"),
+        ("planetary.toml", r'title = "[^"]*"', "title = 3", "'title' must be text"),
+        ("planetary.toml", r'kind = "planetary"\n', "", "missing key 'kind'"),
         ("planetary.toml", 'kind = "planetary"', 'kind = "planetry"', "did you mean 'planetary'"),
         ("planetary.toml", r"value = [\d.]+\n", "value = 13\n", "ratios multiply to"),
         (
@@ -95,6 +108,16 @@ def test_typos_give_one_clear_line(copy, file, old, new, message):
     with pytest.raises(ActuatorError, match=message) as caught:
         load_catalog(copy)
     assert "\n" not in str(caught.value)
+
+
+def test_a_message_is_one_line_of_at_most_200_characters():
+    assert one_line("a\n  b\tc") == "a b c"
+    for length in (199, 200):
+        assert one_line("x" * length) == "x" * length
+    assert one_line("x" * 201) == "x" * 197 + "..."
+    assert closest("bete", ["alpha", "beta"]) == "did you mean 'beta'?"
+    assert closest("qqqq", ["beta", "alpha"]) == "known: alpha, beta"
+    assert closest("qqqq", []) == "known: none"
 
 
 def test_missing_component_and_missing_catalogue(copy, tmp_path):

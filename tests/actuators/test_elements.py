@@ -1,3 +1,5 @@
+import math
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +11,7 @@ from actuators.hypoid import Hypoid
 from actuators.inertia import Inertia
 from actuators.motor import DCMotor
 from actuators.ratio import Ratio
-from tests.actuators.motions import constant, harmonic, split
+from tests.actuators.motions import constant, harmonic, series, split
 
 positive = st.floats(0.0, 10.0)
 fraction = st.floats(0.0, 0.95)
@@ -114,6 +116,10 @@ def test_parameters_may_differ_by_joint():
         lambda: Hypoid("h", 10.0, 0.5, 0.6, 0.03, 0.1),
         lambda: Hypoid("h", 10.0, 1.5, 1.4, 0.03, 0.5),
         lambda: Hypoid("h", 10.0, 1.6, 0.4, 0.03, 0.1),
+        lambda: Hypoid("h", ratio=2.0),
+        lambda: Hypoid("h", 0.0, 1.4, 0.4, 0.03, 0.1),
+        lambda: Hypoid("h", 10.0, 1.4, 0.4, 0.0, 0.1),
+        lambda: Hypoid("h", 10.0, 1.4, -0.1, 0.03, 0.1),
         lambda: DCMotor("m", 0.0, 0.3),
         lambda: DCMotor("m", 0.03, -0.3),
         lambda: DCMotor("m", 0.03, 0.3, max_speed=0.0),
@@ -149,6 +155,27 @@ def test_hypoid_driven_efficiency_in_closed_form():
 def test_hypoid_without_friction_is_its_ratio():
     s = constant([1.0, -1.0], 30.0)
     np.testing.assert_allclose(hypoid(0.0).moving(s).torque, 1.0, rtol=1e-13)
+
+
+def test_hypoid_of_ratio_and_pinion_angle_alone_is_a_spiral_without_friction():
+    h = Hypoid("h", ratio=4.0, pinion_angle=0.7)
+    s = constant([1.0, -1.0], 30.0)
+    np.testing.assert_allclose(h.moving(s).torque, 7.5, rtol=1e-13)
+    np.testing.assert_allclose(h.normal_force(s), 30.0)  # at a wheel of 1 m, teeth along its axis
+    assert not h.loss(s, h.moving(s)).any()
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.2], ids=["reversible", "self-locking"])
+def test_hypoid_without_a_load_needs_no_torque(mu):
+    s = constant([1.0, -1.0], 0.0)
+    assert not hypoid(mu).moving(s).torque.any()
+    assert not hypoid(mu).driving(s).torque.any()
+
+
+def test_self_locking_hypoid_names_the_sample_in_which_it_jams():
+    s = series([0.0, 1.0, 2.0], [[0, 0]] * 3, [[1, 1]] * 3, [[0, 0]] * 3, [[1, 1], [1, 1], [1, -1]])
+    with pytest.raises(SelfLockingError, match="joint 'j1' cannot keep moving in sample 2"):
+        hypoid(0.2).driving(s)
 
 
 def test_self_locking_hypoid_holds_any_load_without_torque():
@@ -188,6 +215,20 @@ def test_motor_power_is_mechanical_power_and_copper_loss(torque, speed):
     u = m.voltage(i, np.array(speed))
     assert u * i == pytest.approx(torque * speed + m.copper_loss(i), rel=1e-9, abs=1e-6)
     assert m.torque(u, np.array(speed)) == pytest.approx(torque, rel=1e-9, abs=1e-6)
+
+
+def test_a_motor_may_be_small():
+    limits = ("max_speed", "supply_voltage", "continuous_current", "peak_current")
+    small = DCMotor("m", 0.003, 0.3, **dict.fromkeys(limits, 0.5))
+    assert [getattr(small, name) for name in limits] == [0.5] * 4
+    with pytest.raises(UnphysicalElementError, match="torque_constant must be > 0"):
+        DCMotor("m", np.array([0.03, 0.0]), 0.3)
+
+
+def test_a_motor_has_no_limits_and_no_spread_unless_given():
+    m = DCMotor("m", 0.03, 0.3)
+    assert {m.max_speed, m.supply_voltage, m.continuous_current, m.peak_current} == {math.inf}
+    assert m.torque_constant_spread == m.resistance_spread == 0.0
 
 
 def test_inertia_stores_the_change_of_kinetic_energy():

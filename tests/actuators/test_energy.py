@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,6 +16,7 @@ from actuators.energy import (
 )
 from actuators.errors import EnergyError
 from actuators.limits import limit_rows, rms_over_time, time_over
+from actuators.motor import DCMotor
 from actuators.regeneration import supply
 from tests.actuators.motions import ALTERNATIVES, CHAINS, harmonic, series, split
 
@@ -58,6 +61,14 @@ def test_piecewise_linear_power_is_integrated_exactly(values):
     assert forward[0] - reverse[0] == pytest.approx(integral(t, p)[0], abs=1e-9)
     assert forward[0] >= 0.0
     assert reverse[0] >= 0.0
+
+
+def test_energy_is_never_negative_however_power_rounds():
+    rng = np.random.default_rng(0)
+    for small in (1e-17, 1e-12, 1e-3):
+        power = rng.normal(size=(2, 2000)) * np.array([[1.0], [small]])
+        for energy in split_integral(np.array([0.0, 1.0]), power):
+            assert (energy >= 0.0).all()
 
 
 def test_a_break_has_no_width():
@@ -176,6 +187,38 @@ def test_limits_of_a_fast_and_a_slow_joint():
 def test_root_mean_square_of_a_line_is_exact():
     t = np.array([0.0, 3.0])
     assert rms_over_time(t, np.array([[0.0], [3.0]]))[0] == pytest.approx(np.sqrt(3.0))
+    assert rms_over_time(t, np.array([[1.0], [4.0]]))[0] == pytest.approx(np.sqrt(7.0))
+    assert rms_over_time(t, np.array([[-1.0], [2.0]]))[0] == pytest.approx(1.0)
+
+
+def test_a_peak_at_its_limit_is_no_breach():
+    """The data sheet permits the limit itself, at every instant and root mean square."""
+    chain = CHAINS["ideal"]
+    motor = DCMotor("m", 0.03, 0.3, max_speed=800.0, peak_current=2.5 / 0.03, continuous_current=99)
+    two = np.ones((2, 1))
+    s = series([0.0, 4.0], 0 * two, 2.0 * two, 0 * two, 1000.0 * two)  # 800 rad/s, 2.5 N*m
+    result = replace(chain, motor=motor).moving(s)
+    rows = {r.quantity: r for r in limit_rows(result, motor)}
+    assert rows["speed"].peak == rows["speed"].limit == 800.0
+    assert rows["current"].peak == rows["current"].limit
+    for quantity in ("speed", "current"):
+        assert not rows[quantity].breach
+        assert rows[quantity].share_over == 0.0
+    assert not rows["voltage"].breach  # no limit
+    exact = replace(motor, continuous_current=rows["rms_current"].peak)
+    assert not {r.quantity: r for r in limit_rows(result, exact)}["rms_current"].breach
+    lower = replace(motor, continuous_current=0.99 * rows["rms_current"].peak)
+    over = {r.quantity: r for r in limit_rows(result, lower)}["rms_current"]
+    assert (over.breach, over.share_over, over.peak_time) == (True, 1.0, 0.0)
+
+
+def test_time_over_a_limit_counts_the_part_of_each_line_above_it():
+    t = np.array([0.0, 1.0, 3.0, 4.0, 6.0])
+    m = np.array([0.0, 4.0, 8.0, 8.0, 4.0])
+    assert time_over(t, m, 5.0) == pytest.approx(2.0 * 0.75 + 1.0 + 2.0 * 0.75)
+    assert time_over(t, m, 8.0) == 0.0
+    assert time_over(t, m, 0.0) == pytest.approx(6.0)
+    assert time_over(t, np.full(5, 4.0), 4.0) == 0.0
 
 
 def test_time_over_a_limit_on_a_triangle():

@@ -40,6 +40,7 @@ def test_values_are_si_and_rows_keep_what_was_written():
         ({"mass": entry(unit="N")}, "unit of force, expected mass such as 'kg'"),
         ({"mass": entry(unit="kgg")}, "unknown unit 'kgg': did you mean 'kg'"),
         ({"mass": entry(value="2")}, "must be a number"),
+        ({"mass": entry(value="x" * 100)}, f"must be a number, not '{'x' * 39}$"),
         ({"mass": entry(value=True)}, "must be a number"),
         ({"mass": entry(value=math.nan)}, "finite"),
         ({"mass": entry(value=math.inf)}, "finite"),

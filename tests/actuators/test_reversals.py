@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import CubicHermiteSpline
 
 from actuators.shaft import block_starts
 from tests.actuators.motions import harmonic, series, split
@@ -40,6 +41,62 @@ def test_zero_a_rounding_error_off_a_sample_snaps_to_it():
     s = split(series(t, *polynomial(t, [-0.5, 1])))
     assert s.time.size == 4
     assert s.velocity[1, 0] == s.velocity[2, 0] == 0.0
+
+
+@pytest.mark.parametrize("off", [-1e-11, 1e-11], ids=["just before", "just after"])
+def test_zero_closer_to_a_sample_than_time_resolves_is_on_it(off):
+    """Fast enough that the sample's own speed is no rest: 10 nrad/s at 1000 rad/s^2."""
+    t = np.array([0.0, 0.5, 1.0, 1.5])
+    s = split(series(t, *polynomial(t, [-1000.0 * (0.5 - off), 1000.0])))
+    assert s.time.tolist() == [0.0, 0.5, 0.5, 1.0, 1.5]
+    assert s.velocity[1:3, 0].tolist() == [0.0, 0.0]
+    assert s.velocity[[0, 3, 4], 0] == pytest.approx([-500.0, 500.0, 1000.0])
+    assert s.direction[:, 0].tolist() == [-1, -1, 1, 1, 1]
+
+
+def test_a_zero_after_a_touch_is_found():
+    t = np.arange(6.0)
+    v = np.array([2.0, 0.0, 1.0, 0.0, -1.0, -1.0])
+    s = split(series(t, v, v, 0 * v, v))
+    assert s.time.tolist() == [0, 1, 2, 3, 3, 4, 5]
+    assert s.direction[:, 0].tolist() == [1, 1, 1, 1, -1, -1, -1]
+
+
+def test_at_a_break_the_other_joints_are_interpolated():
+    """Velocity by its Hermite, exact for a cubic; acceleration and torque by a line."""
+    t = np.array([0.0, 1.0, 2.0, 3.0])
+    first, other = polynomial(t, [-1.4, 1.0]), polynomial(t, [3.0, -1.0, 0.5, 1.0])
+    s = split(series(t, *(np.column_stack(x) for x in zip(first, other, strict=True))))
+    q, v, a, torque = polynomial([1.0, 2.0], [3.0, -1.0, 0.5, 1.0])
+    at, u = s.time == s.time[2], 0.4
+    assert at.sum() == 2
+    np.testing.assert_allclose(s.time[at], 1.4, rtol=1e-14)
+    np.testing.assert_allclose(s.velocity[at, 1], 3.0 - 1.4 + 0.5 * 1.4**2 + 1.4**3, rtol=1e-13)
+    np.testing.assert_allclose(s.acceleration[at, 1], (1 - u) * a[0] + u * a[1], rtol=1e-13)
+    np.testing.assert_allclose(s.torque[at, 1], (1 - u) * torque[0] + u * torque[1], rtol=1e-13)
+    reference = CubicHermiteSpline([1.0, 2.0], q, v)(1.4)
+    np.testing.assert_allclose(s.position[at, 1], reference, rtol=1e-13)
+
+
+@pytest.mark.parametrize("acceleration", [0.0, 5.0])
+def test_a_joint_at_rest_stays_so_where_another_reverses(acceleration):
+    """Whatever acceleration its samples claim: between two samples at rest there is no motion."""
+    t = np.array([0.0, 1.0])
+    v = np.column_stack((t - 0.3, 0 * t))
+    a = np.column_stack((0 * t + 1.0, np.array([acceleration, -acceleration])))
+    s = split(series(t, v, v, a, v + 1.0))
+    assert s.time.size == 4
+    assert not s.velocity[:, 1].any()
+    assert not s.direction[:, 1].any()
+
+
+def test_a_joint_that_starts_from_rest_moves_to_its_own_side_only():
+    """Its Hermite dips to the other side where another joint reverses."""
+    t = np.array([0.0, 1.0])
+    v = np.column_stack((t - 0.3, np.array([0.0, 1.0])))
+    a = np.column_stack((0 * t + 1.0, np.array([-9.0, 1.0])))
+    s = split(series(t, v, v, a, v))
+    assert (s.velocity[:, 1] >= 0.0).all()
 
 
 def test_touching_zero_and_edges_need_no_break():

@@ -29,6 +29,29 @@ def test_known_conversions(value, unit, si, dim):
     assert dimension(unit) == dim
 
 
+RPM, DEGREE = 2.0 * math.pi / 60.0, math.pi / 180.0  # [rad/s], [rad]
+#: Every unit that is not its dimension's SI unit, from the definitions of the prefixes.
+SI = {
+    **{"%": 1 / 100, "cm": 1 / 100, "mm": 1 / 1000, "g": 1 / 1000, "ms": 1 / 1000, "min": 60.0},
+    **{"deg": DEGREE, "deg/s": DEGREE, "rpm": RPM, "mm/s": 1 / 1000, "m/min": 1 / 60},
+    **{"kN": 1000.0, "mN*m": 1 / 1000, "cN*m": 1 / 100, "N*cm": 1 / 100},
+    **{"g*cm^2": 1 / 1000 / 100**2, "kg*cm^2": 1 / 100**2, "N*m/deg": 1 / DEGREE},
+    **{"mN*m*s/rad": 1 / 1000, "mN*m/krpm": 1 / 1000 / (1000 * RPM), "mN*m/rpm": 1 / 1000 / RPM},
+    **{"kN/m": 1000.0, "N/mm": 1000.0, "g/cm^3": 100**3 / 1000},
+    **{"mW": 1 / 1000, "mJ": 1 / 1000, "Wh": 3600.0, "mA": 1 / 1000, "mV": 1 / 1000},
+    **{"mohm": 1 / 1000, "mH": 1 / 1000, "mN*m/A": 1 / 1000, "V*s/rad": 1.0},
+    **{"V/krpm": 1 / (1000 * RPM), "%/K": 1 / 100, "degC": 1.0},
+}
+
+
+@pytest.mark.parametrize("unit", known_units())
+def test_every_unit_has_the_factor_of_its_prefixes(unit):
+    factor = to_si(1.0, unit) - to_si(0.0, unit)
+    assert factor == pytest.approx(SI.get(unit, 1.0), rel=1e-12)
+    assert (unit in SI) == (unit != si_unit(dimension(unit)))
+    assert to_si(0.0, unit) == (273.15 if unit == "degC" else 0.0)
+
+
 @given(st.sampled_from(known_units()), st.floats(-1e6, 1e6))
 def test_from_si_inverts_to_si(unit, value):
     assert from_si(to_si(value, unit), unit) == pytest.approx(value, rel=1e-9, abs=1e-9)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 
 import pytest
+from scipy.stats import norm
 
 from pipeline.app.blind_answer import Answer, Named
-from pipeline.app.blind_identifiable import Identifiability, Rival
+from pipeline.app.blind_identifiable import THRESHOLD, Identifiability, Rival
 from pipeline.app.blind_rates import Rate, wilson
 from pipeline.app.blind_score import score
 from pipeline.app.blind_truth import HiddenTruth
@@ -137,3 +138,13 @@ def test_gap_closed_above_the_floor_in_squares() -> None:
     )
     assert score(0, [], [], twice).closed == pytest.approx(1.0)
     assert math.isnan(score(0, [], [], answer()).closed)
+
+
+def test_identifiable_means_neither_chance_nor_noise_hides_the_truth() -> None:
+    """Beyond what the best of 400 candidates reaches by chance in 1 of 100 logs (two-sided), by as
+    much as lets the truth be seen in 95 of 100; and hardly more, or rivals would be excuses.
+    """
+    needed = norm.isf(0.01 / 400 / 2) + norm.isf(0.05)
+    assert needed <= THRESHOLD <= needed + 0.5
+    near, far = (Rival("x", (), z) for z in (needed - 0.2, needed + 0.7))
+    assert Identifiability(50.0, (near, far)).like == (near,)

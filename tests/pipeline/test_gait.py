@@ -48,6 +48,14 @@ def test_profiles_start_and_end_at_rest_on_the_ground(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TRANSFER_PATHS)
+def test_a_smooth_path_is_one_whose_acceleration_vanishes_at_both_ends(name: str) -> None:
+    path = transfer_path(name)
+    ends = path.advance(np.array([0.0, 1.0]))[2]
+    assert np.allclose(ends, 0.0, atol=1e-9) == path.smooth_acceleration
+    assert path.advance(np.array([0.5]))[0] == pytest.approx(0.5)  # there and back alike
+
+
+@pytest.mark.parametrize("name", TRANSFER_PATHS)
 def test_joint_rates_are_finite_differences(hexapod: Robot, name: str) -> None:
     motion = tripod_gait(with_path(hexapod, name), samples=3001)
     for segment in motion.segments:
@@ -110,6 +118,56 @@ def test_a_stroke_beyond_reach_is_refused(hexapod: Robot) -> None:
     spec = hexapod.spec.with_parameters({"foot_stroke": 1.2, "walking_speed": 0.8})
     with pytest.raises(OutOfReachError, match=r"leg '\w+' at t = .* beyond its reach"):
         tripod_gait(load_robot(spec))
+
+
+def test_stroke_and_speed_agree_within_a_millionth(hexapod: Robot) -> None:
+    for share, good in ((5e-7, True), (2e-6, False), (-2e-6, False)):
+        spec = hexapod.spec.with_parameters({"walking_speed": 0.16 * (1 + share)})
+        robot = load_robot(spec)
+        if good:
+            tripod_gait(robot, samples=2)
+            continue
+        with pytest.raises(GaitError, match="change one"):
+            tripod_gait(robot, samples=2)
+
+
+@pytest.mark.parametrize(
+    "tripods",
+    [
+        (("lf", "lr", "rm"),),
+        (("lf", "lr", "rm"), ("rf", "rr")),
+        (("lf", "lr", "rm"), ("rf", "rr", "rm")),
+        (("lf", "lr"), ("rm", "rf"), ("rr", "lm")),
+    ],
+)
+def test_sets_that_do_not_part_the_legs_in_two_are_refused(
+    hexapod: Robot, tripods: tuple[tuple[str, ...], ...]
+) -> None:
+    robot = replace(hexapod, spec=replace(hexapod.spec, tripods=tripods))
+    with pytest.raises(GaitError, match="must part the legs .* in two sets"):
+        tripod_gait(robot)
+
+
+def test_the_first_set_supports_first_and_the_body_moves_on(hexapod: Robot, walk: Motion) -> None:
+    speed = hexapod.spec.parameters["walking_speed"]
+    assert tuple(s.stance for s in walk.segments) == hexapod.spec.tripods
+    for segment in walk.segments:
+        base, rate = segment.configuration[:, :3], segment.velocity[:, :6]
+        np.testing.assert_allclose(base[:, 0], speed * segment.time, atol=1e-12)
+        assert not base[:, 1:].any()
+        np.testing.assert_allclose(rate, np.tile([speed, 0, 0, 0, 0, 0], (len(rate), 1)))
+        assert not segment.acceleration[:, :6].any()
+
+
+def test_standing_on_feet_of_ones_choice(hexapod: Robot) -> None:
+    segment = standing_posture(hexapod, ("lf", "lm", "lr", "rf", "rr"))
+    feet = foot_positions(hexapod.chains, hexapod.leg_positions(segment.configuration))[0]
+    neutral = np.array([leg.neutral_foot for leg in hexapod.spec.legs])
+    neutral[hexapod.leg_names.index("rm"), 2] += hexapod.spec.parameters["foot_lift"]
+    np.testing.assert_allclose(feet, neutral, atol=1e-9)
+    assert not segment.velocity.any()
+    assert not segment.acceleration.any()
+    assert segment.name == "standing on lf, lm, lr, rf, rr"
 
 
 def test_numbers_that_contradict_each_other_are_refused(hexapod: Robot) -> None:

@@ -1,0 +1,248 @@
+"""A loaded robot: columns, a base that is not level, and limits of its joints."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pipeline.errors import GaitError, OutOfReachError, UrdfError
+from pipeline.gait import standing_posture, tripod_gait
+from pipeline.inverse_kinematics import solve_positions, solve_rates
+from pipeline.joint_demand import segment_demand
+from pipeline.kinematics import foot_jacobians, foot_positions
+from pipeline.leg_chains import leg_chains
+from pipeline.motion import Motion, Segment
+from pipeline.robot import Robot, load_robot
+from pipeline.stability import stability_margins
+
+
+def turned(segment: Segment, rotation: np.ndarray) -> Segment:
+    """The same posture with the base turned; every 50th sample."""
+    part = slice(None, None, 50)
+    q = segment.configuration[part].copy()
+    q[:, 3:7] = pin.Quaternion(rotation).coeffs()
+    return replace(
+        segment,
+        time=segment.time[part],
+        configuration=q,
+        velocity=segment.velocity[part],
+        acceleration=segment.acceleration[part],
+    )
+
+
+def test_base_rotation_is_that_of_its_quaternion(hexapod: Robot) -> None:
+    rng = np.random.default_rng(0)
+    q = hexapod.configuration(np.zeros((20, 18)))
+    assert hexapod.base_rotation(q) is None
+    turns = [pin.rpy.rpyToMatrix(*rng.uniform(-3.0, 3.0, 3)) for _ in range(20)]
+    q[:, 3:7] = [pin.Quaternion(turn).coeffs() for turn in turns]
+    found = hexapod.base_rotation(q)
+    assert found is not None
+    np.testing.assert_allclose(found, turns, atol=1e-12)
+
+
+def test_columns_go_where_pinocchio_has_them(hexapod: Robot) -> None:
+    rng = np.random.default_rng(1)
+    joints, base = rng.normal(size=(3, 18)), rng.normal(size=(3, 3))
+    q, v = hexapod.configuration(joints, base), hexapod.tangent(joints, base)
+    for k, name in enumerate(hexapod.joints):
+        joint = hexapod.model.joints[hexapod.model.getJointId(name)]
+        np.testing.assert_array_equal(q[:, joint.idx_q], joints[:, k])
+        np.testing.assert_array_equal(v[:, joint.idx_v], joints[:, k])
+    np.testing.assert_array_equal(q[:, :3], base)
+    np.testing.assert_array_equal(v[:, :3], base)
+    assert not v[:, 3:6].any()
+    np.testing.assert_array_equal(hexapod.leg_positions(q), joints.reshape(3, 6, 3))
+
+
+@pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.7), (0.02, 0.01, 0.0), (-0.01, 0.02, -1.2)])
+def test_demand_of_a_base_that_is_not_level(
+    hexapod: Robot, walk: Motion, rpy: tuple[float, float, float]
+) -> None:
+    """Pinocchio's own frame Jacobians in the world's directions balance base and joints."""
+    rotation = pin.rpy.rpyToMatrix(*rpy)
+    segment = turned(walk.segments[0], rotation)
+    demand, contacts = segment_demand(hexapod, segment)
+    assert contacts is not None
+    data = hexapod.model.createData()
+    for n in range(segment.time.size):
+        q, v, a = segment.configuration[n], segment.velocity[n], segment.acceleration[n]
+        tau = pin.rnea(hexapod.model, data, q, v, a).copy()
+        pin.computeJointJacobians(hexapod.model, data, q)
+        pin.updateFramePlacements(hexapod.model, data)
+        for i, leg in enumerate(hexapod.spec.legs):
+            frame = hexapod.model.getFrameId(leg.foot)
+            world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+            jacobian = pin.getFrameJacobian(hexapod.model, data, frame, world)
+            tau -= jacobian[:3].T @ contacts.force_world[n, i]
+        np.testing.assert_allclose(tau[:6], 0, atol=1e-9)
+        np.testing.assert_allclose(tau[hexapod.velocity_index], demand.torque[n], atol=1e-9)
+    np.testing.assert_allclose(
+        contacts.force_world, np.einsum("ij,nfj->nfi", rotation, contacts.force), atol=1e-9
+    )
+
+
+def test_a_heading_changes_neither_torques_nor_stability(hexapod: Robot, walk: Motion) -> None:
+    level = turned(walk.segments[0], np.eye(3))
+    ahead = turned(walk.segments[0], pin.rpy.rpyToMatrix(0.0, 0.0, 2.1))
+    one, other = (segment_demand(hexapod, s)[0].torque for s in (level, ahead))
+    np.testing.assert_allclose(one, other, atol=1e-9)
+    np.testing.assert_allclose(
+        stability_margins(hexapod, level), stability_margins(hexapod, ahead), atol=1e-12
+    )
+
+
+def test_a_tilt_moves_the_centre_of_mass_over_the_feet(hexapod: Robot, walk: Motion) -> None:
+    """Held against the hull's edges from Pinocchio's own foot frames in the world."""
+    segment = turned(walk.segments[0], pin.rpy.rpyToMatrix(0.08, -0.05, 0.3))
+    margins = stability_margins(hexapod, segment)
+    data = hexapod.model.createData()
+    for n, q in enumerate(segment.configuration):
+        centre = pin.centerOfMass(hexapod.model, data, q)[:2].copy()
+        pin.framesForwardKinematics(hexapod.model, data, q)
+        feet = np.array(
+            [
+                data.oMf[hexapod.model.getFrameId(leg.foot)].translation[:2]
+                for leg in hexapod.spec.legs
+                if leg.name in segment.stance
+            ]
+        )
+        edges = []
+        for k in range(3):
+            a, b = feet[k], feet[(k + 1) % 3]
+            along = (b - a) / np.linalg.norm(b - a)
+            normal = np.array([-along[1], along[0]])
+            inward = np.sign(normal @ (feet[(k + 2) % 3] - a))
+            edges.append(inward * float(normal @ (centre - a)))
+        assert margins[n] == pytest.approx(min(edges), abs=1e-12)
+
+
+@pytest.mark.parametrize("what", ["walking", "standing"])
+def test_joints_stay_within_their_limits(hexapod: Robot, what: str) -> None:
+    """Both limits count, to a billionth of a radian, and the message names joint and instant."""
+
+    def make(robot: Robot) -> list[Segment]:
+        if what == "walking":
+            return list(tripod_gait(robot, samples=51).segments)
+        return [standing_posture(robot)]
+
+    reached = np.concatenate([s.configuration[:, hexapod.position_index] for s in make(hexapod)])
+    column = hexapod.joints.index("lr_joint_2")
+    place = hexapod.position_index[column]
+    for end, sign in (("upperPositionLimit", 1.0), ("lowerPositionLimit", -1.0)):
+        extreme = sign * (sign * reached[:, column]).max()
+        for slack, good in ((1e-6, True), (0.0, True), (-1e-6, False)):
+            model = hexapod.model.copy()
+            limits = getattr(model, end).copy()
+            limits[place] = extreme + sign * slack
+            setattr(model, end, limits)
+            robot = replace(hexapod, model=model)
+            if good:
+                make(robot)
+                continue
+            with pytest.raises(GaitError, match=f"'lr_joint_2' .* {np.degrees(extreme):.1f} deg"):
+                make(robot)
+
+
+def test_feet_are_put_where_they_are_asked_for(hexapod: Robot) -> None:
+    """Anywhere within reach, from one start posture, and on its branch of the knee."""
+    rng = np.random.default_rng(5)
+    wanted = rng.uniform(-0.4, 0.4, (40, 6, 3))
+    target = foot_positions(hexapod.chains, wanted)
+    start = np.array([leg.start_posture for leg in hexapod.spec.legs])
+    found = solve_positions(hexapod.chains, target, start, np.arange(40.0))
+    np.testing.assert_allclose(foot_positions(hexapod.chains, found), target, atol=1e-9)
+    np.testing.assert_allclose(found, wanted, atol=1e-6)
+
+
+def test_a_foot_hardly_out_of_reach_is_refused_with_leg_and_instant(hexapod: Robot) -> None:
+    """Legs stretched along a line, and a target 4 mm further out."""
+    stretched = np.zeros((1, 6, 3))
+    stretched[:, :, 2] = np.pi / 2  # the tibia in line with the femur
+    foot = foot_positions(hexapod.chains, stretched)
+    target = foot + [0.0, 0.004, 0.0] * np.array([[[1.0]] * 3 + [[-1.0]] * 3])
+    start = np.array([leg.start_posture for leg in hexapod.spec.legs])
+    with pytest.raises(OutOfReachError, match=r"leg 'l\w' at t = 7 s: .* mm beyond") as caught:
+        solve_positions(hexapod.chains, target, start, np.array([7.0]))
+    (miss,) = re.findall(r"lies ([\d.]+) mm", str(caught.value))
+    assert 4.0 <= float(miss) < 40.0
+
+
+def test_a_stretched_leg_has_no_rates(hexapod: Robot) -> None:
+    q = np.array([[leg.start_posture for leg in hexapod.spec.legs]] * 2)
+    q[:] = [0.1, 0.2, 0.3]
+    still = np.zeros_like(q)
+    time = np.array([0.0, 0.5])
+    velocity, acceleration = solve_rates(hexapod.chains, q, still, still, time)
+    assert not velocity.any()
+    assert not acceleration.any()
+    q[1, 4, 2] = np.pi / 2
+    with pytest.raises(OutOfReachError, match="leg 'rm' is stretched .* t = 0.5 s"):
+        solve_rates(hexapod.chains, q, still, still, time)
+
+
+def test_rates_move_the_feet_as_asked(hexapod: Robot) -> None:
+    rng = np.random.default_rng(6)
+    q = rng.uniform(-0.3, 0.3, (10, 6, 3))
+    velocity, acceleration = rng.normal(size=(2, 10, 6, 3))
+    v, a = solve_rates(hexapod.chains, q, velocity, acceleration, np.zeros(10))
+    h = 3e-5
+    ahead, behind = (
+        foot_positions(hexapod.chains, q + s * h * v + 0.5 * h**2 * a) for s in (1.0, -1.0)
+    )
+    here = foot_positions(hexapod.chains, q)
+    np.testing.assert_allclose((ahead - behind) / (2 * h), velocity, rtol=1e-5)
+    np.testing.assert_allclose((ahead - 2 * here + behind) / h**2, acceleration, rtol=1e-3)
+    jacobian = foot_jacobians(hexapod.chains, q)[1]
+    np.testing.assert_allclose(np.einsum("nlij,nlj->nli", jacobian, v), velocity, atol=1e-12)
+
+
+LEG = """<robot name="r"><link name="base"/>
+<joint name="a" type="{kind}"><parent link="base"/><child link="l1"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="l1">{mass}</link>
+<joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><axis xyz="{axis}"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="l2">{mass}</link>
+<joint name="c" type="revolute"><parent link="l2"/><child link="l3"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint><link name="l3">{mass}</link>
+<joint name="f" type="fixed"><parent link="l3"/><child link="foot"/></joint><link name="foot"/>
+<joint name="g" type="fixed"><parent link="l2"/><child link="knee"/></joint><link name="knee"/>
+</robot>"""
+MASS = (
+    '<inertial><mass value="1"/>'
+    '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+)
+
+
+@pytest.mark.parametrize(
+    ("kind", "joints", "foot", "message"),
+    [
+        ("prismatic", ("a", "b", "c"), "foot", "'a' is not a revolute joint"),
+        ("continuous", ("a", "b", "c"), "foot", "'a' is not a revolute joint"),
+        ("revolute", ("a", "c", "b"), "foot", "'c' hangs on 'b', not on 'a'"),
+        ("revolute", ("a", "b"), "foot", "names 2 joints; a leg has 3"),
+        ("revolute", ("a", "b", "c"), "knee", "foot 'knee' is not carried by 'c'"),
+        ("revolute", ("a", "b", "c"), "foo", "did you mean 'foot'"),
+        ("revolute", ("a", "b", "cc"), "foot", "'cc' is not in the URDF"),
+    ],
+)
+def test_what_is_no_leg(kind: str, joints: tuple[str, ...], foot: str, message: str) -> None:
+    model = pin.buildModelFromXML(LEG.format(kind=kind, mass=MASS, axis="0 1 0"))
+    with pytest.raises(UrdfError, match=message):
+        leg_chains(model, [("leg", joints, foot)], 0)
+
+
+def test_axes_are_those_of_the_urdf() -> None:
+    model = pin.buildModelFromXML(LEG.format(kind="revolute", mass=MASS, axis="0 0.6 -0.8"))
+    chains = leg_chains(model, [("leg", ("a", "b", "c"), "foot")], 0)
+    np.testing.assert_allclose(chains.axis[:, 0], [[0, 0, 1], [0, 0.6, -0.8], [1, 0, 0]])
+    assert [None if a is None else a[0] for a in chains.along] == [2, None, 0]
+    assert chains.turned == (False, False, False)
+
+
+def test_a_joint_of_no_leg_is_refused(hexapod: Robot) -> None:
+    with pytest.raises(UrdfError, match="'rr_joint_1' of the URDF belongs to no leg"):
+        load_robot(replace(hexapod.spec, build=None, legs=hexapod.spec.legs[:5]))

@@ -1,0 +1,147 @@
+"""Numbers of a robot file at the edge of what a robot can have, and how files extend each other."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from pathlib import Path
+
+import pytest
+
+from actuators.parameters import ParameterSet
+from pipeline.errors import RobotFileError
+from pipeline.robot import Robot
+from pipeline.robot_file import built_neutral_foot, check_parameters, load_robot_file
+
+
+def with_values(hexapod: Robot, **values: float) -> ParameterSet:
+    """The hexapod's numbers with some at other values, whatever their bounds and intervals."""
+    rows = tuple(
+        dataclasses.replace(
+            p, value=values[p.name], bounds=None, interval=(values[p.name], values[p.name])
+        )
+        if p.name in values
+        else p
+        for p in hexapod.spec.parameters.rows()
+    )
+    return ParameterSet(rows, "here")
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"femur_com": 0.0}, ""),
+        ({"femur_com": 1.0}, ""),
+        ({"femur_com": -1e-9}, "femur_com = -1e-09 lies outside the link"),
+        ({"tibia_com": 1.001}, "tibia_com = 1.001 lies outside the link"),
+        ({"foot_lift": 0.0}, ""),
+        ({"foot_lift": -1e-9}, "foot_lift must not be negative"),
+        ({"coxa_length": 0.0}, ""),
+        ({"coxa_length": -1e-9}, "coxa_length must not be negative"),
+        ({"coxa_length": 0.2, "joint_2_lateral": 0.2}, ""),
+        ({"coxa_length": 0.2, "joint_2_lateral": 0.19}, "joint_2_lateral is smaller than coxa"),
+        ({"joint_2_lower": 0.5, "joint_2_upper": 0.5}, "joint_2_lower must be below joint_2_upper"),
+        ({"joint_3_lower": 0.6, "joint_3_upper": 0.5}, "joint_3_lower must be below joint_3_upper"),
+        ({"joint_effort_limit": 1e9}, ""),
+        ({"joint_effort_limit": 1.001e9}, "joint_effort_limit is beyond any robot"),
+        ({"trunk_com_left": -1.001e9}, "trunk_com_left is beyond any robot"),
+        ({"joint_1_axis_angle": 0.0}, ""),
+    ],
+)
+def test_edges_of_what_a_built_robot_can_have(
+    hexapod: Robot, values: dict[str, float], message: str
+) -> None:
+    parameters = with_values(hexapod, **values)
+    if not message:
+        check_parameters(parameters, "hexapod", "here")
+        return
+    with pytest.raises(RobotFileError, match=message):
+        check_parameters(parameters, "hexapod", "here")
+
+
+WALKS = ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity")
+BUILT = (
+    *("body_length", "robot_width", "hip_spacing", "body_height", "femur_length", "tibia_length"),
+    *("hip_link_mass", "femur_mass", "tibia_mass", "trunk_height", "link_width"),
+    *("joint_1_range", "joint_effort_limit", "joint_velocity_limit"),
+)
+
+
+@pytest.mark.parametrize("name", [*WALKS, *BUILT])
+def test_what_must_be_positive(hexapod: Robot, name: str) -> None:
+    check_parameters(with_values(hexapod, **{name: 1e-6}), "hexapod", "here")
+    with pytest.raises(RobotFileError, match=rf"parameters\.{name} = .* must be positive"):
+        check_parameters(with_values(hexapod, **{name: 0.0}), "hexapod", "here")
+    if name in BUILT:  # a URDF of one's own has no such number
+        check_parameters(with_values(hexapod, **{name: 0.0}), None, "here")
+
+
+def test_feet_stand_at_the_robots_width_and_the_hips_spacing(hexapod: Robot) -> None:
+    p = hexapod.spec.parameters
+    x, y, z = p["hip_spacing"], p["robot_width"] / 2, p["body_height"]
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        for station, ahead in (("front", 1.0), ("middle", 0.0), ("rear", -1.0)):
+            assert built_neutral_foot(p, side, station) == (ahead * x, sign * y, -z)
+
+
+def extending(root: Path, folder: Path, text: str) -> Path:
+    path = folder / "own.toml"
+    base = (root / "urdf" / "hexapod.toml").as_posix()
+    path.write_text(f'extends = "{base}"\n' + text, encoding="utf-8")
+    return path
+
+
+def test_a_file_that_extends_another_keeps_what_it_does_not_say(root: Path, tmp_path: Path) -> None:
+    base = load_robot_file(root / "urdf" / "hexapod.toml")
+    path = extending(root, tmp_path, '[robot]\nname = "other"\n[standing]\nfeet = ["lf"]\n')
+    spec = load_robot_file(path)
+    assert (spec.name, spec.standing_feet) == ("other", ("lf",))
+    assert (spec.base_link, spec.legs, spec.tripods) == (base.base_link, base.legs, base.tripods)
+    assert dict(spec.parameters) == dict(base.parameters)
+    assert [p.name for p in spec.sources] == ["own.toml", "hexapod.toml"]
+
+
+def test_legs_are_replaced_as_a_whole(root: Path, tmp_path: Path) -> None:
+    leg = '[legs.rm]\njoints = ["a", "b", "c"]\nfoot = "f"\nside = "right"\nstation = "middle"\n'
+    groups = '[gait]\ntripods = []\n[standing]\nfeet = ["rm"]\n'
+    spec = load_robot_file(extending(root, tmp_path, leg + groups))
+    assert [leg.name for leg in spec.legs] == ["rm"]
+    assert spec.joints == ("a", "b", "c")
+
+
+def test_a_circle_of_files_is_refused(tmp_path: Path) -> None:
+    for own, other in (("a", "b"), ("b", "a")):
+        (tmp_path / f"{own}.toml").write_text(f'extends = "{other}.toml"\n', encoding="utf-8")
+    with pytest.raises(RobotFileError, match=r"a\.toml: extends itself through .*b\.toml"):
+        load_robot_file(tmp_path / "a.toml")
+
+
+@pytest.mark.parametrize(
+    ("pattern", "replacement", "message"),
+    [
+        (r'side = "left"', 'side = "port"', "side = 'port'; expected 'left' or 'right'"),
+        (r'"lf_joint_2"', '"lf_joint_1"', "joint 'lf_joint_1' belongs to two legs"),
+        (r'"lm_joint_2"', '"lf_joint_1"', "joint 'lf_joint_1' belongs to two legs"),
+        (r'base = "floating"', 'base = "flying"', "robot.base = 'flying'; expected 'floating'"),
+        (r'build = "hexapod"', 'build = "hexpod"', "did you mean 'hexapod'"),
+        (r'feet = \["lf", "lr"', 'feet = ["lf", "lf"', "a leg is named twice"),
+        (r"feet = \[.*?\]", 'feet = "lf"', "standing.feet: expected a list of leg names"),
+        (r'foot = "lf_foot_link"', "foot = 3", "'foot' is missing or not a text"),
+        (r'foot = "lf_foot_link"', 'foot = ""', "'foot' is missing or not a text"),
+        (r"joints = \[.*?\]", 'joints = "a"', "joints must be a list of names"),
+        (r'(side = "left")', r"\1" + "\nstart_posture = [0, 1]", "start_posture must be three"),
+        (r'(side = "left")', r"\1" + "\nstart_posture = [0, 1, true]", "must be three numbers"),
+        (r"^\[gait\]", "[gate]", "unknown table 'gate'; did you mean 'gait'"),
+        (r"^\[standing\].*?(?=^\[)", "", r"the table \[standing\] is missing"),
+    ],
+)
+def test_what_no_robot_file_may_say(
+    root: Path, tmp_path: Path, pattern: str, replacement: str, message: str
+) -> None:
+    text = (root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")
+    changed, count = re.subn(pattern, replacement, text, count=1, flags=re.S | re.M)
+    assert count == 1
+    path = tmp_path / "own.toml"
+    path.write_text(changed, encoding="utf-8")
+    with pytest.raises(RobotFileError, match=message):
+        load_robot_file(path)
