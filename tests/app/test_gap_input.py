@@ -365,7 +365,9 @@ def _with_torque(root: Path, friction: float) -> Columns:
 
     m = leg.leg_motion(duration=12.0)
     rigid = machine_of_urdf(root / "urdf" / "leg.urdf").rigid
-    torque = np.array([pin.rnea(rigid, rigid.createData(), *x) for x in zip(m.q, m.v, m.a)])
+    torque = np.array(
+        [pin.rnea(rigid, rigid.createData(), *x) for x in zip(m.q, m.v, m.a, strict=True)]
+    )
     torque[:, 1] += friction * np.sign(m.v[:, 1])
     torque += 0.02 * np.random.default_rng(3).standard_normal(torque.shape)
     columns: Columns = {"time_s": m.time}
