@@ -8,7 +8,7 @@ import shutil
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -107,16 +107,111 @@ def parameters(out: Path) -> str:
     ).replace("| --- | ---: | ---: |", "| --- | ---: | --- |")
 
 
-BLOCKS = {"standing": standing, "walking": walking, "parameters": parameters}
+#: Rates of the blind trials in the README's order and words.
+RATES = {
+    "right_and_written": "one effect the log can show: the first name, with its place, is it or "
+    "one of its class, **and the model file holds it**",
+    "right_and_written_where_no_class": "the same, where the log tells it from every other effect",
+    "right_and_written_of_all": "the same of all trials with one effect, shown by the log or not",
+    "right_first": "one effect the log can show: the first name is right, though it may be "
+    "doubted and left out",
+    "wrong_name": "anything hidden, also what has no name in the catalogue: a wrong name given "
+    "with confidence",
+    "wrong_name_of_known": "the same, only effects of the catalogue hidden",
+    "nothing_found_in_empty_logs": "nothing hidden: nothing named",
+    "empty_logs_called_explained": "the same, and nothing called unexplained",
+    "both_of_a_pair": "two effects the log can show: both named, nothing wrong",
+    "both_of_a_pair_written": "the same, and the model file holds both",
+    "unknown_called_unexplained": "an effect outside the catalogue: called unexplained",
+    "unknown_not_misnamed": "the same: no name given with confidence",
+    "intervals_that_cover": "95 % intervals of trusted right names that hold the truth",
+    "gap_closed": "right names that close at least 90 % of the gap on held-out data",
+}
 
 
-def renewed(text: str, out: Path) -> str:
-    """The README with every block between its markers made anew from a run's files.
+def share(hits: str, trials: str) -> str:
+    """A count out of another."""
+    return f"{hits} of {trials}"
+
+
+def percentage(text: str) -> str:
+    """One decimal."""
+    return f"{100 * float(text):.1f}"
+
+
+def aim(row: dict[str, str]) -> str:
+    """What is aimed at, empty where nothing is."""
+    low, high = row["aim_low"], row["aim_high"]
+    if not low:
+        return ""
+    if float(high) == 1.0:
+        return f"≥ {100 * float(low):.0f} %"
+    if float(low) == 0.0:
+        return f"≤ {100 * float(high):.0f} %"
+    return f"{100 * float(low):.0f} to {100 * float(high):.0f} %"
+
+
+def blind(out: Path) -> str:
+    """Rates of the blind trials, from the stored run."""
+    found = {r["rate"]: r for r in rows(PICTURES, "blind_rates")}
+    lines = [
+        (
+            words,
+            f"{share(found[name]['hits'], found[name]['trials'])}, "
+            f"{percentage(found[name]['share'])} %",
+            f"{percentage(found[name]['low'])} to {percentage(found[name]['high'])} %",
+            aim(found[name]),
+        )
+        for name, words in RATES.items()
+    ]
+    count = len(rows(PICTURES, "blind_trials"))
+    return table((f"{count} trials", "reached", "95 % interval", "aim"), lines)
+
+
+def blind_effects(out: Path) -> str:
+    """How each effect fared that was hidden alone, from the stored run."""
+    lines = []
+    for r in rows(PICTURES, "blind_by_effect"):
+        known = r["in_catalogue"] == "true"
+        lines.append(
+            (
+                f"`{r['effect']}`" if known else f"`{r['effect']}` (no name)",
+                share(r["right_and_written"], r["visible"]) if known else "",
+                share(r["right_first"], r["visible"]) if known else "",
+                share(r["right_and_written_of_all"], r["trials"]) if known else "",
+                share(r["called_unexplained"], r["trials"]),
+                r["wrong"],
+            )
+        )
+    header = ("hidden alone", "right and written", "right first", "of all trials")
+    return table((*header, "called unexplained", "wrong"), lines)
+
+
+BLOCKS = {
+    "standing": standing,
+    "walking": walking,
+    "parameters": parameters,
+    "blind": blind,
+    "blind effects": blind_effects,
+}
+#: What a run of `make blind` leaves that the README shows.
+BLIND = ("blind_trials.csv", "blind_rates.csv", "blind_by_effect.csv", "blind_confusion.csv")
+BLIND_PICTURE = "blind_confusion.png"
+
+
+def renewed(text: str, out: Path, names: Iterable[str] = tuple(BLOCKS)) -> str:
+    """The README with blocks between their markers made anew from a run's files.
+
+    Args:
+        text: Of the README.
+        out: Folder of the run.
+        names: Of the blocks.
 
     Raises:
         ValueError: A block's markers are missing or doubled.
     """
-    for name, make in BLOCKS.items():
+    for name in names:
+        make = BLOCKS[name]
         begin, end = f"<!-- begin: {name} -->", f"<!-- end: {name} -->"
         pattern = re.compile(re.escape(begin) + r".*?" + re.escape(end), re.S)
         if len(pattern.findall(text)) != 1:
@@ -126,8 +221,20 @@ def renewed(text: str, out: Path) -> str:
     return text
 
 
+def store_blind(folder: Path) -> int:
+    """Take over the tables and the picture of a run of `make blind`, renew the README's."""
+    for name in (*BLIND, BLIND_PICTURE):
+        shutil.copyfile(folder / name, PICTURES / name)
+    text = README.read_text(encoding="utf-8")
+    README.write_text(renewed(text, folder, ("blind", "blind effects")), encoding="utf-8")
+    print(f"renewed {README.name} from {folder}")
+    return 0
+
+
 def main() -> int:
-    """Run, renew the tables and pictures."""
+    """Run, renew the tables and pictures; with `--blind DIR` those of the blind trials."""
+    if sys.argv[1:2] == ["--blind"]:
+        return store_blind(Path(sys.argv[2]))
     from pipeline.app.cli import main as command
 
     with tempfile.TemporaryDirectory() as folder:

@@ -29,7 +29,7 @@ from pipeline.app.blind_make import (
     trial_folder,
 )
 from pipeline.app.blind_score import score
-from pipeline.app.blind_summary import Scored, confusion, rates, trial_rows
+from pipeline.app.blind_summary import Scored, by_effect, confusion, rates, trial_rows
 from pipeline.app.blind_truth import hidden_truths
 from pipeline.app.staging import staged
 from pipeline.calibration.checkpoint import Checkpoint
@@ -152,9 +152,10 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
     from reports.tables import blind as tables
     from reports.writer import write_table
 
-    reached = rates(trials)
+    rows = trial_rows(trials)
+    reached = rates(rows)
     hidden, named, counts = confusion(trials)
-    rows = [
+    shares = [
         {
             "rate": r.name,
             "meaning": r.meaning,
@@ -163,16 +164,17 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
             "share": r.value,
             "low": r.interval[0],
             "high": r.interval[1],
-            "aim_low": r.aim[0],
-            "aim_high": r.aim[1],
-            "reached": r.reached,
+            "aim_low": r.aim[0] if r.aim else None,
+            "aim_high": r.aim[1] if r.aim else None,
+            "reached": r.reached if r.aim else None,
         }
         for r in reached
     ]
     meta = {"options": {"seed": seed, "trials": len(trials)}}
     every = (
-        tables.blind_trials(trial_rows(trials)),
-        tables.blind_rates(rows),
+        tables.blind_trials(rows),
+        tables.blind_rates(shares),
+        tables.blind_by_effect(by_effect(rows)),
         tables.confusion(hidden, named, counts),
     )
     with staged(out, "blind") as folder:
@@ -185,9 +187,9 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
         if r.trials:
             low, high = r.interval
             mark = "reached" if r.reached else "not reached"
+            aim = f", aim {r.aim[0]:.0%} to {r.aim[1]:.0%} {mark}" if r.aim else ""
             print(
-                f"{r.name}: {r.hits} of {r.trials} = {r.value:.1%} ({low:.1%} to {high:.1%}), "
-                f"aim {r.aim[0]:.0%} to {r.aim[1]:.0%} {mark}"
+                f"{r.name}: {r.hits} of {r.trials} = {r.value:.1%} ({low:.1%} to {high:.1%}){aim}"
             )
     usual = sorted(seconds)[len(seconds) // 2]
     print(f"{len(trials)} trials; an answer takes {usual:.1f} s of computing (median)")

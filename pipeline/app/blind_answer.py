@@ -34,6 +34,7 @@ class Named:
         gap_before: Error on *prove* without it.
         gap_after: The same with it.
         noise_floor: Of the joints it acts on.
+        written: Whether the model file holds it.
     """
 
     effect: str
@@ -44,6 +45,7 @@ class Named:
     gap_before: float
     gap_after: float
     noise_floor: float
+    written: bool = True
 
     @property
     def confident(self) -> bool:
@@ -148,6 +150,7 @@ def read_answer(run: dict[str, Any], out: Path) -> Answer:
                 gap_before=_number(first["gap_before"]),
                 gap_after=_number(first["gap_after"]),
                 noise_floor=_number(first["noise_floor"]),
+                written=first["written"] == "true",
             )
         )
     return Answer(run["code"], run["seconds"], tuple(named))

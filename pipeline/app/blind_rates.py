@@ -18,14 +18,14 @@ class Rate:
         meaning: In words.
         hits: How often.
         trials: Out of how many.
-        aim: What is aimed at, e.g. ``(0.95, 1.0)``.
+        aim: What is aimed at, e.g. ``(0.95, 1.0)``; None where nothing is.
     """
 
     name: str
     meaning: str
     hits: int
     trials: int
-    aim: tuple[float, float]
+    aim: tuple[float, float] | None
 
     @property
     def value(self) -> float:
@@ -39,7 +39,9 @@ class Rate:
 
     @property
     def reached(self) -> bool:
-        """Whether the share lies inside the aim."""
+        """Whether the share lies inside the aim; where nothing is aimed at it does."""
+        if self.aim is None:
+            return True
         return bool(self.trials) and self.aim[0] <= self.value <= self.aim[1]
 
 

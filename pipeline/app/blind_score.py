@@ -26,8 +26,8 @@ OUTCOMES: Final = {
     "right": "name and place first, or a member of its class",
     "wrong place": "the right name at another place first",
     "wrong name": "another name first, without calling the truth indistinguishable from it",
-    "unexplained": "no name, or a doubted one that is not right; the gap called unexplained",
-    "nothing": "nothing found",
+    "unexplained": "no name, or doubted ones that are not right; the gap called unexplained",
+    "nothing": "no name, or doubted ones that are not right; the gap called noise",
     "failed": "no answer",
 }
 
@@ -44,6 +44,7 @@ class Score:
         outcome: Key of `OUTCOMES`; by the first name.
         wrong: Names given with confidence that are neither hidden nor of a hidden one's class.
         right: Hidden effects that were named, or whose class was.
+        written: Of them, those whose name the model file holds.
         intervals: Parameters of rightly named effects, not doubted, with an interval.
         covered: Of them, those whose interval holds the truth.
         closed: Share of the removable gap on *prove* that is closed; NaN without a name.
@@ -56,9 +57,15 @@ class Score:
     outcome: str
     wrong: tuple[Key, ...]
     right: tuple[Key, ...]
+    written: tuple[Key, ...]
     intervals: int
     covered: int
     closed: float
+
+    @property
+    def right_and_written(self) -> bool:
+        """Whether the first name is right and the model file holds it."""
+        return self.outcome == "right" and self.answer.named[0].written
 
     @property
     def visible(self) -> bool:
@@ -89,10 +96,12 @@ def score(
         if halves and halves <= given:
             classes[k] |= halves
             excused[k] |= halves
-    wrong, right = [], set()
+    wrong, right, written = [], set(), set()
     for n in answer.named:
         hits = [k for k, members in enumerate(classes) if _meets(n, members)]
-        right |= {(hidden[k].effect, hidden[k].place) for k in hits}
+        met = {(hidden[k].effect, hidden[k].place) for k in hits}
+        right |= met
+        written |= met if n.written else set()
         if n.confident and not any(_meets(n, members) for members in excused):
             wrong.append((n.effect, n.place))
     intervals, covered = _coverage(hidden, answer.named)
@@ -104,6 +113,7 @@ def score(
         outcome=_outcome(hidden, classes, answer),
         wrong=tuple(wrong),
         right=tuple(sorted(right)),
+        written=tuple(sorted(written)),
         intervals=intervals,
         covered=covered,
         closed=_closed(answer.named),
@@ -132,13 +142,11 @@ def _meets(named: Named, members: set[Key]) -> bool:
 def _outcome(hidden: Sequence[HiddenTruth], classes: Sequence[set[Key]], answer: Answer) -> str:
     if answer.code not in (0, 1):
         return "failed"
-    if not answer.named:
+    if answer.named and any(_meets(answer.named[0], members) for members in classes):
+        return "right"
+    if all(n.doubt for n in answer.named):
         return "unexplained" if answer.code == 1 else "nothing"
     first = answer.named[0]
-    if any(_meets(first, members) for members in classes):
-        return "right"
-    if answer.code == 1 and all(n.doubt for n in answer.named):
-        return "unexplained"
     return "wrong place" if first.effect in {one.effect for one in hidden} else "wrong name"
 
 
@@ -164,7 +172,8 @@ def _closed(named: Sequence[Named]) -> float:
     """
     before: dict[tuple[str, ...], float] = {}
     after: dict[tuple[str, ...], float] = {}
-    named = [n for n in named if not math.isnan(n.gap_before)]
+    # What the model file leaves out closes nothing.
+    named = [n for n in named if n.written and not math.isnan(n.gap_before)]
     for n in named:
         before.setdefault(n.place, max(n.gap_before**2 - n.noise_floor**2, 0.0))
         after[n.place] = max(n.gap_after**2 - n.noise_floor**2, 0.0)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from csv import DictReader
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,7 @@ from pipeline.gap.effects.registry import EFFECTS
 from pipeline.gap.twin.effects import UNCATALOGUED
 from pipeline.gap.twin.matrix import TrialSpec
 
+Row = dict[str, Any]
 NOTHING, UNEXPLAINED, FAILED = "(nothing)", "(unexplained)", "(no answer)"
 WRONG_PLACE = "(right name, wrong place)"
 
@@ -28,120 +31,143 @@ class Scored:
     score: Score
     sha256: str
 
-    @property
-    def known(self) -> bool:
-        """Whether everything hidden is in the catalogue, and something is hidden."""
-        return bool(self.score.hidden) and all(one.in_catalogue for one in self.score.hidden)
 
+def rates(rows: Sequence[Row]) -> list[Rate]:
+    """What the trials were made for, from the rows of `blind_trials.csv` alone.
 
-def rates(trials: Sequence[Scored]) -> list[Rate]:
-    """What the trials were made for."""
+    Args:
+        rows: From `trial_rows` or `read_rows`.
+    """
 
     def rate(
         name: str,
         meaning: str,
-        aim: tuple[float, float],
-        among: Callable[[Scored], bool],
-        hit: Callable[[Scored], bool],
+        aim: tuple[float, float] | None,
+        among: Callable[[Row], bool],
+        hit: Callable[[Row], bool],
     ) -> Rate:
-        chosen = [t for t in trials if among(t)]
-        return Rate(name, meaning, sum(hit(t) for t in chosen), len(chosen), aim)
+        chosen = [row for row in rows if among(row)]
+        return Rate(name, meaning, sum(hit(row) for row in chosen), len(chosen), aim)
 
-    def single(t: Scored) -> bool:
-        return t.known and len(t.score.hidden) == 1
+    def pair(row: Row) -> bool:
+        return row["in_catalogue"] and len(_several(row["hidden"])) == 2
 
-    def pair(t: Scored) -> bool:
-        return t.known and len(t.score.hidden) == 2
+    def empty(row: Row) -> bool:
+        return not row["hidden"]
 
-    def empty(t: Scored) -> bool:
-        return not t.score.hidden
+    def unknown(row: Row) -> bool:
+        return bool(row["hidden"]) and not row["in_catalogue"]
 
-    def unknown(t: Scored) -> bool:
-        return bool(t.score.hidden) and not t.known
+    def answered(row: Row) -> bool:
+        return row["exit_code"] in (0, 1)
 
     out = [
         rate(
-            "right_name_and_place_first",
-            "one hidden effect the log can show: named first, with its place (or its class)",
+            "right_and_written",
+            "one hidden effect the log can show: the first name is right (name and place, or its "
+            "class) and the model file holds it",
             (0.95, 1.0),
-            lambda t: single(t) and t.score.visible,
-            lambda t: t.score.outcome == "right",
+            lambda row: single(row) and row["visible"],
+            lambda row: row["right_and_written"],
         ),
         rate(
-            "right_where_no_class",
+            "right_and_written_where_no_class",
             "the same, where the log can tell the effect from every other",
             (0.95, 1.0),
-            lambda t: single(t) and t.score.alone,
-            lambda t: t.score.outcome == "right",
+            lambda row: single(row) and row["tellable"],
+            lambda row: row["right_and_written"],
         ),
         rate(
-            "confident_wrong_name",
-            "one or two hidden effects: any name given with confidence that was not hidden",
-            (0.0, 0.01),
-            lambda t: t.known,
-            lambda t: bool(t.score.wrong),
+            "right_and_written_of_all",
+            "the same of every hidden effect, whether the log can show it or not",
+            None,
+            single,
+            lambda row: row["right_and_written"],
         ),
         rate(
-            "confident_wrong_name_first",
-            "the same, the first name only",
+            "right_first",
+            "one hidden effect the log can show: the first name is right, trusted or doubted",
+            None,
+            lambda row: single(row) and row["visible"],
+            lambda row: row["outcome"] == "right",
+        ),
+        rate(
+            "wrong_name",
+            "anything hidden, effects without a name in the catalogue among it: any wrong name "
+            "given with confidence",
             (0.0, 0.01),
-            lambda t: t.known,
-            lambda t: _first_is_wrong(t.score),
+            lambda row: bool(row["hidden"]),
+            lambda row: bool(row["wrong_names"]),
+        ),
+        rate(
+            "wrong_name_of_known",
+            "the same, where the catalogue has a name for all that is hidden",
+            (0.0, 0.01),
+            lambda row: bool(row["hidden"]) and row["in_catalogue"],
+            lambda row: bool(row["wrong_names"]),
         ),
         rate(
             "nothing_found_in_empty_logs",
             "nothing hidden: nothing named",
             (0.98, 1.0),
             empty,
-            lambda t: t.score.answer.code in (0, 1) and not t.score.answer.named,
+            lambda row: answered(row) and not row["named"],
         ),
         rate(
             "empty_logs_called_explained",
             "nothing hidden: nothing named and no part called unexplained",
             (0.98, 1.0),
             empty,
-            lambda t: t.score.outcome == "nothing",
+            lambda row: row["exit_code"] == 0 and not row["named"],
         ),
         rate(
             "both_of_a_pair",
             "two hidden effects the log can show: both named, nothing wrong with confidence",
             (0.9, 1.0),
-            lambda t: pair(t) and t.score.visible,
-            lambda t: len(t.score.right) == 2 and not t.score.wrong,
+            lambda row: pair(row) and row["visible"],
+            lambda row: len(_several(row["right_names"])) == 2 and not row["wrong_names"],
+        ),
+        rate(
+            "both_of_a_pair_written",
+            "the same, and the model file holds both",
+            (0.9, 1.0),
+            lambda row: pair(row) and row["visible"],
+            lambda row: len(_several(row["written_names"])) == 2 and not row["wrong_names"],
         ),
         rate(
             "unknown_called_unexplained",
             "an effect outside the catalogue that the log can tell from all in it: called "
             "unexplained",
             (0.95, 1.0),
-            lambda t: unknown(t) and t.score.alone,
-            lambda t: t.score.answer.code == 1,
+            lambda row: unknown(row) and row["tellable"],
+            lambda row: row["exit_code"] == 1,
         ),
         rate(
             "unknown_not_misnamed",
             "the same: no name given with confidence",
             (0.95, 1.0),
-            lambda t: unknown(t) and t.score.alone,
-            lambda t: t.score.answer.code in (0, 1) and not t.score.wrong,
+            lambda row: unknown(row) and row["tellable"],
+            lambda row: answered(row) and not row["wrong_names"],
         ),
     ]
-    named = [t.score for t in trials if t.known and t.score.intervals]
+    named = [row for row in rows if row["hidden"] and row["in_catalogue"]]
     out.append(
         Rate(
             "intervals_that_cover",
             "95 % intervals of rightly named effects, not doubted, that hold the truth",
-            sum(s.covered for s in named),
-            sum(s.intervals for s in named),
+            sum(row["intervals_that_cover"] for row in named),
+            sum(row["intervals"] for row in named),
             (0.90, 0.99),
         )
     )
-    closed = [t for t in trials if single(t) and t.score.outcome == "right"]
-    closed = [t for t in closed if np.isfinite(t.score.closed)]
+    closed = [row["gap_closed"] for row in rows if single(row) and row["outcome"] == "right"]
+    closed = [share for share in closed if share is not None and np.isfinite(share)]
     out.append(
         Rate(
             "gap_closed",
-            "rightly named effects, of a gap above the noise floor at least 90 % closed on prove",
-            sum(t.score.closed >= 0.9 for t in closed),
+            "rightly named effects, of a gap above the noise floor at least 90 % closed on "
+            "held-out data",
+            sum(share >= 0.9 for share in closed),
             len(closed),
             (0.95, 1.0),
         )
@@ -149,9 +175,54 @@ def rates(trials: Sequence[Scored]) -> list[Rate]:
     return out
 
 
-def _first_is_wrong(score: Score) -> bool:
-    named = score.answer.named
-    return bool(named) and (named[0].effect, named[0].place) in score.wrong
+def single(row: Row) -> bool:
+    """Whether one effect of the catalogue is hidden."""
+    return bool(row["in_catalogue"]) and len(_several(row["hidden"])) == 1
+
+
+def by_effect(rows: Sequence[Row]) -> list[Row]:
+    """How each effect that was hidden alone fared, in the catalogue's order, then the others."""
+    alone = [row for row in rows if len(_several(row["hidden"])) == 1]
+    out = []
+    for effect in dict.fromkeys((*EFFECTS, *UNCATALOGUED)):
+        own = [row for row in alone if row["hidden"] == effect]
+        if not own:
+            continue
+        seen = [row for row in own if row["visible"]]
+        out.append(
+            {
+                "effect": effect,
+                "in_catalogue": effect in EFFECTS,
+                "trials": len(own),
+                "visible": len(seen),
+                "right_first": sum(row["outcome"] == "right" for row in seen),
+                "right_and_written": sum(row["right_and_written"] for row in seen),
+                "right_and_written_of_all": sum(row["right_and_written"] for row in own),
+                "called_unexplained": sum(row["exit_code"] == 1 for row in own),
+                "wrong": sum(bool(row["wrong_names"]) for row in own),
+            }
+        )
+    return out
+
+
+def read_rows(path: Path) -> list[Row]:
+    """The rows of a `blind_trials.csv`, with the types that `trial_rows` gives them."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return [{key: _typed(key, text) for key, text in row.items()} for row in DictReader(file)]
+
+
+def _typed(key: str, text: str) -> Any:
+    if key in ("in_catalogue", "visible", "tellable", "right_and_written"):
+        return text == "true"
+    if key in ("exit_code", "intervals", "intervals_that_cover"):
+        return int(text)
+    if key == "gap_closed":
+        return float(text) if text else None
+    return text
+
+
+def _several(text: str) -> list[str]:
+    return [part for part in text.split("; ") if part]
 
 
 def confusion(trials: Sequence[Scored]) -> tuple[list[str], list[str], NDArray[np.int_]]:
@@ -186,12 +257,12 @@ def _said(score: Score) -> str:
     return WRONG_PLACE if score.outcome == "wrong place" else score.answer.named[0].effect
 
 
-def trial_rows(trials: Sequence[Scored]) -> list[dict[str, Any]]:
+def trial_rows(trials: Sequence[Scored]) -> list[Row]:
     """Rows of `blind_trials.csv`."""
     return [_row(t) for t in trials]
 
 
-def _row(t: Scored) -> dict[str, Any]:
+def _row(t: Scored) -> Row:
     s, named = t.score, t.score.answer.named
     worst = min(s.judged, key=lambda j: j.nearest.misfit, default=None)
     return {
@@ -229,6 +300,9 @@ def _row(t: Scored) -> dict[str, Any]:
             for n in named
         ),
         "outcome": s.outcome,
+        "right_and_written": s.right_and_written,
+        "right_names": _join(f"{effect} at {place_text(place)}" for effect, place in s.right),
+        "written_names": _join(f"{effect} at {place_text(place)}" for effect, place in s.written),
         "wrong_names": _join(f"{effect} at {place_text(place)}" for effect, place in s.wrong),
         "intervals": s.intervals,
         "intervals_that_cover": s.covered,

@@ -111,7 +111,9 @@ def answer(story: Story) -> tuple[str, ...]:
     naming, weighed = story.naming, story.weighed
     out = [
         words.where_words(story.where.rows),
-        words.what_words(naming, unexplained=weighed.unexplained),
+        words.what_words(
+            naming, story.where.measurements[0].channels, unexplained=weighed.unexplained
+        ),
         words.shrink_words(naming.found, _joints(story), _whole(story), naming.unit, story.noise),
     ]
     if story.energy is not None:

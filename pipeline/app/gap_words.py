@@ -11,8 +11,10 @@ import numpy as np
 
 from pipeline.app.gap_energy import PAIR, EnergyChange
 from pipeline.gap.circumstances import WHOLE, Where
+from pipeline.gap.effects.base import CHANNEL_COLUMNS
 from pipeline.gap.effects.effort_gain import EffortGain
 from pipeline.gap.effects.registry import effect_named
+from pipeline.gap.effects.torque_constant_error import TorqueConstantError
 from pipeline.gap.errors import EffectError
 from pipeline.gap.measurement import PROVE, Measurement
 from pipeline.gap.verdict import Estimate, Found, Naming, Remainder
@@ -21,8 +23,8 @@ from reports.page import cell_text
 _LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 #: A band is worth a word when its gap is this many times the joint's.
 STANDS_OUT = 1.25
-#: Name of a column's wrong scale.
-GAIN = EffortGain.name
+#: Names of a column's wrong scale, and of what is the same in a log of current alone.
+GAIN, CONSTANT = EffortGain.name, TorqueConstantError.name
 #: Effects that the first lines tell in full.
 TOLD = 3
 #: Held-out rows turn one way where less than this share turns the other way.
@@ -79,11 +81,12 @@ def _circumstance(row: Where) -> str:
     }.get(row.by, f"by {row.by}: {row.band}")
 
 
-def what_words(naming: Naming, *, unexplained: bool) -> str:
+def what_words(naming: Naming, channels: Sequence[str], *, unexplained: bool) -> str:
     """What is missing.
 
     Args:
         naming: What was found.
+        channels: That were compared.
         unexplained: Whether the model as written leaves more than noise.
     """
     if not naming.found:
@@ -108,19 +111,28 @@ def what_words(naming: Naming, *, unexplained: bool) -> str:
         text += " doubtful; `--keep-doubtful` writes doubtful names into the model file, too."
     if len(naming.found) == 1:
         text += f" {meaning(naming.found[0].effect)}"
-    return text + scale_words(naming.found)
+    return text + scale_words(naming.found, channels)
 
 
-def scale_words(found: Sequence[Found]) -> str:
+def scale_words(found: Sequence[Found], channels: Sequence[str]) -> str:
     """What to do about columns that read a multiple of what they should; empty without any."""
-    gains = [f for f in found if f.effect == GAIN]
-    if not gains:
+    hints = [(f.place[0], 1.0 / f.values["gain"]) for f in found if f.effect == GAIN]
+    text = ""
+    if hints:
+        text += " A column that reads a multiple is usually the log's"
+    if tuple(channels) == ("current",):
+        column = CHANNEL_COLUMNS["current"]
+        constants = [f for f in found if f.effect == CONSTANT]
+        hints += [(f"{f.place[0]}__{column}", 1.0 + f.values["relative"]) for f in constants]
+        if constants:
+            text += (
+                " A log of current alone cannot tell a motor's torque constant from a current "
+                "column that reads a multiple"
+            )
+    if not text:
         return ""
-    hints = [f'[columns."{f.place[0]}"] scale = {1.0 / f.values["gain"]:.3g}' for f in gains[:TOLD]]
-    return (
-        f" A column that reads a multiple is usually the log's: {'; '.join(hints)} in a mapping "
-        "file brings it to what the model expects."
-    )
+    listed = [f'[columns."{name}"] scale = {scale:.3g}' for name, scale in hints[:TOLD]]
+    return f"{text}: {'; '.join(listed)} in a mapping file brings it to what the model expects."
 
 
 def _named(found: Sequence[Found]) -> str:

@@ -15,7 +15,7 @@ from scipy.ndimage import median_filter, percentile_filter
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: Rows of the median: what lasts up to five rows is passed over.
+#: Rows of the median: what lasts up to five rows is passed over, two at the ends of a log.
 _WINDOW: Final = 11
 #: Rows over which the usual change from row to row is taken.
 _NEAR: Final = 41

@@ -35,6 +35,9 @@ TRIALS = {
     "named_doubts": ("why the answer does not trust them", ""),
     "named_values": ("parameters with 95 % intervals", ""),
     "outcome": ("of the first name: right, wrong place, wrong name, unexplained, nothing", ""),
+    "right_and_written": ("whether the first name is right and the model file holds it", ""),
+    "right_names": ("hidden effects that were named, or whose class was", ""),
+    "written_names": ("of them, those whose name the model file holds", ""),
     "wrong_names": ("given with confidence, neither hidden nor of a hidden one's class", ""),
     "intervals": ("parameters of rightly named effects, not doubted", "1"),
     "intervals_that_cover": ("of them, those whose interval holds the truth", "1"),
@@ -49,9 +52,22 @@ RATES = {
     "share": ("hits over trials", "1"),
     "low": ("lower end of Wilson's 95 % interval", "1"),
     "high": ("upper end", "1"),
-    "aim_low": ("what is aimed at: at least", "1"),
+    "aim_low": ("what is aimed at: at least; empty where nothing is", "1"),
     "aim_high": ("at most", "1"),
     "reached": ("whether the share lies inside the aim", ""),
+}
+
+
+BY_EFFECT = {
+    "effect": ("hidden alone", ""),
+    "in_catalogue": ("whether the workflow has a name for it", ""),
+    "trials": ("with it alone", "1"),
+    "visible": ("of them, those whose log could show it", "1"),
+    "right_first": ("of the visible, those where the first name is right", "1"),
+    "right_and_written": ("of the visible, those where the model file holds that name too", "1"),
+    "right_and_written_of_all": ("the same of all trials", "1"),
+    "called_unexplained": ("of all trials", "1"),
+    "wrong": ("of all trials, those with a wrong name given with confidence", "1"),
 }
 
 
@@ -65,6 +81,11 @@ def blind_rates(rows: Sequence[Mapping[str, Any]]) -> Table:
     return table_from_rows(
         "blind_rates", rows, RATES, "How often the workflow was right, with Wilson's intervals."
     )
+
+
+def blind_by_effect(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One row per effect."""
+    return table_from_rows("blind_by_effect", rows, BY_EFFECT, "How each effect fared alone.")
 
 
 def confusion(hidden: Sequence[str], named: Sequence[str], counts: NDArray[np.int_]) -> Table:

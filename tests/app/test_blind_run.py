@@ -55,8 +55,8 @@ def _write_answer(to: Path, effect: str) -> None:
         encoding="utf-8",
     )
     header = "order,effect,joint,parameter,value,ci_low,ci_high,gap_before,gap_after,noise_floor"
-    line = f"1,{effect},rm_joint_1,torque,1.0,0.9,1.1,1.0,0.1,0.1,\n" * bool(effect)
-    (to / "found.csv").write_text(f"{header},doubt\n{line}", encoding="utf-8")
+    line = f"1,{effect},rm_joint_1,torque,1.0,0.9,1.1,1.0,0.1,0.1,,true\n" * bool(effect)
+    (to / "found.csv").write_text(f"{header},doubt,written\n{line}", encoding="utf-8")
 
 
 def test_a_stopped_run_goes_on_and_judges(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import math
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from scipy.stats import norm
@@ -11,6 +14,7 @@ from pipeline.app.blind_answer import Answer, Named
 from pipeline.app.blind_identifiable import THRESHOLD, Identifiability, Rival
 from pipeline.app.blind_rates import Rate, wilson
 from pipeline.app.blind_score import score
+from pipeline.app.blind_summary import by_effect, rates, read_rows
 from pipeline.app.blind_truth import HiddenTruth
 
 JOINT = ("rm_joint_2",)
@@ -148,3 +152,52 @@ def test_identifiable_means_neither_chance_nor_noise_hides_the_truth() -> None:
     assert needed <= THRESHOLD <= needed + 0.5
     near, far = (Rival("x", (), z) for z in (needed - 0.2, needed + 0.7))
     assert Identifiability(50.0, (near, far)).like == (near,)
+
+
+def test_a_right_name_that_is_left_out_of_the_file_is_right_and_not_written() -> None:
+    truth = [hidden("coulomb_friction", torque=1.0)]
+    doubted = replace(named("coulomb_friction", doubt="its law is not"), written=False)
+    s = score(0, truth, [clear()], answer(doubted, code=1))
+    assert (s.outcome, s.right_and_written, s.written) == ("right", False, ())
+    assert s.right == (("coulomb_friction", JOINT),)
+    s = score(0, truth, [clear()], answer(named("coulomb_friction")))
+    assert s.right_and_written
+    assert s.written == s.right
+
+
+def test_doubted_names_that_are_not_right_are_as_good_as_none() -> None:
+    truth = [hidden("coulomb_friction")]
+    for code, outcome in ((0, "nothing"), (1, "unexplained")):
+        said = answer(named("backlash", doubt="its law is not"), code=code)
+        assert score(0, truth, [clear()], said).outcome == outcome
+
+
+EXAMPLE = Path(__file__).parents[2] / "reports" / "example"
+
+
+def test_stored_rates_follow_from_the_stored_trials_alone() -> None:
+    rows = read_rows(EXAMPLE / "blind_trials.csv")
+    with (EXAMPLE / "blind_rates.csv").open(encoding="utf-8", newline="") as file:
+        stored = {r["rate"]: (int(r["hits"]), int(r["trials"])) for r in csv.DictReader(file)}
+    assert {r.name: (r.hits, r.trials) for r in rates(rows)} == stored
+    with (EXAMPLE / "blind_by_effect.csv").open(encoding="utf-8", newline="") as file:
+        effects = [dict(r) for r in csv.DictReader(file)]
+    anew = [
+        {k: str(v).lower() if k == "in_catalogue" else str(v) for k, v in r.items()}
+        for r in by_effect(rows)
+    ]
+    assert anew == effects
+    alone = [r for r in effects if r["in_catalogue"] == "true"]
+    for key, rate in (("visible", "right_and_written"), ("trials", "right_and_written_of_all")):
+        assert stored[rate] == (sum(int(r[rate]) for r in alone), sum(int(r[key]) for r in alone))
+
+
+def test_wrong_names_count_where_the_catalogue_has_no_name_too() -> None:
+    row = {"hidden": "cable_loom", "in_catalogue": False, "visible": True, "tellable": True}
+    row |= {"exit_code": 0, "named": "parallel_spring", "wrong_names": "parallel_spring at a"}
+    row |= {"outcome": "wrong name", "right_and_written": False, "right_names": ""}
+    row |= {"written_names": "", "intervals": 0, "intervals_that_cover": 0, "gap_closed": None}
+    found = {r.name: r for r in rates([row])}
+    assert (found["wrong_name"].hits, found["wrong_name"].trials) == (1, 1)
+    assert found["wrong_name_of_known"].trials == 0
+    assert found["right_and_written"].trials == 0

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import csv
+import re
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pyarrow.parquet as pq
 import pytest
 
 from pipeline.app.demo import DEMO
+from pipeline.gap.model import machine_of_urdf
 from pipeline.gap.twin.trial import make_trial
 from tests.app.conftest import exit_code, rows_of
 
@@ -269,3 +272,154 @@ def test_a_run_killed_in_the_middle_leaves_nothing(tmp_path: Path, root: Path) -
         process.kill()
         process.wait()
     assert not out.exists() or not [p for p in out.iterdir() if p.name.startswith(".")]
+
+
+def _gap(step: str, logs: list[Path], out: Path, *more: str, robot: Path) -> int:
+    arguments = ["gap", step, *map(str, logs), "--robot", str(robot), "--out", str(out), *more]
+    return exit_code(arguments)
+
+
+def test_data_given_twice_is_refused_under_any_name(
+    tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str], simulated_leg: Columns
+) -> None:
+    robot, out = root / "urdf" / "leg.toml", tmp_path / "out"
+    log = write_log(tmp_path / "one.csv", simulated_leg)
+    copy = tmp_path / "two.csv"
+    copy.write_bytes(log.read_bytes())
+    later = {k: v + 100.0 if k == "time_s" else v for k, v in simulated_leg.items()}
+    shifted = write_log(tmp_path / "later.csv", later)
+    part = write_log(tmp_path / "part.csv", {k: v[1000:4000] for k, v in simulated_leg.items()})
+    for logs, more in (
+        ([log, log], []),
+        ([log, copy], []),
+        ([log], ["--holdout", str(log)]),
+        ([log], ["--holdout", str(copy)]),
+        ([log], ["--holdout", str(shifted)]),
+        ([log], ["--holdout", str(part)]),
+    ):
+        assert _gap("where", logs, out, *more, robot=robot) == 2
+        err = capsys.readouterr().err
+        assert err.count("\n") == 1
+        assert "the same" in err
+        assert not out.exists()
+
+
+def test_two_logs_of_one_machine_are_not_the_same(tmp_path: Path, root: Path) -> None:
+    logs = make_trial(3, None, "leg", "low", logs=2).logs
+    one, two = (write_log(tmp_path / f"{name}.csv", log) for name, log in logs.items())
+    robot = root / "urdf" / "leg.toml"
+    assert _gap("where", [one], tmp_path / "out", "--holdout", str(two), robot=robot) == 0
+
+
+def test_one_sample_of_500_rad_is_said_and_left_out(
+    tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str], simulated_leg: Columns
+) -> None:
+    robot = root / "urdf" / "leg.toml"
+    column = "rm_joint_2__position_rad"
+    spoilt = simulated_leg | {column: simulated_leg[column].copy()}
+    spoilt[column][1234] = 500.0
+    gaps = []
+    for name, columns in (("good", simulated_leg), ("spoilt", spoilt)):
+        log, out = write_log(tmp_path / f"{name}.csv", columns), tmp_path / f"{name}.out"
+        assert _gap("where", [log], out, robot=robot) == 0
+        rows = rows_of(out / "where.csv")
+        gaps.append({r["joint"]: float(r["gap"]) for r in rows if r["by"] == "joint"})
+    (row,) = [r for r in rows_of(out / "quality.csv") if r["check"] == "glitches"]
+    assert (row["column"], row["verdict"]) == (column, "warning")
+    assert "500 rad" in capsys.readouterr().out
+    assert gaps[1] == pytest.approx(gaps[0], rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [("current_A", "curent_A"), ("current_A", "current_a"), ("voltage_V", "votlage_V")],
+)
+def test_a_slip_of_the_pen_in_a_header_is_no_other_log(
+    tmp_path: Path,
+    root: Path,
+    capsys: pytest.CaptureFixture[str],
+    simulated_leg: Columns,
+    old: str,
+    new: str,
+) -> None:
+    slipped = {k.replace(old, new): v for k, v in simulated_leg.items()}
+    log = write_log(tmp_path / "log.csv", slipped)
+    assert _gap("read", [log], tmp_path / "out", robot=root / "urdf" / "leg.toml") == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1
+    assert f"did you mean 'rm_joint_1__{old}'" in err
+
+
+def test_a_column_of_another_name_is_kept_and_ignored(
+    tmp_path: Path, root: Path, simulated_leg: Columns
+) -> None:
+    reference = {"rm_joint_1__current_reference_A": simulated_leg["rm_joint_1__current_A"]}
+    log, out = write_log(tmp_path / "log.csv", simulated_leg | reference), tmp_path / "out"
+    assert _gap("read", [log], out, robot=root / "urdf" / "leg.toml") == 0
+    assert {r["verdict"] for r in rows_of(out / "quality.csv")} <= {"ok", "masked"}
+
+
+def _with_torque(root: Path, friction: float) -> Columns:
+    """A leg's motion with the torque its motors supply, brought to the joints."""
+    from tests.pipeline.gap import bench_leg as leg
+
+    m = leg.leg_motion(duration=12.0)
+    rigid = machine_of_urdf(root / "urdf" / "leg.urdf").rigid
+    torque = np.array(
+        [pin.rnea(rigid, rigid.createData(), *x) for x in zip(m.q, m.v, m.a, strict=True)]
+    )
+    torque[:, 1] += friction * np.sign(m.v[:, 1])
+    torque += 0.02 * np.random.default_rng(3).standard_normal(torque.shape)
+    columns: Columns = {"time_s": m.time}
+    for j, joint in enumerate(m.joints):
+        columns[f"{joint}__position_rad"] = m.q[:, j]
+        columns[f"{joint}__torque_Nm"] = torque[:, j]
+    return columns
+
+
+def test_torque_means_the_same_with_a_robot_file_and_with_its_urdf(
+    tmp_path: Path, root: Path
+) -> None:
+    log = write_log(tmp_path / "log.csv", _with_torque(root, 1.5))
+    found = []
+    for name in ("leg.toml", "leg.urdf"):
+        out = tmp_path / name
+        assert _gap("name", [log], out, robot=root / "urdf" / name) == 0
+        found.append(rows_of(out / "found.csv"))
+    for rows in found:
+        assert [(r["effect"], r["joint"]) for r in rows] == [("coulomb_friction", "rm_joint_2")]
+        assert float(rows[0]["value"]) == pytest.approx(1.5, rel=0.05)
+    assert float(found[0][0]["value"]) == pytest.approx(float(found[1][0]["value"]), rel=1e-6)
+
+
+def test_weak_correlation_is_said_and_no_reason_to_stop(
+    tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    columns = _with_torque(root, 0.0)
+    for j in (1, 2, 3):
+        v = np.gradient(columns[f"rm_joint_{j}__position_rad"])
+        # Geared wrists: friction is many times what their bodies ask.
+        columns[f"rm_joint_{j}__torque_Nm"] = columns[f"rm_joint_{j}__torque_Nm"] + 40 * np.sign(v)
+    log, out = write_log(tmp_path / "log.csv", columns), tmp_path / "out"
+    assert _gap("where", [log], out, robot=root / "urdf" / "leg.urdf") == 0
+    (row,) = [r for r in rows_of(out / "quality.csv") if r["check"] == "correlation"]
+    assert row["verdict"] == "warning"
+    assert "little in common" in capsys.readouterr().out
+
+
+def test_a_scaled_log_is_never_called_explained_without_a_name(
+    tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str], simulated_leg: Columns
+) -> None:
+    currents = {k: 5.0 * v for k, v in simulated_leg.items() if k.endswith("current_A")}
+    bare = {k: v for k, v in simulated_leg.items() if not k.endswith("voltage_V")}
+    log, out = write_log(tmp_path / "log.csv", bare | currents), tmp_path / "out"
+    _gap("name", [log], out, robot=root / "urdf" / "leg.toml")
+    (row,) = rows_of(out / "found.csv")
+    assert (row["effect"], row["written"]) == ("effort_gain", "true")
+    assert float(row["value"]) == pytest.approx(5.0, rel=0.05)
+    said = capsys.readouterr().out
+    hint = re.search(r'\[columns\."\*__current_A"\] scale = ([0-9.]+)', said)
+    assert hint
+    assert float(hint[1]) == pytest.approx(0.2, rel=0.05)
+    factors = [r for r in rows_of(out / "quality.csv") if r["check"] == "factor"]
+    assert {r["verdict"] for r in factors} == {"warning"}

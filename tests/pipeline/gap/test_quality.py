@@ -10,6 +10,7 @@ from actuators.units import to_si
 from pipeline.gap.errors import GapError
 from pipeline.gap.expected import Expected
 from pipeline.gap.finding import Quality
+from pipeline.gap.glitches import glitches
 from pipeline.gap.log import Log
 from pipeline.gap.model_check import compare_with_prediction
 from pipeline.gap.quality import judge
@@ -233,3 +234,30 @@ def test_a_wrist_that_carries_only_friction_is_no_unit_error(two_joints: Expecte
     mask = np.ones(e.shape, dtype=np.bool_)
     found = compare_with_prediction(made_log(q, e), tiny + friction, tiny, mask, 0.002, "torque")
     assert "refused" not in {f.verdict for f in found}
+
+
+@pytest.mark.parametrize(("at", "length"), [(0, 1), (1, 1), (3999, 1), (700, 1), (700, 4)])
+def test_samples_that_jump_away_and_back_are_left_out(
+    two_joints: Expected, at: int, length: int
+) -> None:
+    q, _, e = good()
+    rows = slice(at, at + length)
+    q[rows, 0] = 500.0
+    quality = judge(made_log(q, e), two_joints)
+    assert checks(quality, "warning") == {("a__position_rad", "glitches")}
+    bad = np.zeros(len(q), dtype=np.bool_)
+    bad[rows] = True
+    assert np.array_equal(~quality.position_ok[:, 0], bad)
+    assert quality.position_ok[:, 1].all()
+
+
+def test_steps_ramps_and_noise_are_no_glitches() -> None:
+    rng = np.random.default_rng(2)
+    t = np.arange(4000) / 500
+    step = np.where(t > 3.0, 1.0, 0.0)
+    ramp = np.clip(20.0 * (t - 3.0), 0.0, 0.5)
+    jerk = np.clip((t - 3.0) * 500 / 6.0, 0.0, 1.0)  # six rows
+    stairs = np.round(np.sin(t) / 0.01) * 0.01
+    friction = np.sign(np.sin(5 * t)) + 0.05 * rng.standard_normal(t.size)
+    for x in (step, ramp, jerk, stairs, friction, rng.standard_normal(t.size), 0.0 * t):
+        assert not glitches(x).any()
