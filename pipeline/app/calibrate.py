@@ -12,6 +12,7 @@ from pipeline.calibration.prior import load_prior
 from pipeline.calibration.store import calibrated_numbers, save
 
 WORK = Path(".calibration")
+AT_LEAST = 0.05  # share of sets at a bound that is worth a word
 
 
 def run_calibrate(options: argparse.Namespace) -> int:
@@ -30,11 +31,12 @@ def run_calibrate(options: argparse.Namespace) -> int:
     for path in save(results, options.robot):
         print(path.name)
     numbers = calibrated_numbers(results, load_prior())
-    free = [n.key for n in numbers if n.verdict == "not determined"]
-    bound = [f"{n.key} ({n.at_bound})" for n in numbers if n.at_bound]
-    print(f"{len(results['ensemble'])} of {results['draws']} draws became admissible sets")
-    print(f"not determined by the targets: {', '.join(free) or 'none'}")
-    print(f"at a bound: {', '.join(bound) or 'none'}")
+    print(f"{len(results['ensemble'])} of {results['draws']} draws became sets of the ensemble")
+    for verdict in ("not determined", "against the prior"):
+        keys = [n.key for n in numbers if n.verdict == verdict]
+        print(f"{verdict}: {', '.join(keys) or 'none'}")
+    bound = [f"{n.key} ({n.bound}, {n.at_bound:.0%})" for n in numbers if n.at_bound >= AT_LEAST]
+    print(f"at a bound in 5 % of the sets or more: {', '.join(bound) or 'none'}")
     print("run `make urdf` to build the URDFs from the calibrated robot file")
     return 0
 
