@@ -9,10 +9,9 @@ from pathlib import Path
 
 from pipeline.calibration.calibrate import Effort, calibrate
 from pipeline.calibration.prior import load_prior
-from pipeline.calibration.store import calibrated_numbers, save
+from pipeline.calibration.store import AT_LEAST, calibrated_numbers, save
 
 WORK = Path(".calibration")
-AT_LEAST = 0.05  # share of sets at a bound that is worth a word
 
 
 def run_calibrate(options: argparse.Namespace) -> int:

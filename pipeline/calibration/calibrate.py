@@ -20,7 +20,8 @@ from pipeline.calibration.machine import MIDDLE_LEGS
 from pipeline.calibration.prior import PRIOR_FILE
 from pipeline.calibration.problem import EXTRA
 from pipeline.calibration.published import PUBLISHED_FILE
-from pipeline.calibration.search import HELD, Reading
+from pipeline.calibration.rotor_friction import HELD, friction_ranges
+from pipeline.calibration.search import Reading
 
 logger = logging.getLogger("legwatt")
 AXES_DEG = (0.0, 15.0, 30.0, 45.0, 90.0)
@@ -79,7 +80,10 @@ def input_hash(robot: Path, effort: Effort) -> str:
     """
     digest = hashlib.sha256(f"{effort.seed}".encode())
     here = Path(__file__).parent
-    names = ("search", "problem", "machine", "quantities", "prior", "motor_constants")
+    names = (
+        *("search", "problem", "machine", "quantities", "prior"),
+        *("motor_constants", "rotor_friction", "table_entries"),
+    )
     code = [here / f"{name}.py" for name in names]
     for path in [PRIOR_FILE, PUBLISHED_FILE, robot, *sorted(CATALOG.glob("*.toml")), *code]:
         digest.update(path.read_bytes())
@@ -112,8 +116,8 @@ def calibrate(
     missing = [leg for leg in MIDDLE_LEGS if leg not in {own.name for own in task.spec.legs}]
     if missing or not task.spec.floating:
         raise CalibrationError(
-            f"{robot.name}: the paper's numbers are those of a walking hexapod with the middle legs "
-            f"{' and '.join(MIDDLE_LEGS)}; this robot "
+            f"{robot.name}: the paper's numbers are those of a walking hexapod with the middle "
+            f"legs {' and '.join(MIDDLE_LEGS)}; this robot "
             + (f"has no leg '{missing[0]}'" if missing else "is on a stand")
         )
     logger.info("rotor friction leaves unmet: %s", ", ".join(task.sliver.frictions.unmet) or "none")
@@ -215,6 +219,7 @@ def calibrate(
         "left_out_draws": effort.left_out_draws,
         "readings": grouped,
         "sensitivity": sensitivity,
+        "rotor_friction": [asdict(row) for row in friction_ranges(task.published)],
     }
 
 

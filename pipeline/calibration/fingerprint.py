@@ -38,9 +38,7 @@ def fingerprint(
     for row in published.values():
         out[f"published.{row.id}"] = repr((row.unit, row.value, row.half_width, row.role))
     for free in prior.free:
-        out[f"prior.{free.key}"] = repr(
-            (free.centre, free.interval, free.bounds, free.logarithmic)
-        )
+        out[f"prior.{free.key}"] = repr((free.centre, free.interval, free.bounds, free.logarithmic))
     return out
 
 

@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 
 from actuators.build import CATALOG, load_catalog
 from pipeline.calibration.machine import POSTURE, catalog_with, with_transfer_path
-from pipeline.calibration.prior import PRIOR_FILE, load_prior
 from pipeline.calibration.motor_constants import KEYS
+from pipeline.calibration.prior import PRIOR_FILE, load_prior
 from pipeline.calibration.problem import EXTRA, Evaluation, Problem
 from pipeline.calibration.published import PUBLISHED_FILE, load_published
 from pipeline.calibration.quantities import DIMENSIONS, IDS
+from pipeline.calibration.rotor_friction import HELD
 from pipeline.calibration.whole_robot import totals
 from pipeline.errors import PipelineError
 from pipeline.robot_file import load_robot_file
@@ -32,7 +33,6 @@ PATHS = ("cubic", "harmonic", "quintic", "cycloid")
 _PULL = 3.0  # the nearest point: a third of a half width counts like one prior sigma
 _FIRM = 8.0  # a member of the ensemble: close to its own goal
 _STRICT = 60.0  # whether a reading can be met at all: the prior hardly counts
-HELD = "reversible_motor_torque_2"
 _SPAN = 0.85  # goals of members spread over this part of the half widths
 
 

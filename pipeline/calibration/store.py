@@ -42,6 +42,8 @@ MOVED_ABOVE = 0.5
 BELIEF = 1.96
 #: Coordinates this close to a bound count as lying at it.
 AT_BOUND = 0.02
+#: Share of the ensemble at a bound that is worth a word.
+AT_LEAST = 0.05
 FIXED = "fixed by Tables IV to VI"
 #: What the targets did to a number.
 VERDICTS = {
@@ -194,7 +196,7 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
             documents[path] = tomlkit.parse(path.read_text(encoding="utf-8"))
         reason = number.verdict + (
             f"; at its {number.bound} bound in {number.at_bound:.0%} of the sets"
-            if number.at_bound >= 0.05
+            if number.at_bound >= AT_LEAST
             else ""
         )
         _replace(documents[path], name, number.value, number.low, number.high, reason)
@@ -205,7 +207,8 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
     documents[robot]["gait"]["transfer_path"] = results["nearest"]["path"]
     contents = {path: tomlkit.dumps(document) for path, document in documents.items()}
     temporary = {
-        path: path.with_name(f".{path.name}.{os.getpid()}.tmp") for path in (*contents, RESULTS_FILE)
+        path: path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        for path in (*contents, RESULTS_FILE)
     }
     try:
         for path, text in contents.items():
