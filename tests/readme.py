@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 import tempfile
+import textwrap
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -107,7 +108,27 @@ def parameters(out: Path) -> str:
     ).replace("| --- | ---: | ---: |", "| --- | ---: | --- |")
 
 
-BLOCKS = {"standing": standing, "walking": walking, "parameters": parameters}
+def agreement(out: Path) -> str:
+    """What is fitted, predicted and contradicted: the first paragraph of `summary.md`."""
+    from pipeline.app.cli import parser
+    from pipeline.app.judgement import basis, judged
+    from pipeline.app.settings import settings
+    from pipeline.app.summary_words import first_paragraph
+
+    given = settings(parser().parse_args(["reports", "--robot", str(ROOT / "urdf/hexapod.toml")]))
+    by = basis(given)
+    if isinstance(by, str) or by.results is None:
+        raise ValueError(f"the calibration does not belong to the files: {by}")
+    text = first_paragraph(judged(given, by)[0])
+    return "\n".join(textwrap.wrap(text, 110, break_on_hyphens=False, break_long_words=False))
+
+
+BLOCKS = {
+    "standing": standing,
+    "walking": walking,
+    "parameters": parameters,
+    "agreement": agreement,
+}
 
 
 def renewed(text: str, out: Path) -> str:

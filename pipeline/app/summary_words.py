@@ -6,126 +6,151 @@ Every number and every count in them is computed.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from pipeline.app.judgement import Judged
-from pipeline.calibration.conclusions import Conclusion
 from pipeline.calibration.evidence import Interval
+from pipeline.calibration.machine import PUBLISHED_LEG
 from pipeline.calibration.price import NOTABLE
-from pipeline.calibration.problem import EVEN
+from pipeline.calibration.problem import EVEN, EXTRA
 from pipeline.calibration.published import ROLES
+from pipeline.calibration.quantities import STANDING_SECONDS
 from pipeline.calibration.reproduction import REPRODUCED, ReproducedRow, headline
 from reports.table import Table
 
-_STANDING_SECONDS = 3.0
+_REAL = ("rotor", "reversible", "irreversible")
+_WORDS = {1: "one", 2: "two", 3: "three", 4: "four"}
 
 
 def answer(judged: Judged, tables: Mapping[str, Table]) -> tuple[str, ...]:
     """The paragraphs a reader in a hurry reads."""
     if judged.by.results is None:
-        return (_changed(judged), _energies(judged, tables), _counts(judged))
-    return (_first(judged), _energies(judged, tables), _ensemble(judged))
+        return (_changed(judged), _energies(judged, tables), " ".join(_counted(judged)))
+    return (first_paragraph(judged), _energies(judged, tables), _ensemble(judged))
 
 
-def _first(judged: Judged) -> str:
-    """What is fitted, predicted and contradicted, and what the fit costs."""
-    judgement = judged.judgement
-    rows = {row.published.id: row for row in judgement.reproduction}
-    text = (
-        "A paper compares four drives for the joints of a walking robot and prints how much more "
-        "energy walking takes with each, but not the friction it used. Here that friction was "
-        "**fitted** until the paper's walking figures came out (reversible gears "
-        f"{_ratio(rows, 'reversible')} times the ideal drive's energy, irreversible ones "
-        f"{_ratio(rows, 'irreversible')} times), so that they come out proves nothing. "
+def first_paragraph(judged: Judged) -> str:
+    """What is fitted, predicted and contradicted, and what the fit costs, for a cold reader.
+
+    Args:
+        judged: With the calibration's sets.
+    """
+    rows = _rows(judged)
+    mass, even = rows["robot_mass"].published.value, rows[EVEN].computed
+    ratios = [rows[f"walking_ratio_{name}"].computed for name in _REAL]
+    return " ".join(
+        (
+            f"A paper compares four drives for the joints of a {mass:g} kg six-legged robot: an "
+            "ideal one, the same with a real motor's rotor, *reversible* gears, and *irreversible* "
+            "gears, which lock when the motor is off. It prints the electrical energy that each "
+            "takes, but not the friction behind it. **Fitted:** friction was chosen here so that "
+            f"walking takes {_listed(f'{r:.1f}' for r in ratios)} times the ideal drive's energy "
+            "(printed: 4, more than 10, almost 15) and irreversible gears pay only for a robot "
+            f"that stands still over {even:.0%} of the time; that these agree is no evidence.",
+            *_counted(judged),
+            _price(judged),
+        )
     )
-    text += _counts(judged)
-    text += _price(judged)
-    before = {c.sentence.text: c for c in judgement.conclusions}
-    prior = rows["walking_ratio_irreversible"].prior
-    costs_more = next(
-        c for c in before.values() if c.sentence.text.startswith("walking, the irreversible")
-    )
-    return text + (
-        " Data sheets and literature alone, without the fit, would put the irreversible drive at "
-        f"{_span(prior)} times the ideal one's energy, and in {_less(costs_more)} of their draws "
-        "below the reversible one even walking."
-    )
 
 
-def _less(row: Conclusion) -> str:
-    return f"{1 - row.prior_share:.0%}"
+def _rows(judged: Judged) -> dict[str, ReproducedRow]:
+    return {row.published.id: row for row in judged.judgement.reproduction}
 
 
-def _ratio(rows: Mapping[str, ReproducedRow], alternative: str) -> str:
-    return f"{rows[f'walking_ratio_{alternative}'].computed:.1f}"
+def _listed(words: Iterable[str]) -> str:
+    """One, two and three."""
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last
 
 
-def _counts(judged: Judged) -> str:
-    """How many printed numbers are what, and what contradicts."""
-    judgement = judged.judgement
-    count = headline(judgement.reproduction)
+def _word(count: int) -> str:
+    return _WORDS.get(count, str(count))
+
+
+def _counted(judged: Judged) -> tuple[str, ...]:
+    """How many printed numbers play which part; what is predicted, contradicted, missed."""
+    count = headline(judged.judgement.reproduction)
     total = sum(of for _, of in count.values())
-    fitted = "fitted" if judged.by.results is not None else "targets of the fit"
     met, of = count["prediction"]
     text = (
-        f"Of {total} printed numbers {count['input'][1]} were put in, {count['target'][1]} "
-        f"{fitted}, {count['consequence'][1]} follow from those (by Ohm's law and the like), "
-        f"{count['symmetry'][1]} is zero by symmetry and {of} are **predicted**: that friction "
-        "alone holds the lightly loaded knee with reversible gears, and the whole leg with "
+        f"**Predicted:** only {_word(of)} of the {total} printed numbers, both zeros: standing "
+        "still, friction alone holds the knee with reversible gears and the whole leg with "
         f"irreversible ones. {'Both' if met == of == 2 else f'{met} of {of}'} come out"
     )
     shares = [
         row.met
-        for row in judgement.reproduction
+        for row in judged.judgement.reproduction
         if row.published.role == "prediction" and not math.isnan(row.met)
     ]
-    text += f" (in {min(shares):.0%} of the fitted sets at least). " if shares else ". "
-    return text + _against(judged) + _missed(judgement.reproduction)
+    if shares and judged.by.results is not None:
+        text += (
+            f" (in {_listed(f'{s:.0%}' for s in shares)} of the "
+            f"{len(judged.by.results['ensemble'])} sets of numbers that fit)"
+        )
+    text += (
+        f". {count['input'][1]} were put in, {count['target'][1]} "
+        f"{'fitted' if judged.by.results is not None else 'are what was fitted'}, "
+        f"{count['consequence'][1]} follow from those by Ohm's law and the like, "
+        f"{count['symmetry'][1]} is zero by symmetry."
+    )
+    return tuple(part for part in (text, _against(judged), _missed(judged)) if part)
 
 
 def _against(judged: Judged) -> str:
     """The rows that the paper contradicts, with the two numbers."""
     judgement = judged.judgement
-    first, second = judgement.contradiction.asked
     met, of = headline(judgement.reproduction)["contradicted"]
     if of == 0:
         return ""
+    first, second = judgement.contradiction.asked
     unmet = [
-        f"{row.published.quantity} {row.computed:.4g} instead of {row.published.value:g} "
-        f"{row.published.unit}"
+        _beside(row)
         for row in judgement.reproduction
         if row.published.role == "contradicted" and row.verdict != REPRODUCED
     ]
-    return (
-        f"The other {of} **contradict** each other: the two motor torques of Table V ask for a "
-        f"rotor friction of {first:.3f} and of {second:.3f} mN·m, and its energy is that of a "
-        f"rounded power. {met} of the {of} {'is' if met == 1 else 'are'} met"
-        + (f", {len(unmet)} cannot be ({'; '.join(unmet)}). " if unmet else ". ")
+    text = (
+        f"**Contradicted:** the other {_word(of)} exclude one another. Two motor torques of Table "
+        f"V ask for a rotor friction of {first:.3f} and of {second:.3f} mN·m, and an energy was "
+        f"computed from a rounded power; {_word(met) if met else 'none'} "
+        f"{'is' if met < 2 else 'are'} met"
     )
+    if unmet:
+        text += f", {_word(len(unmet))} {'is' if len(unmet) == 1 else 'are'} not: {_listed(unmet)}"
+    return text + "."
 
 
-def _missed(rows: tuple[ReproducedRow, ...]) -> str:
+def _beside(row: ReproducedRow) -> str:
+    """Ours instead of the paper's, with the printed digits."""
+    published, ours, unit = row.published.value, row.computed, row.published.unit
+    half = row.published.half_width
+    if unit == "N*m":
+        published, ours, half, unit = 1e3 * published, 1e3 * ours, 1e3 * half, "mN·m"
+    digits = max(0, -math.floor(math.log10(half))) - 1 if half > 0 else 3
+    return f"{row.published.quantity} {ours:.{digits}f} instead of {published:.{digits}f} {unit}"
+
+
+def _missed(judged: Judged) -> str:
     """Rows not reproduced that nothing contradicts."""
     missed = [
         row.published.id
-        for row in rows
+        for row in judged.judgement.reproduction
         if row.verdict != REPRODUCED and row.published.role != "contradicted"
     ]
-    return f"Not reproduced: {', '.join(missed)}. " if missed else ""
+    return f"**Not reproduced:** {', '.join(missed)}." if missed else ""
 
 
 def _price(judged: Judged) -> str:
     """What the fit asks of single numbers."""
     p = judged.judgement.price
-    low, high = p.gear_interval
+    _, high = p.gear_interval
     return (
-        f'The fit has its price. "Almost 15" takes a planetary gear with {p.gear_friction:.1f} '
-        f"mN·m of Coulomb friction, {p.gear_friction / p.gear_prior:.1f} times the "
-        f"{p.gear_prior:g} mN·m that gear data suggest (they believe {low:g} to {high:g}); "
-        f"it alone turns {p.gear_heat:.0f} of the leg's {p.leg_energy:.0f} J per step cycle into "
-        f"heat. And {p.no_load_share:.0%} of the fitted sets ask for a motor that draws over "
-        f"{NOTABLE - 1:.0%} more current without load than its data sheet's "
-        f"{1e3 * p.no_load_sheet:.0f} mA."
+        '**The price of the fit:** "almost 15" takes a planetary gear with '
+        f"{p.gear_friction:.1f} mN·m of constant friction, {p.gear_friction / p.gear_prior:.1f} "
+        f"times what gear data suggest ({p.gear_prior:g} mN·m, at most {high:g}); it alone turns "
+        f"{p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle into heat. And "
+        f"{p.no_load_share:.0%} of the sets that fit ask for a motor that draws over "
+        f"{NOTABLE - 1:.0%} more current without load than the {1e3 * p.no_load_sheet:.0f} mA of "
+        "its data sheet."
     )
 
 
@@ -137,37 +162,39 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
         for name, leg, joules in zip(
             energy["alternative"], energy["leg"], energy["electrical_J"], strict=True
         )
-        if leg == "rm"
+        if leg == PUBLISHED_LEG
     }
-    rows = {row.published.id: row for row in judged.judgement.reproduction}
+    rows = _rows(judged)
     power = {
-        name: rows[f"{name}_leg_energy_3s"].computed / _STANDING_SECONDS
+        name: rows[f"{name}_leg_energy_3s"].computed / STANDING_SECONDS
         for name in ("reversible", "irreversible")
     }
     text = (
-        f"Walking one 3 s cycle, the middle right leg draws **{legs['ideal']:.1f} J** with "
-        f"ideal actuators, {legs['rotor']:.1f} J once the rotor has inertia and friction, "
-        f"**{legs['reversible']:.1f} J** with belt and Harmonic Drive and "
-        f"**{legs['irreversible']:.1f} J** with planetary and hypoid gears. Standing still, the "
-        f"loaded leg draws {power['reversible']:.2f} W with the reversible actuator and "
-        f"{power['irreversible']:.2g} W with the irreversible one"
+        f"**What it costs:** walking one 3 s cycle, the middle right leg draws "
+        f"**{legs['ideal']:.1f} J** with ideal drives, {legs['rotor']:.1f} J once the rotor has "
+        f"inertia and friction, **{legs['reversible']:.1f} J** with belt and Harmonic Drive "
+        f"(reversible) and **{legs['irreversible']:.1f} J** with planetary and hypoid gears "
+        "(irreversible). Standing still, the loaded leg draws "
+        f"{power['reversible']:.2f} W with reversible and {power['irreversible']:.2g} W with "
+        "irreversible gears"
     )
     even = rows[EVEN]
     if math.isnan(even.computed):
-        return text + "; there is no share of standing above which the irreversible one pays."
-    text += f", which pays only above {even.computed:.1%} of the time standing"
+        return text + "; there is no share of standing above which the irreversible ones pay."
+    text += f", which pay only above {even.computed:.1%} of the time standing."
     if judged.by.results is None:
-        return text + "."
-    before = next(c for c in judged.judgement.conclusions if c.sentence.left_out and _is_even(c))
+        return text
+    row = next(c for c in judged.judgement.conclusions if c.sentence.name == EVEN)
+    more = next(c for c in judged.judgement.conclusions if c.sentence.name == EXTRA)
     return text + (
-        f". That share too is fitted: left out of the fit together with the irreversible ratio it "
-        f"would be {_percent(even.left_out)}, before any fit {_percent(before.prior)} where there "
-        "is one at all."
+        " Data sheets and literature alone, before any fit, put the irreversible gears at "
+        f"{_span(rows['walking_ratio_irreversible'].prior)} times the ideal drive's energy; in "
+        f"{1 - more.prior_share:.0%} of their draws walking takes less with irreversible than "
+        "with reversible gears, and where it takes more, the irreversible ones pay above "
+        f"{_percent(row.prior)} of the time standing. Fitted to everything but the irreversible "
+        f"gears' own two figures, they take {_span(rows['walking_ratio_irreversible'].left_out)} "
+        "times the ideal drive's energy."
     )
-
-
-def _is_even(row: Conclusion) -> bool:
-    return row.sentence.quantity.startswith("break-even")
 
 
 def _percent(interval: Interval) -> str:
@@ -183,18 +210,18 @@ def _ensemble(judged: Judged) -> str:
     results = judged.by.results
     assert results is not None
     count = headline(judged.judgement.reproduction)
-    members, draws = len(results["ensemble"]), results["draws"]
     unmet = judged.judgement.contradiction.best.unmet
     return (
-        "The paper does not print friction, inertia, masses or gear angles. "
-        f"{count['target'][1]} fitted figures cannot determine "
-        f"{len(results['nearest']['z'])} numbers: the values here are the set nearest to data "
-        f"sheets and literature. Beside it stand {members} sets (of {draws} draws from prior "
-        f"knowledge, moved as little as needed) that give every printed number at printed "
-        f"precision but {' and '.join(f'`{name}`' for name in unmet)} and the predictions, of "
-        "which none was asked. The motor's torque constant, resistance and rotor friction have no "
-        "prior: these rows leave so narrow a sliver of them that no data sheet resolves it, and "
-        "all sets are drawn from inside it."
+        "**How sure it is:** the paper does not print friction, inertia, masses or gear angles, "
+        f"and {count['target'][1]} figures cannot determine {len(results['nearest']['z'])} "
+        "numbers. The values here are the set nearest to data sheets and literature that fits. "
+        f"Beside it stand {len(results['ensemble'])} sets of numbers that fit as well, from "
+        f"{results['draws']} draws of prior knowledge, each moved as little as needed: every one "
+        "gives every printed number at printed precision, but for "
+        f"{_listed(f'`{name}`' for name in unmet)}, and was not asked for the predictions. That "
+        "they can is no wonder: the motor's torque constant, resistance and rotor friction have "
+        "no prior, all are drawn from the sliver in which Tables IV to VI come out, which no "
+        "data sheet resolves."
     )
 
 

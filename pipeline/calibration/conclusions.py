@@ -24,6 +24,7 @@ class Sentence:
     """One sentence of section V and how it is tested.
 
     Attributes:
+        name: Short name: of the printed value it rests on, where there is one.
         text: In the paper's terms.
         quantity: What is computed.
         unit: Of it.
@@ -34,6 +35,7 @@ class Sentence:
         holds: Whether the sentence holds for them.
     """
 
+    name: str
     text: str
     quantity: str
     unit: str
@@ -88,6 +90,7 @@ def _ratio(alternative: str) -> Callable[[Values], float]:
 
 SENTENCES = (
     Sentence(
+        "walking_ratio_rotor",
         "rotor inertia and friction make walking 4 times as costly as the ideal actuator",
         "walking energy of the middle right leg over the ideal actuator's",
         "1",
@@ -98,6 +101,7 @@ SENTENCES = (
         lambda v: 3.5 <= v["walking_ratio_rotor"] <= 4.5,
     ),
     Sentence(
+        "walking_ratio_reversible",
         "the reversible actuator needs more than 10 times the ideal energy",
         "walking energy of the middle right leg over the ideal actuator's",
         "1",
@@ -108,6 +112,7 @@ SENTENCES = (
         lambda v: v["walking_ratio_reversible"] > 10,
     ),
     Sentence(
+        "walking_ratio_irreversible",
         "the ratio is almost 15 for the irreversible actuator",
         "walking energy of the middle right leg over the ideal actuator's",
         "1",
@@ -118,6 +123,7 @@ SENTENCES = (
         lambda v: 14.5 <= v["walking_ratio_irreversible"] <= 15,
     ),
     Sentence(
+        EXTRA,
         "walking, the irreversible actuator needs more than the reversible one",
         "irreversible less reversible, per middle leg and cycle",
         "J",
@@ -128,6 +134,7 @@ SENTENCES = (
         lambda v: v[EXTRA] > 0,
     ),
     Sentence(
+        "ideal_most",
         "standing, friction saves: the ideal actuator draws most",
         "energy of the loaded leg in 3 s, ideal less the most of the others",
         "J",
@@ -138,6 +145,7 @@ SENTENCES = (
         lambda v: ideal_margin(v) > 0,
     ),
     Sentence(
+        "ordered",
         "standing, the more friction matters, the less is drawn",
         "energy of the loaded leg in 3 s, least step from one actuator to the next",
         "J",
@@ -148,6 +156,7 @@ SENTENCES = (
         lambda v: least_drop(v) > 0,
     ),
     Sentence(
+        "irreversible_leg_energy_3s",
         "standing, the irreversible actuator draws nothing",
         "energy of the loaded leg in 3 s",
         "J",
@@ -158,6 +167,7 @@ SENTENCES = (
         lambda v: v[_STANDING["irreversible"]] == 0,
     ),
     Sentence(
+        EVEN,
         "the reversible actuator is cheaper unless the robot stands over 94 % of the time",
         "break-even fraction of time standing, both middle legs",
         "1",

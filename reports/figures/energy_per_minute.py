@@ -132,7 +132,9 @@ def _names(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
     """Names above the lines near their left end, each in its line's colour."""
     at = 0.04
     x = float(share[0] + at * (share[-1] - share[0]))
-    tops = [line.energy if line.high is None else line.high for line in lines]
+    tops = [
+        line.energy if line.high is None else np.maximum(line.high, line.energy) for line in lines
+    ]
     heights = [float(np.interp(x, share, top)) for top in tops]
     gap = 0.055 * max(max(heights), 1e-9)
     taken = -np.inf
