@@ -129,6 +129,11 @@ def _beside(row: ReproducedRow) -> str:
     return f"{row.published.quantity} {ours:.{digits}f} instead of {published:.{digits}f} {unit}"
 
 
+def _named(row: ReproducedRow) -> str:
+    joint = f" of joint {row.published.joint}" if row.published.joint else ""
+    return f"the {row.published.quantity}{joint} ({row.published.where})"
+
+
 def _missed(judged: Judged) -> str:
     """Rows not reproduced that nothing contradicts."""
     missed = [
@@ -218,7 +223,8 @@ def _ensemble(judged: Judged) -> str:
         f"Beside it stand {len(results['ensemble'])} sets of numbers that fit as well, from "
         f"{results['draws']} draws of prior knowledge, each moved as little as needed: every one "
         "gives every printed number at printed precision, but for "
-        f"{_listed(f'`{name}`' for name in unmet)}, and was not asked for the predictions. That "
+        f"{_listed(_named(_rows(judged)[name]) for name in unmet)}, and was not asked for the "
+        "predictions. That "
         "they can is no wonder: the motor's torque constant, resistance and rotor friction have "
         "no prior, all are drawn from the sliver in which Tables IV to VI come out, which no "
         "data sheet resolves."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,8 +18,8 @@ from pipeline.calibration.checkpoint import Checkpoint
 from pipeline.calibration.errors import CalibrationError
 from pipeline.calibration.machine import MIDDLE_LEGS
 from pipeline.calibration.prior import PRIOR_FILE
-from pipeline.calibration.problem import EXTRA
-from pipeline.calibration.published import PUBLISHED_FILE
+from pipeline.calibration.problem import EXTRA, fixed_before
+from pipeline.calibration.published import PUBLISHED_FILE, Published
 from pipeline.calibration.rotor_friction import HELD, friction_ranges
 from pipeline.calibration.search import Reading
 
@@ -56,6 +56,7 @@ class Effort:
     Attributes:
         starts: Of the search for the nearest point, per transfer path.
         draws: From the prior for the ensemble.
+        prior_draws: From the prior for what it says by itself.
         left_out_draws: Per target left out.
         reading_starts: Per reading.
         sobol: Base sample of the sensitivity analysis, a power of two.
@@ -65,6 +66,7 @@ class Effort:
 
     starts: int = 4
     draws: int = 560
+    prior_draws: int = 2000
     left_out_draws: int = 60
     reading_starts: int = 2
     sobol: int = 512
@@ -152,9 +154,9 @@ def calibrate(
             search.prior_member,
             [
                 (f"prior/{'+'.join(paths)}/{i}", (name, paths, effort.seed, i))
-                for i in range(effort.draws)
+                for i in range(effort.prior_draws)
             ],
-            progress("prior", effort.draws),
+            progress("prior", effort.prior_draws),
         )
         left_out = {
             "+".join(targets): store.run(
@@ -183,7 +185,8 @@ def calibrate(
             return [p | {"totals": t} for p, t in zip(points, found, strict=True)]
 
         members = with_totals("ensemble", [m for m in ensemble if m.get("admissible")])
-        before = with_totals("prior", [m for m in unmoved if "failed" not in m])
+        # The motor's limits are the data sheet's, so a draw beyond them is not what it says.
+        before = with_totals("prior", [m for m in unmoved if m.get("inside")])
         predicted = {
             key: with_totals(key, [m for m in tries if m.get("admissible")])
             for key, tries in left_out.items()
@@ -202,6 +205,7 @@ def calibrate(
             progress("readings", len(READINGS) * effort.reading_starts),
         )
         sensitivity = _sensitivity(pool, store, name, best, effort, progress)
+    published = task.published
     grouped = []
     for r, reading in enumerate(READINGS):
         at = r * effort.reading_starts
@@ -213,13 +217,15 @@ def calibrate(
         "starts": starts,
         "paths": paths,
         "ensemble": members,
-        "prior": before,
+        "prior": [_kept(p, published) for p in before],
         "draws": len(ensemble),
-        "left_out": {key: [_kept(p) for p in points] for key, points in predicted.items()},
+        "left_out": {
+            key: [_kept(p, published) for p in points] for key, points in predicted.items()
+        },
         "left_out_draws": effort.left_out_draws,
         "readings": grouped,
         "sensitivity": sensitivity,
-        "rotor_friction": [asdict(row) for row in friction_ranges(task.published)],
+        "rotor_friction": [asdict(row) for row in friction_ranges(published)],
     }
 
 
@@ -228,9 +234,17 @@ def _task_name(reading: Reading) -> str:
     return f"{reading.axis_deg:g}/{reading.legs}/{'net' if reading.net else 'drawn'}"
 
 
-def _kept(point: dict[str, Any]) -> dict[str, Any]:
-    """What the judgement needs of a set that meets all but some targets."""
-    return {key: point[key] for key in ("path", "values", "totals")}
+def _kept(point: dict[str, Any], published: Mapping[str, Published]) -> dict[str, Any]:
+    """What the judgement needs of a set of which only quantiles are shown, to six digits."""
+    fixed = fixed_before(published)
+
+    def short(value: float) -> float:
+        return float(f"{value:.6g}")
+
+    return {
+        "values": {k: short(v) for k, v in point["values"].items() if k not in fixed},
+        "totals": {a: {k: short(v) for k, v in t.items()} for a, t in point["totals"].items()},
+    }
 
 
 def _reading_cost(point: dict[str, Any]) -> float:

@@ -33,8 +33,8 @@ class Evidence:
 
     Attributes:
         ensemble: Every printed value but contradicted ones and predictions.
-        prior: Nothing but the standing posture and the motor's constants, which Tables III to V
-            fix: what data sheets and literature say of the rest.
+        prior: Nothing but the standing posture, the motor's constants, which Tables III to V
+            fix, and the motor's limits: what data sheets and literature say of the rest.
         left_out: Everything but some targets, by the targets' names joined with ``+``.
     """
 

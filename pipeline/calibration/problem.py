@@ -30,6 +30,7 @@ from pipeline.calibration.motor_constants import Sliver, sliver
 from pipeline.calibration.prior import Prior
 from pipeline.calibration.published import Published
 from pipeline.calibration.quantities import computed, walking_extra
+from pipeline.calibration.table_entries import entries
 from pipeline.errors import PipelineError
 from pipeline.robot_file import RobotSpec
 
@@ -266,6 +267,16 @@ class Problem:
         extra = [t for t in self.targets if t.name == EXTRA]
         fits = all(abs(point.values[t.name] - t.centre) <= t.half_width for t in extra)
         return fits and set(self.unmet(point)) <= spared and max(point.excess.values()) <= 0
+
+
+def fixed_before(published: Mapping[str, Published]) -> set[str]:
+    """Ids that are put in, or follow from that, before any walking figure is fitted.
+
+    The posture gives Table III, the motor's constants give Tables IV and V.
+    """
+    out = {p.id for p in published.values() if p.role in ("input", "symmetry")} | set(EXACT)
+    standing = {e.id for e in entries(published) if e.alternative != "reversible"}
+    return out | {name for name in standing if not name.endswith("_leg_energy_3s")}
 
 
 def extra_target(published: Mapping[str, Published], standing_legs: int) -> Target:

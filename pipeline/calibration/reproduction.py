@@ -10,10 +10,9 @@ import numpy as np
 
 from actuators.units import from_si
 from pipeline.calibration.evidence import NONE, Evidence, Interval, quantiles
-from pipeline.calibration.problem import EVEN, EXACT, EXTRA
+from pipeline.calibration.problem import EVEN, EXTRA, fixed_before
 from pipeline.calibration.published import ROLES, Published
 from pipeline.calibration.rotor_friction import HELD, asked_frictions, asked_widths
-from pipeline.calibration.table_entries import entries
 
 REPRODUCED = "reproduced"
 MISSED = "not reproduced"
@@ -71,8 +70,7 @@ def reproduction(
         unmet: Ids that stay unmet at the rotor friction that leaves the fewest.
         known: The calibration's sets; None where they belong to other numbers.
     """
-    fixed = {p.id for p in published.values() if p.role in ("input", "symmetry")} | set(EXACT)
-    fixed |= {e.id for e in entries(published) if e.alternative != "reversible"}
+    fixed = fixed_before(published) | {f"{a}_leg_energy_3s" for a in ("ideal", "rotor")}
     rows = []
     for name, row in published.items():
         value = from_si(ours[name], row.unit)

@@ -236,6 +236,7 @@ def prior_member(robot: str, paths: tuple[str, ...], seed: int, draw: int) -> di
         "z": z.tolist(),
         "constants": {key: numbers[key] for key in KEYS},
         "values": dict(point.values),
+        "inside": max(point.excess.values()) <= 0,
     }
 
 
