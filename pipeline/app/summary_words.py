@@ -224,10 +224,9 @@ def _ensemble(judged: Judged) -> str:
         f"{results['draws']} draws of prior knowledge, each moved as little as needed: every one "
         "gives every printed number at printed precision, but for "
         f"{_listed(_named(_rows(judged)[name]) for name in unmet)}, and was not asked for the "
-        "predictions. That "
-        "they can is no wonder: the motor's torque constant, resistance and rotor friction have "
-        "no prior, all are drawn from the sliver in which Tables IV to VI come out, which no "
-        "data sheet resolves."
+        "predictions. That they can is no wonder: the motor's torque constant, resistance and "
+        "rotor friction have no prior, all are drawn from the sliver in which Tables IV to VI "
+        "come out and which no data sheet resolves."
     )
 
 

@@ -54,6 +54,15 @@ VERDICTS = {
     "not determined": "as wide as the prior and where the prior is",
     FIXED: "one of all motor constants that give these tables",
 }
+#: The same as the reason of a number whose source is what the sets meet.
+_REASONS = {
+    "determined": "determined by them",
+    "narrowed": "narrowed by them",
+    "moved": "moved by them",
+    "against the prior": "driven out of the prior's 95 % by them",
+    "not determined": "not determined by them",
+    FIXED: "no data sheet resolves what these tables leave",
+}
 _SOURCE = "nearest to the prior among all sets that meet the paper's figures"
 _FIXED_SOURCE = "middle of all motor constants that give Tables IV to VI as printed"
 
@@ -194,7 +203,7 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
         path = robot if component == ROBOT else catalog / f"{component}.toml"
         if path not in documents:
             documents[path] = tomlkit.parse(path.read_text(encoding="utf-8"))
-        reason = number.verdict + (
+        reason = _REASONS[number.verdict] + (
             f"; at its {number.bound} bound in {number.at_bound:.0%} of the sets"
             if number.at_bound >= AT_LEAST
             else ""
