@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.app.judgement import Basis, Judged
 from pipeline.app.settings import Settings
-from pipeline.app.summary_words import answer, roles_text
+from pipeline.app.summary_words import answer, percent, roles_text
 from pipeline.calibration.readings import readings, verdict
 from pipeline.calibration.sensitivity import Index, leading, ranking
 from pipeline.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
@@ -215,7 +215,7 @@ def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Sect
 
 
 def _index(row: Index) -> str:
-    return f"`{row.parameter}` ({row.total:.0%} +- {row.half_width:.0%})"
+    return f"`{row.parameter}` ({100 * row.total:.0f} ± {percent(row.half_width)})"
 
 
 def measure_next(ranked: Sequence[Index]) -> str:
@@ -279,7 +279,7 @@ def _number_words(numbers: Sequence[Calibrated]) -> list[str]:
     free = [f"`{n.key}`" for n in numbers if n.verdict == "not determined"]
     fixed = [f"`{n.key}`" for n in numbers if n.verdict == FIXED]
     bound = [
-        f"`{n.key}` ({n.bound}, {n.at_bound:.0%})"
+        f"`{n.key}` ({n.bound}, {percent(n.at_bound)})"
         for n in sorted(numbers, key=lambda n: -n.at_bound)
         if n.at_bound >= AT_LEAST
     ]

@@ -46,7 +46,7 @@ def first_paragraph(judged: Judged) -> str:
             "takes, but not the friction behind it. **Fitted:** friction was chosen here so that "
             f"walking takes {_listed(f'{r:.1f}' for r in ratios)} times the ideal drive's energy "
             "(printed: 4, more than 10, almost 15) and irreversible gears pay only for a robot "
-            f"that stands still over {even:.0%} of the time; that these agree is no evidence.",
+            f"that stands still over {percent(even)} of the time; that these agree is no evidence.",
             *_counted(judged),
             _price(judged),
         )
@@ -84,7 +84,7 @@ def _counted(judged: Judged) -> tuple[str, ...]:
     ]
     if shares and judged.by.results is not None:
         text += (
-            f" (in {_listed(f'{s:.0%}' for s in shares)} of the "
+            f" (in {_listed(percent(s) for s in shares)} of the "
             f"{len(judged.by.results['ensemble'])} sets of numbers that fit)"
         )
     text += (
@@ -109,9 +109,9 @@ def _against(judged: Judged) -> str:
         if row.published.role == "contradicted" and row.verdict != REPRODUCED
     ]
     text = (
-        f"**Contradicted:** the other {_word(of)} exclude one another. Two motor torques of Table "
-        f"V ask for a rotor friction of {first:.3f} and of {second:.3f} mN·m, and an energy was "
-        f"computed from a rounded power; {_word(met) if met else 'none'} "
+        f"**Contradicted:** the other {_word(of)} cannot be met together. Two motor torques of "
+        f"Table V ask for a rotor friction of {first:.3f} and of {second:.3f} mN·m, and an energy "
+        f"was computed from a rounded power; {_word(met) if met else 'none'} "
         f"{'is' if met < 2 else 'are'} met"
     )
     if unmet:
@@ -153,8 +153,8 @@ def _price(judged: Judged) -> str:
         f"{p.gear_friction:.1f} mN·m of constant friction, {p.gear_friction / p.gear_prior:.1f} "
         f"times what gear data suggest ({p.gear_prior:g} mN·m, at most {high:g}); it alone turns "
         f"{p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle into heat. And "
-        f"{p.no_load_share:.0%} of the sets that fit ask for a motor that draws over "
-        f"{NOTABLE - 1:.0%} more current without load than the {1e3 * p.no_load_sheet:.0f} mA of "
+        f"{percent(p.no_load_share)} of the sets that fit ask for a motor that draws over "
+        f"{percent(NOTABLE - 1)} more current without load than the {1e3 * p.no_load_sheet:.0f} mA of "
         "its data sheet."
     )
 
@@ -186,7 +186,7 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
     even = rows[EVEN]
     if math.isnan(even.computed):
         return text + "; there is no share of standing above which the irreversible ones pay."
-    text += f", which pay only above {even.computed:.1%} of the time standing."
+    text += f", which pay only above {percent(even.computed, 1)} of the time standing."
     if judged.by.results is None:
         return text
     row = next(c for c in judged.judgement.conclusions if c.sentence.name == EVEN)
@@ -194,7 +194,7 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
     return text + (
         " Data sheets and literature alone, before any fit, put the irreversible gears at "
         f"{_span(rows['walking_ratio_irreversible'].prior)} times the ideal drive's energy; in "
-        f"{1 - more.prior_share:.0%} of their draws walking takes less with irreversible than "
+        f"{percent(1 - more.prior_share)} of their draws walking takes less with irreversible than "
         "with reversible gears, and where it takes more, the irreversible ones pay above "
         f"{_percent(row.prior)} of the time standing. Fitted to everything but the irreversible "
         f"gears' own two figures, they take {_span(rows['walking_ratio_irreversible'].left_out)} "
@@ -202,8 +202,13 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
     )
 
 
+def percent(share: float, digits: int = 0) -> str:
+    """A share in percent."""
+    return f"{100 * share:.{digits}f} %"
+
+
 def _percent(interval: Interval) -> str:
-    return f"{interval[0]:.0%} to {interval[1]:.0%}"
+    return f"{100 * interval[0]:.0f} to {percent(interval[1])}"
 
 
 def _span(interval: Interval) -> str:

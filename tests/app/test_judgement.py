@@ -137,7 +137,7 @@ def test_the_first_paragraph_says_what_is_fitted_predicted_contradicted_and_what
         assert f"**{word}" in text or f"**The {word}" in text
     price = shipped.judgement.price
     assert f"{price.gear_friction:.1f} mN·m" in text
-    assert f"{price.no_load_share:.0%} of the sets" in text
+    assert f"{100 * price.no_load_share:.0f} % of the sets" in text
     assert "3.575 and of 3.620 mN·m" in text
     assert "reproduced" not in text  # nothing outside printed precision is called so
     assert price.gear_friction > 2 * price.gear_prior
