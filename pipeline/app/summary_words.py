@@ -154,8 +154,8 @@ def _price(judged: Judged) -> str:
         f"times what gear data suggest ({p.gear_prior:g} mN·m, at most {high:g}); it alone turns "
         f"{p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle into heat. And "
         f"{percent(p.no_load_share)} of the sets that fit ask for a motor that draws over "
-        f"{percent(NOTABLE - 1)} more current without load than the {1e3 * p.no_load_sheet:.0f} mA of "
-        "its data sheet."
+        f"{percent(NOTABLE - 1)} more current without load than the "
+        f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
     )
 
 
