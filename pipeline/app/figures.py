@@ -181,7 +181,7 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
         if not np.isnan(row.fraction):
             reference = next(c for c in curves if c.alternative == "reversible")
             energy = float(np.interp(row.fraction, share, reference.energy))
-            known = (v if np.isfinite(v) else None for v in row.left_out)
+            known = (v if np.isfinite(v) else None for v in row.prior)
             mark = BreakEven(row.fraction, energy, *known)
         figure = energy_per_minute_figure(
             share,

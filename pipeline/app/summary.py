@@ -97,22 +97,31 @@ def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
             "Every number the paper prints",
             (Text(roles_text()), table_block(tables["reproduction"], shown, tones=TONES)),
         )
-    shown |= {
+    open_ = {
+        "where": "where",
+        "quantity": "quantity",
+        "joint": "joint",
+        "unit": "unit",
+        "published": "paper",
         "prior_low": "prior low",
         "prior_high": "prior high",
         "left_out_low": "left out, low",
         "left_out_high": "left out, high",
     }
+    columns = tables["reproduction"].columns
+    known = [low is not None for low in columns["prior_low"]]
     return Section(
         "Every number the paper prints",
         (
             Text(roles_text()),
-            Text(
-                "*Prior*: 95 % of what data sheets and literature say before anything is fitted. "
-                "*Left out*: 95 % of what everything else says when this figure is left out of "
-                "the fit. Where a quantity was put in or follows from what was, neither says more."
-            ),
             table_block(tables["reproduction"], shown, tones=TONES),
+            Text(
+                "What is known of them without the fit. *Prior*: 95 % of what data sheets and "
+                "literature say before anything is fitted. *Left out*: 95 % of what everything "
+                "else says when this figure is left out, the irreversible actuator's two figures "
+                "together. Other rows were put in or follow from that."
+            ),
+            table_block(tables["reproduction"], open_, keep=known),
             Text(
                 "Table V contradicts itself: no rotor friction gives all its entries at printed "
                 "precision. The entries that each friction leaves unmet:"

@@ -15,6 +15,8 @@ from pipeline.calibration.whole_robot import Totals
 Array = NDArray[np.float64]
 #: Quantiles shown as low and high.
 BAND = (0.025, 0.975)
+#: Fewer values than this have no 95 % that is worth showing.
+LEAST = 10
 Interval = tuple[float, float]
 NONE: Interval = (math.nan, math.nan)
 
@@ -62,9 +64,9 @@ def numbers(values: Mapping[str, Any]) -> dict[str, float]:
 
 
 def quantiles(values: Sequence[float]) -> Interval:
-    """The middle 95 % of the values that are known; NaN without any."""
+    """The middle 95 % of the values that are known; NaN where fewer than `LEAST` are."""
     known = np.array([v for v in values if not math.isnan(v)])
-    if known.size == 0:
+    if known.size < LEAST:
         return NONE
     low, high = np.quantile(known, BAND)
     return float(low), float(high)

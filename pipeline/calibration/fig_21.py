@@ -107,8 +107,8 @@ def _break_even(subject: str, whole: Totals, known: Evidence | None) -> BreakEve
     before = [crossing(p.totals, cycle, stand) for p in known.prior]
     others = [crossing(p.totals, cycle, stand) for p in known.left_out[PREDICTED_BY[EVEN]]]
     note += (
-        f"; no break-even in {float(np.mean(np.isnan(before))):.0%} of the prior's draws and in "
-        f"{float(np.mean(np.isnan(others))):.0%} of the sets without the irreversible figures"
+        f"; no break-even in {100 * float(np.mean(np.isnan(before))):.0f} % of the prior's draws and in "
+        f"{100 * float(np.mean(np.isnan(others))):.0f} % of the sets without the irreversible figures"
     )
     return BreakEven(subject, value, quantiles(before), quantiles(others), note)
 

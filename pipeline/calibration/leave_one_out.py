@@ -10,7 +10,7 @@ import numpy as np
 
 from actuators.units import from_si
 from pipeline.calibration.data_sheet import data_sheet
-from pipeline.calibration.evidence import NONE, Evidence, Interval, quantiles
+from pipeline.calibration.evidence import LEAST, NONE, Evidence, Interval, quantiles
 from pipeline.calibration.problem import EVEN, EXTRA, extra_target
 from pipeline.calibration.published import Published
 from pipeline.calibration.table_entries import joint_torques
@@ -35,9 +35,9 @@ class Prediction:
         unit: Of the numbers.
         published: Printed, or implied by the printed break-even.
         half_width: Of it.
-        median: Predicted; NaN where nothing predicts it.
+        median: Predicted; NaN where nothing or too few sets predict it.
         interval: 95 % of the prediction.
-        sets: How many sets met the others; 0 for a data sheet.
+        sets: How many sets met the others and have such a value; 0 for a data sheet.
         by: What predicts it.
     """
 
@@ -93,9 +93,10 @@ def _by_sets(
         row = published[name]
         unit, centre, half = row.unit, row.value, row.half_width
         values = [from_si(v, unit) for v in values]
-    median = float(np.nanmedian(values)) if not np.isnan(values).all() else math.nan
+    known = [v for v in values if not math.isnan(v)]
+    median = float(np.median(known)) if len(known) >= LEAST else math.nan
     return Prediction(
-        *(name, without, unit, centre, half, median, quantiles(values), len(values), _OTHERS)
+        *(name, without, unit, centre, half, median, quantiles(known), len(known), _OTHERS)
     )
 
 

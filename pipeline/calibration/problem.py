@@ -172,7 +172,9 @@ class Problem:
         constants = self.sliver.middle if self.constants is None else self.constants
         return self.prior.values(z) | dict(constants)
 
-    def residuals(self, z: Array, centre: Array, *, pull: float, goal: Array | None) -> Array:
+    def residuals(
+        self, z: Array, centre: Array, *, pull: float, goal: Array | None, free: float = 0.0
+    ) -> Array:
         """Residual vector at z.
 
         Args:
@@ -181,11 +183,13 @@ class Problem:
             pull: Weight of the distance from the printed values, per half width.
             goal: Where to aim, in half widths from the printed values, (T,). None aims at the
                 printed values.
+            free: Half widths around the goal within which nothing pulls.
         """
         point = self.evaluate(z)
         error = np.array([(point.values[t.name] - t.centre) / t.half_width for t in self.targets])
         if goal is not None:
             error = error - goal
+        error = np.sign(error) * np.maximum(np.abs(error) - free, 0.0)
         limits = _STEEP * np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
         return np.concatenate([z - centre, pull * error, limits])
 
@@ -197,9 +201,19 @@ class Problem:
         columns: NDArray[np.intp],
         pull: float,
         goal: Array | None = None,
+        free: float = 0.0,
         evaluations: int = 40,
     ) -> Array:
         """Least-squares solution in some of the coordinates, the others staying at `start`.
+
+        Args:
+            start: Coordinates (D,).
+            centre: As for `residuals`, like `pull`, `goal` and `free`.
+            columns: Which coordinates may move.
+            pull: Weight of the printed values.
+            goal: Where to aim.
+            free: Where nothing pulls.
+            evaluations: At most so many.
 
         Returns:
             Coordinates (D,).
@@ -212,7 +226,7 @@ class Problem:
 
         def residuals(x: Array) -> Array:
             try:
-                return self.residuals(full(x), centre, pull=pull, goal=goal)
+                return self.residuals(full(x), centre, pull=pull, goal=goal, free=free)
             except PipelineError:
                 # Out of reach or tipping: a wall, felt as a large but finite residual.
                 return np.full(self._size, 30.0)

@@ -144,11 +144,10 @@ def _net(found: list[Reading], point: Mapping[str, Any]) -> str:
     known = [r for r in own if r.worst_error == r.worst_error]
     if not known:
         return text
-    best = min(known, key=lambda r: r.worst_error)
+    best = min(known, key=lambda r: max(r.worst_error - 1, 0.0) + max(r.worst_limit, 0.0))
     return text + (
-        f"Calibrated on its own, the net reading misses {best.worst_row} by "
-        f"{best.worst_error - 1:.2f} half widths beyond its rounding at best, at a prior distance "
-        f"of {best.prior_distance:.1f}."
+        f"Calibrated on its own, the net reading is out of reach: {_name(best)} comes nearest, with "
+        f"{_miss(best)}, at a prior distance of {best.prior_distance:.1f}."
     )
 
 
@@ -180,21 +179,24 @@ def _axis_and_legs(found: list[Reading]) -> tuple[str, ...]:
             + ". "
         )
     if failing:
-        text += (
-            "Out of reach: "
-            + "; ".join(
-                f"{_name(r)} ({r.worst_row} off by {r.worst_error:.1f} half widths"
-                + (f", {r.worst_limit_name} {r.worst_limit:+.0%}" if r.worst_limit > 0 else "")
-                + ")"
-                for r in failing
-            )
-            + ". "
-        )
+        text += "Out of reach: " + "; ".join(f"{_name(r)} ({_miss(r)})" for r in failing) + ". "
     return (
         text
         + "The layout remains an objection: with the feet 260 mm from the mid-plane and a coxa, "
         "joint 1 lies only 40 to 90 mm from it.",
     )
+
+
+def _miss(reading: Reading) -> str:
+    """What a reading leaves unmet."""
+    words = []
+    if reading.worst_error > 1 + SEARCH_SLACK:
+        words.append(f"{reading.worst_row} off by {reading.worst_error:.1f} half widths")
+    if reading.worst_limit > 0:
+        words.append(
+            f"{reading.worst_limit_name} {100 * reading.worst_limit:.1f} % over the data sheet"
+        )
+    return ", ".join(words) or "nothing that can walk"
 
 
 def _name(reading: Reading) -> str:

@@ -108,7 +108,9 @@ def _remark(row: Published, published: Mapping[str, Published], known: Evidence 
         return text
     if row.id == EVEN and known is not None:
         none = float(np.mean([math.isnan(p.values[EVEN]) for p in known.prior]))
-        return f"prior: of the draws that have one; {none:.0%} have none, see conclusions.csv"
+        return (
+            f"prior: of the draws that have one; {100 * none:.0f} % have none, see conclusions.csv"
+        )
     return ""
 
 

@@ -32,7 +32,8 @@ Array = NDArray[np.float64]
 PATHS = ("cubic", "harmonic", "quintic", "cycloid")
 _PULL = 3.0  # the nearest point: a third of a half width counts like one prior sigma
 _FIRM = 8.0  # a member of the ensemble: close to its own goal
-_STRICT = 60.0  # whether a reading can be met at all: the prior hardly counts
+_STRICT = 60.0  # whether a reading can be met at all: the prior hardly counts,
+_FREE = 0.97  # and inside its printed precision a row does not pull against the motor's limits
 _SPAN = 0.85  # goals of members spread over this part of the half widths
 
 
@@ -143,7 +144,12 @@ def read(
     z = np.array(found["z"])
     try:
         z = task.solve(
-            z, np.zeros(z.size), columns=np.arange(z.size), pull=_STRICT, evaluations=evaluations
+            z,
+            np.zeros(z.size),
+            columns=np.arange(z.size),
+            pull=_STRICT,
+            free=_FREE,
+            evaluations=evaluations,
         )
         point = task.evaluate(z)
     except PipelineError:

@@ -204,7 +204,7 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
         if path not in documents:
             documents[path] = tomlkit.parse(path.read_text(encoding="utf-8"))
         reason = _REASONS[number.verdict] + (
-            f"; at its {number.bound} bound in {number.at_bound:.0%} of the sets"
+            f"; at its {number.bound} bound in {100 * number.at_bound:.0f} % of the sets"
             if number.at_bound >= AT_LEAST
             else ""
         )

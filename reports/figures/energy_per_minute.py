@@ -60,7 +60,7 @@ class BreakEven:
     Attributes:
         share: From 0 to 1.
         energy: There [J].
-        low: Lower end of what is known without the figure that fixes it, or None.
+        low: Lower end of what is known without any fit, or None.
         high: Upper end, or None.
     """
 
@@ -174,5 +174,5 @@ def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: 
     axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
     text = f"break-even {number(at)} %"
     if len(spread) == 2:
-        text += f" (fitted);\nwithout it {number(spread[0])} to {number(spread[1])} %"
+        text += f" (fitted),\nbefore the fit {number(spread[0])} to {number(spread[1])} %"
     axes.set_title(text, fontweight="bold", loc="center")

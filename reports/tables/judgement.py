@@ -109,7 +109,8 @@ def rotor_friction(rows: Sequence[Frictions]) -> Table:
             ),
             "which": ("their ids in reproduction.csv", ""),
         },
-        "No friction meets every entry; the calibration uses those that leave the fewest unmet.",
+        "Frictions tried in steps of 0.0025 mN*m; the calibration draws from the range that leaves "
+        "the fewest unmet.",
     )
 
 
@@ -219,7 +220,7 @@ def leave_one_out(rows: Sequence[Prediction]) -> Table:
             "low": ("2.5 % quantile of these sets, or of the data sheet's rounding", "see unit"),
             "high": ("97.5 % quantile of the same", "see unit"),
             "inside": ("whether prediction and published value overlap", ""),
-            "sets": ("how many sets met the others", "1"),
+            "sets": ("how many sets met the others and have such a value", "1"),
             "by": ("what predicts it", ""),
         },
     )

@@ -13,7 +13,7 @@ from actuators.build import CATALOG, load_catalog
 from actuators.units import from_si, to_si
 from pipeline.calibration import search
 from pipeline.calibration.conclusions import SENTENCES
-from pipeline.calibration.evidence import evidence
+from pipeline.calibration.evidence import LEAST, evidence
 from pipeline.calibration.fig_21 import crossing
 from pipeline.calibration.judge import Judgement, judge
 from pipeline.calibration.leave_one_out import leave_one_out
@@ -263,9 +263,11 @@ def test_leave_one_out_is_complete_and_says_what_predicts(
     for row in rows:
         if row.by.startswith("nothing"):
             assert row.inside is None
-        elif row.sets:
-            assert row.sets >= 20
-            assert np.isnan(row.median) or row.interval[0] <= row.median <= row.interval[1]
+        elif row.sets >= LEAST:
+            assert row.interval[0] <= row.median <= row.interval[1]
+        elif row.sets:  # too few for a quantile: most of these sets have no break-even at all
+            assert row.name == EVEN
+            assert np.isnan([row.median, *row.interval]).all()
     sheet = {row.name: row for row in rows if "data sheet" in row.by}
     assert sheet["ideal_current_2"].inside
     assert sheet["ideal_current_2"].median == pytest.approx(-30.71 / 400 / 0.0302)
