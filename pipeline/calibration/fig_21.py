@@ -106,9 +106,10 @@ def _break_even(subject: str, whole: Totals, known: Evidence | None) -> BreakEve
         return BreakEven(subject, value, NONE, NONE, note)
     before = [crossing(p.totals, cycle, stand) for p in known.prior]
     others = [crossing(p.totals, cycle, stand) for p in known.left_out[PREDICTED_BY[EVEN]]]
+    none, none_left_out = (100 * float(np.mean(np.isnan(v))) for v in (before, others))
     note += (
-        f"; no break-even in {100 * float(np.mean(np.isnan(before))):.0f} % of the prior's draws and in "
-        f"{100 * float(np.mean(np.isnan(others))):.0f} % of the sets without the irreversible figures"
+        f"; no break-even in {none:.0f} % of the prior's draws and in {none_left_out:.0f} % of the "
+        "sets without the irreversible figures"
     )
     return BreakEven(subject, value, quantiles(before), quantiles(others), note)
 

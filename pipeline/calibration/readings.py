@@ -146,8 +146,8 @@ def _net(found: list[Reading], point: Mapping[str, Any]) -> str:
         return text
     best = min(known, key=lambda r: max(r.worst_error - 1, 0.0) + max(r.worst_limit, 0.0))
     return text + (
-        f"Calibrated on its own, the net reading is out of reach: {_name(best)} comes nearest, with "
-        f"{_miss(best)}, at a prior distance of {best.prior_distance:.1f}."
+        f"Calibrated on its own, the net reading is out of reach: {_name(best)} comes nearest, "
+        f"with {_miss(best)}, at a prior distance of {best.prior_distance:.1f}."
     )
 
 
