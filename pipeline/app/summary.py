@@ -140,7 +140,20 @@ def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
                 "it is left out. A wide interval says that the paper's figure was needed to know "
                 "it."
             ),
-            table_block(tables["leave_one_out"]),
+            table_block(
+                tables["leave_one_out"],
+                {
+                    "id": "target",
+                    "without": "left out",
+                    "unit": "unit",
+                    "published": "paper",
+                    "predicted": "predicted",
+                    "low": "low",
+                    "high": "high",
+                    "sets": "sets",
+                    "by": "by",
+                },
+            ),
         ),
     )
 
@@ -202,11 +215,28 @@ def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Sect
             ),
             Text(measure_next(ranks["the difference that sets the break-even"])),
         )
+    shown = {
+        "sentence": "sentence",
+        "unit": "unit",
+        "printed": "paper",
+        "computed": "ours",
+        "holds": "holds",
+    }
+    if results is not None:
+        shown |= {
+            "part": "part",
+            "prior_low": "prior low",
+            "prior_high": "prior high",
+            "prior_holds_share": "holds in prior",
+            "left_out_low": "left out, low",
+            "left_out_high": "left out, high",
+            "left_out_holds_share": "holds left out",
+        }
     notes = [f"{row.subject.replace('_', ' ')}: {row.note}" for row in judgement.break_even]
     return Section(
         "What the conclusions hang on",
         (
-            table_block(tables["conclusions"], tones=TONES),
+            table_block(tables["conclusions"], shown),
             *words,
             FigureBlock(
                 out / "energy_per_minute_middle_legs.svg",

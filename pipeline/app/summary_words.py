@@ -236,7 +236,7 @@ def _ensemble(judged: Judged) -> str:
 
 
 def _changed(judged: Judged) -> str:
-    return f"**Changed numbers.** {judged.by.word[0].upper()}{judged.by.word[1:]}."
+    return f"**Changed numbers:** {judged.by.word}."
 
 
 def roles_text() -> str:

@@ -168,8 +168,8 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
             "computed": ("ours", "see unit"),
             "holds": ("whether the sentence holds for ours", ""),
             "part": (
-                "fitted: ours holds because it was asked for; follows: from fitted and put-in "
-                "numbers; predicted: neither",
+                "in the calibration; fitted: asked for, so that it holds there says nothing; "
+                "follows: from fitted and put-in numbers; predicted: neither",
                 "",
             ),
             "prior_low": (PRIOR_LOW, "see unit"),
