@@ -115,7 +115,9 @@ def _against(judged: Judged) -> str:
         f"{'is' if met < 2 else 'are'} met"
     )
     if unmet:
-        text += f", {_word(len(unmet))} {'is' if len(unmet) == 1 else 'are'} not: {_listed(unmet)}"
+        text += (
+            f", {_word(len(unmet))} {'is' if len(unmet) == 1 else 'are'} not ({'; '.join(unmet)})"
+        )
     return text + "."
 
 
@@ -126,7 +128,11 @@ def _beside(row: ReproducedRow) -> str:
     if unit == "N*m":
         published, ours, half, unit = 1e3 * published, 1e3 * ours, 1e3 * half, "mN·m"
     digits = max(0, -math.floor(math.log10(half))) - 1 if half > 0 else 3
-    return f"{row.published.quantity} {ours:.{digits}f} instead of {published:.{digits}f} {unit}"
+    joint = f" of joint {row.published.joint}" if row.published.joint else ""
+    return (
+        f"{row.published.quantity}{joint}, {ours:.{digits}f} instead of {published:.{digits}f} "
+        f"{unit}"
+    )
 
 
 def _named(row: ReproducedRow) -> str:
@@ -149,7 +155,7 @@ def _price(judged: Judged) -> str:
     p = judged.judgement.price
     _, high = p.gear_interval
     return (
-        '**The price of the fit:** "almost 15" takes a planetary gear with '
+        '**The price of the fit:** "almost 15" needs a planetary gear with '
         f"{p.gear_friction:.1f} mN·m of constant friction, {p.gear_friction / p.gear_prior:.1f} "
         f"times what gear data suggest ({p.gear_prior:g} mN·m, at most {high:g}); it alone turns "
         f"{p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle into heat. And "
