@@ -7,6 +7,7 @@ import re
 import shutil
 import sys
 import tempfile
+import textwrap
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -129,6 +130,21 @@ RATES = {
 }
 
 
+def agreement(out: Path) -> str:
+    """What is fitted, predicted and contradicted: the first paragraph of `summary.md`."""
+    from pipeline.app.cli import parser
+    from pipeline.app.judgement import basis, judged
+    from pipeline.app.settings import settings
+    from pipeline.app.summary_words import first_paragraph
+
+    given = settings(parser().parse_args(["reports", "--robot", str(ROOT / "urdf/hexapod.toml")]))
+    by = basis(given)
+    if isinstance(by, str) or by.results is None:
+        raise ValueError(f"the calibration does not belong to the files: {by}")
+    text = first_paragraph(judged(given, by)[0])
+    return "\n".join(textwrap.wrap(text, 110, break_on_hyphens=False, break_long_words=False))
+
+
 def share(hits: str, trials: str) -> str:
     """A count out of another."""
     return f"{hits} of {trials}"
@@ -191,6 +207,7 @@ BLOCKS = {
     "standing": standing,
     "walking": walking,
     "parameters": parameters,
+    "agreement": agreement,
     "blind": blind,
     "blind effects": blind_effects,
 }

@@ -11,7 +11,7 @@ from pipeline.calibration.calibrate import Effort, calibrate
 from pipeline.calibration.errors import CalibrationError
 from pipeline.calibration.machine import MIDDLE_LEGS, POSTURE, ROBOT
 from pipeline.calibration.prior import load_prior
-from pipeline.calibration.store import calibrated_numbers, save
+from pipeline.calibration.store import AT_LEAST, calibrated_numbers, save
 from pipeline.robot_file import load_robot_file, read_toml
 
 WORK = Path(".calibration")
@@ -35,11 +35,12 @@ def run_calibrate(options: argparse.Namespace) -> int:
     for path in save(results, options.robot):
         print(path.name)
     numbers = calibrated_numbers(results, load_prior())
-    free = [n.key for n in numbers if n.verdict == "not determined"]
-    bound = [f"{n.key} ({n.at_bound})" for n in numbers if n.at_bound]
-    print(f"{len(results['ensemble'])} of {results['draws']} draws became admissible sets")
-    print(f"not determined by the targets: {', '.join(free) or 'none'}")
-    print(f"at a bound: {', '.join(bound) or 'none'}")
+    print(f"{len(results['ensemble'])} of {results['draws']} draws became sets of the ensemble")
+    for verdict in ("not determined", "against the prior"):
+        keys = [n.key for n in numbers if n.verdict == verdict]
+        print(f"{verdict}: {', '.join(keys) or 'none'}")
+    bound = [f"{n.key} ({n.bound}, {n.at_bound:.0%})" for n in numbers if n.at_bound >= AT_LEAST]
+    print(f"at a bound in 5 % of the sets or more: {', '.join(bound) or 'none'}")
     print("run `make urdf` to build the URDFs from the calibrated robot file")
     return 0
 

@@ -14,6 +14,7 @@ from actuators.energy import stage_energies
 from pipeline.app.compute import Standing, Walking
 from pipeline.app.names import leg_words, shown_leg
 from pipeline.app.settings import Settings
+from pipeline.calibration.fig_21 import EnergyPerMinute
 from pipeline.calibration.judge import Judgement
 from pipeline.robot import Robot
 from reports.figures.electrical_energy import electrical_energy_figure
@@ -236,14 +237,33 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
         if not np.isnan(row.fraction):
             reference = next(c for c in curves if c.alternative == "reversible")
             energy = float(np.interp(row.fraction, share, reference.energy))
-            mark = BreakEven(row.fraction, energy, row.low, row.high)
+            known = (v if np.isfinite(v) else None for v in row.prior)
+            mark = BreakEven(row.fraction, energy, *known)
         figure = partial(
             energy_per_minute_figure,
             share,
-            [EnergyLine(titles[c.alternative], c.energy, c.low, c.high) for c in curves],
+            [
+                EnergyLine(
+                    titles[c.alternative],
+                    c.energy,
+                    *(c.prior if c.prior is not None else (None, None)),
+                    *(c.left_out if c.left_out is not None else (None, None)),
+                )
+                for c in curves
+            ],
             title=f"Energy in one minute: {SUBJECT_TITLES[row.subject]}",
-            subtitle=row.note if mark is None else "band: 95 % of the admissible parameter sets",
+            subtitle=row.note.split(";")[0] if mark is None else _bands(curves),
             break_even=mark,
         )
         every.append(Drawing(f"energy_per_minute_{row.subject}", figure))
     return save_figures(every, out)
+
+
+def _bands(curves: list[EnergyPerMinute]) -> str:
+    """What the lines and bands are."""
+    if any(c.prior is None for c in curves):
+        return "computed anew with changed numbers"
+    return (
+        "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
+        "fitted without the drive's own walking figure"
+    )

@@ -1,53 +1,125 @@
-"""Judges the run against the paper where the run is the calibrated default."""
+"""Judges the run against the paper, as far as the stored calibration belongs to its numbers."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from pipeline.app.settings import Settings
-from pipeline.calibration.judge import Judgement, judge, leave_one_out, reading_rows
-from pipeline.calibration.judge import sensitivity_rows as sensitivities_of
-from pipeline.calibration.prior import load_prior
+from pipeline.calibration.fingerprint import differences, fingerprint
+from pipeline.calibration.judge import Judgement, judge
+from pipeline.calibration.prior import Prior, load_prior
+from pipeline.calibration.published import Published, load_published
+from pipeline.calibration.quantities import DIMENSIONS, IDS
+from pipeline.calibration.readings import reading_rows
+from pipeline.calibration.sensitivity import sensitivity_rows
 from pipeline.calibration.store import RESULTS_FILE, calibrated_numbers, load_results
 from reports.table import Table
 from reports.tables import judgement as tables
 
-
-def applies(given: Settings) -> bool:
-    """Whether the stored ensemble belongs to this run: the calibrated robot, nothing changed."""
-    return (
-        RESULTS_FILE.exists()
-        and not given.changes
-        and given.effects is None
-        and given.actuators is None
-        and not given.quasi_static
-        and given.regeneration.policy == "none"
-        and given.robot.spec.path.name == load_results().get("robot")
-    )
+#: A robot or an actuator built otherwise than the paper's has no such numbers to compare.
+_STRUCTURE = ("alternatives.", "legs", "gait.tripods", "standing.feet")
+_SHOWN = 3
 
 
-def judged(given: Settings) -> tuple[Judgement, list[Table]]:
-    """Everything held against the paper.
+@dataclass(frozen=True)
+class Basis:
+    """What a run may be judged by.
+
+    Attributes:
+        published: The printed values.
+        prior: What was known before.
+        stored: The stored calibration.
+        changed: Numbers of the run that differ from those the calibration was made with; its
+            sets, intervals and verdicts then belong to other numbers and are left out.
+    """
+
+    published: Mapping[str, Published]
+    prior: Prior
+    stored: Mapping[str, Any]
+    changed: tuple[str, ...]
+
+    @property
+    def results(self) -> Mapping[str, Any] | None:
+        """The stored calibration where it belongs to the run's numbers, else None."""
+        return None if self.changed else self.stored
+
+    @property
+    def word(self) -> str:
+        """What to say of the numbers that differ; empty where none does."""
+        if not self.changed:
+            return ""
+        shown = ", ".join(self.changed[:_SHOWN])
+        more = len(self.changed) - _SHOWN
+        return (
+            f"{shown}{f' and {more} more' if more > 0 else ''} "
+            f"{'differs' if len(self.changed) == 1 else 'differ'} from the numbers of the "
+            "calibration: what is compared with the paper was computed anew; what rests on the "
+            "calibration's sets (intervals, predictions, readings, sensitivities) is left out"
+        )
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A judgement and what it rests on."""
+
+    judgement: Judgement
+    by: Basis
+
+
+def basis(given: Settings) -> Basis | str:
+    """What the run may be judged by, or why not at all, in words.
 
     Raises:
-        CalibrationError: There are no stored results.
+        CalibrationError: The stored calibration, the printed values or the prior cannot be read.
     """
+    if not RESULTS_FILE.exists():
+        return "there is no stored calibration; `make calibrate` makes one"
     results = load_results()
-    judgement = judge(given.robot, given.catalog, results, samples=given.samples)
-    prior = load_prior()
-    return judgement, [
+    if given.robot.spec.path.name != results.get("robot"):
+        return f"{given.robot.spec.path.name} is not the paper's robot"
+    if given.actuators is not None:
+        return f"the actuators of {given.actuators} are not the paper's"
+    if given.effects is not None:
+        return "a model file changes the robot, and the paper knows nothing of its effects"
+    if given.quasi_static:
+        return "the paper counts the links' inertia, this run does not"
+    if given.regeneration.policy != "none":
+        return "in the paper energy that flows back is lost, in this run it is used again"
+    published, prior = load_published(IDS, DIMENSIONS), load_prior()
+    now = fingerprint(given.robot.spec, given.catalog, published, prior)
+    changed = differences(results.get("numbers", {}), now)
+    built = [name for name in changed if name.startswith(_STRUCTURE)]
+    if built:
+        return f"{built[0]} differs from the paper's"
+    return Basis(published, prior, results, tuple(changed))
+
+
+def judged(given: Settings, by: Basis) -> tuple[Judged, list[Table]]:
+    """Everything held against the paper."""
+    judgement = judge(
+        given.robot, given.catalog, by.published, by.prior, by.results, samples=given.samples
+    )
+    out = [
         tables.reproduction(judgement.reproduction),
         tables.conclusions(judgement.conclusions),
-        tables.readings(reading_rows(results)),
-        tables.leave_one_out(leave_one_out(results)),
-        tables.calibration(calibrated_numbers(results, prior)),
-        tables.sensitivities(sensitivities_of(results)),
+        tables.rotor_friction(judgement.ranges),
         tables.break_even(judgement.break_even),
         tables.energy_per_minute(judgement.per_minute),
     ]
+    if by.results is not None:
+        out += [
+            tables.readings(reading_rows(by.results, by.published)),
+            tables.leave_one_out(judgement.predictions),
+            tables.calibration(calibrated_numbers(by.results, by.prior)),
+            tables.sensitivities(sensitivity_rows(by.results)),
+        ]
+    return Judged(judgement, by), out
 
 
-def pages(given: Settings, judgement: Judgement, every: list[Table], out: Path) -> int:
+def pages(given: Settings, judged: Judged, every: list[Table], out: Path) -> int:
     """Fig. 21 for every subject, then the summary that shows all figures.
 
     Returns:
@@ -57,7 +129,5 @@ def pages(given: Settings, judgement: Judgement, every: list[Table], out: Path) 
     from pipeline.app.summary import write_summary
 
     titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
-    count = write_fig_21(judgement, titles, out)
-    results = load_results()
-    numbers = calibrated_numbers(results, load_prior())
-    return count + write_summary(given, judgement, numbers, every, results, out)
+    count = write_fig_21(judged.judgement, titles, out)
+    return count + write_summary(given, judged, every, out)

@@ -63,15 +63,15 @@ def run(options: argparse.Namespace) -> int:
     if options.verb == "reports":
         from pipeline.app import judgement as judging
 
-        if judging.applies(given):
-            logger.info("holding the run against the paper")
-            judgement, more = judging.judged(given)
-            tables += more
+        by = judging.basis(given)
+        if isinstance(by, str):
+            print(f"not held against the paper: {by}")
         else:
-            print(
-                "not held against the paper: no stored calibration belongs to this robot, these "
-                "numbers and these options"
-            )
+            logger.info("holding the run against the paper")
+            judgement, more = judging.judged(given, by)
+            tables += more
+            if by.word:
+                print(by.word)
     meta = metadata(given)
     with staged(options.out, options.verb, inputs=inputs_of(given)) as out:
         for table in tables:

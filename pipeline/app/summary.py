@@ -4,121 +4,63 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+from pipeline.app.judgement import Basis, Judged
 from pipeline.app.names import names_text
 from pipeline.app.settings import Settings
-from pipeline.calibration.judge import Judgement, headline
+from pipeline.app.summary_words import answer, percent, roles_text
 from pipeline.calibration.readings import readings, verdict
-from pipeline.calibration.store import Calibrated
+from pipeline.calibration.sensitivity import Index, leading, ranking
+from pipeline.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
 from reports.table import Table
 
-TONES = {"reproduced": "good", "not reproduced": "bad", "not determined": "quiet"}
+TONES = {
+    "reproduced": "good",
+    "not reproduced": "bad",
+    "contradicted": "bad",
+    "against the prior": "bad",
+    "not determined": "quiet",
+}
 
 
-def write_summary(
-    given: Settings,
-    judgement: Judgement,
-    numbers: Sequence[Calibrated],
-    tables: Sequence[Table],
-    results: Mapping[str, Any],
-    out: Path,
-) -> int:
+def write_summary(given: Settings, judged: Judged, tables: Sequence[Table], out: Path) -> int:
     """Write ``summary.md`` and ``index.html``.
 
     Args:
         given: The run.
-        judgement: Ours against the paper's.
-        numbers: Every free number after calibration.
-        tables: All tables of the run, for links.
-        results: The stored calibration.
+        judged: Ours against the paper's.
+        tables: All tables of the run.
         out: Folder; the figures must be there already.
 
     Returns:
         How many files.
     """
-    page = summary(given, judgement, numbers, {t.name: t for t in tables}, results, out)
+    page = summary(given, judged, {t.name: t for t in tables}, out)
     write_markdown(page, out / "summary.md")
     write_html(page, out / "index.html")
     return 2
 
 
-def summary(
-    given: Settings,
-    judgement: Judgement,
-    numbers: Sequence[Calibrated],
-    tables: Mapping[str, Table],
-    results: Mapping[str, Any],
-    out: Path,
-) -> Page:
+def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: Path) -> Page:
     """The page; see `write_summary`."""
-    sections = (
-        _energy(tables, out, names_text(given)),
-        _reproduction(tables),
-        _reading(results),
-        _conclusions(judgement, results, tables, out),
-        _parameters(numbers, tables, given),
+    sections = [_energy(tables, out, names_text(given)), _reproduction(judged, tables)]
+    if judged.by.results is not None:
+        sections.append(_reading(judged.by))
+    sections += [
+        _conclusions(judged, tables, out),
+        _parameters(judged.by, tables, given),
         _robot(out),
-    )
+    ]
     return Page(
         title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
-        answer=_answer(judgement, tables, results),
-        sections=sections,
+        answer=answer(judged, tables),
+        sections=tuple(sections),
         files={f"{t.name}.csv": t.description or _first_meanings(t) for t in tables.values()},
         footer="Every CSV has a .meta.json beside it: meanings, units, input hashes, versions.",
     )
-
-
-def _answer(
-    judgement: Judgement, tables: Mapping[str, Table], results: Mapping[str, Any]
-) -> tuple[str, ...]:
-    counts = headline(judgement.reproduction)
-    energy = tables["walking_energy"].columns
-    rows = dict(
-        zip(
-            zip(energy["alternative"], energy["leg"], strict=True),
-            zip(energy["electrical_J"], energy["ratio_to_ideal"], strict=True),
-            strict=True,
-        )
-    )
-    legs = {name: rows[name, "rm"] for name in ("ideal", "rotor", "reversible", "irreversible")}
-    spread = {row.published.id: row for row in judgement.reproduction}
-    power = {
-        name: spread[f"{name}_leg_energy_3s"].computed / 3.0
-        for name in ("reversible", "irreversible")
-    }
-    even = spread["break_even_standing_fraction"]
-    missed = [r.published.id for r in judgement.reproduction if r.verdict != "reproduced"]
-    check, target, put_in = (counts[role] for role in ("check", "target", "input"))
-    first = (
-        f"Walking one 3 s cycle, the middle right leg draws **{legs['ideal'][0]:.1f} J** with "
-        f"ideal actuators, {legs['rotor'][0]:.1f} J once the rotor has inertia and friction, "
-        f"**{legs['reversible'][0]:.1f} J** with belt and Harmonic Drive and "
-        f"**{legs['irreversible'][0]:.1f} J** with planetary and hypoid gears. Standing still, the "
-        f"loaded leg draws {power['reversible']:.2f} W with the reversible actuator and "
-        f"{power['irreversible']:.2g} W with the irreversible one, which "
-        f"pays only above {even.computed:.1%} of the time standing "
-        f"({even.low:.1%} to {even.high:.1%})."
-    )
-    second = (
-        f"Of the 46 numbers the paper prints, **{check[0]} of {check[1]} were predicted** within "
-        f"their printed precision, {target[0]} of {target[1]} were fitted and meet theirs, "
-        f"{put_in[0]} of {put_in[1]} were put in."
-        + (f" Not reproduced: {', '.join(missed)}." if missed else "")
-    )
-    members, draws = len(results["ensemble"]), results["draws"]
-    third = (
-        "The paper does not print friction, inertia, masses or gear angles. "
-        f"{target[1]} fitted figures cannot determine {len(results['nearest']['z'])} numbers: the "
-        "values here are the admissible set nearest to data sheets and literature, and every low "
-        f"and high spans 95 % of {members} admissible sets (of {draws} draws from prior "
-        "knowledge). What the walking ratios say was fitted, not found; see the columns "
-        "`prior_low` and `prior_high` for what data sheets alone would say."
-    )
-    return first, second, third
 
 
 def _energy(tables: Mapping[str, Table], out: Path, names: str) -> Section:
@@ -141,7 +83,7 @@ def _energy(tables: Mapping[str, Table], out: Path, names: str) -> Section:
     )
 
 
-def _reproduction(tables: Mapping[str, Table]) -> Section:
+def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
     shown = {
         "where": "where",
         "quantity": "quantity",
@@ -149,38 +91,83 @@ def _reproduction(tables: Mapping[str, Table]) -> Section:
         "unit": "unit",
         "published": "paper",
         "computed": "ours",
-        "low": "low",
-        "high": "high",
         "role": "role",
         "verdict": "verdict",
     }
+    if judged.by.results is None:
+        return Section(
+            "Every number the paper prints",
+            (Text(roles_text()), table_block(tables["reproduction"], shown, tones=TONES)),
+        )
+    open_ = {
+        "where": "where",
+        "quantity": "quantity",
+        "joint": "joint",
+        "unit": "unit",
+        "published": "paper",
+        "prior_low": "prior low",
+        "prior_high": "prior high",
+        "left_out_low": "left out, low",
+        "left_out_high": "left out, high",
+    }
+    columns = tables["reproduction"].columns
+    known = [low is not None for low in columns["prior_low"]]
     return Section(
         "Every number the paper prints",
         (
-            Text(
-                "*input*: put in. *target*: the calibration was fitted to it. *check*: predicted. "
-                "Low and high span the admissible sets. The electrical checks of Tables IV to VI "
-                "hold together only for a torque constant of 30.175 to 30.200 mN*m/A, a resistance "
-                "of 0.3157 to 0.3161 ohm and a rotor friction of 3.600 to 3.617 mN*m; the prior "
-                "was placed inside that sliver of the data sheet's rounding, so these checks show "
-                "that the tables agree with each other and with one motor, not more."
-            ),
+            Text(roles_text()),
             table_block(tables["reproduction"], shown, tones=TONES),
             Text(
-                "How much each target is worth: the others predict it as follows when it is left "
-                "out. A wide interval says that the paper's figure was needed to know it."
+                "What is known of them without the fit. *Prior*: 95 % of what data sheets and "
+                "literature say before anything is fitted. *Left out*: 95 % of what everything "
+                "else says when this figure is left out, the irreversible actuator's two figures "
+                "together. Other rows were put in or follow from that."
             ),
-            table_block(tables["leave_one_out"]),
+            table_block(tables["reproduction"], open_, keep=known),
+            Text(
+                "Table V contradicts itself: no rotor friction gives all its entries at printed "
+                "precision. The entries that each friction leaves unmet:"
+            ),
+            table_block(
+                tables["rotor_friction"],
+                {
+                    "from_mNm": "from [mN·m]",
+                    "to_mNm": "to [mN·m]",
+                    "unmet": "unmet",
+                    "which": "which",
+                },
+            ),
+            Text(
+                "What each target is worth as a test: everything else predicts it as follows when "
+                "it is left out. A wide interval says that the paper's figure was needed to know "
+                "it."
+            ),
+            table_block(
+                tables["leave_one_out"],
+                {
+                    "id": "target",
+                    "without": "left out",
+                    "unit": "unit",
+                    "published": "paper",
+                    "predicted": "predicted",
+                    "low": "low",
+                    "high": "high",
+                    "sets": "sets",
+                    "by": "by",
+                },
+            ),
         ),
     )
 
 
-def _reading(results: Mapping[str, Any]) -> Section:
-    found = readings(results)
+def _reading(by: Basis) -> Section:
+    assert by.results is not None
+    found = readings(by.results)
     rows = tuple(
         (
             r.axis_deg,
             r.legs,
+            "net" if r.net else "drawn",
             r.worst_error,
             r.worst_row,
             r.worst_limit,
@@ -194,7 +181,7 @@ def _reading(results: Mapping[str, Any]) -> Section:
     )
     block = TableBlock(
         (
-            *("axis [deg]", "legs loaded", "worst row [half widths]", "which"),
+            *("axis [deg]", "legs loaded", "consumption", "worst row [half widths]", "which"),
             *("worst limit, over less 1", "prior distance", "ideal leg [J]"),
             *("E_el/E_m joint 2", "E_el/E_m others", "verdict"),
         ),
@@ -204,34 +191,58 @@ def _reading(results: Mapping[str, Any]) -> Section:
         {"meets all": "good", "out of reach": "bad"},
         3,
     )
-    return Section("How the paper was read", (Text(verdict(found)), block))
+    words = verdict(found, by.results["nearest"])
+    return Section("How the paper was read", (*(Text(text) for text in words), block))
 
 
-def _conclusions(
-    judgement: Judgement, results: Mapping[str, Any], tables: Mapping[str, Table], out: Path
-) -> Section:
-    table = results["sensitivity"]
-    points = []
-    for output, words in (
-        ("walking_ratio_reversible", "the reversible ratio"),
-        ("walking_ratio_irreversible", "the irreversible ratio"),
-        ("walking_extra_J", "the difference that sets the break-even"),
-    ):
-        total = sorted(zip(table[output]["ST"], table["names"], strict=True), reverse=True)[:3]
-        points.append(f"{words}: " + ", ".join(f"`{name}` ({share:.0%})" for share, name in total))
-    extra = sorted(zip(table["walking_extra_J"]["ST"], table["names"], strict=True), reverse=True)[
-        0
-    ][1]
+def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Section:
+    judgement, results = judged.judgement, judged.by.results
+    words: tuple[Text | Points, ...] = ()
+    if results is not None:
+        ranks = {
+            text: ranking(results, output)
+            for output, text in (
+                ("walking_ratio_reversible", "the reversible ratio"),
+                ("walking_ratio_irreversible", "the irreversible ratio"),
+                ("walking_extra_J", "the difference that sets the break-even"),
+            )
+        }
+        words = (
+            Text("Largest total sensitivities (share of variance with interactions, 95 %):"),
+            Points(
+                tuple(
+                    f"{text}: " + ", ".join(_index(row) for row in ranked[:3])
+                    for text, ranked in ranks.items()
+                )
+            ),
+            Text(measure_next(ranks["the difference that sets the break-even"])),
+        )
+    shown = {
+        "sentence": "sentence",
+        "unit": "unit",
+        "printed": "paper",
+        "computed": "ours",
+        "holds": "holds",
+    }
+    if results is not None:
+        shown |= {
+            "part": "part",
+            "prior_low": "prior low",
+            "prior_high": "prior high",
+            "prior_holds_share": "holds in prior",
+            "left_out_low": "left out, low",
+            "left_out_high": "left out, high",
+            "left_out_holds_share": "holds left out",
+        }
     notes = [f"{row.subject.replace('_', ' ')}: {row.note}" for row in judgement.break_even]
     return Section(
         "What the conclusions hang on",
         (
-            table_block(tables["conclusions"], tones=TONES),
-            Text("Largest total sensitivities (share of variance with interactions):"),
-            Points(tuple(points)),
-            Text(f"**Measure next:** `{extra}`, the number that moves the break-even most."),
+            table_block(tables["conclusions"], shown),
+            *words,
             FigureBlock(
-                out / "energy_per_minute_middle_legs.svg", "Fig. 21: both middle legs, one minute."
+                out / "energy_per_minute_middle_legs.svg",
+                "Fig. 21: both middle legs, one minute.",
             ),
             FigureBlock(
                 out / "energy_per_minute_robot_on_3_feet.svg", "The whole robot on three feet."
@@ -244,34 +255,82 @@ def _conclusions(
     )
 
 
-def _parameters(
-    numbers: Sequence[Calibrated], tables: Mapping[str, Table], given: Settings
-) -> Section:
-    free = [f"`{n.key}`" for n in numbers if n.verdict == "not determined"]
-    bound = [f"`{n.key}` ({n.at_bound})" for n in numbers if n.at_bound]
-    return Section(
-        "What is assumed and what was fitted",
-        (
-            Text(
-                f"Not determined by the paper: {', '.join(free) or 'none'}. At a bound: "
-                f"{', '.join(bound) or 'none'}. The foot's path through the air is "
-                f"`{given.robot.spec.transfer_path}`; the paper does not give it."
-            ),
-            table_block(tables["calibration"], tones=TONES),
-            table_block(
-                tables["parameters"],
-                {
-                    "group": "file",
-                    "parameter": "parameter",
-                    "value": "value",
-                    "unit": "unit",
-                    "basis": "basis",
-                    "source": "source",
-                },
-                caption="Every number that went in.",
-            ),
-        ),
+def _index(row: Index) -> str:
+    return f"`{row.parameter}` ({100 * row.total:.0f} ± {percent(row.half_width)})"
+
+
+def measure_next(ranked: Sequence[Index]) -> str:
+    """Which number to measure next, if the sensitivities can tell.
+
+    Args:
+        ranked: Total indices on what is to be known better, largest first.
+    """
+    first = leading(ranked)
+    if len(first) == 1:
+        return (
+            f"**Measure next:** `{first[0].parameter}`, the number that moves the break-even most; "
+            "the interval of its index lies above all others."
+        )
+    return (
+        "What to measure next is not decided: the intervals of "
+        + " and ".join(_index(row) for row in first)
+        + " overlap."
     )
+
+
+def _parameters(by: Basis, tables: Mapping[str, Table], given: Settings) -> Section:
+    path = (
+        f"The foot's path through the air is `{given.robot.spec.transfer_path}`; the paper does "
+        "not give it."
+    )
+    blocks: list[Text | Points | TableBlock] = []
+    if by.results is None:
+        blocks.append(Text(path))
+    else:
+        numbers = calibrated_numbers(by.results, by.prior)
+        blocks += [
+            Text(path),
+            Points(tuple(_number_words(numbers))),
+            table_block(tables["calibration"], tones=TONES),
+        ]
+    blocks.append(
+        table_block(
+            tables["parameters"],
+            {
+                "group": "file",
+                "parameter": "parameter",
+                "value": "value",
+                "unit": "unit",
+                "basis": "basis",
+                "source": "source",
+            },
+            caption="Every number that went in.",
+        )
+    )
+    return Section("What is assumed and what was fitted", tuple(blocks))
+
+
+def _number_words(numbers: Sequence[Calibrated]) -> list[str]:
+    """Numbers by what the targets did to them, and how often each lies at a bound."""
+    against = [
+        f"`{n.key}` ({n.shift:+.1f})"
+        for n in numbers
+        if n.verdict == "against the prior" and n.shift is not None
+    ]
+    free = [f"`{n.key}`" for n in numbers if n.verdict == "not determined"]
+    fixed = [f"`{n.key}`" for n in numbers if n.verdict == FIXED]
+    bound = [
+        f"`{n.key}` ({n.bound}, {percent(n.at_bound)})"
+        for n in sorted(numbers, key=lambda n: -n.at_bound)
+        if n.at_bound >= AT_LEAST
+    ]
+    return [
+        "Driven out of what data sheets and literature believe (mean of the ensemble, in standard "
+        f"deviations of that belief): {', '.join(against) or 'none'}.",
+        f"At a bound, in so many of the ensemble's sets: {', '.join(bound) or 'none'}.",
+        f"Not determined by the paper: {', '.join(free) or 'none'}.",
+        f"Without a prior, drawn from all that give Tables IV to VI: {', '.join(fixed) or 'none'}.",
+    ]
 
 
 def _robot(out: Path) -> Section:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,12 +16,21 @@ from actuators.build import CATALOG
 from pipeline.calibration import search
 from pipeline.calibration.checkpoint import Checkpoint
 from pipeline.calibration.errors import CalibrationError
+from pipeline.calibration.machine import MIDDLE_LEGS
 from pipeline.calibration.prior import PRIOR_FILE
-from pipeline.calibration.published import PUBLISHED_FILE
+from pipeline.calibration.problem import EXTRA, fixed_before
+from pipeline.calibration.published import PUBLISHED_FILE, Published
+from pipeline.calibration.rotor_friction import HELD, friction_ranges
+from pipeline.calibration.search import Reading
 
 logger = logging.getLogger("legwatt")
 AXES_DEG = (0.0, 15.0, 30.0, 45.0, 90.0)
 COUNTS = (1, 2)  # middle legs that Fig. 21 counts as loaded
+#: Every axis with either count, and at the vertical axis consumption net of what returns.
+READINGS = (
+    *(Reading(axis, count) for axis in AXES_DEG for count in COUNTS),
+    *(Reading(0.0, count, net=True) for count in COUNTS),
+)
 OUTPUTS = (
     "walking_ratio_rotor",
     "walking_ratio_reversible",
@@ -29,12 +38,14 @@ OUTPUTS = (
     "walking_extra_J",
     "break_even_standing_fraction",
 )
-_LEAVE_OUT = (
-    *("standing_reaction_rm", "standing_torque_2", "standing_torque_3"),
-    *("ideal_current_2", "ideal_voltage_2", "ideal_voltage_3"),
-    *("rotor_motor_torque_2", "reversible_motor_torque_2"),
-    *("walking_ratio_rotor", "walking_ratio_reversible", "walking_ratio_irreversible"),
-    "walking_extra_J",
+#: Targets left out together. What the irreversible actuator costs stands in two of them.
+LEAVE_OUT = (
+    (HELD,),
+    ("walking_ratio_rotor",),
+    ("walking_ratio_reversible",),
+    ("walking_ratio_irreversible",),
+    (EXTRA,),
+    ("walking_ratio_irreversible", EXTRA),
 )
 
 
@@ -45,6 +56,7 @@ class Effort:
     Attributes:
         starts: Of the search for the nearest point, per transfer path.
         draws: From the prior for the ensemble.
+        prior_draws: From the prior for what it says by itself.
         left_out_draws: Per target left out.
         reading_starts: Per reading.
         sobol: Base sample of the sensitivity analysis, a power of two.
@@ -54,9 +66,10 @@ class Effort:
 
     starts: int = 4
     draws: int = 560
-    left_out_draws: int = 20
+    prior_draws: int = 2000
+    left_out_draws: int = 60
     reading_starts: int = 2
-    sobol: int = 128
+    sobol: int = 512
     workers: int = 2
     seed: int = 1
 
@@ -69,7 +82,11 @@ def input_hash(robot: Path, effort: Effort) -> str:
     """
     digest = hashlib.sha256(f"{effort.seed}".encode())
     here = Path(__file__).parent
-    code = [here / f"{name}.py" for name in ("search", "problem", "machine", "quantities", "prior")]
+    names = (
+        *("search", "problem", "machine", "quantities", "prior"),
+        *("motor_constants", "rotor_friction", "table_entries"),
+    )
+    code = [here / f"{name}.py" for name in names]
     for path in [PRIOR_FILE, PUBLISHED_FILE, robot, *sorted(CATALOG.glob("*.toml")), *code]:
         digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -97,14 +114,22 @@ def calibrate(
         CalibrationError: No admissible point at all.
     """
     name = str(robot)
-    search.base_problem(name)  # bad input is an error here, before any process starts
+    task = search.base_problem(name)  # bad input is an error here, before any process starts
+    missing = [leg for leg in MIDDLE_LEGS if leg not in {own.name for own in task.spec.legs}]
+    if missing or not task.spec.floating:
+        raise CalibrationError(
+            f"{robot.name}: the paper's numbers are those of a walking hexapod with the middle "
+            f"legs {' and '.join(MIDDLE_LEGS)}; this robot "
+            + (f"has no leg '{missing[0]}'" if missing else "is on a stand")
+        )
+    logger.info("rotor friction leaves unmet: %s", ", ".join(task.sliver.frictions.unmet) or "none")
     store = Checkpoint(work / "tasks.jsonl", input_hash(robot, effort))
     with ProcessPoolExecutor(effort.workers) as pool:
         starts = store.run(
             pool,
             search.nearest,
             [
-                (f"start/{path}/{i}", (name, path, 0.0, 1, effort.seed, i, 30))
+                (f"start/{path}/{i}", (name, path, search.READ, effort.seed, i, 30))
                 for path in search.PATHS
                 for i in range(effort.starts)
             ],
@@ -119,7 +144,7 @@ def calibrate(
             pool,
             search.member,
             [
-                (f"member/{'+'.join(paths)}/{i}", (name, paths, 0.0, 1, effort.seed, i))
+                (f"member/{'+'.join(paths)}/{i}", (name, paths, effort.seed, i))
                 for i in range(effort.draws)
             ],
             progress("ensemble", effort.draws),
@@ -129,65 +154,96 @@ def calibrate(
             search.prior_member,
             [
                 (f"prior/{'+'.join(paths)}/{i}", (name, paths, effort.seed, i))
-                for i in range(effort.draws)
+                for i in range(effort.prior_draws)
             ],
-            progress("prior", effort.draws),
-        )
-        members = [m for m in ensemble if m.get("admissible")]
-        whole = store.run(
-            pool,
-            search.robot_totals,
-            [
-                (f"totals/{'+'.join(paths)}/{i}", (name, m["path"], m["z"]))
-                for i, m in enumerate(ensemble)
-                if m.get("admissible")
-            ],
-            progress("whole robot", len(members)),
+            progress("prior", effort.prior_draws),
         )
         left_out = {
-            target: store.run(
+            "+".join(targets): store.run(
                 pool,
-                search.left_out,
+                search.member,
                 [
-                    (f"without/{target}/{i}", (name, paths, 1, effort.seed, target, i))
+                    (f"without/{'+'.join(targets)}/{i}", (name, paths, effort.seed, i, targets))
                     for i in range(effort.left_out_draws)
                 ],
-                progress(f"without {target}", effort.left_out_draws),
+                progress(f"without {' and '.join(targets)}", effort.left_out_draws),
             )
-            for target in _LEAVE_OUT
+            for targets in LEAVE_OUT
+        }
+
+        def with_totals(kind: str, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
+            """Points with the energy of the whole robot."""
+            found = store.run(
+                pool,
+                search.robot_totals,
+                [
+                    (f"totals/{kind}/{i}", (name, p["path"], p["z"], p["constants"]))
+                    for i, p in enumerate(points)
+                ],
+                progress(f"whole robot, {kind}", len(points)),
+            )
+            return [p | {"totals": t} for p, t in zip(points, found, strict=True)]
+
+        members = with_totals("ensemble", [m for m in ensemble if m.get("admissible")])
+        # The motor's limits are the data sheet's, so a draw beyond them is not what it says.
+        before = with_totals("prior", [m for m in unmoved if m.get("inside")])
+        predicted = {
+            key: with_totals(key, [m for m in tries if m.get("admissible")])
+            for key, tries in left_out.items()
         }
         readings = store.run(
             pool,
-            search.reading,
+            search.read,
             [
                 (
-                    f"reading/{axis}/{count}/{i}",
-                    (name, best["path"], axis, count, effort.seed, i, 15),
+                    f"reading/{_task_name(reading)}/{i}",
+                    (name, best["path"], reading, effort.seed, i, 30),
                 )
-                for axis in AXES_DEG
-                for count in COUNTS
+                for reading in READINGS
                 for i in range(effort.reading_starts)
             ],
-            progress("readings", len(AXES_DEG) * len(COUNTS) * effort.reading_starts),
+            progress("readings", len(READINGS) * effort.reading_starts),
         )
         sensitivity = _sensitivity(pool, store, name, best, effort, progress)
+    published = task.published
     grouped = []
-    for a, axis in enumerate(AXES_DEG):
-        for c, count in enumerate(COUNTS):
-            at = (a * len(COUNTS) + c) * effort.reading_starts
-            tries = [r for r in readings[at : at + effort.reading_starts] if "failed" not in r]
-            chosen = min(tries, key=_reading_cost) if tries else None
-            grouped.append({"axis_deg": axis, "legs": count, "point": chosen})
+    for r, reading in enumerate(READINGS):
+        at = r * effort.reading_starts
+        tries = [p for p in readings[at : at + effort.reading_starts] if "failed" not in p]
+        chosen = min(tries, key=_reading_cost) if tries else None
+        grouped.append(asdict(reading) | {"point": chosen})
     return {
         "nearest": best,
         "starts": starts,
         "paths": paths,
-        "ensemble": [m | {"totals": t} for m, t in zip(members, whole, strict=True)],
-        "prior": [m["values"] for m in unmoved if "failed" not in m],
+        "ensemble": members,
+        "prior": [_kept(p, published) for p in before],
         "draws": len(ensemble),
-        "left_out": left_out,
+        "left_out": {
+            key: [_kept(p, published) for p in points] for key, points in predicted.items()
+        },
+        "left_out_draws": effort.left_out_draws,
         "readings": grouped,
         "sensitivity": sensitivity,
+        "rotor_friction": [asdict(row) for row in friction_ranges(published)],
+    }
+
+
+def _task_name(reading: Reading) -> str:
+    """A name for the reading's tasks."""
+    return f"{reading.axis_deg:g}/{reading.legs}/{'net' if reading.net else 'drawn'}"
+
+
+def _kept(point: dict[str, Any], published: Mapping[str, Published]) -> dict[str, Any]:
+    """What the judgement needs of a set of which only quantiles are shown, to six digits."""
+    fixed = fixed_before(published)
+
+    def short(value: float) -> float:
+        return float(f"{value:.6g}")
+
+    return {
+        "values": {k: short(v) for k, v in point["values"].items() if k not in fixed},
+        "totals": {a: {k: short(v) for k, v in t.items()} for a, t in point["totals"].items()},
     }
 
 
@@ -224,7 +280,7 @@ def _sensitivity(
     outputs = store.run(
         pool,
         search.sensitivity_row,
-        [(f"sobol/{best['path']}/{i}", (robot, best["path"], 1, b)) for i, b in enumerate(blocks)],
+        [(f"sobol/{best['path']}/{i}", (robot, best["path"], b)) for i, b in enumerate(blocks)],
         progress("sensitivities", len(blocks)),
     )
     y = np.array([row for part in outputs for row in part], dtype=float)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, as_completed
 from pathlib import Path
 from typing import Any
@@ -67,8 +67,3 @@ class Checkpoint:
             self.add(waiting[future], future.result())
             progress(1)
         return [self.done[name] for name, _ in tasks]
-
-
-def numbered(prefix: str, count: int) -> Iterator[str]:
-    """Names of `count` tasks of a kind."""
-    return (f"{prefix}/{i}" for i in range(count))

@@ -7,8 +7,9 @@ as the actuators' part, which takes a given demand. Only the two middle legs are
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from actuators.build import Catalog
 from actuators.chain import Chain, ChainResult, HoldingResult
 from actuators.energy import stage_energy
+from actuators.limits import limit_rows
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.calibration.errors import CalibrationError
@@ -33,6 +35,7 @@ POSTURE = ("trunk_com_left", "joint_2_lateral", "body_height")
 #: Samples per segment: within 0.2 % of the converged energies, see tests.
 SAMPLES = 81
 ROBOT = "robot"
+_REMEMBERED = 16  # outcomes kept per robot: a derivative changes one actuator at a time
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,30 @@ class RobotPart:
     reaction: float
     standing_torque: Array
     series: ShaftSeries
+    _outcomes: OrderedDict[tuple[object, ...], Outcome] = field(
+        default_factory=OrderedDict, repr=False, compare=False
+    )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one alternative makes of it.
+
+    Attributes:
+        chain: The alternative.
+        walking: Both middle legs.
+        holding: The middle right leg standing.
+        drawn: Electrical energy E_el(+) per cycle, by leg [J].
+        returned: E_el(-) per cycle, by leg [J].
+        excess: Motor quantity to its peak over its limit, less one.
+    """
+
+    chain: Chain
+    walking: ChainResult
+    holding: HoldingResult
+    drawn: Mapping[str, float]
+    returned: Mapping[str, float]
+    excess: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -60,13 +87,15 @@ class ActuatorPart:
         chains: By alternative.
         walking: By alternative, both middle legs.
         holding: By alternative, the middle right leg standing.
-        energy: Electrical energy per cycle, alternative to leg [J].
+        energy: Consumption per cycle, alternative to leg [J]: E_el(+), or net of what returns.
+        outcomes: All of it, by alternative.
     """
 
     chains: Mapping[str, Chain]
     walking: Mapping[str, ChainResult]
     holding: Mapping[str, HoldingResult]
     energy: Mapping[str, Mapping[str, float]]
+    outcomes: Mapping[str, Outcome]
 
 
 def standing_targets(published: Mapping[str, Published]) -> Array:
@@ -183,23 +212,61 @@ def catalog_with(catalog: Catalog, values: Mapping[str, float], ratio: float) ->
     return catalog
 
 
-def actuator_part(part: RobotPart, catalog: Catalog) -> ActuatorPart:
-    """Take a demand through every alternative."""
-    chains = catalog.chains()
-    walking = {name: chain.moving(part.series) for name, chain in chains.items()}
-    legs = {
+def actuator_part(part: RobotPart, catalog: Catalog, *, net: bool = False) -> ActuatorPart:
+    """Take a demand through every alternative.
+
+    Args:
+        part: What the robot asks.
+        catalog: The alternatives.
+        net: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
+    """
+    outcomes = {name: _outcome(part, catalog, name) for name in catalog.alternatives}
+    energy = {
+        name: {leg: o.drawn[leg] - (o.returned[leg] if net else 0.0) for leg in MIDDLE_LEGS}
+        for name, o in outcomes.items()
+    }
+    return ActuatorPart(
+        {name: o.chain for name, o in outcomes.items()},
+        {name: o.walking for name, o in outcomes.items()},
+        {name: o.holding for name, o in outcomes.items()},
+        energy,
+        outcomes,
+    )
+
+
+def _outcome(part: RobotPart, catalog: Catalog, name: str) -> Outcome:
+    """One alternative, remembered with the robot while none of its numbers changes."""
+    alternative = catalog.alternatives[name]
+    motor = catalog.components[alternative.motor].parameters
+    structure = ((e.name, e.law, e.stage, *e.arguments.items()) for e in alternative.elements)
+    numbers = (catalog.parameter(r).value for r in alternative.references)
+    key = (name, *structure, *motor.values(), *numbers)
+    known = part._outcomes.pop(key, None)
+    if known is None:
+        known = _computed_outcome(part, catalog.chain(name))
+    part._outcomes[key] = known
+    if len(part._outcomes) > _REMEMBERED:
+        part._outcomes.popitem(last=False)
+    return known
+
+
+def _computed_outcome(part: RobotPart, chain: Chain) -> Outcome:
+    walking = chain.moving(part.series)
+    energy = stage_energy(walking, "el")
+    columns = {
         leg: [part.series.joints.index(j) for j in leg_joints(part.robot.spec, leg)]
         for leg in MIDDLE_LEGS
     }
-    energy = {}
-    for name, result in walking.items():
-        forward = stage_energy(result, "el").forward
-        energy[name] = {leg: float(forward[columns].sum()) for leg, columns in legs.items()}
-    return ActuatorPart(
-        chains,
+    excess: dict[str, float] = {}
+    for row in limit_rows(walking, chain.motor):
+        excess[row.quantity] = max(excess.get(row.quantity, -1.0), row.peak / row.limit - 1)
+    return Outcome(
+        chain,
         walking,
-        {name: chain.holding(part.standing_torque) for name, chain in chains.items()},
-        energy,
+        chain.holding(part.standing_torque),
+        {leg: float(energy.forward[c].sum()) for leg, c in columns.items()},
+        {leg: float(energy.reverse[c].sum()) for leg, c in columns.items()},
+        excess,
     )
 
 

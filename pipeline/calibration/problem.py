@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
 from actuators.build import Catalog
-from actuators.limits import limit_rows
-from actuators.units import to_si
+from actuators.units import from_si, to_si
 from pipeline.calibration.machine import (
     ROBOT,
     ActuatorPart,
@@ -26,9 +26,11 @@ from pipeline.calibration.machine import (
     robot_part,
     standing_targets,
 )
+from pipeline.calibration.motor_constants import Sliver, sliver
 from pipeline.calibration.prior import Prior
 from pipeline.calibration.published import Published
 from pipeline.calibration.quantities import computed, walking_extra
+from pipeline.calibration.table_entries import entries
 from pipeline.errors import PipelineError
 from pipeline.robot_file import RobotSpec
 
@@ -36,9 +38,20 @@ Array = NDArray[np.float64]
 #: Rows met exactly by solving the posture.
 EXACT = ("standing_reaction_rm", "standing_torque_2", "standing_torque_3")
 EXTRA = "walking_extra_J"
-#: Fitted rows whose half width is mere rounding: any value within it is as good as another.
-ROUNDED = ("ideal_current_2", "ideal_voltage_2", "rotor_motor_torque_2")
-_INSIDE = 1.0  # half widths, within which a rounded row pulls at nothing
+#: The energy difference stands for it among the fitted rows.
+EVEN = "break_even_standing_fraction"
+#: Met by the choice of the motor's constants, see `pipeline.calibration.motor_constants`.
+CHOSEN = ("ideal_current_2", "ideal_voltage_2")
+#: Rows that say the same as a target: left out with it. The torque's own table follows from it,
+#: and so do the energy of the standing leg and with it the break-even.
+FOLLOWING = {
+    "reversible_motor_torque_2": (
+        *(f"reversible_{what}_2" for what in ("current", "voltage", "power")),
+        "reversible_leg_energy_3s",
+        EVEN,
+    ),
+    EXTRA: (EVEN,),
+}
 _STEEP = 200.0  # residual per relative excess over a motor limit
 _STEP = 1e-4  # of a prior standard deviation, for derivatives
 
@@ -59,6 +72,7 @@ class Evaluation:
     Attributes:
         values: Published quantities, SI, by id; and the fitted energy difference.
         excess: Motor limits, relative: peak over limit less one; negative is inside.
+            Named ``<alternative>.<quantity>``.
         robot: The robot's part.
         actuators: The actuators' part.
     """
@@ -79,7 +93,9 @@ class Problem:
         prior: Free numbers.
         published: All printed values.
         standing_legs: How many middle legs Fig. 21 counts as loaded.
-        without: A target left out, or None.
+        without: Targets left out.
+        constants: The motor's three constants, by reference; the sliver's middle where None.
+        net: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
         posture_offset: Added to the reaction [N] and the torques [N*m] that fix the posture.
     """
 
@@ -88,7 +104,9 @@ class Problem:
     prior: Prior
     published: Mapping[str, Published]
     standing_legs: int = 1
-    without: str | None = None
+    without: tuple[str, ...] = ()
+    constants: Mapping[str, float] | None = None
+    net: bool = False
     posture_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     _robots: dict[bytes, RobotPart] = field(default_factory=dict, repr=False)
 
@@ -109,9 +127,9 @@ class Problem:
         rows = [
             Target(p.id, to_si(p.value, p.unit), to_si(p.half_width, p.unit))
             for p in self.published.values()
-            if p.role == "target" and p.id not in EXACT and p.id != self.without
+            if p.role == "target" and p.id not in (*EXACT, *CHOSEN, EVEN, *self.without)
         ]
-        if self.without != EXTRA:
+        if EXTRA not in self.without:
             rows.append(extra_target(self.published, self.standing_legs))
         return tuple(rows)
 
@@ -133,17 +151,30 @@ class Problem:
         """
         robot = self.robot(z)
         ratio = self.catalog.parameter("requirement.ratio").value
-        actuators = actuator_part(robot, catalog_with(self.catalog, self.prior.values(z), ratio))
+        catalog = catalog_with(self.catalog, self.numbers(z), ratio)
+        actuators = actuator_part(robot, catalog, net=self.net)
         values = computed(robot, actuators, self.standing_legs)
         values[EXTRA] = walking_extra(actuators.energy)
-        excess: dict[str, float] = {}
-        for name, result in actuators.walking.items():
-            for row in limit_rows(result, actuators.chains[name].motor):
-                key = f"{name}.{row.quantity}"
-                excess[key] = max(excess.get(key, -1.0), row.peak / row.limit - 1)
+        excess = {
+            f"{name}.{quantity}": value
+            for name, outcome in actuators.outcomes.items()
+            for quantity, value in outcome.excess.items()
+        }
         return Evaluation(values, excess, robot, actuators)
 
-    def residuals(self, z: Array, centre: Array, *, pull: float, goal: Array | None) -> Array:
+    @cached_property
+    def sliver(self) -> Sliver:
+        """Motor constants that the tables allow."""
+        return sliver(self.published)
+
+    def numbers(self, z: Array) -> dict[str, float]:
+        """Every number that is not in the paper, SI, by reference."""
+        constants = self.sliver.middle if self.constants is None else self.constants
+        return self.prior.values(z) | dict(constants)
+
+    def residuals(
+        self, z: Array, centre: Array, *, pull: float, goal: Array | None, free: float = 0.0
+    ) -> Array:
         """Residual vector at z.
 
         Args:
@@ -151,16 +182,14 @@ class Problem:
             centre: Coordinates whose neighbourhood is sought: 0 for the prior's centre.
             pull: Weight of the distance from the printed values, per half width.
             goal: Where to aim, in half widths from the printed values, (T,). None aims at the
-                printed values, rounded ones anywhere within their rounding.
+                printed values.
+            free: Half widths around the goal within which nothing pulls.
         """
         point = self.evaluate(z)
         error = np.array([(point.values[t.name] - t.centre) / t.half_width for t in self.targets])
-        if goal is None:
-            rounded = np.array([t.name in ROUNDED for t in self.targets])
-            free = np.sign(error) * np.maximum(np.abs(error) - _INSIDE, 0.0)
-            error = np.where(rounded, free, error)
-        else:
+        if goal is not None:
             error = error - goal
+        error = np.sign(error) * np.maximum(np.abs(error) - free, 0.0)
         limits = _STEEP * np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
         return np.concatenate([z - centre, pull * error, limits])
 
@@ -172,9 +201,19 @@ class Problem:
         columns: NDArray[np.intp],
         pull: float,
         goal: Array | None = None,
+        free: float = 0.0,
         evaluations: int = 40,
     ) -> Array:
         """Least-squares solution in some of the coordinates, the others staying at `start`.
+
+        Args:
+            start: Coordinates (D,).
+            centre: As for `residuals`, like `pull`, `goal` and `free`.
+            columns: Which coordinates may move.
+            pull: Weight of the printed values.
+            goal: Where to aim.
+            free: Where nothing pulls.
+            evaluations: At most so many.
 
         Returns:
             Coordinates (D,).
@@ -187,7 +226,7 @@ class Problem:
 
         def residuals(x: Array) -> Array:
             try:
-                return self.residuals(full(x), centre, pull=pull, goal=goal)
+                return self.residuals(full(x), centre, pull=pull, goal=goal, free=free)
             except PipelineError:
                 # Out of reach or tipping: a wall, felt as a large but finite residual.
                 return np.full(self._size, 30.0)
@@ -221,12 +260,37 @@ class Problem:
     def _size(self) -> int:
         return len(self.prior.free) + len(self.targets) + 4 * len(self.catalog.alternatives)
 
+    def unmet(self, point: Evaluation) -> list[str]:
+        """Ids of printed values that a point does not give at printed precision."""
+        return [
+            p.id
+            for p in self.published.values()
+            if not p.reproduced(from_si(point.values[p.id], p.unit))
+        ]
+
     def admissible(self, point: Evaluation) -> bool:
-        """Whether every fitted row is reproduced and every motor inside its limits."""
-        fits = all(
-            abs(point.values[t.name] - t.centre) <= t.half_width * (1 + 1e-9) for t in self.targets
-        )
-        return fits and max(point.excess.values()) <= 0
+        """Whether a point is a set of the ensemble.
+
+        It gives every printed value at printed precision, but those that contradict what the
+        motor's constants were chosen by, those left out, and the predictions, which would be none
+        if they were asked for; and every motor stays inside its limits.
+        """
+        spared = {*self.sliver.frictions.unmet, *self.without}
+        spared |= {row for name in self.without for row in FOLLOWING.get(name, ())}
+        spared |= {p.id for p in self.published.values() if p.role == "prediction"}
+        extra = [t for t in self.targets if t.name == EXTRA]
+        fits = all(abs(point.values[t.name] - t.centre) <= t.half_width for t in extra)
+        return fits and set(self.unmet(point)) <= spared and max(point.excess.values()) <= 0
+
+
+def fixed_before(published: Mapping[str, Published]) -> set[str]:
+    """Ids that are put in, or follow from that, before any walking figure is fitted.
+
+    The posture gives Table III, the motor's constants give Tables IV and V.
+    """
+    out = {p.id for p in published.values() if p.role in ("input", "symmetry")} | set(EXACT)
+    standing = {e.id for e in entries(published) if e.alternative != "reversible"}
+    return out | {name for name in standing if not name.endswith("_leg_energy_3s")}
 
 
 def extra_target(published: Mapping[str, Published], standing_legs: int) -> Target:

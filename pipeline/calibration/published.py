@@ -12,7 +12,15 @@ from actuators.units import dimension
 from pipeline.calibration.errors import TargetError
 
 PUBLISHED_FILE = Path(__file__).parent / "published_values.csv"
-ROLES = ("input", "target", "check")
+#: What part a printed number plays, and what is said of it.
+ROLES = {
+    "input": "put in",
+    "target": "fitted to",
+    "consequence": "follows from inputs and targets by Eq. 1, Ohm's law, P = U I and E = 3 P",
+    "symmetry": "zero because the robot is symmetric",
+    "prediction": "neither put in nor fitted nor a consequence of what was",
+    "contradicted": "another printed number contradicts it",
+}
 _COLUMNS = ("id", "where", "quantity", "joint", "unit", "value", "half_width", "role", "note")
 
 
@@ -28,7 +36,7 @@ class Published:
         unit: As printed.
         value: As printed.
         half_width: Half of the last printed digit, or of the range the words leave.
-        role: ``input`` (put in), ``target`` (fitted to) or ``check`` (predicted).
+        role: One of `ROLES`.
         note: Remark.
     """
 
@@ -95,7 +103,7 @@ def _entry(
     if name not in known:
         raise TargetError(f"{where}: id '{name}' is not computed; {closest(name, list(known))}")
     if text["role"] not in ROLES:
-        raise TargetError(f"{where}: role '{text['role']}'; {closest(text['role'], ROLES)}")
+        raise TargetError(f"{where}: role '{text['role']}'; {closest(text['role'], list(ROLES))}")
     try:
         found = dimension(text["unit"])
     except UnitError as error:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
+#: The prior's bands are wide and overlap, so they are fainter than those of figures left out.
+PRIOR_ALPHA, LEFT_OUT_ALPHA = 0.10, 0.28
+_REACH = 4.0  # to either side of the crossing [%]
 
 
 @dataclass(frozen=True)
@@ -35,14 +38,19 @@ class EnergyLine:
     Attributes:
         name: Shown at the line.
         energy: At each share of standing, shape (N,) [J].
-        low: Lower end of its spread, shape (N,) [J], or None.
+        low: Lower end of what is known without any fit, shape (N,) [J], or None.
         high: Upper end, shape (N,) [J], or None.
+        left_out_low: Lower end of what is known without this line's own figure, shape (N,) [J],
+            or None.
+        left_out_high: Upper end, shape (N,) [J], or None.
     """
 
     name: str
     energy: Array
     low: Array | None = None
     high: Array | None = None
+    left_out_low: Array | None = None
+    left_out_high: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,7 @@ class BreakEven:
     Attributes:
         share: From 0 to 1.
         energy: There [J].
-        low: Lower end of its spread, or None.
+        low: Lower end of what is known without any fit, or None.
         high: Upper end, or None.
     """
 
@@ -71,7 +79,7 @@ def energy_per_minute_figure(
     subtitle: str = "",
     break_even: BreakEven | None = None,
 ) -> Figure:
-    """One line per alternative, with its spread as a band; the crossing enlarged beside it.
+    """One line per alternative, what is known without it as bands; the crossing enlarged beside it.
 
     Args:
         share: Fraction of the time standing, increasing, shape (N,).
@@ -86,7 +94,8 @@ def energy_per_minute_figure(
     if not lines or share.ndim != 1 or share.size < 2:
         raise FigureError(f"'{title}': at least one line over two shares is needed")
     for line in lines:
-        for values in (line.energy, line.low, line.high):
+        bands = (line.low, line.high, line.left_out_low, line.left_out_high)
+        for values in (line.energy, *bands):
             if values is not None and values.shape != share.shape:
                 raise FigureError(f"'{title}': '{line.name}' needs {share.size} values")
     figure = new_figure(4.8)
@@ -112,8 +121,10 @@ def energy_per_minute_figure(
 def _lines(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
     for k, line in enumerate(lines):
         color = CYCLE[k % len(CYCLE)]
-        if line.low is not None and line.high is not None:
-            axes.fill_between(share * 100, line.low, line.high, color=color, alpha=0.2, lw=0)
+        bands = ((line.low, line.high), (line.left_out_low, line.left_out_high))
+        for (low, high), alpha in zip(bands, (PRIOR_ALPHA, LEFT_OUT_ALPHA), strict=True):
+            if low is not None and high is not None:
+                axes.fill_between(share * 100, low, high, color=color, alpha=alpha, lw=0)
         axes.plot(share * 100, line.energy, color=color)
 
 
@@ -132,8 +143,7 @@ def _key(figure: Figure, lines: Sequence[EnergyLine]) -> None:
 def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: BreakEven) -> None:
     at = 100 * break_even.share
     spread = [100 * v for v in (break_even.low, break_even.high) if v is not None]
-    reach = max(4.0, *(1.3 * abs(v - at) for v in spread)) if spread else 4.0
-    low, high = max(at - reach, 100 * float(share[0])), min(at + reach, 100 * float(share[-1]))
+    low, high = max(at - _REACH, 100 * float(share[0])), min(at + _REACH, 100 * float(share[-1]))
     axes.set_xlim(low, high)
     window = np.linspace(low, high, 50) / 100
     crossing = [
@@ -145,12 +155,13 @@ def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: 
     values = np.array([np.interp(window, share, line.energy) for line in crossing or lines])
     axes.set_ylim(min(0.0, float(values.min())), 1.12 * float(values.max()))
     if len(spread) == 2:
-        axes.axvspan(spread[0], spread[1], color=QUIET, alpha=0.12, linewidth=0)
+        shown = (max(spread[0], low), min(spread[1], high))
+        axes.axvspan(*shown, color=QUIET, alpha=0.12, linewidth=0)
     axes.plot(
         at, break_even.energy, marker="o", markersize=7, color="white", markeredgecolor=INK, mew=1.4
     )
     axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
     text = f"break-even {number(at)} %"
     if len(spread) == 2:
-        text += f"\n({number(spread[0])} to {number(spread[1])} %)"
+        text += f" (fitted),\nbefore the fit {number(spread[0])} to {number(spread[1])} %"
     axes.set_title(text, fontweight="bold", loc="center")

@@ -7,20 +7,25 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuators.units import from_si
-from pipeline.calibration.judge import (
-    BreakEven,
-    Conclusion,
-    EnergyPerMinute,
-    Prediction,
-    ReproducedRow,
-)
-from pipeline.calibration.store import Calibrated
+from pipeline.calibration.conclusions import Conclusion
+from pipeline.calibration.fig_21 import BreakEven, EnergyPerMinute
+from pipeline.calibration.leave_one_out import Prediction
+from pipeline.calibration.published import ROLES
+from pipeline.calibration.reproduction import ReproducedRow
+from pipeline.calibration.rotor_friction import Frictions
+from pipeline.calibration.store import VERDICTS, Calibrated
 from reports.table import Table, table_from_rows
 
-LOW = "2.5 % quantile over the ensemble"
-HIGH = "97.5 % quantile over the ensemble"
+Array = NDArray[np.float64]
+#: What the columns of intervals mean; empty where the run's numbers are not the calibration's.
+PRIOR_LOW = "2.5 % quantile of what data sheets and literature say, before anything is fitted"
+PRIOR_HIGH = "97.5 % quantile of the same"
+LEFT_LOW = "2.5 % quantile of what everything else says, this figure left out of the fit"
+LEFT_HIGH = "97.5 % quantile of the same"
+_ROLE = "; ".join(f"{role}: {meaning}" for role, meaning in ROLES.items())
 
 
 def reproduction(rows: Sequence[ReproducedRow]) -> Table:
@@ -37,11 +42,15 @@ def reproduction(rows: Sequence[ReproducedRow]) -> Table:
                 "published": row.published.value,
                 "half_width": row.published.half_width,
                 "computed": row.computed,
-                "low": row.low,
-                "high": row.high,
                 "error": row.error,
                 "role": row.published.role,
                 "verdict": row.verdict,
+                "met_share": _known(row.met),
+                "prior_low": _known(row.prior[0]),
+                "prior_high": _known(row.prior[1]),
+                "left_out_low": _known(row.left_out[0]),
+                "left_out_high": _known(row.left_out[1]),
+                "remark": row.remark,
             }
             for row in rows
         ],
@@ -57,26 +66,71 @@ def reproduction(rows: Sequence[ReproducedRow]) -> Table:
                 "see unit",
             ),
             "computed": ("ours, with the calibrated files", "see unit"),
-            "low": (LOW, "see unit"),
-            "high": (HIGH, "see unit"),
             "error": ("computed less published", "see unit"),
-            "role": ("input: put in; target: fitted to; check: predicted", ""),
-            "verdict": ("reproduced: the error is within the half width", ""),
+            "role": (_ROLE, ""),
+            "verdict": (
+                "reproduced: the error is within the half width; contradicted: it is not, and "
+                "other printed numbers leave no way to it",
+                "",
+            ),
+            "met_share": ("share of the ensemble's sets that give it at printed precision", "1"),
+            "prior_low": (
+                PRIOR_LOW + "; empty where it was put in or follows from that",
+                "see unit",
+            ),
+            "prior_high": (PRIOR_HIGH, "see unit"),
+            "left_out_low": (LEFT_LOW + "; empty where nothing was", "see unit"),
+            "left_out_high": (LEFT_HIGH, "see unit"),
+            "remark": ("in words", ""),
         },
     )
 
 
+def rotor_friction(rows: Sequence[Frictions]) -> Table:
+    """How many entries of Tables IV to VI each rotor friction leaves unmet."""
+    return table_from_rows(
+        "rotor_friction",
+        [
+            {
+                "from_mNm": from_si(row.low, "mN*m"),
+                "to_mNm": from_si(row.high, "mN*m"),
+                "unmet": len(row.unmet),
+                "which": " ".join(row.unmet),
+            }
+            for row in rows
+        ],
+        {
+            "from_mNm": ("least Coulomb friction of the rotor tried", "mN*m"),
+            "to_mNm": ("greatest", "mN*m"),
+            "unmet": (
+                "entries of Tables IV to VI unmet at printed precision, at the torque constant and "
+                "resistance that meet the most",
+                "1",
+            ),
+            "which": ("their ids in reproduction.csv", ""),
+        },
+        "Frictions tried in steps of 0.0025 mN*m; the calibration draws from the range that leaves "
+        "the fewest unmet.",
+    )
+
+
 def readings(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Both open readings of the paper, each calibrated on its own."""
+    """The open readings of the paper, each calibrated on its own."""
     return table_from_rows(
         "readings",
         rows,
         {
             "axis_deg": ("angle of joint 1's axis from the vertical, in the frontal plane", "deg"),
             "standing_legs_counted": ("middle legs that Fig. 21 counts as loaded", "1"),
+            "consumption": (
+                "drawn: what the supply delivers, E_el(+); net: less what flows back, "
+                "E_el(+) - E_el(-)",
+                "",
+            ),
+            "numbers": ("with which numbers: fitted to this reading, or those of this run", ""),
             "id": ("printed value, limit:<alternative>.<quantity>, or discriminator", ""),
             "unit": ("unit of computed", ""),
-            "computed": ("at this reading's own calibration", "see unit"),
+            "computed": ("with these numbers", "see unit"),
             "verdict": ("for printed values and limits", ""),
         },
         "limit rows: peak over the data sheet's limit, less one; positive is a breach.",
@@ -89,17 +143,20 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
         "conclusions",
         [
             {
-                "sentence": row.sentence,
-                "quantity": row.quantity,
-                "unit": row.unit,
-                "printed": row.printed,
+                "sentence": row.sentence.text,
+                "quantity": row.sentence.quantity,
+                "unit": row.sentence.unit,
+                "printed": row.sentence.printed,
                 "computed": _known(row.computed),
-                "low": _known(row.low),
-                "high": _known(row.high),
-                "prior_low": _known(row.prior_low),
-                "prior_high": _known(row.prior_high),
-                "holds_share": row.holds_share,
-                "prior_holds_share": row.prior_holds_share,
+                "holds": row.holds,
+                "part": row.sentence.part,
+                "prior_low": _known(row.prior[0]),
+                "prior_high": _known(row.prior[1]),
+                "prior_holds_share": _known(row.prior_share),
+                "left_out_low": _known(row.left_out[0]),
+                "left_out_high": _known(row.left_out[1]),
+                "left_out_holds_share": _known(row.left_out_share),
+                "ensemble_holds_share": _known(row.ensemble_share),
             }
             for row in rows
         ],
@@ -109,12 +166,22 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
             "unit": ("unit of the numbers", ""),
             "printed": ("the paper's number or word", ""),
             "computed": ("ours", "see unit"),
-            "low": (LOW, "see unit"),
-            "high": (HIGH, "see unit"),
-            "prior_low": ("2.5 % quantile with data sheets and literature alone", "see unit"),
-            "prior_high": ("97.5 % quantile with data sheets and literature alone", "see unit"),
-            "holds_share": ("share of the ensemble in which the sentence holds", "1"),
-            "prior_holds_share": ("share of the prior's draws in which it holds", "1"),
+            "holds": ("whether the sentence holds for ours", ""),
+            "part": (
+                "in the calibration; fitted: asked for, so that it holds there says nothing; "
+                "follows: from fitted and put-in numbers; predicted: neither",
+                "",
+            ),
+            "prior_low": (PRIOR_LOW, "see unit"),
+            "prior_high": (PRIOR_HIGH, "see unit"),
+            "prior_holds_share": ("share of these draws in which the sentence holds", "1"),
+            "left_out_low": (LEFT_LOW, "see unit"),
+            "left_out_high": (LEFT_HIGH, "see unit"),
+            "left_out_holds_share": ("share of these sets in which it holds", "1"),
+            "ensemble_holds_share": (
+                "share of the ensemble in which it holds, where that was not asked for",
+                "1",
+            ),
         },
     )
 
@@ -124,33 +191,37 @@ def _known(value: float) -> float | None:
 
 
 def leave_one_out(rows: Sequence[Prediction]) -> Table:
-    """Each target predicted from the others."""
+    """Each target predicted from the rest."""
     return table_from_rows(
         "leave_one_out",
         [
             {
                 "id": row.name,
+                "without": row.without,
                 "unit": row.unit,
                 "published": row.published,
                 "half_width": row.half_width,
                 "predicted": _known(row.median),
-                "low": _known(row.low),
-                "high": _known(row.high),
-                "inside": bool(row.low <= row.published <= row.high),
+                "low": _known(row.interval[0]),
+                "high": _known(row.interval[1]),
+                "inside": row.inside,
                 "sets": row.sets,
+                "by": row.by,
             }
             for row in rows
         ],
         {
-            "id": ("target left out of the calibration", ""),
+            "id": ("target, or the energy difference that the break-even implies", ""),
+            "without": ("left out of the calibration together, with what follows from them", ""),
             "unit": ("unit of the numbers", ""),
             "published": ("as printed; walking_extra_J: implied by the break-even", "see unit"),
             "half_width": ("of the published value", "see unit"),
             "predicted": ("median over sets that meet all other targets", "see unit"),
-            "low": ("2.5 % quantile of these sets", "see unit"),
-            "high": ("97.5 % quantile of these sets", "see unit"),
-            "inside": ("whether the published value lies between low and high", ""),
-            "sets": ("how many sets met the others", "1"),
+            "low": ("2.5 % quantile of these sets, or of the data sheet's rounding", "see unit"),
+            "high": ("97.5 % quantile of the same", "see unit"),
+            "inside": ("whether prediction and published value overlap", ""),
+            "sets": ("how many sets met the others and have such a value", "1"),
+            "by": ("what predicts it", ""),
         },
     )
 
@@ -163,32 +234,46 @@ def calibration(rows: Sequence[Calibrated]) -> Table:
             {
                 "parameter": row.key,
                 "unit": row.unit,
-                "prior": from_si(row.prior, row.unit),
-                "prior_low": from_si(row.prior_interval[0], row.unit),
-                "prior_high": from_si(row.prior_interval[1], row.unit),
+                "prior": None if row.prior is None else from_si(row.prior, row.unit),
+                "prior_low": _end(row, 0),
+                "prior_high": _end(row, 1),
                 "calibrated": from_si(row.value, row.unit),
                 "low": from_si(row.low, row.unit),
                 "high": from_si(row.high, row.unit),
+                "shift_over_prior": row.shift,
                 "spread_over_prior": row.spread,
+                "at_lower_share": row.at_lower,
+                "at_upper_share": row.at_upper,
                 "verdict": row.verdict,
-                "at_bound": row.at_bound or None,
             }
             for row in rows
         ],
         {
             "parameter": ("robot or component, and name in its file", ""),
             "unit": ("unit of the numbers", ""),
-            "prior": ("centre of prior knowledge", "see unit"),
+            "prior": ("centre of prior knowledge; empty where there was none", "see unit"),
             "prior_low": ("lower end of the 95 % belief", "see unit"),
             "prior_high": ("upper end of the 95 % belief", "see unit"),
-            "calibrated": ("at the admissible point nearest to the prior", "see unit"),
-            "low": (LOW, "see unit"),
-            "high": (HIGH, "see unit"),
-            "spread_over_prior": ("standard deviation over the ensemble, in prior sigmas", "1"),
-            "verdict": ("determined, narrowed, or not determined by the targets", ""),
-            "at_bound": ("lower or upper, where the calibrated value lies at its bound", ""),
+            "calibrated": ("at the set nearest to the prior", "see unit"),
+            "low": ("2.5 % quantile over the ensemble", "see unit"),
+            "high": ("97.5 % quantile over the ensemble", "see unit"),
+            "shift_over_prior": (
+                "mean of the ensemble less the prior's centre, in prior standard deviations",
+                "1",
+            ),
+            "spread_over_prior": (
+                "standard deviation over the ensemble, in prior standard deviations",
+                "1",
+            ),
+            "at_lower_share": ("share of the ensemble at the number's lower bound", "1"),
+            "at_upper_share": ("share of the ensemble at the number's upper bound", "1"),
+            "verdict": ("; ".join(f"{v}: {meaning}" for v, meaning in VERDICTS.items()), ""),
         },
     )
+
+
+def _end(row: Calibrated, end: int) -> float | None:
+    return None if row.prior_interval is None else from_si(row.prior_interval[end], row.unit)
 
 
 def sensitivities(rows: Sequence[Mapping[str, Any]]) -> Table:
@@ -216,8 +301,10 @@ def break_even(rows: Sequence[BreakEven]) -> Table:
             {
                 "subject": row.subject,
                 "standing_fraction": _known(row.fraction),
-                "low": _known(row.low),
-                "high": _known(row.high),
+                "prior_low": _known(row.prior[0]),
+                "prior_high": _known(row.prior[1]),
+                "left_out_low": _known(row.left_out[0]),
+                "left_out_high": _known(row.left_out[1]),
                 "note": row.note,
             }
             for row in rows
@@ -225,8 +312,13 @@ def break_even(rows: Sequence[BreakEven]) -> Table:
         {
             "subject": ("the paper's pair of middle legs, or the robot on three or six feet", ""),
             "standing_fraction": ("fraction of time standing; empty where there is none", "1"),
-            "low": (LOW, "1"),
-            "high": (HIGH, "1"),
+            "prior_low": (PRIOR_LOW + "; of the draws that have one", "1"),
+            "prior_high": (PRIOR_HIGH, "1"),
+            "left_out_low": (
+                LEFT_LOW + ", nor the irreversible ratio; of those that have one",
+                "1",
+            ),
+            "left_out_high": (LEFT_HIGH, "1"),
             "note": ("in words", ""),
         },
     )
@@ -235,6 +327,16 @@ def break_even(rows: Sequence[BreakEven]) -> Table:
 def energy_per_minute(rows: Sequence[EnergyPerMinute]) -> Table:
     """Fig. 21 as numbers."""
     count = [row.fraction.size for row in rows]
+
+    def ends(bands: Sequence[Array | None], end: int) -> Array:
+        return np.concatenate(
+            [
+                np.full(n, np.nan) if band is None else band[end]
+                for n, band in zip(count, bands, strict=True)
+            ]
+        )
+
+    prior, left_out = [row.prior for row in rows], [row.left_out for row in rows]
     return Table(
         "energy_per_minute",
         {
@@ -242,15 +344,23 @@ def energy_per_minute(rows: Sequence[EnergyPerMinute]) -> Table:
             "alternative": np.repeat([row.alternative for row in rows], count).tolist(),
             "standing_fraction": np.concatenate([row.fraction for row in rows]),
             "energy_J": np.concatenate([row.energy for row in rows]),
-            "low_J": np.concatenate([row.low for row in rows]),
-            "high_J": np.concatenate([row.high for row in rows]),
+            "prior_low_J": ends(prior, 0),
+            "prior_high_J": ends(prior, 1),
+            "left_out_low_J": ends(left_out, 0),
+            "left_out_high_J": ends(left_out, 1),
         },
         {
             "subject": ("the paper's pair of middle legs, or the robot on three or six feet", ""),
             "alternative": ("actuator alternative of section III", ""),
             "standing_fraction": ("fraction of the minute spent standing", "1"),
-            "energy_J": ("electrical energy in one minute", "J"),
-            "low_J": (LOW, "J"),
-            "high_J": (HIGH, "J"),
+            "energy_J": ("electrical energy in one minute, fitted", "J"),
+            "prior_low_J": (PRIOR_LOW, "J"),
+            "prior_high_J": (PRIOR_HIGH, "J"),
+            "left_out_low_J": (
+                "2.5 % quantile of the sets fitted without this actuator's walking figures; empty "
+                "where it has none",
+                "J",
+            ),
+            "left_out_high_J": ("97.5 % quantile of the same", "J"),
         },
     )

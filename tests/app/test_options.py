@@ -119,7 +119,7 @@ def test_a_change_reaches_the_files(tmp_path: Path, command: Command, out: Path)
         if (r["group"], r["parameter"]) == ("motor_re40_24v", "resistance")
     )
     assert row["basis"] == "assumed"
-    assert "replaces 0.31585 ohm (calibrated)" in row["reason"]
+    assert f"replaces {resistance:g} ohm (calibrated)" in row["reason"]
 
 
 def total(folder: Path, alternative: str = "rotor") -> float:

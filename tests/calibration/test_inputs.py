@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+import os
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +17,7 @@ from pipeline.calibration.published import PUBLISHED_FILE, load_published
 from pipeline.calibration.quantities import DIMENSIONS, IDS
 from pipeline.robot_file import load_robot_file
 
+SHARED = os.environ.get("LEGWATT_SHARED", "")
 HEADER, *ROWS = PUBLISHED_FILE.read_text(encoding="utf-8").splitlines()
 
 
@@ -23,10 +27,40 @@ def written(tmp_path: Path, lines: list[str]) -> Path:
     return path
 
 
-def test_every_printed_value_is_computed() -> None:
+def test_every_printed_value_is_computed_and_has_its_role() -> None:
     published = load_published(IDS, DIMENSIONS)
-    assert len(published) == 46
-    assert {p.role for p in published.values()} == {"input", "target", "check"}
+    assert Counter(p.role for p in published.values()) == {
+        "input": 10,
+        "target": 10,
+        "consequence": 20,
+        "symmetry": 1,
+        "prediction": 2,
+        "contradicted": 3,
+    }
+
+
+def test_half_widths_of_the_standing_tables_are_half_of_the_last_printed_digit() -> None:
+    """None was widened to make a value fit; a column's zeros have the digits of their column."""
+    digits = {
+        **{f"{a}_current_2": 2 for a in ("ideal", "rotor", "reversible")},
+        **{f"{a}_voltage_{j}": 3 for a in ("ideal", "rotor", "reversible") for j in (2, 3)},
+        **{"ideal_power_2": 2, "rotor_power_2": 2, "reversible_power_2": 3},
+        **{"rotor_motor_torque_2": 5, "reversible_motor_torque_2": 5, "rotor_motor_torque_3": 5},
+        **{f"{a}_leg_energy_3s": 2 for a in ("ideal", "rotor", "reversible")},
+        **{"rotor_current_3": 2, "standing_torque_2": 2, "standing_torque_3": 2},
+    }
+    published = load_published(IDS, DIMENSIONS)
+    for name, count in digits.items():
+        assert published[name].half_width == pytest.approx(0.5 * 10.0**-count), name
+
+
+@pytest.mark.skipif(not SHARED, reason="the table is shared only where $LEGWATT_SHARED is set")
+def test_the_printed_values_are_the_shared_ones() -> None:
+    def rows(path: Path) -> list[list[str]]:
+        with path.open(encoding="utf-8", newline="") as file:
+            return [row[:8] for row in csv.reader(file)]  # notes may name other files
+
+    assert rows(PUBLISHED_FILE) == rows(Path(SHARED) / "published_values.csv")
 
 
 @pytest.mark.parametrize(

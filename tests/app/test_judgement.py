@@ -1,0 +1,155 @@
+"""A judgement belongs to the numbers it was made with."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from actuators.build import CATALOG, load_catalog
+from pipeline.app import judgement as judging
+from pipeline.app.cli import parser
+from pipeline.app.settings import Settings, settings
+from pipeline.app.summary import measure_next
+from pipeline.app.summary_words import first_paragraph
+from pipeline.calibration.fingerprint import differences, fingerprint
+from pipeline.calibration.prior import load_prior
+from pipeline.calibration.published import load_published
+from pipeline.calibration.quantities import DIMENSIONS, IDS
+from pipeline.calibration.sensitivity import Index
+from pipeline.calibration.store import load_results
+from pipeline.robot_file import load_robot_file
+
+#: Tables that rest on the calibration's sets.
+OF_THE_SETS = {"readings", "leave_one_out", "calibration", "sensitivities"}
+
+
+def given(root: Path, *options: str, robot: Path | None = None) -> Settings:
+    file = robot or root / "urdf" / "hexapod.toml"
+    return settings(parser().parse_args(["reports", "--robot", str(file), *options]))
+
+
+@pytest.fixture(scope="module")
+def shipped(root: Path) -> judging.Judged:
+    run = given(root)
+    by = judging.basis(run)
+    assert isinstance(by, judging.Basis)
+    return judging.judged(run, by)[0]
+
+
+def test_the_shipped_files_hold_the_numbers_the_calibration_was_made_with(
+    shipped: judging.Judged,
+) -> None:
+    assert shipped.by.changed == ()
+    assert shipped.by.word == ""
+
+
+def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(root: Path) -> None:
+    run = given(root, "--set", "harmonic_drive.load=0.1")
+    by = judging.basis(run)
+    assert isinstance(by, judging.Basis)
+    assert by.changed == ("harmonic_drive.load",)
+    assert by.word.startswith("harmonic_drive.load differs")
+    judged, tables = judging.judged(run, by)
+    assert not OF_THE_SETS & {table.name for table in tables}
+    rows = {row.published.id: row for row in judged.judgement.reproduction}
+    assert rows["reversible_motor_torque_2"].verdict == "not reproduced"
+    assert rows["ideal_current_2"].verdict == "reproduced"
+    for table in tables:
+        for column in table.columns:
+            if column.startswith(("prior_", "left_out_", "met_share", "ensemble_")):
+                assert all(v is None or v != v for v in table.columns[column]), column
+
+
+def test_a_number_edited_in_the_robot_file_is_noticed(root: Path, tmp_path: Path) -> None:
+    for name in ("hexapod.toml", "hexapod.urdf"):
+        shutil.copyfile(root / "urdf" / name, tmp_path / name)
+    robot = tmp_path / "hexapod.toml"
+    by = judging.basis(given(root, robot=robot))
+    assert isinstance(by, judging.Basis)
+    assert by.changed == ()  # a copy is the same robot
+    text = robot.read_text(encoding="utf-8")
+    robot.write_text(text.replace("value = 600", "value = 601", 1), encoding="utf-8")
+    by = judging.basis(given(root, robot=robot))
+    assert isinstance(by, judging.Basis)
+    assert by.changed == ("robot.body_length",)
+
+
+def test_a_number_edited_in_an_actuator_file_is_noticed(root: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "catalog"
+    shutil.copytree(CATALOG, folder)
+    spec = load_robot_file(root / "urdf" / "hexapod.toml")
+    published, prior = load_published(IDS, DIMENSIONS), load_prior()
+    stored = load_results()["numbers"]
+    now = fingerprint(spec, load_catalog(folder), published, prior)
+    assert differences(stored, now) == []
+    catalog = load_catalog(folder).replaced("harmonic_drive.viscous", 1.0)
+    now = fingerprint(spec, catalog, published, prior)
+    assert differences(stored, now) == ["harmonic_drive.viscous"]
+    text = (folder / "alternatives.toml").read_text(encoding="utf-8")
+    text = text.replace('stage = "wg"', 'stage = "w"')
+    (folder / "alternatives.toml").write_text(text, encoding="utf-8")
+    now = fingerprint(spec, load_catalog(folder), published, prior)
+    assert differences(stored, now) == ["alternatives.reversible"]
+
+
+def test_a_printed_value_or_a_prior_that_is_edited_is_noticed(root: Path) -> None:
+    from dataclasses import replace
+
+    spec, catalog = load_robot_file(root / "urdf" / "hexapod.toml"), load_catalog()
+    published, prior = load_published(IDS, DIMENSIONS), load_prior()
+    stored = load_results()["numbers"]
+    wider = dict(published)
+    wider["rotor_motor_torque_2"] = replace(published["rotor_motor_torque_2"], half_width=3e-5)
+    now = fingerprint(spec, catalog, wider, prior)
+    assert differences(stored, now) == ["published.rotor_motor_torque_2"]
+    other = replace(prior, free=(replace(prior.free[0], centre=0.02), *prior.free[1:]))
+    now = fingerprint(spec, catalog, published, other)
+    assert differences(stored, now) == [f"prior.{prior.free[0].key}"]
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--quasi-static",), "inertia"),
+        (("--regeneration", "bus"), "flows back"),
+    ],
+)
+def test_a_run_the_paper_says_nothing_of_is_left_out_with_a_word(
+    root: Path, options: tuple[str, ...], word: str
+) -> None:
+    reason = judging.basis(given(root, *options))
+    assert isinstance(reason, str)
+    assert word in reason
+
+
+def test_another_robot_is_not_held_against_the_paper(root: Path) -> None:
+    reason = judging.basis(given(root, robot=root / "urdf" / "hexapod_axis90.toml"))
+    assert reason == "hexapod_axis90.toml is not the paper's robot"
+
+
+def test_the_first_paragraph_says_what_is_fitted_predicted_contradicted_and_what_it_costs(
+    shipped: judging.Judged,
+) -> None:
+    text = first_paragraph(shipped)
+    for word in ("Fitted", "Predicted", "Contradicted", "price of the fit"):
+        assert f"**{word}" in text or f"**The {word}" in text
+    price = shipped.judgement.price
+    assert f"{price.gear_friction:.1f} mN·m" in text
+    assert f"{100 * price.no_load_share:.0f} % of the sets" in text
+    assert "3.575 and of 3.620 mN·m" in text
+    assert "reproduced" not in text  # nothing outside printed precision is called so
+    assert price.gear_friction > 2 * price.gear_prior
+    assert price.gear_heat > 0.5 * price.leg_energy
+    assert price.no_load_share > 0.5
+
+
+def test_what_to_measure_next_is_said_only_where_it_is_known() -> None:
+    clear = measure_next([Index("a", 0.6, 0.1), Index("b", 0.3, 0.1)])
+    assert clear.startswith("**Measure next:** `a`")
+    close = measure_next([Index("a", 0.6, 0.2), Index("b", 0.4, 0.1)])
+    assert "Measure next" not in close
+    assert "`a`" in close
+    assert "`b`" in close
+    assert "overlap" in close

@@ -1,0 +1,44 @@
+"""Entries of `actuators/ERRATA.md` that take the robot: one test for each."""
+
+from __future__ import annotations
+
+import pytest
+
+from actuators.build import load_catalog
+from actuators.energy import StageEnergy, stage_energy
+from pipeline.app.compute import walk
+from pipeline.calibration.contradictions import contradiction
+from pipeline.calibration.published import load_published
+from pipeline.calibration.quantities import DIMENSIONS, IDS
+from pipeline.calibration.rotor_friction import friction_ranges
+from pipeline.robot import Robot
+
+
+@pytest.fixture(scope="module")
+def at_the_joints(hexapod: Robot) -> StageEnergy:
+    result = walk(hexapod, {"ideal": load_catalog().chain("ideal")}, samples=201).results["ideal"]
+    return stage_energy(result, "out")
+
+
+def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(at_the_joints: StageEnergy) -> None:
+    assert float(at_the_joints.net.sum()) == pytest.approx(0, abs=1e-9)
+    net = dict(zip(at_the_joints.joints, at_the_joints.net, strict=True))
+    for joint in (1, 2, 3):
+        for leg in ("lm", "rm"):
+            assert net[f"{leg}_joint_{joint}"] == pytest.approx(0, abs=1e-6)
+        for side in ("l", "r"):  # backwards in time, front and rear change places
+            front, rear = net[f"{side}f_joint_{joint}"], net[f"{side}r_joint_{joint}"]
+            assert front == pytest.approx(-rear, abs=1e-6)
+            assert abs(front) > 0.01
+    index = at_the_joints.joints.index("lf_joint_3")
+    assert at_the_joints.forward[index] == pytest.approx(0.07, abs=0.005)
+    assert at_the_joints.reverse[index] == pytest.approx(0.24, abs=0.005)
+
+
+def test_table_v_contradicts_itself() -> None:
+    published = load_published(IDS, DIMENSIONS)
+    found = contradiction(published, friction_ranges(published))
+    assert found.apart
+    assert found.asked == pytest.approx((3.575, 3.62))
+    assert (1e3 * found.best.low, 1e3 * found.best.high) == pytest.approx((3.615, 3.625))
+    assert found.best.unmet == ("rotor_motor_torque_2", "rotor_leg_energy_3s")
