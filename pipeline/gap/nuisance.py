@@ -88,10 +88,10 @@ class Nuisance:
             assert actuator.motor is not None
             motor = actuator.motor
             if self.kind == "torque_constant":
-                constant = float(np.asarray(motor.torque_constant)) * (1.0 + value)
+                constant = float(np.asarray(motor.torque_constant)) * _factor(value)
                 motor = replace(motor, torque_constant=constant)
             else:
-                resistance = float(np.asarray(motor.resistance)) * (1.0 + value)
+                resistance = float(np.asarray(motor.resistance)) * _factor(value)
                 motor = replace(motor, resistance=resistance)
             changed = replace(actuator, motor=motor)
         return model.with_actuator(changed)
@@ -108,6 +108,14 @@ class Nuisance:
             shift["xyz".index(self.kind[-1])] += value
             body = replace(body, shift=(shift[0], shift[1], shift[2]))
         return model.with_bodies(model.bodies.with_body(joint, body))
+
+
+def _factor(value: float) -> float:
+    """Factor on a constant that cannot be zero: 1 + value, and below a half it falls off smoothly.
+
+    A tolerance as wide as that of an unknown motor would else turn the constant's sign.
+    """
+    return 1.0 + value if value > -0.5 else 0.5 * float(np.exp(2.0 * (value + 0.5)))
 
 
 def with_tolerances(

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.calibration.judge import crossing
+from pipeline.calibration.fig_21 import crossing
 from pipeline.calibration.quantities import STANDING_SECONDS, break_even
 
 PERIOD = 3.0  # of the gait [s]
