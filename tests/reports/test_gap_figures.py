@@ -133,6 +133,6 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
 
 def test_tables_have_the_promised_columns() -> None:
     header = "order effect joint parameter value ci_low ci_high unit gap_before gap_after gap_unit"
-    assert list(found([]).columns) == [*header.split(), "noise_floor", "doubt"]
+    assert list(found([]).columns) == [*header.split(), "noise_floor", "doubt", "written"]
     table = deciding_motion(np.arange(3.0), ["a", "b"], np.zeros((3, 2)))
     assert list(table.columns) == ["time_s", "a__position_rad", "b__position_rad"]
