@@ -205,7 +205,7 @@ def load_robot_file(path: Path) -> RobotSpec:
     where = str(path)
     _known_keys(table, _TOP_KEYS, where, "table")
     _refuse_missing(table, where)
-    robot = _table(table, "robot", where)
+    robot = table["robot"]
     _known_keys(robot, _ROBOT_KEYS, where, "key of [robot]")
     build = robot.get("build")
     if build is not None and build not in BUILDS:
@@ -214,15 +214,13 @@ def load_robot_file(path: Path) -> RobotSpec:
     if base not in ("floating", "fixed"):
         raise RobotFileError(f"{where}: robot.base = '{base}'; expected 'floating' or 'fixed'")
     schema = GAIT_SCHEMA | (BUILD_SCHEMA if build else {})
-    parameters = parameters_from_table(
-        _table(table, "parameters", where), schema, f"{where}: parameters"
-    )
+    parameters = parameters_from_table(table["parameters"], schema, f"{where}: parameters")
     check_parameters(parameters, build, where)
-    legs = _legs(_table(table, "legs", where), parameters, build, where)
+    legs = _legs(table["legs"], parameters, build, where)
     names = [leg.name for leg in legs]
-    gait = _table(table, "gait", where)
+    gait = table["gait"]
     _known_keys(gait, _GAIT_KEYS, where, "key of [gait]")
-    standing = _table(table, "standing", where) if "standing" in table else {}
+    standing = table.get("standing", {})
     _known_keys(standing, _STANDING_KEYS, where, "key of [standing]")
     groups = gait.get("tripods", [])
     if not isinstance(groups, list):
@@ -273,7 +271,7 @@ def _refuse_missing(table: Mapping[str, Any], where: str) -> None:
     """All keys that are missing, in one line: whoever writes a file need not run it for each.
 
     Raises:
-        RobotFileError: At least one is missing.
+        RobotFileError: At least one is missing, or a table is none.
     """
 
     def under(key: str) -> Mapping[str, Any]:
@@ -298,10 +296,8 @@ def _refuse_missing(table: Mapping[str, Any], where: str) -> None:
     for name, entry in under("parameters").items():
         if isinstance(entry, dict):
             missing += [f"parameters.{name}.{key}" for key in REQUIRED_KEYS if key not in entry]
-    # A table of the wrong kind is told below, where its keys are read.
-    wrong = [
-        k for k in ("robot", "legs", "gait", "parameters") if not isinstance(table.get(k, {}), dict)
-    ]
+    tables = ("robot", "legs", "gait", "parameters", "standing")
+    wrong = [k for k in tables if not isinstance(table.get(k, {}), dict)]
     if wrong:
         raise RobotFileError(f"{where}: {wrong[0]} must be a table, [{wrong[0]}]")
     if missing:
@@ -312,13 +308,6 @@ def _known_keys(table: Mapping[str, Any], known: set[str], where: str, what: str
     for key in table:
         if key not in known:
             raise RobotFileError(f"{where}: unknown {what} '{key}'; {closest(key, sorted(known))}")
-
-
-def _table(table: Mapping[str, Any], key: str, where: str) -> dict[str, Any]:
-    value = table.get(key)
-    if not isinstance(value, dict):
-        raise RobotFileError(f"{where}: the table [{key}] is missing")
-    return value
 
 
 def _text(table: Mapping[str, Any], key: str, where: str) -> str:

@@ -237,6 +237,9 @@ def _without_mass(body: Body) -> list[Finding]:
         detail = "0 kg: it stands still; with a floating base it needs mass"
         return [Finding(body.name, "mass of the root", True, detail, note=True)]
     if body.carries and all(reach < COMPOUND for reach in body.reaches):
+        moments = np.linalg.eigvalsh(body.inertia.inertia)
+        if moments.any():
+            return [Finding(body.name, "inertia possible", False, _excess(0.0, moments)[1])]
         detail = "0 kg between joints at one place: computed as one compound joint"
         return [Finding(body.name, "mass", True, detail, note=True)]
     detail = (
@@ -267,19 +270,21 @@ def _centre_in_geometry(link: ET.Element, where: str) -> list[Finding]:
     if not boxes:
         return []
     # A shape for looks or contact is not the body: outside is odd, out by its own size is wrong.
-    out, size = min(
-        (float(np.linalg.norm(np.maximum(np.abs(turn.T @ (centre - at)) - half, 0.0))), _size(half))
+    outs = [
+        float(np.linalg.norm(np.maximum(np.abs(turn.T @ (centre - at)) - half, 0.0)))
         for at, turn, half in boxes
+    ]
+    # One that is large enough suffices: a small part beside it makes nothing worse.
+    near = any(
+        out <= GEOMETRY_MARGIN + float(np.linalg.norm(half))
+        for out, (_, _, half) in zip(outs, boxes, strict=True)
     )
+    out = min(outs)
     outside = out > GEOMETRY_MARGIN
     detail = "(" + ", ".join(f"{x:.4g}" for x in centre) + ") m"
     detail += f", {1e3 * out:.3g} mm outside" if outside else ""
     check = "centre of mass within the geometry"
-    return [Finding(name, check, out <= GEOMETRY_MARGIN + size, detail, note=outside)]
-
-
-def _size(half: Array) -> float:
-    return float(np.linalg.norm(half))
+    return [Finding(name, check, near, detail, note=outside)]
 
 
 def _half_size(shape: ET.Element, where: str) -> Array | None:
@@ -330,9 +335,7 @@ def _limits(joint: ET.Element, kind: str, where: str) -> list[Finding]:
     findings = []
     for key in ("effort", "velocity"):
         detail = f"{value[key]:g}" + ("" if value[key] else " is taken for none")
-        findings.append(
-            Finding(name, f"{key} limit", value[key] >= 0, detail, note=value[key] == 0)
-        )
+        findings.append(Finding(name, f"{key} limit", True, detail, note=value[key] == 0))
     if kind == "continuous":
         return findings
     lower, upper = value.get("lower", 0.0), value.get("upper", 0.0)

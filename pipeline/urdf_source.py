@@ -287,7 +287,11 @@ def _look_at_joint(joint: ET.Element, links: list[str], joints: list[str], where
         for key in ("effort", "velocity"):
             if limit.get(key) is None:
                 raise UrdfError(f"{place}: <limit> without {key}")
-        for key in ("effort", "velocity", "lower", "upper"):
+            if numbers(limit, key, where, (0,))[0] < 0:
+                raise UrdfError(
+                    f"{place}: <limit>: {key} = '{one_line(limit.get(key))}', may not be negative"
+                )
+        for key in ("lower", "upper"):
             numbers(limit, key, where, (0,))
     mimic = joint.find("mimic")
     if mimic is not None:

@@ -32,7 +32,8 @@ def test_known_conversions(value, unit, si, dim):
 RPM, DEGREE = 2.0 * math.pi / 60.0, math.pi / 180.0  # [rad/s], [rad]
 #: Every unit that is not its dimension's SI unit, from the definitions of the prefixes.
 SI = {
-    **{"%": 1 / 100, "cm": 1 / 100, "mm": 1 / 1000, "g": 1 / 1000, "ms": 1 / 1000, "min": 60.0},
+    **{"%": 1 / 100, "cm": 1 / 100, "mm": 1 / 1000, "g": 1 / 1000, "min": 60.0},
+    **{"ms": 1 / 1000, "us": 1 / 1000**2, "ns": 1 / 1000**3},
     **{"deg": DEGREE, "deg/s": DEGREE, "rpm": RPM, "mm/s": 1 / 1000, "m/min": 1 / 60},
     **{"kN": 1000.0, "mN*m": 1 / 1000, "cN*m": 1 / 100, "N*cm": 1 / 100},
     **{"g*cm^2": 1 / 1000 / 100**2, "kg*cm^2": 1 / 100**2, "N*m/deg": 1 / DEGREE},

@@ -220,8 +220,9 @@ MASS = (
 @pytest.mark.parametrize(
     ("kind", "joints", "foot", "message"),
     [
-        ("prismatic", ("a", "b", "c"), "foot", "'a' is not a revolute joint"),
-        ("continuous", ("a", "b", "c"), "foot", "'a' is not a revolute joint"),
+        ("prismatic", ("a", "b", "c"), "foot", "'a' slides; a leg's are of type revolute"),
+        ("continuous", ("a", "b", "c"), "foot", "'a' is continuous; .* revolute, with limits"),
+        ("planar", ("a", "b", "c"), "foot", "'a' is of several coordinates; .* revolute"),
         ("revolute", ("a", "c", "b"), "foot", "'c' hangs on 'b', not on 'a'"),
         ("revolute", ("a", "b"), "foot", "names 2 joints; a leg has 3"),
         ("revolute", ("a", "b", "c"), "knee", "foot 'knee' is not carried by 'c'"),

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from actuators.parameters import ParameterSet
+from actuators.units import from_si
 from pipeline.errors import RobotFileError
 from pipeline.robot import Robot
 from pipeline.robot_file import built_neutral_foot, check_parameters, load_robot_file
@@ -45,6 +46,14 @@ def with_values(hexapod: Robot, **values: float) -> ParameterSet:
         ({"joint_effort_limit": 1e9}, ""),
         ({"joint_effort_limit": 1.001e9}, "joint_effort_limit is beyond any robot"),
         ({"trunk_com_left": -1.001e9}, "trunk_com_left is beyond any robot"),
+        ({"trunk_com_left": -1e-6}, ""),
+        ({"trunk_com_left": -10.0}, ""),
+        ({"trunk_com_left": -10.001}, "trunk_com_left = .* is longer than in any walking robot"),
+        ({"coxa_length": 1e-6}, ""),
+        ({"foot_lift": 1e-3}, ""),
+        ({"foot_lift": 0.999e-3}, "foot_lift = .* is shorter than in any walking robot"),
+        ({"gravity": 30.0}, ""),
+        ({"gravity": 30.001}, "gravity is beyond any planet"),
         ({"joint_1_axis_angle": 0.0}, ""),
     ],
 )
@@ -60,20 +69,50 @@ def test_edges_of_what_a_built_robot_can_have(
 
 
 WALKS = ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity")
-BUILT = (
+LENGTHS = (
     *("body_length", "robot_width", "hip_spacing", "body_height", "femur_length", "tibia_length"),
-    *("hip_link_mass", "femur_mass", "tibia_mass", "trunk_height", "link_width"),
+    *("trunk_height", "link_width"),
+)
+BUILT = (
+    *LENGTHS,
+    *("hip_link_mass", "femur_mass", "tibia_mass"),
     *("joint_1_range", "joint_effort_limit", "joint_velocity_limit"),
 )
 
 
 @pytest.mark.parametrize("name", [*WALKS, *BUILT])
 def test_what_must_be_positive(hexapod: Robot, name: str) -> None:
-    check_parameters(with_values(hexapod, **{name: 1e-6}), "hexapod", "here")
+    least = 1e-3 if name in (*LENGTHS, "foot_stroke") else 1e-6
+    check_parameters(with_values(hexapod, **{name: least}), "hexapod", "here")
     with pytest.raises(RobotFileError, match=rf"parameters\.{name} = .* must be positive"):
         check_parameters(with_values(hexapod, **{name: 0.0}), "hexapod", "here")
     if name in BUILT:  # a URDF of one's own has no such number
         check_parameters(with_values(hexapod, **{name: 0.0}), None, "here")
+
+
+@pytest.mark.parametrize("name", [*LENGTHS, "foot_stroke"])
+def test_lengths_lie_between_a_millimetre_and_ten_metres(hexapod: Robot, name: str) -> None:
+    """As told in the file's unit, with the unit that was meant where one fits."""
+    for size, unit, message in (
+        (1e-3, "mm", ""),
+        (0.999e-3, "mm", "= 0.999 mm is shorter than .*; is 0.999 m meant"),
+        (0.999e-3, "cm", "= 0.0999 cm is shorter than .*; check its unit"),
+        (10.0, "m", ""),
+        (10.001, "m", "= 10.001 m is longer than .*; is 10.001 mm meant"),
+        (10.001, "mm", "= 10001 mm is longer than .*; check its unit"),
+    ):
+        rows = tuple(
+            dataclasses.replace(p, unit=unit, value_as_written=from_si(size, unit))
+            if p.name == name
+            else p
+            for p in with_values(hexapod, **{name: size}).rows()
+        )
+        for build in ("hexapod", None):
+            if not message:
+                check_parameters(ParameterSet(rows, "here"), build, "here")
+                continue
+            with pytest.raises(RobotFileError, match=rf"parameters\.{name} {message}"):
+                check_parameters(ParameterSet(rows, "here"), build, "here")
 
 
 def test_feet_stand_at_the_robots_width_and_the_hips_spacing(hexapod: Robot) -> None:
@@ -132,7 +171,8 @@ def test_a_circle_of_files_is_refused(tmp_path: Path) -> None:
         (r'(side = "left")', r"\1" + "\nstart_posture = [0, 1]", "start_posture must be three"),
         (r'(side = "left")', r"\1" + "\nstart_posture = [0, 1, true]", "must be three numbers"),
         (r"^\[gait\]", "[gate]", "unknown table 'gate'; did you mean 'gait'"),
-        (r"^\[standing\].*?(?=^\[)", "", r"the table \[standing\] is missing"),
+        (r"^\[gait\].*?(?=^\[)", "", r"missing: gait\.transfer_path; see urdf/hexapod\.toml"),
+        (r"^\[standing\].*?(?=^\[)", "[[standing]]\n", r"standing must be a table, \[standing\]"),
     ],
 )
 def test_what_no_robot_file_may_say(
@@ -145,3 +185,14 @@ def test_what_no_robot_file_may_say(
     path.write_text(changed, encoding="utf-8")
     with pytest.raises(RobotFileError, match=message):
         load_robot_file(path)
+
+
+def test_without_a_standing_table_every_leg_stands(root: Path, tmp_path: Path) -> None:
+    text = (root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")
+    changed, count = re.subn(r"^\[standing\].*?(?=^\[)", "", text, flags=re.S | re.M)
+    assert count == 1
+    path = tmp_path / "own.toml"
+    path.write_text(changed, encoding="utf-8")
+    spec = load_robot_file(path)
+    assert spec.standing_feet == ("lf", "lm", "lr", "rf", "rm", "rr")
+    assert load_robot_file(root / "urdf" / "hexapod.toml").standing_feet == ("lf", "lr", "rm")
