@@ -90,7 +90,7 @@ URDFS = {
     "another mass": (
         r'(<link name="base_link">.*?<mass value=)"[^"]*"',
         r'\1"5.6"',
-        r"total mass fails \(links add up to 21.578\d* kg, stated 40 kg, 46 % apart",
+        r"total mass fails \(links add up to 21\.\d+ kg, stated 40 kg, 46 % apart",
     ),
     "degrees": (
         r'(<joint name="lf_joint_2".*?lower=")[^"]*(" upper=")[^"]*',

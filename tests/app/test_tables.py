@@ -153,7 +153,7 @@ def test_stages_are_spelled_out_beside_their_codes(out: Path) -> None:
 
 
 def test_comma_copies_of_a_run(out: Path, tmp_path: Path, command: Command) -> None:
-    """No quotes around numbers and no dot in them; the paper's 2.04 in a text column, too."""
+    """No quotes around numbers and no dot in them; the paper's 0.94 in a text column, too."""
     assert command("reports", tmp_path / "reports", "--decimal", "comma") == 0
     gap = ["gap", "where", str(DEMO), "--out", str(tmp_path / "gap"), "--decimal", "comma"]
     assert exit_code(gap) == 0
@@ -167,7 +167,7 @@ def test_comma_copies_of_a_run(out: Path, tmp_path: Path, command: Command) -> N
             assert not re.search(r'(^|;)"[-+0-9.,e]*"(;|$)', line), (path.name, line)
             assert not [cell for cell in line.split(";") if number.fullmatch(cell)], path.name
     conclusions = (tmp_path / "reports" / "conclusions.comma.csv").read_text(encoding="utf-8-sig")
-    assert ";W;2,04;" in conclusions
+    assert ";1;0,94;" in conclusions
 
 
 def test_legs_add_up_to_the_robot(out: Path) -> None:
