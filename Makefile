@@ -5,9 +5,9 @@ PY     := $(VENV)/bin/python
 STAMP  := $(VENV)/.installed
 OUT    ?= reports/out
 ROBOT  ?= urdf/hexapod.toml
-LOG    ?= pipeline/gap/demo/walk.parquet
+LOG    ?= pipeline/identification/demo/walk.parquet
 # The demonstration is proved on the same machine at another speed.
-HOLDOUT := $(if $(filter file,$(origin LOG)),--holdout pipeline/gap/demo/walk_slow.parquet)
+HOLDOUT := $(if $(filter file,$(origin LOG)),--holdout pipeline/identification/demo/walk_slow.parquet)
 ARGS   ?=
 # A name as one word of the shell, whatever is in it.
 quoted = '$(subst ','\'',$(1))'

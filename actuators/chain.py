@@ -7,9 +7,9 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import FloatArray, Scalars
-from actuators.element import Element
+from actuators.elements.element import Element
+from actuators.elements.motor import DCMotor
 from actuators.errors import ChainError, closest
-from actuators.motor import DCMotor
 from actuators.shaft import ShaftSeries
 
 JOINT_STAGE: Final = "out"

@@ -28,13 +28,13 @@ import pinocchio as pin
 import pyarrow as pa
 import pyarrow.csv as pacsv
 
-from actuators.build import load_catalog
-from pipeline.app.compute import joint_series
-from pipeline.gait import tripod_gait
-from pipeline.joint_demand import MotionDemand, motion_demand
-from pipeline.motion import Motion
-from pipeline.robot import Robot, load_robot
-from pipeline.robot_file import load_robot_file
+from actuators.loading.build import load_catalog
+from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
+from pipeline.motion.gait import tripod_gait
+from pipeline.motion.motion import Motion
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.walk_stand import joint_series
 from reports.tables.walking import walking_joint_demand
 from reports.writer import csv_bytes
 from tests.bench_gap import gap_costs
@@ -193,7 +193,7 @@ marks = {"interpreter": clock()}
 start = clock()
 import numpy, pinocchio, pyarrow.csv, matplotlib.figure, matplotlib.backends.backend_agg
 import matplotlib.backends.backend_svg, matplotlib.path
-import pipeline.app.cli, pipeline.app.figures, pipeline.app.judgement, pipeline.app.run as run
+import pipeline.cli.main, pipeline.cli.figures, pipeline.cli.judgement, pipeline.cli.run as run
 marks["imports"] = clock() - start
 def count(module, name, phase):
     real = getattr(module, name)
@@ -208,12 +208,12 @@ count(run, "settings", "loading")
 count(run, "stand", "computing")
 count(run, "walk", "computing")
 count(run, "write_table", "CSV and sidecars")
-count(pipeline.app.judgement, "judged", "judging")
-count(pipeline.app.figures, "write_figures", "figures")
-count(pipeline.app.judgement, "pages", "pages")
+count(pipeline.cli.judgement, "judged", "judging")
+count(pipeline.cli.figures, "write_figures", "figures")
+count(pipeline.cli.judgement, "pages", "pages")
 begin = clock()
 sys.stdout = sys.stderr
-code = pipeline.app.cli.main(sys.argv[1:])
+code = pipeline.cli.main.main(sys.argv[1:])
 marks["the rest"] = clock() - begin - sum(
     marks.get(phase, 0.0)
     for phase in ("loading", "computing", "CSV and sidecars", "judging", "figures", "pages")

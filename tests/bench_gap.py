@@ -11,16 +11,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-import pipeline.app.gap_setup
-from pipeline.app.gap_options import add_gap_options, split_items
-from pipeline.app.gap_run import Whereabouts, find_where
-from pipeline.app.gap_setup import Setup, setup, take_in
-from pipeline.app.gap_stages import stages
-from pipeline.gap.columns import make_benches
-from pipeline.gap.effects.registry import catalogue
-from pipeline.gap.problem import Problem
-from pipeline.gap.screen import Screen, score_all
-from pipeline.gap.twin.trial import make_trial
+from pipeline.blind.twin.trial import make_trial
+from pipeline.cli.gap_options import add_gap_options, split_items
+from pipeline.effects.registry import catalogue
+from pipeline.identification.compare.stages import stages
+from pipeline.identification.regression.design_matrix import make_benches
+from pipeline.identification.regression.problem import Problem
+from pipeline.identification.selection.screen import Screen, score_all
+from pipeline.identification.workflow.locate import Whereabouts, find_where
+from pipeline.identification.workflow.setup import Setup, setup, take_in
 
 ROOT = Path(__file__).parents[1]
 #: How often the log is repeated.
@@ -40,8 +39,8 @@ def gap_costs() -> None:
 
 def _rows(log: dict[str, np.ndarray], path: Path) -> None:
     print("gap, one leg, log in chunks: CPU seconds and their ratio to the shortest log")
-    shortest = pipeline.app.gap_setup.LONG_ROWS
-    pipeline.app.gap_setup.LONG_ROWS = 0  # all of them in chunks, so that they compare
+    shortest = setup.LONG_ROWS
+    setup.LONG_ROWS = 0  # all of them in chunks, so that they compare
     first: tuple[int, float] | None = None
     try:
         for repeats in (1, *REPEATS):
@@ -59,7 +58,7 @@ def _rows(log: dict[str, np.ndarray], path: Path) -> None:
                 f"  {rows:8d} rows {spent:6.2f} s   {longer:5.1f} times the rows cost {more:5.2f}"
             )
     finally:
-        pipeline.app.gap_setup.LONG_ROWS = shortest
+        setup.LONG_ROWS = shortest
 
 
 def _candidates(log: dict[str, np.ndarray], path: Path) -> None:

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from pipeline.gait import tripod_gait
-from pipeline.joint_demand import MotionDemand, motion_demand
-from pipeline.motion import Motion
-from pipeline.robot import Robot, load_robot
-from pipeline.robot_file import load_robot_file
+from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
+from pipeline.motion.gait import tripod_gait
+from pipeline.motion.motion import Motion
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
 
 # No clock in a test: a loaded machine is no failure.
 settings.register_profile("legwatt", deadline=None)

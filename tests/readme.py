@@ -132,10 +132,10 @@ RATES = {
 
 def agreement(out: Path) -> str:
     """What is fitted, predicted and contradicted: the first paragraph of `summary.md`."""
-    from pipeline.app.cli import parser
-    from pipeline.app.judgement import basis, judged
-    from pipeline.app.settings import settings
-    from pipeline.app.summary_words import first_paragraph
+    from pipeline.cli.judgement import basis, judged
+    from pipeline.cli.main import parser
+    from pipeline.cli.settings import settings
+    from reports.pages.summary_words import first_paragraph
 
     given = settings(parser().parse_args(["reports", "--robot", str(ROOT / "urdf/hexapod.toml")]))
     by = basis(given)
@@ -252,7 +252,7 @@ def main() -> int:
     """Run, renew the tables and pictures; with `--blind DIR` those of the blind trials."""
     if sys.argv[1:2] == ["--blind"]:
         return store_blind(Path(sys.argv[2]))
-    from pipeline.app.cli import main as command
+    from pipeline.cli.main import main as command
 
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.projection import View
+from reports.figures.robot.projection import View
+from reports.figures.robot.visuals import JointMark
 from reports.figures.style import INK
-from reports.figures.visuals import JointMark
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

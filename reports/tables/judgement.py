@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.units import from_si
-from pipeline.calibration.conclusions import Conclusion
-from pipeline.calibration.fig_21 import BreakEven, EnergyPerMinute
-from pipeline.calibration.leave_one_out import Prediction
-from pipeline.calibration.published import ROLES
-from pipeline.calibration.reproduction import ReproducedRow
-from pipeline.calibration.rotor_friction import Frictions
-from pipeline.calibration.store import VERDICTS, Calibrated
+from pipeline.paper.calibration.store import VERDICTS, Calibrated
+from pipeline.paper.constants.rotor_friction import Frictions
+from pipeline.paper.judgement.conclusions import Conclusion
+from pipeline.paper.judgement.fig_21 import BreakEven, EnergyPerMinute
+from pipeline.paper.judgement.leave_one_out import Prediction
+from pipeline.paper.judgement.reproduction import ReproducedRow
+from pipeline.paper.published import ROLES
 from reports.table import Table, table_from_rows
 
 Array = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from actuators.chain import HoldingResult
-from pipeline.contact_forces import ContactForces
-from pipeline.joint_demand import JointDemand
+from pipeline.dynamics.contact_forces import ContactForces
+from pipeline.dynamics.joint_demand import JointDemand
 from reports.table import Table, table_from_rows
 
 #: Time over which the paper adds up standing energy: that of one gait cycle [s].

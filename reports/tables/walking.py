@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.chain import Chain, ChainResult
-from actuators.energy import loss_energies, stage_energies
-from actuators.limits import limit_rows
-from actuators.regeneration import BUS, Supply
-from pipeline.joint_demand import MotionDemand
+from actuators.energy.energy import loss_energies, stage_energies
+from actuators.energy.limits import limit_rows
+from actuators.energy.regeneration import BUS, Supply
+from pipeline.dynamics.joint_demand import MotionDemand
 from reports.table import Table, table_from_rows
 from reports.wide import Quantity, wide_series
 
@@ -274,7 +274,7 @@ def _support_energy(
 ) -> float | None:
     if BUS in supply.accounts:
         return None
-    from actuators.energy import split_integral
+    from actuators.energy.energy import split_integral
 
     total = 0.0
     for contacts in demand.contacts:

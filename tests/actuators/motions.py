@@ -3,7 +3,7 @@
 import numpy as np
 from hypothesis import strategies as st
 
-from actuators.build import load_catalog
+from actuators.loading.build import load_catalog
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 

@@ -3,8 +3,8 @@ import shutil
 
 import pytest
 
-from actuators.build import CATALOG, load_catalog
 from actuators.errors import ActuatorError, CatalogError, ParameterError, closest, one_line
+from actuators.loading.build import CATALOG, load_catalog
 from tests.actuators.motions import ALTERNATIVES
 
 

@@ -3,14 +3,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.balance import balance_residual
-from actuators.build import load_catalog
 from actuators.chain import Chain
+from actuators.elements.friction import Friction
+from actuators.elements.motor import DCMotor
+from actuators.elements.ratio import Ratio
+from actuators.energy.balance import balance_residual
+from actuators.energy.regeneration import supply
 from actuators.errors import ChainError
-from actuators.friction import Friction
-from actuators.motor import DCMotor
-from actuators.ratio import Ratio
-from actuators.regeneration import supply
+from actuators.loading.build import load_catalog
 from tests.actuators.motions import ALTERNATIVES, CHAINS, constant, harmonic, seeds, series, split
 
 REVERSIBLE = ("ideal", "rotor", "reversible")

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from actuators.elements.friction import Friction
+from actuators.elements.hypoid import Hypoid
+from actuators.elements.inertia import Inertia
+from actuators.elements.motor import DCMotor
+from actuators.elements.ratio import Ratio
 from actuators.errors import SelfLockingError, UnphysicalElementError
-from actuators.friction import Friction
-from actuators.hypoid import Hypoid
-from actuators.inertia import Inertia
-from actuators.motor import DCMotor
-from actuators.ratio import Ratio
 from tests.actuators.motions import constant, harmonic, series, split
 
 positive = st.floats(0.0, 10.0)

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from actuators.build import load_catalog
-from actuators.energy import (
+from actuators.elements.motor import DCMotor
+from actuators.energy.energy import (
     duration,
     integral,
     loss_energies,
@@ -15,10 +15,10 @@ from actuators.energy import (
     stage_energies,
     stage_energy,
 )
+from actuators.energy.limits import limit_rows, rms_over_time, time_over
+from actuators.energy.regeneration import supply
 from actuators.errors import EnergyError
-from actuators.limits import limit_rows, rms_over_time, time_over
-from actuators.motor import DCMotor
-from actuators.regeneration import supply
+from actuators.loading.build import load_catalog
 from tests.actuators.motions import ALTERNATIVES, CHAINS, harmonic, series, split
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from actuators.chain import ChainResult
-from actuators.envelope import operating_region
-from actuators.limits import limit_rows
-from actuators.motor import DCMotor
+from actuators.elements.motor import DCMotor
+from actuators.energy.envelope import operating_region
+from actuators.energy.limits import limit_rows
 from actuators.shaft import ShaftSeries
 
 RE40 = DCMotor("m", 0.0302, 0.316, 858.7, 24.0, 5.77, 75.7)
@@ -34,7 +34,7 @@ def inside(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     ],
 )
 def test_inside_is_where_no_limit_is_exceeded(motor: DCMotor) -> None:
-    """Against the limits as `actuators.limits` checks them, at random points of the plane."""
+    """Against what `limits` checks, at random points of the plane."""
     reach = (1500.0, 3.0)
     points = np.random.default_rng(1).uniform(-1, 1, (4000, 2)) * reach
     corners = operating_region(motor, reach=reach)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from actuators.balance import balance_residual
-from actuators.friction import Friction
-from actuators.hypoid import Hypoid
-from actuators.inertia import Inertia
+from actuators.elements.friction import Friction
+from actuators.elements.hypoid import Hypoid
+from actuators.elements.inertia import Inertia
+from actuators.energy.balance import balance_residual
 from tests.actuators.motions import CHAINS, constant, harmonic, split
 
 

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from actuators.directional import DirectionalFriction
-from actuators.element import Element
+from actuators.elements.directional import DirectionalFriction
+from actuators.elements.element import Element
+from actuators.elements.friction import Friction
+from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
+from actuators.elements.inertia import Inertia
+from actuators.elements.position_torque import ParallelSpring, Ripple
+from actuators.elements.quadrant import QuadrantFriction
+from actuators.elements.ratio import Ratio
+from actuators.elements.stribeck import Stribeck
 from actuators.errors import UnphysicalElementError
-from actuators.friction import Friction
-from actuators.heating import Heating, warm_resistance, warm_torque_constant
-from actuators.inertia import Inertia
-from actuators.position_torque import ParallelSpring, Ripple
-from actuators.quadrant import QuadrantFriction
-from actuators.ratio import Ratio
 from actuators.shaft import ShaftSeries
-from actuators.stribeck import Stribeck
 
 LAWS = [
     Stribeck("s", excess=2.0, speed=0.1),

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuators.build import load_catalog
+from actuators.loading.build import load_catalog
 from tests.actuators.motions import CHAINS
 
 JOINT_TORQUES = np.array([0.0, -30.71, 1.46])  # Table III [N*m]

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from pipeline.app.cli import main
+from pipeline.cli.main import main
 
 Rows = list[dict[str, str]]
 #: Runs a verb on the hexapod with `--out`, and returns the exit code, argparse's own included.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from pipeline.robot_file import load_robot_file
+from pipeline.robot.robot_file import load_robot_file
 
 #: Parameters that a robot file with a URDF of the user's own still gives.
 GAIT = ("total_mass", "foot_stroke", "foot_lift", "walking_speed", "gait_period", "gravity")

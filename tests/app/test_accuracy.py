@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuators.balance import balance_residual
-from actuators.build import load_catalog
 from actuators.chain import Chain
-from actuators.energy import stage_energies
-from actuators.regeneration import supply
-from pipeline.app.compute import Walking, walk
-from pipeline.robot import Robot
+from actuators.energy.balance import balance_residual
+from actuators.energy.energy import stage_energies
+from actuators.energy.regeneration import supply
+from actuators.loading.build import load_catalog
+from pipeline.robot.robot import Robot
+from pipeline.simulation.walk_stand import Walking, walk
 
 ALTERNATIVES = ("ideal", "rotor", "reversible", "irreversible")
 POLICIES = (("none", 0.0), ("fraction", 0.5), ("fraction", 1.0), ("bus", 0.0))

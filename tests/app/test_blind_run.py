@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from pipeline.app import blind
-from pipeline.app.blind_answer import ask
-from pipeline.app.blind_make import make, read_judgement
-from pipeline.app.cli import main
-from pipeline.gap.twin.matrix import TrialSpec
+from pipeline.blind.answer import ask
+from pipeline.blind.make import make, read_judgement
+from pipeline.blind.twin.matrix import TrialSpec
+from pipeline.cli import blind
+from pipeline.cli.main import main
 
 SPECS = (
     TrialSpec(0, 3, ("coulomb_friction",), "leg", "low"),

@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 from scipy.stats import norm
 
-from pipeline.app.blind_answer import Answer, Named
-from pipeline.app.blind_identifiable import THRESHOLD, Identifiability, Rival
-from pipeline.app.blind_rates import Rate, wilson
-from pipeline.app.blind_score import score
-from pipeline.app.blind_summary import by_effect, rates, read_rows
-from pipeline.app.blind_truth import HiddenTruth
+from pipeline.blind.answer import Answer, Named
+from pipeline.blind.identifiable import THRESHOLD, Identifiability, Rival
+from pipeline.blind.rates import Rate, wilson
+from pipeline.blind.score import score
+from pipeline.blind.summary import by_effect, rates, read_rows
+from pipeline.blind.truth import HiddenTruth
 
 JOINT = ("rm_joint_2",)
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.app.cli import parser
-from pipeline.app.compute import stand, walk
-from pipeline.app.figures import drawings
-from pipeline.app.names import leg_words, names_text
-from pipeline.app.settings import settings
+from pipeline.cli.figures import drawings
+from pipeline.cli.main import parser
+from pipeline.cli.settings import settings
+from pipeline.simulation.walk_stand import stand, walk
 from reports.figures.several import Drawing
+from reports.pages.names import leg_words, names_text
 from tests.reports import geometry
 
 NAMES = (

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from actuators.build import Catalog, load_catalog
-from pipeline.app.compute import stand, walk
-from pipeline.app.edited_chain import EditedChain, edited_chain
-from pipeline.app.effects import Effects, effects
-from pipeline.app.gap_energy import Cost, break_even, energy_change
-from pipeline.app.gap_words import energy_words
-from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.model import MachineModel, machine_of_robot
-from pipeline.robot import Robot
+from actuators.loading.build import Catalog, load_catalog
+from pipeline.effects.registry import effect_named
+from pipeline.machine.edited_chain import EditedChain, edited_chain
+from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.robot.robot import Robot
+from pipeline.simulation.edited import Effects, effects
+from pipeline.simulation.energy_change import Cost, break_even, energy_change
+from pipeline.simulation.walk_stand import stand, walk
+from reports.pages.gap_words import energy_words
 
 JOINT = "rm_joint_2"
 SAMPLES = 151

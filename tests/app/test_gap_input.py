@@ -14,9 +14,9 @@ import pinocchio as pin
 import pyarrow.parquet as pq
 import pytest
 
-from pipeline.app.demo import DEMO
-from pipeline.gap.model import machine_of_urdf
-from pipeline.gap.twin.trial import make_trial
+from pipeline.blind.twin.trial import make_trial
+from pipeline.cli.demo import DEMO
+from pipeline.machine.machine import machine_of_urdf
 from tests.app.conftest import exit_code, rows_of
 
 Columns = dict[str, np.ndarray]

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.gap.model_writer import edits_of
-from pipeline.gap.verdict import Estimate, Found
+from pipeline.identification.results import Estimate, Found
+from pipeline.identification.workflow.model_writer import edits_of
 from tests.app.conftest import exit_code, rows_of
 
 SEED = 5  # of the machine: its tolerances, its motion and what is hidden

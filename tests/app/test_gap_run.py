@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.app.demo import DEMO, HIDDEN, SLOW, write_demo
-from pipeline.gap.model_file import load_model, read_model_file
+from pipeline.cli.demo import DEMO, HIDDEN, SLOW, write_demo
+from pipeline.effects.model_file import load_model, read_model_file
 from tests.app.conftest import exit_code, rows_of, sidecar_of
 
 COLUMNS = {
@@ -147,7 +147,7 @@ def test_where_gives_the_same_bytes_twice(tmp_path: Path) -> None:
 
 
 def test_the_shipped_logs_are_of_the_shipped_robot(tmp_path: Path) -> None:
-    """A changed robot file or catalogue asks for `python -m pipeline.app.demo`."""
+    """A changed robot file or catalogue asks for `python -m pipeline.cli.demo`."""
     import pyarrow.parquet as pq
 
     for old, new in zip((DEMO, SLOW), write_demo(tmp_path), strict=True):

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from pipeline.app.gap_stages import overall
-from pipeline.app.gap_words import shrink_words
-from pipeline.app.gap_written import Weighed, weigh_found
-from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.model_file import Edit, ModelFile, edits_in
-from pipeline.gap.model_writer import edits_of, model_text
-from pipeline.gap.verdict import Estimate, Found
+from pipeline.effects.model_file import Edit, ModelFile, edits_in
+from pipeline.effects.registry import effect_named
+from pipeline.identification.compare.stages import overall
+from pipeline.identification.results import Estimate, Found
+from pipeline.identification.workflow.model_writer import edits_of, model_text
+from pipeline.identification.workflow.written import Weighed, weigh_found
+from reports.pages.gap_words import shrink_words
 from tests.pipeline.gap import bench_leg as leg
 
 JOINT = "rm_joint_1"

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.app import figures
-from pipeline.app.cli import main
-from pipeline.app.demo import DEMO
-from pipeline.app.staging import holding
+from pipeline.cli import figures
+from pipeline.cli.demo import DEMO
+from pipeline.cli.main import main
+from pipeline.cli.staging import holding
 from reports.errors import FigureError
 from reports.exchange import EXCHANGE
 from reports.manifest import MANIFEST, read_manifest
@@ -32,14 +32,14 @@ def rename(source, target):
         os.kill(os.getpid(), signal.SIGKILL)
     real(source, target)
 os.rename = rename
-from pipeline.app.cli import main
+from pipeline.cli.main import main
 sys.exit(main(sys.argv[1:]))
 """
 #: No file may grow beyond so many bytes, as on a disk that is full: the system itself refuses.
 FULL = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, ({bytes}, {bytes}))
-from pipeline.app.cli import main
+from pipeline.cli.main import main
 sys.exit(main(sys.argv[1:]))
 """
 CHANGE = ("--set", "hip_spacing=280")
@@ -162,7 +162,7 @@ def test_many_kills_at_random_instants_leave_whole_sets(
 
 def test_two_at_once(root: Path, tmp_path: Path, command: Command) -> None:
     """The second is refused in one line while the first goes on; after it, it is welcome."""
-    code = "import sys\nfrom pipeline.app.staging import holding\nfrom pathlib import Path\n"
+    code = "import sys\nfrom pipeline.cli.staging import holding\nfrom pathlib import Path\n"
     code += "with holding(Path(sys.argv[1])):\n    print(flush=True)\n    sys.stdin.read()\n"
     first = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path)],

@@ -7,19 +7,19 @@ from pathlib import Path
 
 import pytest
 
-from actuators.build import CATALOG, load_catalog
-from pipeline.app import judgement as judging
-from pipeline.app.cli import parser
-from pipeline.app.settings import Settings, settings
-from pipeline.app.summary import measure_next
-from pipeline.app.summary_words import first_paragraph
-from pipeline.calibration.fingerprint import differences, fingerprint
-from pipeline.calibration.prior import load_prior
-from pipeline.calibration.published import load_published
-from pipeline.calibration.quantities import DIMENSIONS, IDS
-from pipeline.calibration.sensitivity import Index
-from pipeline.calibration.store import load_results
-from pipeline.robot_file import load_robot_file
+from actuators.loading.build import CATALOG, load_catalog
+from pipeline.cli import judgement as judging
+from pipeline.cli.main import parser
+from pipeline.cli.settings import Settings, settings
+from pipeline.paper.calibration.fingerprint import differences, fingerprint
+from pipeline.paper.calibration.prior import load_prior
+from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
+from pipeline.paper.calibration.store import load_results
+from pipeline.paper.judgement.sensitivity import Index
+from pipeline.paper.published import load_published
+from pipeline.robot.robot_file import load_robot_file
+from reports.pages.summary import measure_next
+from reports.pages.summary_words import first_paragraph
 
 #: Tables that rest on the calibration's sets.
 OF_THE_SETS = {"readings", "leave_one_out", "calibration", "sensitivities"}

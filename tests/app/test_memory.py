@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.app import memory
+from pipeline.cli import memory
 from pipeline.errors import GaitError
 from tests.app.conftest import Command
 

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.app.cli import parser
-from pipeline.app.judgement import basis
-from pipeline.app.settings import settings
+from pipeline.cli.judgement import basis
+from pipeline.cli.main import parser
+from pipeline.cli.settings import settings
 from tests.app.conftest import Command, exit_code, rows_of
 from tests.app.robots import changed, edited_robot, own_robot
 from tests.app.test_bad_input import refused
@@ -314,7 +314,9 @@ def test_urdf_of_ones_own(
     """Every verb that computes refuses it, with line and element where there is one."""
     pattern, replacement, message = URDFS[what]
     robot = own_robot(root, tmp_path, pattern, replacement)
-    more = [] if verb == "walk" else ["read", str(root / "pipeline/gap/demo/walk.parquet")]
+    more = (
+        [] if verb == "walk" else ["read", str(root / "pipeline/identification/demo/walk.parquet")]
+    )
     code = exit_code([verb, *more, "--robot", str(robot), "--out", str(tmp_path / "out")])
     refused(capsys, tmp_path / "out", code, message)
 

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from actuators.build import load_catalog
 from actuators.errors import ActuatorError
+from actuators.loading.build import load_catalog
 from actuators.units import to_si
-from pipeline.app.settings import Settings, settings
+from pipeline.cli.settings import Settings, settings
 from pipeline.errors import PipelineError
-from pipeline.robot_file import load_robot_file
+from pipeline.robot.robot_file import load_robot_file
 from tests.app.conftest import Command, exit_code, rows_of, sidecar_of, stand_and_walk
 
 ROBOT = Path(__file__).parents[2] / "urdf" / "hexapod.toml"

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.app.cli import parser
+from pipeline.cli.main import parser
 from tests.readme import SHOWN, number, renewed
 
 LINK = re.compile(r"\]\(([^)#:]+)\)")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.app.demo import DEMO
+from pipeline.cli.demo import DEMO
 from tests.app.conftest import Command, exit_code, rows_of
 
 pytestmark = [

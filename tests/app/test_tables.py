@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.app.demo import DEMO
+from pipeline.cli.demo import DEMO
 from tests.app.conftest import Command, exit_code, rows_of, sidecar_of, stand_and_walk
 
 LEGS = ("lf", "lm", "lr", "rf", "rm", "rr")

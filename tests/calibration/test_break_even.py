@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.calibration.fig_21 import crossing
-from pipeline.calibration.quantities import STANDING_SECONDS, break_even
+from pipeline.paper.calibration.quantities import STANDING_SECONDS, break_even
+from pipeline.paper.judgement.fig_21 import crossing
 
 PERIOD = 3.0  # of the gait [s]
 CASES = [(120.0, 9.0, 200.0, 1.0), (10.0, 2.0, 10.5, 0.0), (50.0, 1.0, 400.0, 0.9)]

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from actuators.build import load_catalog
-from actuators.energy import StageEnergy, stage_energy
-from pipeline.app.compute import walk
-from pipeline.calibration.contradictions import contradiction
-from pipeline.calibration.published import load_published
-from pipeline.calibration.quantities import DIMENSIONS, IDS
-from pipeline.calibration.rotor_friction import friction_ranges
-from pipeline.robot import Robot
+from actuators.energy.energy import StageEnergy, stage_energy
+from actuators.loading.build import load_catalog
+from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
+from pipeline.paper.constants.rotor_friction import friction_ranges
+from pipeline.paper.judgement.contradictions import contradiction
+from pipeline.paper.published import load_published
+from pipeline.robot.robot import Robot
+from pipeline.simulation.walk_stand import walk
 
 
 @pytest.fixture(scope="module")

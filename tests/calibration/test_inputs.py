@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuators.build import load_catalog
-from pipeline.calibration.errors import PriorError, TargetError
-from pipeline.calibration.prior import PRIOR_FILE, load_prior
-from pipeline.calibration.published import PUBLISHED_FILE, load_published
-from pipeline.calibration.quantities import DIMENSIONS, IDS
-from pipeline.robot_file import load_robot_file
+from actuators.loading.build import load_catalog
+from pipeline.paper.calibration.prior import PRIOR_FILE, load_prior
+from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
+from pipeline.paper.errors import PriorError, TargetError
+from pipeline.paper.published import PUBLISHED_FILE, load_published
+from pipeline.robot.robot_file import load_robot_file
 
 SHARED = os.environ.get("LEGWATT_SHARED", "")
 HEADER, *ROWS = PUBLISHED_FILE.read_text(encoding="utf-8").splitlines()

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuators.build import load_catalog
-from pipeline.app.compute import walk
-from pipeline.calibration.checkpoint import Checkpoint
-from pipeline.calibration.machine import (
+from actuators.loading.build import load_catalog
+from pipeline.paper.calibration.checkpoint import Checkpoint
+from pipeline.paper.calibration.machine import (
     SAMPLES,
     actuator_part,
     catalog_with,
@@ -18,9 +17,10 @@ from pipeline.calibration.machine import (
     solve_posture,
     standing_state,
 )
-from pipeline.calibration.quantities import break_even, computed
-from pipeline.robot import Robot
-from pipeline.robot_file import load_robot_file
+from pipeline.paper.calibration.quantities import break_even, computed
+from pipeline.robot.robot import Robot
+from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.walk_stand import walk
 
 
 def test_the_machine_agrees_with_a_whole_walk(hexapod: Robot) -> None:

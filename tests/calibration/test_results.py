@@ -9,23 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuators.build import CATALOG, load_catalog
+from actuators.loading.build import CATALOG, load_catalog
 from actuators.units import from_si, to_si
-from pipeline.calibration import search
-from pipeline.calibration.conclusions import SENTENCES
-from pipeline.calibration.evidence import LEAST, evidence
-from pipeline.calibration.fig_21 import crossing
-from pipeline.calibration.judge import Judgement, judge
-from pipeline.calibration.leave_one_out import leave_one_out
-from pipeline.calibration.motor_constants import KEYS
-from pipeline.calibration.prior import load_prior
-from pipeline.calibration.problem import EVEN, EXACT, EXTRA
-from pipeline.calibration.published import Published, load_published
-from pipeline.calibration.quantities import DIMENSIONS, IDS
-from pipeline.calibration.readings import reading_rows, readings, supported, verdict
-from pipeline.calibration.reproduction import headline
-from pipeline.calibration.sensitivity import Index, leading, ranking, sensitivity_rows
-from pipeline.calibration.store import (
+from pipeline.errors import PipelineError
+from pipeline.paper.calibration import search
+from pipeline.paper.calibration.prior import load_prior
+from pipeline.paper.calibration.problem import EVEN, EXACT, EXTRA
+from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
+from pipeline.paper.calibration.store import (
     FIXED,
     VERDICTS,
     calibrated_numbers,
@@ -33,9 +24,18 @@ from pipeline.calibration.store import (
     number_verdict,
     save,
 )
-from pipeline.errors import PipelineError
-from pipeline.robot import load_robot
-from pipeline.robot_file import load_robot_file
+from pipeline.paper.constants.motor_constants import KEYS
+from pipeline.paper.judgement.conclusions import SENTENCES
+from pipeline.paper.judgement.evidence import LEAST, evidence
+from pipeline.paper.judgement.fig_21 import crossing
+from pipeline.paper.judgement.judge import Judgement, judge
+from pipeline.paper.judgement.leave_one_out import leave_one_out
+from pipeline.paper.judgement.readings import reading_rows, readings, supported, verdict
+from pipeline.paper.judgement.reproduction import headline
+from pipeline.paper.judgement.sensitivity import Index, leading, ranking, sensitivity_rows
+from pipeline.paper.published import Published, load_published
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
 
 LEAST_SETS = 200
 CONTRADICTED = ("rotor_motor_torque_2", "rotor_leg_energy_3s")
@@ -310,7 +310,7 @@ def test_an_interrupted_save_leaves_the_old_files(
     for path in CATALOG.glob("*.toml"):
         (catalog / path.name).write_bytes(path.read_bytes())
     before = {p: p.read_bytes() for p in [robot, *catalog.iterdir()]}
-    monkeypatch.setattr("pipeline.calibration.store.RESULTS_FILE", tmp_path / "results.json")
+    monkeypatch.setattr("pipeline.paper.calibration.store.RESULTS_FILE", tmp_path / "results.json")
     written: list[Path] = []
     write_text = Path.write_text
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.calibration.contradictions import contradiction
-from pipeline.calibration.motor_constants import KEYS, sliver
-from pipeline.calibration.published import Published, load_published
-from pipeline.calibration.quantities import DIMENSIONS, IDS
-from pipeline.calibration.rotor_friction import best_frictions, friction_ranges
+from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
+from pipeline.paper.constants.motor_constants import KEYS, sliver
+from pipeline.paper.constants.rotor_friction import best_frictions, friction_ranges
+from pipeline.paper.judgement.contradictions import contradiction
+from pipeline.paper.published import Published, load_published
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 from actuators.parameters import ParameterSet
-from pipeline.check import check_robot, check_urdf
 from pipeline.errors import UrdfError
-from pipeline.robot import Robot
+from pipeline.robot.check import check_robot, check_urdf
+from pipeline.robot.robot import Robot
 
 BOX = '<box size="0.2 0.4 0.6"/>'
 SPHERE = '<sphere radius="0.3"/>'

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.linalg import null_space
 
-from pipeline.contact_forces import ContactForces, least_tangential_forces
+from pipeline.dynamics.contact_forces import ContactForces, least_tangential_forces
+from pipeline.dynamics.joint_demand import contact_forces, inverse_dynamics, motion_demand
+from pipeline.dynamics.stability import stability_margins, support_margin
 from pipeline.errors import TippingError
-from pipeline.gait import tripod_gait
-from pipeline.joint_demand import contact_forces, inverse_dynamics, motion_demand
-from pipeline.motion import Motion
-from pipeline.robot import Robot, load_robot
-from pipeline.stability import stability_margins, support_margin
+from pipeline.motion.gait import tripod_gait
+from pipeline.motion.motion import Motion
+from pipeline.robot.robot import Robot, load_robot
 
 TRIPOD = np.array([[0.30, 0.25, -0.31], [-0.24, 0.26, -0.31], [0.02, -0.27, -0.31]])
 SIX = np.array([[x, y, -0.3] for x in (-0.27, 0.0, 0.27) for y in (-0.26, 0.26)])

@@ -8,12 +8,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.gait import tripod_gait
-from pipeline.joint_demand import MotionDemand, motion_demand, segment_demand
-from pipeline.kinematics import foot_jacobians
-from pipeline.motion import Motion, Segment
-from pipeline.robot import Robot, load_robot
-from pipeline.robot_file import load_robot_file
+from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
+from pipeline.motion.gait import tripod_gait
+from pipeline.motion.motion import Motion, Segment
+from pipeline.robot.kinematics import foot_jacobians
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
 
 
 @pytest.fixture(scope="module", params=["hexapod.toml", "hexapod_axis90.toml"])

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from pipeline.errors import GaitError, OutOfReachError
-from pipeline.gait import standing_posture, tripod_gait
-from pipeline.kinematics import foot_jacobians, foot_positions
-from pipeline.motion import Motion
-from pipeline.robot import Robot, load_robot
-from pipeline.transfer_path import TRANSFER_PATHS, transfer_path
+from pipeline.motion.gait import standing_posture, tripod_gait
+from pipeline.motion.motion import Motion
+from pipeline.motion.transfer_path import TRANSFER_PATHS, transfer_path
+from pipeline.robot.kinematics import foot_jacobians, foot_positions
+from pipeline.robot.robot import Robot, load_robot
 
 
 def with_path(robot: Robot, name: str) -> Robot:

@@ -10,15 +10,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.kinematics import (
+from pipeline.robot.kinematics import (
     foot_force_torques,
     foot_jacobian_rates,
     foot_jacobians,
     foot_positions,
     leg_posture,
 )
-from pipeline.robot import Robot, load_robot, parse_urdf
-from pipeline.robot_file import load_robot_file
+from pipeline.robot.robot import Robot, load_robot, parse_urdf
+from pipeline.robot.robot_file import load_robot_file
 
 N = 20
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import InvalidMotionError
-from pipeline.motion import Motion, Segment
+from pipeline.motion.motion import Motion, Segment
 
 N = 4
 

@@ -9,15 +9,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pipeline.dynamics.joint_demand import segment_demand
+from pipeline.dynamics.stability import stability_margins
 from pipeline.errors import GaitError, OutOfReachError, UrdfError
-from pipeline.gait import standing_posture, tripod_gait
-from pipeline.inverse_kinematics import solve_positions, solve_rates
-from pipeline.joint_demand import segment_demand
-from pipeline.kinematics import foot_jacobians, foot_positions
-from pipeline.leg_chains import leg_chains
-from pipeline.motion import Motion, Segment
-from pipeline.robot import Robot, load_robot
-from pipeline.stability import stability_margins
+from pipeline.motion.gait import standing_posture, tripod_gait
+from pipeline.motion.motion import Motion, Segment
+from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
+from pipeline.robot.kinematics import foot_jacobians, foot_positions
+from pipeline.robot.leg_chains import leg_chains
+from pipeline.robot.robot import Robot, load_robot
 
 
 def turned(segment: Segment, rotation: np.ndarray) -> Segment:

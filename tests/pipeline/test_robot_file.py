@@ -11,8 +11,8 @@ import pytest
 from actuators.parameters import ParameterSet
 from actuators.units import from_si
 from pipeline.errors import RobotFileError
-from pipeline.robot import Robot
-from pipeline.robot_file import built_neutral_foot, check_parameters, load_robot_file
+from pipeline.robot.robot import Robot
+from pipeline.robot.robot_file import built_neutral_foot, check_parameters, load_robot_file
 
 
 def with_values(hexapod: Robot, **values: float) -> ParameterSet:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.gait import standing_posture
-from pipeline.joint_demand import segment_demand
-from pipeline.robot import Robot, load_robot
+from pipeline.dynamics.joint_demand import segment_demand
+from pipeline.motion.gait import standing_posture
+from pipeline.robot.robot import Robot, load_robot
 
 PUBLISHED_TORQUE = {"rm_joint_1": 0.0, "rm_joint_2": -30.71, "rm_joint_3": 1.46}  # [N*m]
 TORQUE_TOLERANCE = 0.005  # half of the last printed digit [N*m]

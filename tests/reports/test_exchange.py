@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.app.staging import holding, settled, staged
+from pipeline.cli.staging import holding, settled, staged
 from reports.errors import OutputError
 from reports.exchange import EXCHANGE
 from reports.manifest import MANIFEST, read_manifest

@@ -14,19 +14,19 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from actuators.energy import StageEnergy
-from actuators.motor import DCMotor
+from actuators.elements.motor import DCMotor
+from actuators.energy.energy import StageEnergy
 from actuators.shaft import ShaftSeries
-from pipeline.joint_demand import MotionDemand
+from pipeline.dynamics.joint_demand import MotionDemand
 from reports.errors import FigureError
-from reports.figures.electrical_energy import electrical_energy_figure
-from reports.figures.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
-from reports.figures.gait_view import GaitStretch, gait_figure
-from reports.figures.joint_demand import Stretch, joint_demand_figure, stretches
-from reports.figures.motor_limits import common_scale, motor_limits_figure
+from reports.figures.energy.electrical_energy import electrical_energy_figure
+from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
+from reports.figures.energy.joint_demand import Stretch, joint_demand_figure, stretches
+from reports.figures.energy.motor_limits import common_scale, motor_limits_figure
+from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
+from reports.figures.robot.gait_view import GaitStretch, gait_figure
 from reports.figures.save import save_figure
 from reports.figures.several import Drawing, save_figures
-from reports.figures.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.style import BLUE, VERMILION, number
 
 PARTS = (

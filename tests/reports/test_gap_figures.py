@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from reports.errors import FigureError
-from reports.figures.gap_signature import Signature, binned, gap_signature_figure
-from reports.figures.gap_time import GapTrace, gap_time_figure
-from reports.figures.gap_waterfall import GapStep, gap_waterfall_figure
-from reports.figures.gap_where import WhereGroup, where_map_figure
+from reports.figures.gap.in_time import GapTrace, gap_time_figure
+from reports.figures.gap.signature import Signature, binned, gap_signature_figure
+from reports.figures.gap.waterfall import GapStep, gap_waterfall_figure
+from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
 from reports.tables.gap import deciding_motion, found
 from tests.reports import geometry

@@ -9,15 +9,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.gait import standing_posture
-from pipeline.robot import Robot, load_robot
-from pipeline.robot_file import load_robot_file
+from pipeline.motion.gait import standing_posture
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
 from reports.errors import FigureError
-from reports.figures.joint_directions import joint_directions_figure
-from reports.figures.projection import FRONT, OBLIQUE, SIDE, TOP, draw_scene, extent
-from reports.figures.robot_view import Leg, legs_of, robot_figure
+from reports.figures.robot.joint_directions import joint_directions_figure
+from reports.figures.robot.projection import FRONT, OBLIQUE, SIDE, TOP, draw_scene, extent
+from reports.figures.robot.robot_view import Leg, legs_of, robot_figure
+from reports.figures.robot.visuals import Primitive, joint_marks, primitives
 from reports.figures.style import new_figure
-from reports.figures.visuals import Primitive, joint_marks, primitives
 
 
 def placements(robot: Robot, configuration) -> dict[str, np.ndarray]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from actuators.regeneration import Supply
-from pipeline.contact_forces import ContactForces
-from pipeline.joint_demand import JointDemand, MotionDemand
+from actuators.energy.regeneration import Supply
+from pipeline.dynamics.contact_forces import ContactForces
+from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
 from reports.tables.walking import robot_energy
 
 LEGS = {"a": ("a1", "a2"), "b": ("b1",)}

@@ -11,13 +11,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.check import check_file
+from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import GaitError
-from pipeline.gait import standing_posture
-from pipeline.joint_demand import segment_demand
-from pipeline.robot import load_robot
-from pipeline.robot_file import load_robot_file
-from pipeline.urdf_check import MERGED
+from pipeline.motion.gait import standing_posture
+from pipeline.robot.check import check_file
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.urdf_check import MERGED
 
 DOG = ("{leg}_hip_joint", "{leg}_thigh_joint", "{leg}_calf_joint")
 #: URDF: base link, legs (left front, left hind, right front, right hind), joints, foot, place [m]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from pipeline.errors import UrdfError
-from pipeline.urdf_check import MERGED, Finding, check_urdf
+from pipeline.robot.urdf_check import MERGED, Finding, check_urdf
 
 INERTIA = '<inertia ixx="{0}" ixy="0" ixz="0" iyy="{1}" iyz="0" izz="{2}"/>'
 GOOD = (0.01, 0.01, 0.01)

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.check import Finding, check_file, check_robot
 from pipeline.errors import RobotFileError, UrdfError
-from pipeline.robot import load_robot
-from pipeline.robot_file import load_robot_file
-from pipeline.urdf_builder import build_urdf, leg_mass, trunk_mass
+from pipeline.robot.check import Finding, check_file, check_robot
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.urdf_builder import build_urdf, leg_mass, trunk_mass
 
 ROBOTS = ["hexapod.toml", "hexapod_axis90.toml", "leg.toml"]
 
@@ -158,7 +158,7 @@ def test_malformed_urdfs_are_one_line(tmp_path: Path, content: str, message: str
 
 def test_axis_variants_share_the_zero_pose(root: Path) -> None:
     """The angle of joint 1's axis changes nothing at zero."""
-    from pipeline.kinematics import foot_positions
+    from pipeline.robot.kinematics import foot_positions
 
     feet = [
         foot_positions(robot.chains, np.zeros((1, 6, 3)))

@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from actuators.build import load_catalog
-from pipeline.gap.measurement import CHOOSE, FIT, PROVE, Measurement, near_rest
-from pipeline.gap.model import MachineModel, machine_of_robot
-from pipeline.gap.remainder import remainders
-from pipeline.gap.simulate import Simulator
-from pipeline.gap.verdict import Remainder
-from pipeline.gap.weigh import Weighing, floor_of
-from pipeline.robot import load_robot
-from pipeline.robot_file import load_robot_file
+from actuators.loading.build import load_catalog
+from pipeline.identification.results import Remainder
+from pipeline.identification.selection.residual import remainders
+from pipeline.identification.selection.weigh import Weighing, floor_of
+from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement, near_rest
+from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.predict import Simulator
 
 ROOT = Path(__file__).parents[3]
 RATE = 200.0

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.gap.expected import Expected
+from pipeline.logs.reading.expected import Expected
 from tests.pipeline.gap.logs import motion
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.gap.log import Log
+from pipeline.logs.reading.log import Log
 
 Array = NDArray[np.float64]
 

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 from actuators.chain import Chain
-from actuators.motor import DCMotor
-from actuators.ratio import Ratio
+from actuators.elements.motor import DCMotor
+from actuators.elements.ratio import Ratio
 from actuators.shaft import ShaftSeries
-from pipeline.app.edited_chain import edited_chain
-from pipeline.gap.measurement import Measurement
-from pipeline.gap.model import JointModel, MachineModel
-from pipeline.gap.simulate import Simulator
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.edited_chain import edited_chain
+from pipeline.machine.machine import JointModel, MachineModel
+from pipeline.simulation.predict import Simulator
 from tests.pipeline.gap import bench_leg as leg
 
 RATIO, CONSTANT, TURNS = 50.0, 0.04, 0.3

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.gap.deciding import Rival, deciding_motion
-from pipeline.gap.effects.registry import EFFECTS, effect_named
-from pipeline.gap.expected import expected_of_model
+from pipeline.effects.registry import EFFECTS, effect_named
+from pipeline.identification.selection.deciding_motion import Rival, deciding_motion
+from pipeline.logs.reading.expected import expected_of_model
 from tests.pipeline.gap import bench_leg as leg
 
 J2 = ("rm_joint_2",)

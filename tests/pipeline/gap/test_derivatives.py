@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.gap.derivatives import LowPass, choose_cutoff
-from pipeline.gap.errors import PreparationError
+from pipeline.logs.errors import PreparationError
+from pipeline.logs.signals.derivatives import LowPass, choose_cutoff
 
 RATE = 1000.0
 MIDDLE = slice(300, -300)

@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from actuators.build import load_catalog
-from pipeline.app.gap_constants import voltage_per_speed, voltage_remarks
-from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.expected import expected_of_model
-from pipeline.gap.forward import ForwardSimulator, ServoInput
-from pipeline.gap.identify import identify
-from pipeline.gap.intake import prepare_logs
-from pipeline.gap.log import Log
-from pipeline.gap.measurement import Measurement
-from pipeline.gap.model import MachineModel, machine_of_urdf
-from pipeline.gap.observe import observe
-from pipeline.gap.parts import split
-from pipeline.gap.verdict import Naming
+from actuators.loading.build import load_catalog
+from pipeline.effects.registry import effect_named
+from pipeline.identification.compare.intake import prepare_logs
+from pipeline.identification.compare.observe import observe
+from pipeline.identification.results import Naming
+from pipeline.identification.selection.identify import identify
+from pipeline.identification.workflow.constants import voltage_per_speed, voltage_remarks
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.prepared.parts import split
+from pipeline.logs.reading.expected import expected_of_model
+from pipeline.logs.reading.log import Log
+from pipeline.machine.machine import MachineModel, machine_of_urdf
+from pipeline.simulation.forward import ForwardSimulator, ServoInput
 
 Array = NDArray[np.float64]
 FILES = Path(__file__).parent / "data_files"

@@ -11,17 +11,17 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from actuators.friction import Friction
-from actuators.heating import COPPER, Heating
-from actuators.inertia import Inertia
-from actuators.motor import DCMotor
-from actuators.quadrant import QuadrantFriction
-from actuators.ratio import Ratio
-from actuators.stribeck import Stribeck
-from pipeline.gap.errors import LogContentError, ModelError
-from pipeline.gap.forward import ForwardSimulator, ServoInput, servo_input
-from pipeline.gap.log import Log
-from pipeline.gap.model import JointModel, MachineModel, machine_of_urdf
+from actuators.elements.friction import Friction
+from actuators.elements.heating import COPPER, Heating
+from actuators.elements.inertia import Inertia
+from actuators.elements.motor import DCMotor
+from actuators.elements.quadrant import QuadrantFriction
+from actuators.elements.ratio import Ratio
+from actuators.elements.stribeck import Stribeck
+from pipeline.logs.errors import LogContentError, ModelError
+from pipeline.logs.reading.log import Log
+from pipeline.machine.machine import JointModel, MachineModel, machine_of_urdf
+from pipeline.simulation.forward import ForwardSimulator, ServoInput, servo_input
 
 Array = NDArray[np.float64]
 URDF = Path(__file__).parent / "data_files" / "xl330.urdf"

@@ -8,12 +8,8 @@ import numpy as np
 import pytest
 
 from actuators.errors import ActuatorError
-from pipeline.errors import PipelineError
-from pipeline.gap.effects.base import Effect
-from pipeline.gap.effects.registry import EFFECTS
-from pipeline.gap.errors import GapError
-from pipeline.gap.model import MachineModel
-from pipeline.gap.model_file import (
+from pipeline.effects.base import Effect
+from pipeline.effects.model_file import (
     Edit,
     EditParameter,
     apply_edits,
@@ -21,7 +17,11 @@ from pipeline.gap.model_file import (
     new_model_file,
     read_model_file,
 )
-from pipeline.gap.model_writer import model_text
+from pipeline.effects.registry import EFFECTS
+from pipeline.errors import PipelineError
+from pipeline.identification.workflow.model_writer import model_text
+from pipeline.logs.errors import GapError
+from pipeline.machine.machine import MachineModel
 from tests.pipeline.gap.test_fuzz_readers import TOML_TOKENS, mutated
 
 #: Places on the leg by kind of place; what acts on other things is not on a leg.

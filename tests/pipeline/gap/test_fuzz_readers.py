@@ -11,11 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import ActuatorError
-from pipeline.gap.errors import GapError
-from pipeline.gap.expected import Expected
-from pipeline.gap.intake import take_in
-from pipeline.gap.mapping import load_mapping
-from pipeline.gap.stream import stream_prepared
+from pipeline.identification.compare.intake import take_in
+from pipeline.logs.errors import GapError
+from pipeline.logs.prepared.stream import stream_prepared
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.mapping import load_mapping
 
 Array = NDArray[np.float64]
 ROWS = 400

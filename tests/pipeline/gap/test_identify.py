@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.gap.effects.registry import EFFECTS, effect_named
-from pipeline.gap.identify import identify
-from pipeline.gap.measurement import PROVE
+from pipeline.effects.registry import EFFECTS, effect_named
+from pipeline.identification.selection.identify import identify
+from pipeline.logs.prepared.measurement import PROVE
 from tests.pipeline.gap import bench_leg as leg
 
 J2 = ("rm_joint_2",)

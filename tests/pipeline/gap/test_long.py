@@ -13,16 +13,16 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-import pipeline.app.gap_setup
-from pipeline.app.gap_options import add_gap_options, split_items
-from pipeline.app.gap_run import Whereabouts, find_where
-from pipeline.app.gap_setup import Setup, setup, take_in
-from pipeline.app.gap_stages import stages
-from pipeline.gap.identify import identify
-from pipeline.gap.informative import STRETCH, choose, scan
-from pipeline.gap.measurement import CHOOSE, FIT, PROVE
-from pipeline.gap.parts import GUARD
-from pipeline.gap.twin.trial import make_trial
+import pipeline.identification.workflow.setup
+from pipeline.blind.twin.trial import make_trial
+from pipeline.cli.gap_options import add_gap_options, split_items
+from pipeline.identification.compare.stages import stages
+from pipeline.identification.selection.identify import identify
+from pipeline.identification.workflow.locate import Whereabouts, find_where
+from pipeline.identification.workflow.setup import Setup, setup, take_in
+from pipeline.logs.prepared.informative import STRETCH, choose, scan
+from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE
+from pipeline.logs.prepared.parts import GUARD
 from tests.pipeline.gap.logs import made_log, motion
 
 JOINTS = ("rm_joint_1", "rm_joint_2", "rm_joint_3")
@@ -55,7 +55,7 @@ def taken_in(root: Path, *arguments: str) -> tuple[Setup, Whereabouts]:
 @pytest.fixture
 def chunked(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """What is long from five thousand rows on."""
-    monkeypatch.setattr(pipeline.app.gap_setup, "LONG_ROWS", 5_000)
+    monkeypatch.setattr(pipeline.identification.workflow.setup, "LONG_ROWS", 5_000)
     return monkeypatch
 
 
@@ -112,7 +112,7 @@ def test_the_table_of_chunks_is_that_of_the_whole(
 ) -> None:
     tables = []
     for rows in (5_000, 10**9):
-        monkeypatch.setattr(pipeline.app.gap_setup, "LONG_ROWS", rows)
+        monkeypatch.setattr(pipeline.identification.workflow.setup, "LONG_ROWS", rows)
         _, where = taken_in(root, str(log), "--cutoff", "20")
         assert (where.intake.long is None) == (rows == 10**9)
         tables.append({(r.joint, r.by, r.band): r for r in where.rows})
@@ -151,7 +151,7 @@ def test_naming_on_stretches_gives_the_verdict_of_all_rows(
     path = long_leg(tmp_path / "long.parquet", [effect], 10, seed=8)
     verdicts, gaps = [], []
     for rows in (5_000, 10**9):
-        monkeypatch.setattr(pipeline.app.gap_setup, "LONG_ROWS", rows)
+        monkeypatch.setattr(pipeline.identification.workflow.setup, "LONG_ROWS", rows)
         given, where = taken_in(root, str(path))
         named = identify(given.model, where.measurements)
         verdicts.append(named.naming.found)
@@ -172,7 +172,7 @@ def test_naming_on_stretches_gives_the_verdict_of_all_rows(
 
 CHILD = """
 import resource, sys
-from pipeline.app.cli import main
+from pipeline.cli.main import main
 try:
     main(sys.argv[1:])
 finally:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.gap.errors import GapError
-from pipeline.gap.expected import Expected
-from pipeline.gap.mapping import Mapping, load_mapping
-from pipeline.gap.read import read_log
+from pipeline.logs.errors import GapError
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.mapping import Mapping, load_mapping
+from pipeline.logs.reading.read import read_log
 
 Array = NDArray[np.float64]
 Write = Callable[..., Path]

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from pipeline.gap import verdict as limits
-from pipeline.gap.columns import make_benches
-from pipeline.gap.effects.registry import catalogue, effect_named
-from pipeline.gap.identify import _doubt, identify
-from pipeline.gap.intervals import _certain
-from pipeline.gap.measurement import Measurement
-from pipeline.gap.name import _rivals, _threshold
-from pipeline.gap.problem import Problem
-from pipeline.gap.refit import refit
-from pipeline.gap.screen import Screen, score_all
-from pipeline.gap.trial import Trial, try_candidate
+from pipeline.effects.registry import catalogue, effect_named
+from pipeline.identification import results as limits
+from pipeline.identification.regression.design_matrix import make_benches
+from pipeline.identification.regression.intervals import _certain
+from pipeline.identification.regression.problem import Problem
+from pipeline.identification.regression.refit import refit
+from pipeline.identification.selection.candidate import Trial, try_candidate
+from pipeline.identification.selection.identify import _doubt, identify
+from pipeline.identification.selection.screen import Screen, score_all
+from pipeline.identification.selection.select import _rivals, _threshold
+from pipeline.logs.prepared.measurement import Measurement
 from tests.pipeline.gap import bench_leg as leg
 
 J2 = ("rm_joint_2",)

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.gap.errors import GapError, ModelFileError
-from pipeline.gap.model_file import (
+from pipeline.effects.model_file import (
     Edit,
     EditParameter,
     apply_edits,
@@ -16,7 +15,8 @@ from pipeline.gap.model_file import (
     new_model_file,
     read_model_file,
 )
-from pipeline.gap.model_writer import model_text
+from pipeline.identification.workflow.model_writer import model_text
+from pipeline.logs.errors import GapError, ModelFileError
 
 
 def _edit(value: float = 0.4) -> Edit:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.simulate import Simulator
+from pipeline.effects.registry import effect_named
+from pipeline.simulation.predict import Simulator
 from tests.pipeline.gap import bench_leg as leg
 
 J3 = ("rm_joint_3",)

@@ -10,17 +10,17 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.gap.contact import log_contact, lowest_feet, scheduled_contact
-from pipeline.gap.cycles import cycle_noise, period, repeat_noise
-from pipeline.gap.errors import GapError, PreparationError
-from pipeline.gap.expected import Expected, expected_of_robot
-from pipeline.gap.intake import prepare_logs
-from pipeline.gap.parts import CHOOSE, FIT, PROVE, split
-from pipeline.gap.prepare import Settings, choose_settings, prepare
-from pipeline.gap.read import read_log
-from pipeline.gap.stream import stream_prepared
-from pipeline.motion import Motion
-from pipeline.robot import Robot
+from pipeline.identification.compare.intake import prepare_logs
+from pipeline.logs.errors import GapError, PreparationError
+from pipeline.logs.prepared.contact import log_contact, lowest_feet, scheduled_contact
+from pipeline.logs.prepared.cycles import cycle_noise, period, repeat_noise
+from pipeline.logs.prepared.parts import CHOOSE, FIT, PROVE, split
+from pipeline.logs.prepared.prepare import Settings, choose_settings, prepare
+from pipeline.logs.prepared.stream import stream_prepared
+from pipeline.logs.reading.expected import Expected, expected_of_robot
+from pipeline.logs.reading.read import read_log
+from pipeline.motion.motion import Motion
+from pipeline.robot.robot import Robot
 from tests.pipeline.gap.logs import made_log, motion
 
 Array = NDArray[np.float64]

@@ -7,15 +7,15 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.units import to_si
-from pipeline.gap.errors import GapError
-from pipeline.gap.expected import Expected
-from pipeline.gap.finding import Quality
-from pipeline.gap.glitches import glitches
-from pipeline.gap.log import Log
-from pipeline.gap.model_check import compare_with_prediction
-from pipeline.gap.quality import judge
-from pipeline.gap.sampling import held, quantum
-from pipeline.gap.skew import skew
+from pipeline.identification.compare.model_check import compare_with_prediction
+from pipeline.logs.errors import GapError
+from pipeline.logs.quality.finding import Quality
+from pipeline.logs.quality.glitches import glitches
+from pipeline.logs.quality.quality import judge
+from pipeline.logs.quality.sampling import held, quantum
+from pipeline.logs.quality.skew import skew
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import Log
 from tests.pipeline.gap.logs import made_log, motion
 
 Array = NDArray[np.float64]

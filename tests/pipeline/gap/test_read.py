@@ -12,11 +12,11 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.gap.errors import GapError
-from pipeline.gap.expected import Expected
-from pipeline.gap.quality import judge
-from pipeline.gap.read import read_log, stream_log
-from pipeline.gap.table_file import open_table, row_count
+from pipeline.logs.errors import GapError
+from pipeline.logs.quality.quality import judge
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.read import read_log, stream_log
+from pipeline.logs.reading.table_file import open_table, row_count
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]

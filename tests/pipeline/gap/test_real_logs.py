@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.gap.expected import Expected, expected_of_model
-from pipeline.gap.intake import take_in
-from pipeline.gap.mapping import load_mapping
-from pipeline.gap.parts import PROVE, split
-from pipeline.robot import parse_urdf
+from pipeline.identification.compare.intake import take_in
+from pipeline.logs.prepared.parts import PROVE, split
+from pipeline.logs.reading.expected import Expected, expected_of_model
+from pipeline.logs.reading.mapping import load_mapping
+from pipeline.robot.robot import parse_urdf
 
 FILES = Path(__file__).parent / "data_files"
 

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.app.cli import main, parser
-from pipeline.app.gap_options import split_items
-from pipeline.app.gap_run import Progress, Whereabouts, find_where
-from pipeline.app.gap_setup import Setup, setup, take_in
-from pipeline.app.gap_story import tell
-from pipeline.app.gap_written import Weighed
-from pipeline.gap.measurement import PROVE
-from pipeline.gap.model_writer import edits_of, model_text
-from pipeline.gap.verdict import Found
+from pipeline.cli.gap_options import split_items
+from pipeline.cli.main import main, parser
+from pipeline.identification.results import Found
+from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where
+from pipeline.identification.workflow.model_writer import edits_of, model_text
+from pipeline.identification.workflow.setup import Setup, setup, take_in
+from pipeline.identification.workflow.story import tell
+from pipeline.identification.workflow.written import Weighed
+from pipeline.logs.prepared.measurement import PROVE
 
 Array = NDArray[np.float64]
 FILES = Path(__file__).parent / "data_files"

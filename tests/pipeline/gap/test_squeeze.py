@@ -13,15 +13,15 @@ import pinocchio as pin
 import pytest
 from numpy.typing import NDArray
 
-from actuators.build import load_catalog
-from pipeline.app.compute import stand
-from pipeline.app.effects import effects
-from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.measurement import FIT, Measurement
-from pipeline.gap.model import MachineModel, machine_of_robot
-from pipeline.gap.rigid import RigidBodies
-from pipeline.gap.twin.walking import squeeze_torque
-from pipeline.robot import Robot
+from actuators.loading.build import load_catalog
+from pipeline.blind.twin.walking import squeeze_torque
+from pipeline.effects.registry import effect_named
+from pipeline.logs.prepared.measurement import FIT, Measurement
+from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.robot.robot import Robot
+from pipeline.simulation.edited import effects
+from pipeline.simulation.rigid_bodies import RigidBodies
+from pipeline.simulation.walk_stand import stand
 
 Array = NDArray[np.float64]
 PUSH = 30.0  # of all feet on one side [N]

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.errors import ModelError
-from pipeline.gap.identify import identify
-from pipeline.gap.measurement import Measurement
-from pipeline.gap.model import MachineModel
-from pipeline.gap.nuisance import nuisances
-from pipeline.gap.simulate import Simulator
+from pipeline.effects.registry import effect_named
+from pipeline.identification.regression.tolerances import nuisances
+from pipeline.identification.selection.identify import identify
+from pipeline.logs.errors import ModelError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Simulator
 from tests.pipeline.gap import bench_leg as leg
 
 J2 = "rm_joint_2"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.gap.twin.machine import Machine, load_machine
-from pipeline.robot import Robot, load_robot
-from pipeline.robot_file import load_robot_file
+from pipeline.blind.twin.machine import Machine, load_machine
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
 
 
 @pytest.fixture(scope="session")

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.gap.twin.laws.bristle import BristleFriction, BristleLaw
-from pipeline.gap.twin.laws.extra import CableDrag, QuadraticDrag, Ripple, Spring, StickingSpot
-from pipeline.gap.twin.laws.ground import Footing, Ground
-from pipeline.gap.twin.laws.transmission import transmitted_torque
+from pipeline.blind.twin.laws.bristle import BristleFriction, BristleLaw
+from pipeline.blind.twin.laws.extra import CableDrag, QuadraticDrag, Ripple, Spring, StickingSpot
+from pipeline.blind.twin.laws.ground import Footing, Ground
+from pipeline.blind.twin.laws.transmission import transmitted_torque
 
 DT = 5e-4
 ONE = np.ones(1)

@@ -4,9 +4,9 @@ from collections import Counter
 
 import pytest
 
-from pipeline.gap.twin.effects import EFFECTS
-from pipeline.gap.twin.errors import TwinError
-from pipeline.gap.twin.matrix import trial_matrix
+from pipeline.blind.twin.effects import EFFECTS
+from pipeline.blind.twin.errors import TwinError
+from pipeline.blind.twin.matrix import trial_matrix
 
 
 def test_matrix_holds_what_is_asked_of_it() -> None:

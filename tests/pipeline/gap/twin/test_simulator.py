@@ -6,17 +6,17 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.gap.twin.controller import Controller, Plan
-from pipeline.gap.twin.errors import TwinError
-from pipeline.gap.twin.laws.bristle import BristleLaw
-from pipeline.gap.twin.laws.extra import QuadraticDrag, Ripple, Spring, StickingSpot
-from pipeline.gap.twin.laws.ground import Ground
-from pipeline.gap.twin.machine import Machine
-from pipeline.gap.twin.plant import Heating, Plant, nominal_plant
-from pipeline.gap.twin.simulator import Simulation
-from pipeline.gap.twin.trajectories import leg_plan, multisine
-from pipeline.gap.twin.walking import standing_plan
-from pipeline.robot import Robot
+from pipeline.blind.twin.controller import Controller, Plan
+from pipeline.blind.twin.errors import TwinError
+from pipeline.blind.twin.laws.bristle import BristleLaw
+from pipeline.blind.twin.laws.extra import QuadraticDrag, Ripple, Spring, StickingSpot
+from pipeline.blind.twin.laws.ground import Ground
+from pipeline.blind.twin.machine import Machine
+from pipeline.blind.twin.plant import Heating, Plant, nominal_plant
+from pipeline.blind.twin.simulator import Simulation
+from pipeline.blind.twin.trajectories import leg_plan, multisine
+from pipeline.blind.twin.walking import standing_plan
+from pipeline.robot.robot import Robot
 
 FREE = Controller(proportional=0.0, derivative=0.0)
 

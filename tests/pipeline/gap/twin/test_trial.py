@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.gap.twin import trial as trial_module
-from pipeline.gap.twin.controller import Plan
-from pipeline.gap.twin.effects import CATALOGUE, EFFECTS, UNCATALOGUED, Hidden, draw, effect_named
-from pipeline.gap.twin.errors import TwinError
-from pipeline.gap.twin.files import csv_bytes, sealed_bytes, write_trial
-from pipeline.gap.twin.reference import Reference, reference
-from pipeline.gap.twin.sensors import NOISE_LEVELS, measure
-from pipeline.gap.twin.setup import Setup, nominal_setup, stream, with_tolerances
-from pipeline.gap.twin.trajectories import leg_plan
-from pipeline.gap.twin.trial import make_trial, plan_of
-from pipeline.gap.twin.walking import walking_plan
+from pipeline.blind.twin import trial as trial_module
+from pipeline.blind.twin.controller import Plan
+from pipeline.blind.twin.effects import CATALOGUE, EFFECTS, UNCATALOGUED, Hidden, draw, effect_named
+from pipeline.blind.twin.errors import TwinError
+from pipeline.blind.twin.files import csv_bytes, sealed_bytes, write_trial
+from pipeline.blind.twin.reference import Reference, reference
+from pipeline.blind.twin.sensors import NOISE_LEVELS, measure
+from pipeline.blind.twin.setup import Setup, nominal_setup, stream, with_tolerances
+from pipeline.blind.twin.trajectories import leg_plan
+from pipeline.blind.twin.trial import make_trial, plan_of
+from pipeline.blind.twin.walking import walking_plan
 
 #: The names the workflow's catalogue promises.
 PROMISED = {
@@ -44,7 +44,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trials of one second; squeezing feet plan their own walk, which is cut, too."""
     monkeypatch.setattr(trial_module, "plan_of", lambda *a: cut(plan_of(*a), 1000))
     monkeypatch.setattr(
-        "pipeline.gap.twin.effects.bodies.walking_plan",
+        "pipeline.blind.twin.effects.bodies.walking_plan",
         lambda robot, **options: cut(walking_plan(robot, **options), 1000),
     )
 

@@ -1,0 +1,1 @@
+"""Elements of an actuator: one law between two neighbouring shafts each."""

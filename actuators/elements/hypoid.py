@@ -1,0 +1,166 @@
+"""A hypoid gear with friction at the tooth contact (Eq. 12 and 13 of the paper).
+
+With the wheel (2) on the joint side and the pinion (1) on the motor side, s = sgn(w2), and the
+normal force F
+
+    F = T2 / (r2 (cos b2 + s sgn(T2) mu sin b2))                                        (Eq. 12)
+    T1 = (F cos b1 + s mu |F| sin b1) r1                                                (Eq. 13)
+
+Power is conserved at mu = 0 only if r1 is tied to the ratio: n = r2 cos b2 / (r1 cos b1). Then
+
+    T1 = T2 / n (1 + mu tan b1) / (1 + mu tan b2)   where the pinion drives (s T2 > 0)
+    T1 = T2 / n (1 - mu tan b1) / (1 - mu tan b2)   where the wheel drives (s T2 < 0)
+
+so the driving efficiency is (1 + mu tan b2) / (1 + mu tan b1), and the wheel cannot drive where
+mu tan b1 >= 1. Eq. 11 of the paper, T1 w1 = T2 w2, is the limit mu = 0.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+from actuators.elements.element import Element
+from actuators.errors import SelfLockingError
+from actuators.shaft import ShaftSeries
+
+
+@dataclass(frozen=True, eq=False)
+class Hypoid(Element):
+    """A hypoid gear; reversible or self-locking as its angles and friction decide.
+
+    Attributes:
+        ratio: n, pinion speed over wheel speed, positive.
+        pinion_angle: b1, spiral angle of the pinion [rad].
+        wheel_angle: b2, spiral angle of the wheel [rad], smaller than b1.
+        wheel_radius: r2, mean radius of the wheel [m]; it sets forces and sliding speed, the
+            pinion's torque does not depend on it.
+        friction: mu at the tooth contact, dimensionless; mu tan b2 must stay below 1.
+
+    Raises:
+        UnphysicalElementError: Angles or friction outside the law's reach.
+
+    Note:
+        b1, b2 and mu act on the torque only through mu tan b1 and mu tan b2. Friction is the same
+        at standstill as in motion.
+    """
+
+    ratio: Scalars = 1.0
+    pinion_angle: Scalars = 0.0
+    wheel_angle: Scalars = 0.0
+    wheel_radius: Scalars = 1.0
+    friction: Scalars = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative(
+            self.name, ratio=self.ratio, wheel_radius=self.wheel_radius, friction=self.friction
+        )
+        b1, b2 = np.asarray(self.pinion_angle), np.asarray(self.wheel_angle)
+        require(np.greater(self.ratio, 0.0), self.name, "ratio must be > 0")
+        require(np.greater(self.wheel_radius, 0.0), self.name, "wheel_radius must be > 0")
+        require((b1 < np.pi / 2) & (b2 >= 0.0), self.name, "angles must lie in [0, 90) deg")
+        require(b1 > b2, self.name, "pinion_angle must exceed wheel_angle, or friction gives power")
+        require(
+            self.friction * np.tan(b2) < 1.0,
+            self.name,
+            "friction x tan(wheel_angle) must be below 1, or the wheel cannot turn at all",
+        )
+
+    @property
+    def driving_factor(self) -> Scalars:
+        """T1 n / T2 where the pinion drives: above 1."""
+        factor: Scalars = (1.0 + self.friction * np.tan(self.pinion_angle)) / (
+            1.0 + self.friction * np.tan(self.wheel_angle)
+        )
+        return factor
+
+    @property
+    def driven_factor(self) -> Scalars:
+        """T1 n / T2 where the wheel drives: below 1, zero or less when self-locking."""
+        factor: Scalars = (1.0 - self.friction * np.tan(self.pinion_angle)) / (
+            1.0 - self.friction * np.tan(self.wheel_angle)
+        )
+        return factor
+
+    @property
+    def pinion_radius(self) -> Scalars:
+        """r1 [m], tied to the ratio."""
+        radius: Scalars = (
+            self.wheel_radius * np.cos(self.wheel_angle) / (self.ratio * np.cos(self.pinion_angle))
+        )
+        return radius
+
+    @property
+    def gearing(self) -> Scalars:
+        """The ratio."""
+        return self.ratio
+
+    def normal_force(self, joint_side: ShaftSeries) -> FloatArray:
+        """Return the signed normal force at the teeth, (N, J) [N] (Eq. 12)."""
+        sense = np.sign(joint_side.torque)
+        sense *= joint_side.direction
+        sense *= self.friction * np.sin(self.wheel_angle)
+        sense += np.cos(self.wheel_angle)
+        sense *= self.wheel_radius
+        force: FloatArray = joint_side.torque / sense
+        return force
+
+    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
+        """Return the pinion's torque and motion (Eq. 13)."""
+        force = self.normal_force(joint_side)
+        torque = np.abs(force)
+        torque *= joint_side.direction
+        torque *= self.friction * np.sin(self.pinion_angle)
+        force *= np.cos(self.pinion_angle)
+        torque += force
+        torque *= self.pinion_radius
+        return joint_side.geared(self.ratio, torque)
+
+    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+        """Return the wheel's torque and motion.
+
+        Raises:
+            SelfLockingError: The gear locks by itself and the pinion's torque is against its
+                motion: no finite load keeps it moving, it stops at once.
+
+        Note:
+            A self-locking gear has two loads for one torque that pushes along the motion: a
+            resisting one and an overhauling one. The resisting one is returned.
+        """
+        d = motor_side.direction
+        along = d * np.sign(motor_side.torque)
+        locks = np.less_equal(self.driven_factor, 0.0)
+        if np.any(locks & (along < 0.0)):
+            row, column = np.argwhere(locks & (along < 0.0))[0]
+            raise SelfLockingError(
+                f"element '{self.name}': joint '{motor_side.joints[column]}' cannot keep moving in "
+                f"sample {row} against its pinion's torque: treat it as standing"
+            )
+        driven = np.where(locks, 1.0, self.driven_factor)  # its branch is not used when locking
+        factor = np.where(along > 0.0, self.driving_factor, np.where(along < 0.0, driven, 1.0))
+        torque = motor_side.torque * self.ratio / factor
+        return motor_side.geared(1.0 / np.asarray(self.ratio), torque)
+
+    def holding(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the span of Eq. 13 over both senses of an impending motion.
+
+        Each end of the motor-side interval is a concave (lower) or convex (upper) function of the
+        load, so that its extreme over an interval lies at one of the interval's ends.
+        """
+        a = np.asarray(self.driving_factor) / self.ratio
+        b = np.asarray(self.driven_factor) / self.ratio
+        ends = [low * a, low * b, high * a, high * b]
+        return np.minimum.reduce(ends), np.maximum.reduce(ends)
+
+    def loss(self, joint_side: ShaftSeries, motor_side: ShaftSeries) -> FloatArray:
+        """Return mu |F| |v|, (N, J) [W], with the sliding speed v along the teeth.
+
+        v = r2 w2 cos b2 (tan b1 - tan b2): both gears share the speed normal to the teeth and
+        differ along them. This is a law of its own, not a difference of powers.
+        """
+        slip = np.cos(self.wheel_angle) * (np.tan(self.pinion_angle) - np.tan(self.wheel_angle))
+        power = np.abs(self.normal_force(joint_side))
+        power *= self.friction * slip * self.wheel_radius
+        power *= joint_side.direction
+        power *= joint_side.velocity
+        return power

@@ -1,0 +1,47 @@
+"""A rotating mass at one shaft (the inertial terms of Eq. 3, 7, 8, 14 and 18 of the paper)."""
+
+from dataclasses import dataclass
+
+from actuators.arrays import FloatArray, Scalars, require_non_negative
+from actuators.elements.element import Element
+from actuators.shaft import ShaftSeries
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia(Element):
+    """Torque for the acceleration of a shaft; stores kinetic energy and dissipates nothing.
+
+    Attributes:
+        inertia: Moment of inertia about the shaft [kg*m^2].
+
+    Raises:
+        UnphysicalElementError: The inertia is negative.
+
+    Note:
+        Counted here, reflected rotor inertia must not stand in the rigid-body model as well.
+    """
+
+    inertia: Scalars = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative(self.name, inertia=self.inertia)
+
+    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
+        """Add inertia times acceleration."""
+        torque = joint_side.acceleration * self.inertia
+        torque += joint_side.torque
+        return joint_side.with_torque(torque)
+
+    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+        """Subtract inertia times acceleration."""
+        return motor_side.with_torque(motor_side.torque - self.inertia * motor_side.acceleration)
+
+    def holding(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the interval as it is: at standstill nothing accelerates."""
+        return low, high
+
+    def stored(self, joint_side: ShaftSeries, motor_side: ShaftSeries) -> FloatArray:
+        """Return the rate of kinetic energy, (N, J) [W]."""
+        rate = joint_side.acceleration * self.inertia
+        rate *= joint_side.velocity
+        return rate

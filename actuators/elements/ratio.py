@@ -1,0 +1,44 @@
+"""An ideal transmission: a ratio without loss (Eq. 1 and 2 of the paper)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuators.arrays import FloatArray, Scalars, require
+from actuators.elements.element import Element
+from actuators.shaft import ShaftSeries
+
+
+@dataclass(frozen=True, eq=False)
+class Ratio(Element):
+    """Speed divided from motor side to joint side, torque multiplied, power kept.
+
+    Attributes:
+        ratio: Motor-side over joint-side speed, positive, dimensionless.
+
+    Raises:
+        UnphysicalElementError: The ratio is not positive and finite.
+    """
+
+    ratio: Scalars = 1.0
+
+    def __post_init__(self) -> None:
+        ratio = np.asarray(self.ratio, dtype=float)
+        require(np.isfinite(ratio) & (ratio > 0.0), self.name, "ratio must be positive and finite")
+
+    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
+        """Return the faster shaft with the smaller torque."""
+        return joint_side.geared(self.ratio, joint_side.torque / self.ratio)
+
+    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+        """Return the slower shaft with the larger torque."""
+        return motor_side.geared(1.0 / np.asarray(self.ratio), motor_side.torque * self.ratio)
+
+    def holding(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Scale the interval."""
+        return low / self.ratio, high / self.ratio
+
+    @property
+    def gearing(self) -> Scalars:
+        """The ratio."""
+        return self.ratio

@@ -1,0 +1,1 @@
+"""Energy: supply and return, balance, motor limits."""

@@ -1,0 +1,104 @@
+"""Where a motion asks more of a motor than its data sheet permits."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuators.arrays import FloatArray
+from actuators.chain import ChainResult
+from actuators.elements.motor import DCMotor
+from actuators.energy.energy import duration
+
+
+@dataclass(frozen=True)
+class LimitRow:
+    """One quantity of one joint's motor against its limit, over the whole series.
+
+    Attributes:
+        joint: Name.
+        quantity: speed, voltage, current or rms_current.
+        unit: rad/s, V or A.
+        limit: Permitted magnitude.
+        peak: Greatest magnitude; for rms_current the root mean square.
+        peak_time: When the peak occurs [s]; start of the series for rms_current.
+        share_over: Share of the time above the limit; for rms_current 1 or 0.
+        breach: Whether the peak exceeds the limit.
+    """
+
+    joint: str
+    quantity: str
+    unit: str
+    limit: float
+    peak: float
+    peak_time: float
+    share_over: float
+    breach: bool
+
+
+def limit_rows(result: ChainResult, motor: DCMotor) -> tuple[LimitRow, ...]:
+    """Return a row for every joint and limit, breached or not.
+
+    Args:
+        result: What the chain needs for the motion.
+        motor: The motor whose limits hold.
+
+    Raises:
+        EnergyError: The series spans no time.
+    """
+    time = result.joint.time
+    span = duration(time)
+    rows = []
+    instantaneous = (
+        ("speed", "rad/s", motor.max_speed, result.motor.velocity),
+        ("voltage", "V", motor.supply_voltage, result.voltage),
+        ("current", "A", motor.peak_current, result.current),
+    )
+    rms = rms_over_time(time, result.current)
+    for j, joint in enumerate(result.joint.joints):
+        for quantity, unit, limit, values in instantaneous:
+            magnitude = np.abs(values[:, j])
+            at = int(np.argmax(magnitude))
+            peak = float(magnitude[at])
+            share = time_over(time, magnitude, limit) / span
+            rows.append(
+                LimitRow(joint, quantity, unit, limit, peak, float(time[at]), share, peak > limit)
+            )
+        limit, value = motor.continuous_current, float(rms[j])
+        over = value > limit
+        rows.append(
+            LimitRow(joint, "rms_current", "A", limit, value, float(time[0]), float(over), over)
+        )
+    return tuple(rows)
+
+
+def rms_over_time(time: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the root mean square of a piecewise linear quantity, (J,).
+
+    Args:
+        time: (N,) [s], repeated stamps are breaks.
+        values: (N, J).
+
+    Raises:
+        EnergyError: The series spans no time.
+    """
+    a, b = values[:-1], values[1:]
+    square = np.diff(time) @ (a * a + a * b + b * b) / 3.0  # exact for linear pieces
+    mean_square: FloatArray = square / duration(time)
+    return np.sqrt(mean_square)
+
+
+def time_over(time: FloatArray, magnitude: FloatArray, limit: float) -> float:
+    """Return for how long a piecewise linear quantity exceeds a limit [s].
+
+    Args:
+        time: (N,) [s].
+        magnitude: (N,).
+        limit: The limit.
+    """
+    if not np.isfinite(limit):
+        return 0.0
+    low = np.minimum(magnitude[:-1], magnitude[1:])
+    high = np.maximum(magnitude[:-1], magnitude[1:])
+    rise = np.where(high > low, high - low, 1.0)
+    share = np.where(low > limit, 1.0, np.where(high > limit, (high - limit) / rise, 0.0))
+    return float(np.diff(time) @ share)

@@ -1,0 +1,1 @@
+"""From the catalogue's files to components and chains."""

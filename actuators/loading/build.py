@@ -1,0 +1,173 @@
+"""From the catalogue's files to chains: components, alternatives, and edits of their parameters."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Final
+
+import numpy as np
+
+from actuators.chain import Chain
+from actuators.elements.motor import DCMotor
+from actuators.errors import ActuatorError, CatalogError, closest, one_line
+from actuators.loading.alternatives import ALTERNATIVES_FILE, LAWS, Alternative, read_alternative
+from actuators.loading.components import MOTOR_KIND, Component, load_component
+from actuators.parameters import Parameter, read_toml
+
+CATALOG: Final = Path(__file__).parents[1] / "catalog"
+WINDING: Final = "winding"  # the motor's row among the losses
+_RATIO_TOLERANCE: Final = 1e-9  # relative
+
+
+@dataclass(frozen=True)
+class Catalog:
+    """Components and the alternatives built from them; edits return a new catalogue.
+
+    Attributes:
+        components: By name.
+        alternatives: By name, in the file's order.
+    """
+
+    components: Mapping[str, Component]
+    alternatives: Mapping[str, Alternative]
+
+    def parameter(self, reference: str) -> Parameter:
+        """Return the parameter that `component.parameter` names.
+
+        Raises:
+            CatalogError: No such component.
+            ParameterError: The component has no such parameter.
+        """
+        component, name = self._split(reference)
+        return component.parameters.parameter(name)
+
+    def rows(self) -> tuple[tuple[str, Parameter], ...]:
+        """Return every parameter with its component's name."""
+        return tuple((c.name, p) for c in self.components.values() for p in c.parameters.rows())
+
+    def replaced(self, reference: str, value: float, **changes: Any) -> "Catalog":
+        """Return a catalogue in which one parameter has another SI value.
+
+        Args:
+            reference: `component.parameter`.
+            value: In SI units.
+            **changes: As for `ParameterSet.replaced`.
+
+        Raises:
+            CatalogError: No such component.
+            ParameterError: No such parameter, or a value outside its bounds.
+        """
+        component, name = self._split(reference)
+        edited = dataclasses.replace(
+            component, parameters=component.parameters.replaced(name, value, **changes)
+        )
+        components = {n: edited if n == component.name else c for n, c in self.components.items()}
+        return dataclasses.replace(self, components=MappingProxyType(components))
+
+    def chain(self, name: str) -> Chain:
+        """Return the chain of an alternative.
+
+        Raises:
+            CatalogError: No such alternative, or its ratios do not multiply to what it promises.
+            ActuatorError: A parameter is unphysical.
+        """
+        if name not in self.alternatives:
+            raise CatalogError(
+                f"no alternative '{one_line(name)}': {closest(name, list(self.alternatives))}"
+            )
+        alternative = self.alternatives[name]
+        elements = tuple(
+            LAWS[e.law][0](
+                name=e.name, **{a: self.parameter(r).value for a, r in e.arguments.items()}
+            )
+            for e in alternative.elements
+        )
+        constants = self.components[alternative.motor].parameters
+        spread = {
+            f"{name}_spread": constants.parameter(name).spread
+            for name in ("torque_constant", "resistance")
+        }
+        motor = DCMotor(name=WINDING, **constants, **spread)
+        stages = {e.stage: e.name for e in alternative.elements if e.stage}
+        chain = Chain(name=name, elements=elements, motor=motor, stages=MappingProxyType(stages))
+        total, promised = float(np.asarray(chain.ratio)), self.parameter(alternative.ratio).value
+        if abs(total / promised - 1.0) > _RATIO_TOLERANCE:
+            raise CatalogError(
+                f"alternative '{name}': its ratios multiply to {total:.10g}, "
+                f"'{alternative.ratio}' asks for {promised:.10g}: change them together"
+            )
+        return chain
+
+    def chains(self) -> dict[str, Chain]:
+        """Return the chain of every alternative, in order."""
+        return {name: self.chain(name) for name in self.alternatives}
+
+    def _split(self, reference: str) -> tuple[Component, str]:
+        """Return the component and the parameter's name of a reference."""
+        component, dot, name = reference.partition(".")
+        if not dot:
+            raise CatalogError(f"'{one_line(reference)}': expected component.parameter")
+        if component not in self.components:
+            raise CatalogError(
+                f"no component '{one_line(component)}': {closest(component, list(self.components))}"
+            )
+        return self.components[component], name
+
+
+def load_catalog(directory: str | Path = CATALOG) -> Catalog:
+    """Load a catalogue: every component file of a directory and its `alternatives.toml`.
+
+    Every alternative is built once, so that a catalogue that loads is one that works.
+
+    Raises:
+        ParameterError: A file cannot be read, or a parameter is wrong.
+        CatalogError: A component, law, argument or reference is unknown, a ratio does not come
+            out, or a parameter is used by no alternative.
+        ActuatorError: A parameter is unphysical.
+    """
+    folder = Path(directory)
+    contents = read_toml(folder / ALTERNATIVES_FILE)
+    files = sorted(p for p in folder.glob("*.toml") if p.name != ALTERNATIVES_FILE)
+    components = {p.stem: load_component(p) for p in files}
+    alternatives = {name: read_alternative(name, entry) for name, entry in contents.items()}
+    catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
+    used: set[str] = set()
+    for alternative in alternatives.values():
+        _check_motor(alternative, catalog)
+        for reference in alternative.references:
+            _check_reference(alternative.name, reference, catalog)
+        used |= set(alternative.references)
+        used |= {f"{alternative.motor}.{p}" for p in components[alternative.motor].parameters}
+        try:
+            catalog.chain(alternative.name)
+        except CatalogError:
+            raise
+        except ActuatorError as error:
+            raise CatalogError(f"alternative '{alternative.name}': {error}") from None
+    for component, parameter in catalog.rows():
+        if f"{component}.{parameter.name}" not in used:
+            raise CatalogError(
+                f"{component}.toml: parameter '{parameter.name}' is used by no alternative: "
+                f"name it in {ALTERNATIVES_FILE} or remove it"
+            )
+    return catalog
+
+
+def _check_motor(alternative: Alternative, catalog: Catalog) -> None:
+    """Raise unless an alternative's motor is a motor of the catalogue."""
+    motors = [c.name for c in catalog.components.values() if c.kind == MOTOR_KIND]
+    if alternative.motor not in motors:
+        raise CatalogError(
+            f"alternative '{alternative.name}': no motor '{one_line(alternative.motor)}': "
+            f"{closest(alternative.motor, motors)}"
+        )
+
+
+def _check_reference(alternative: str, reference: str, catalog: Catalog) -> None:
+    """Raise unless a reference names a parameter of the catalogue."""
+    try:
+        catalog.parameter(reference)
+    except ActuatorError as error:
+        raise CatalogError(f"alternative '{alternative}': {error}") from None

@@ -1,0 +1,1 @@
+"""Blind trials: hide an effect in a simulated machine, let the workflow answer, score it."""

@@ -1,1 +1,0 @@
-"""Calibrating what the paper does not print, and judging what it does."""

@@ -1,0 +1,252 @@
+"""The verb blind: make trials, seal what was hidden, ask the workflow, then open the seals.
+
+Three steps, each of which goes on where it was stopped: every trial is made and sealed, with what
+its log could tell; `gap` answers each in a process of its own, in a folder that holds only log,
+robot and actuators; only then are the seals opened and the answers judged.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from pipeline.blind.answer import ask, read_answer
+from pipeline.blind.make import (
+    answer_folder,
+    judgement_file,
+    make,
+    read_judgement,
+    seal_file,
+    trial_folder,
+)
+from pipeline.blind.score import score
+from pipeline.blind.summary import Scored, by_effect, confusion, rates, trial_rows
+from pipeline.blind.truth import hidden_truths
+from pipeline.blind.twin.matrix import TrialSpec, trial_matrix
+from pipeline.blind.twin.trial import ROBOT_FILES
+from pipeline.cli.staging import staged
+from pipeline.logs.errors import GapError
+from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.paper.calibration.checkpoint import Checkpoint
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
+
+_ROOT: Final = Path(__file__).parents[2]
+#: What a trial is made of, and what an answer hangs on beside it.
+_OF_TRIALS: Final = (
+    "urdf/*.toml",
+    "actuators/catalog/*.toml",
+    "pipeline/robot/*.py",
+    "pipeline/motion/*.py",
+    "pipeline/dynamics/*.py",
+)
+_OF_TRIALS_TOO: Final = ("pipeline/blind/twin/**/*.py", "pipeline/blind/[bimt]*.py")
+_OF_ANSWERS: Final = ("pipeline/**/*.py", "actuators/**/*.py")
+
+
+@dataclass(frozen=True)
+class Sealed:
+    """A trial that was made.
+
+    Attributes:
+        spec: Of the matrix.
+        sha256: Of its sealed truth.
+        robot: Robot file, relative to its folder.
+    """
+
+    spec: TrialSpec
+    sha256: str
+    robot: str
+
+
+def run_blind(options: argparse.Namespace) -> int:
+    """Run the matrix, or its first trials.
+
+    Returns:
+        0 where every aim is reached, else 1.
+
+    Raises:
+        PipelineError: Unusable options, or a trial that cannot be made.
+        ReportError: The folder cannot be written.
+    """
+    out: Path = options.out
+    if options.trials is not None and options.trials < 1:
+        raise GapError(f"--trials {options.trials}: give a number from 1")
+    if not 1 <= options.workers <= 64:
+        raise GapError(f"--workers {options.workers}: give a number from 1 to 64")
+    specs = trial_matrix(options.seed)[: options.trials]
+    if out.exists() and not options.resume:
+        _clear(out)
+    sealed = seal(specs, out, options.seed, options.workers)
+    print(f"{len(sealed)} truths sealed; sha256 of their hashes {_together(sealed)}", flush=True)
+    runs = answer(sealed, out, options.workers)
+    trials = open_and_score(sealed, runs, out)
+    return write(trials, out, options.seed, [run["seconds"] for run in runs])
+
+
+def seal(specs: Sequence[TrialSpec], out: Path, seed: int, workers: int) -> list[Sealed]:
+    """Make every trial and print the hash of what was hidden in it."""
+    point = Checkpoint(out / "sealed.jsonl", _hash(seed, *_OF_TRIALS, *_OF_TRIALS_TOO))
+    tasks = [
+        (str(s.number), (str(out), s.number, s.seed, list(s.effects), s.motion, s.noise))
+        for s in specs
+    ]
+    # One simulation at a time per process: libraries' own threads would only get in the way.
+    with (
+        _pool(ProcessPoolExecutor(workers)) as pool,
+        _progress("making trials", len(tasks)) as tick,
+    ):
+        made = point.run(pool, make, tasks, tick)
+    sealed = [Sealed(spec, m["sha256"], m["robot"]) for spec, m in zip(specs, made, strict=True)]
+    for s in sorted(sealed, key=lambda s: s.spec.number):
+        print(f"trial {s.spec.number:04d} sha256 {s.sha256}")
+    return sealed
+
+
+def answer(sealed: Sequence[Sealed], out: Path, workers: int) -> list[dict[str, Any]]:
+    """Let `gap` answer every trial."""
+    point = Checkpoint(out / "answers.jsonl", _hash(_together(sealed), *_OF_ANSWERS))
+    tasks = []
+    for s in sealed:
+        folder = trial_folder(out, s.spec.number)
+        to = answer_folder(out, s.spec.number)
+        tasks.append((str(s.spec.number), (str(folder), s.robot, str(to))))
+    with _pool(ThreadPoolExecutor(workers)) as pool, _progress("asking gap", len(tasks)) as tick:
+        return point.run(pool, ask, tasks, tick)
+
+
+def open_and_score(
+    sealed: Sequence[Sealed], runs: Sequence[dict[str, Any]], out: Path
+) -> list[Scored]:
+    """Open the seals and judge the answers.
+
+    Raises:
+        GapError: A sealed truth is not the one whose hash was printed.
+    """
+    models = {motion: nominal(motion) for motion in {s.spec.motion for s in sealed}}
+    trials = []
+    for s, run in zip(sealed, runs, strict=True):
+        path = seal_file(out, s.spec.number)
+        content = path.read_bytes()
+        if hashlib.sha256(content).hexdigest() != s.sha256:
+            raise GapError(f"{path}: not what was sealed, its hash differs; make the trials anew")
+        hidden = hidden_truths(json.loads(content), models[s.spec.motion])
+        judged = read_judgement(judgement_file(out, s.spec.number))
+        given = read_answer(run, answer_folder(out, s.spec.number))
+        trials.append(Scored(s.spec, score(s.spec.number, hidden, judged, given), s.sha256))
+    return sorted(trials, key=lambda t: t.spec.number)
+
+
+def nominal(motion: str) -> MachineModel:
+    """The machine of a motion by its files, without an actuator."""
+    return machine_of_robot(load_robot(load_robot_file(ROBOT_FILES[motion])), None)
+
+
+def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[float]) -> int:
+    """Write tables and figure, print the rates."""
+    from reports.figures.gap.confusion import confusion as draw
+    from reports.figures.save import save_figure
+    from reports.tables import blind as tables
+    from reports.writer import write_table
+
+    rows = trial_rows(trials)
+    reached = rates(rows)
+    hidden, named, counts = confusion(trials)
+    shares = [
+        {
+            "rate": r.name,
+            "meaning": r.meaning,
+            "hits": r.hits,
+            "trials": r.trials,
+            "share": r.value,
+            "low": r.interval[0],
+            "high": r.interval[1],
+            "aim_low": r.aim[0] if r.aim else None,
+            "aim_high": r.aim[1] if r.aim else None,
+            "reached": r.reached if r.aim else None,
+        }
+        for r in reached
+    ]
+    meta = {"options": {"seed": seed, "trials": len(trials)}}
+    every = (
+        tables.blind_trials(rows),
+        tables.blind_rates(shares),
+        tables.blind_by_effect(by_effect(rows)),
+        tables.confusion(hidden, named, counts),
+    )
+    with staged(out, "blind") as folder:
+        for table in every:
+            write_table(table, folder, meta=meta)
+        shown = int(counts.sum())
+        text = f"{shown} trials with one effect the log could show, or nothing hidden"
+        save_figure(draw(hidden, named, counts, text), folder, "blind_confusion")
+    for r in reached:
+        if r.trials:
+            low, high = r.interval
+            mark = "reached" if r.reached else "not reached"
+            aim = f", aim {r.aim[0]:.0%} to {r.aim[1]:.0%} {mark}" if r.aim else ""
+            print(
+                f"{r.name}: {r.hits} of {r.trials} = {r.value:.1%} ({low:.1%} to {high:.1%}){aim}"
+            )
+    usual = sorted(seconds)[len(seconds) // 2]
+    print(f"{len(trials)} trials; an answer takes {usual:.1f} s of computing (median)")
+    return 0 if all(r.reached for r in reached if r.trials) else 1
+
+
+def _together(sealed: Sequence[Sealed]) -> str:
+    lines = sorted(f"{s.spec.number} {s.sha256}\n" for s in sealed)
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+def _hash(*parts: object) -> str:
+    """Hash of values, and of the project's files by the patterns among them."""
+    total = hashlib.sha256()
+    for part in parts:
+        if isinstance(part, str) and "*" in part:
+            for path in sorted(_ROOT.glob(part)):
+                total.update(path.relative_to(_ROOT).as_posix().encode() + path.read_bytes())
+        else:
+            total.update(str(part).encode())
+    return total.hexdigest()
+
+
+def _clear(out: Path) -> None:
+    """Remove an earlier run's trials; its tables stay until there are new ones."""
+    # What says that trials are done goes before them: a kill in between must not be gone on from.
+    for name in ("sealed.jsonl", "answers.jsonl"):
+        (out / name).unlink(missing_ok=True)
+    for name in ("trials", "sealed", "answers"):
+        shutil.rmtree(out / name, ignore_errors=True)
+
+
+@contextmanager
+def _pool(pool: Executor) -> Iterator[Executor]:
+    """A pool that drops what has not begun when it is interrupted."""
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        raise
+    pool.shutdown()
+
+
+@contextmanager
+def _progress(title: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A progress bar on a terminal, nothing elsewhere."""
+    from tqdm import tqdm
+
+    with tqdm(total=total, desc=title, disable=not sys.stderr.isatty()) as bar:
+
+        def tick(count: int) -> None:
+            bar.update(count)
+
+        yield tick

@@ -1,0 +1,37 @@
+"""Options of the verbs `twin` and `blind`."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from pipeline.cli.named_path import named_path
+
+
+def add_twin_options(sub: argparse.ArgumentParser) -> None:
+    """Declare the options of `twin`."""
+    sub.add_argument("--seed", type=int, default=1, help="of everything drawn")
+    sub.add_argument(
+        "--hide", nargs="*", default=[], metavar="EFFECT", help="effects to hide; none by default"
+    )
+    sub.add_argument("--motion", default="leg", help="leg (on a stand) or walk (hexapod)")
+    sub.add_argument("--noise", default="low", help="low or high")
+    sub.add_argument("--logs", type=int, default=1, help="logs of the same machine")
+    sub.add_argument("--out", type=named_path, required=True, help="new folder for the trial")
+    sub.add_argument("--sealed", type=named_path, help="file for the truth, outside of that folder")
+
+
+def add_blind_options(sub: argparse.ArgumentParser) -> None:
+    """Declare the options of `blind`."""
+    sub.add_argument(
+        "--trials", type=int, help="only the first so many of the matrix, a fair sample of it"
+    )
+    sub.add_argument("--seed", type=int, default=1, help="of the matrix")
+    sub.add_argument("--workers", type=int, default=2, help="processes")
+    sub.add_argument("--resume", action="store_true", help="go on where a run was stopped")
+    sub.add_argument(
+        "--out",
+        type=named_path,
+        default=Path("reports/out/blind"),
+        help="folder for everything written",
+    )

@@ -1,0 +1,96 @@
+"""The verb calibrate: fit what the paper does not print and store it in the project's files."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from pipeline.paper.calibration.calibrate import Effort, calibrate
+from pipeline.paper.calibration.machine import MIDDLE_LEGS, POSTURE, ROBOT
+from pipeline.paper.calibration.prior import load_prior
+from pipeline.paper.calibration.store import AT_LEAST, calibrated_numbers, save
+from pipeline.paper.errors import CalibrationError
+from pipeline.robot.robot_file import load_robot_file, read_toml
+
+WORK = Path(".calibration")
+
+
+def run_calibrate(options: argparse.Namespace) -> int:
+    """Calibrate, going on where an interrupted run stopped, and store the result.
+
+    Raises:
+        PipelineError: Unusable robot, prior or target file, or no admissible point.
+    """
+    _refuse_options(options)
+    refuse_other_robot(options.robot)
+    results = calibrate(
+        options.robot,
+        Effort(workers=options.workers, seed=options.seed),
+        WORK,
+        _progress,
+    )
+    results["robot"] = options.robot.name
+    for path in save(results, options.robot):
+        print(path.name)
+    numbers = calibrated_numbers(results, load_prior())
+    print(f"{len(results['ensemble'])} of {results['draws']} draws became sets of the ensemble")
+    for verdict in ("not determined", "against the prior"):
+        keys = [n.key for n in numbers if n.verdict == verdict]
+        print(f"{verdict}: {', '.join(keys) or 'none'}")
+    bound = [f"{n.key} ({n.bound}, {n.at_bound:.0%})" for n in numbers if n.at_bound >= AT_LEAST]
+    print(f"at a bound in 5 % of the sets or more: {', '.join(bound) or 'none'}")
+    print("run `make urdf` to build the URDFs from the calibrated robot file")
+    return 0
+
+
+def _refuse_options(options: argparse.Namespace) -> None:
+    if options.workers < 1:
+        raise CalibrationError(f"--workers {options.workers}: at least one process is needed")
+    if options.seed < 0:
+        raise CalibrationError(f"--seed {options.seed}: expected zero or a positive number")
+
+
+def refuse_other_robot(path: Path) -> None:
+    """Refuse a robot that the paper does not print numbers of, before twenty minutes are spent.
+
+    Args:
+        path: Robot file.
+
+    Raises:
+        RobotFileError: It cannot be used at all.
+        CalibrationError: It does not walk, lacks the middle legs, or holds no numbers of its own
+            to write the result into.
+    """
+    spec = load_robot_file(path)
+    such = "calibrate fits the paper's hexapod; give urdf/hexapod.toml or a copy of it"
+    if not spec.floating:
+        raise CalibrationError(f"{path}: its base is fixed, so it does not walk; {such}")
+    names = [leg.name for leg in spec.legs]
+    lacking = [leg for leg in MIDDLE_LEGS if leg not in names]
+    if lacking:
+        raise CalibrationError(f"{path}: has no leg '{lacking[0]}'; {such}")
+    keys = (key.split(".") for key in load_prior().keys)
+    wanted = [*POSTURE, *(name for component, name in keys if component == ROBOT)]
+    own = read_toml(path).get("parameters", {})
+    lacking = [name for name in dict.fromkeys(wanted) if name not in own]
+    if lacking:
+        raise CalibrationError(
+            f"{path}: the result is written into this file, which does not hold "
+            f"{', '.join(lacking)}; {such}"
+        )
+
+
+def _progress(title: str, total: int) -> Callable[[int], None]:
+    """A progress bar on a terminal, nothing elsewhere."""
+    from tqdm import tqdm
+
+    bar = tqdm(total=total, desc=title, disable=not sys.stderr.isatty(), leave=True)
+
+    def tick(count: int) -> None:
+        bar.update(count)
+        if bar.n >= total:
+            bar.close()
+
+    return tick

@@ -1,0 +1,269 @@
+"""Which figures a run draws, and from what."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from actuators.energy.energy import stage_energies
+from pipeline.cli.settings import Settings
+from pipeline.paper.judgement.fig_21 import EnergyPerMinute
+from pipeline.paper.judgement.judge import Judgement
+from pipeline.robot.robot import Robot
+from pipeline.simulation.walk_stand import Standing, Walking
+from reports.figures.energy.electrical_energy import electrical_energy_figure
+from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
+from reports.figures.energy.joint_demand import joint_demand_figure, stretches
+from reports.figures.energy.motor_limits import common_scale, motor_limits_figure
+from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
+from reports.figures.robot.gait_view import GaitStretch, gait_figure
+from reports.figures.robot.joint_directions import joint_directions_figure
+from reports.figures.robot.robot_view import Leg, legs_of, robot_figure
+from reports.figures.robot.visuals import Primitive, joint_marks, primitives
+from reports.figures.several import Drawing, save_figures
+from reports.pages.names import leg_words, shown_leg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+#: File name of each subject's Fig. 21.
+SUBJECT_TITLES = {
+    "middle_legs": "both middle legs, as in Fig. 21",
+    "robot_on_3_feet": "whole robot, standing on three feet",
+    "robot_on_6_feet": "whole robot, standing on six feet",
+}
+
+
+def write_figures(given: Settings, standing: Standing, walking: Walking, out: Path) -> int:
+    """Draw and save every figure of a run.
+
+    Returns:
+        How many.
+    """
+    return save_figures(drawings(given, standing, walking), out)
+
+
+def drawings(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
+    """Every figure of a run, the longest first, so that two processes end together."""
+    return [
+        *_robot(given, standing, walking),
+        *_energy(given, walking),
+        *_demand(given, walking),
+    ]
+
+
+def _joints(given: Settings) -> tuple[str, dict[str, str]]:
+    """The leg that is shown, and its joints with their labels."""
+    leg = shown_leg(given.robot)
+    joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
+    return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
+
+
+def _demand(given: Settings, walking: Walking) -> list[Drawing]:
+    leg, joints = _joints(given)
+    return [
+        Drawing(
+            f"joint_demand_{joint}",
+            partial(
+                joint_demand_figure,
+                joint,
+                stretches(walking.demand, joint, leg),
+                title=f"{label.capitalize()} of the {leg_words(leg)}: velocity and torque",
+                subtitle=f"demand over one gait cycle, as in Fig. {number} of the paper",
+            ),
+        )
+        for number, (joint, label) in enumerate(joints.items(), start=2)
+    ]
+
+
+def _energy(given: Settings, walking: Walking) -> list[Drawing]:
+    leg, labels = _joints(given)
+    support = [
+        (float(part.time[0]), float(part.time[-1]))
+        for part in walking.demand.contacts
+        if part is not None and leg in part.stance
+    ]
+    motors = {name: given.catalog.chain(name).motor for name in walking.results}
+    scale = common_scale(
+        [(result.motor, motors[name]) for name, result in walking.results.items()], labels
+    )
+    stages = {name: stage_energies(result) for name, result in walking.results.items()}
+    limits = energy_limits(stages.values(), labels)
+    out, electrical = [], {}
+    for name, result in walking.results.items():
+        title = given.catalog.alternatives[name].title
+        columns = [result.joint.joints.index(joint) for joint in labels]
+        electrical[title.split(": ")[-1]] = stages[name][-1].forward[columns]
+        out += [
+            Drawing(
+                f"motor_limits_{name}",
+                partial(
+                    motor_limits_figure,
+                    result.motor,
+                    motors[name],
+                    labels,
+                    support,
+                    title=f"{title}: its motors, {leg_words(leg)}",
+                    scale=scale,
+                ),
+            ),
+            Drawing(
+                f"stage_energy_{name}",
+                partial(
+                    stage_energy_figure,
+                    stages[name],
+                    labels,
+                    title=title,
+                    subtitle=f"energy per cycle through each stage, {leg_words(leg)}; "
+                    "one scale for all alternatives",
+                    limits=limits,
+                ),
+            ),
+        ]
+    figure = partial(
+        electrical_energy_figure,
+        list(labels.values()),
+        electrical,
+        title=f"Electrical energy per cycle, {leg_words(leg)}",
+        subtitle="returned energy is lost"
+        if given.regeneration.policy == "none"
+        else "what the motors draw; robot_energy.csv has what their return saves",
+    )
+    return [*out, Drawing("electrical_energy", figure)]
+
+
+def _scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Leg]]:
+    """The robot's visual primitives and legs in one posture."""
+    data = robot.model.createData()
+    pin.framesForwardKinematics(robot.model, data, configuration)
+    links = {
+        frame.name: data.oMf[i].homogeneous.copy()
+        for i, frame in enumerate(robot.model.frames)
+        if frame.type == pin.FrameType.BODY
+    }
+    marks = joint_marks(robot.urdf, links)
+    legs = {leg.name: (leg.joints, leg.foot) for leg in robot.spec.legs}
+    return primitives(robot.urdf, links), legs_of(legs, marks, links)
+
+
+def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
+    robot, leg = given.robot, shown_leg(given.robot)
+    posture = standing.segment.configuration[0]
+    zero = robot.configuration(np.zeros((1, len(robot.joints))), np.zeros((1, 3)))[0]
+    data = robot.model.createData()
+
+    def standing_robot() -> Figure:
+        return robot_figure(
+            *_scene(robot, posture),
+            title=f"{robot.spec.name}, {standing.segment.name}",
+            subtitle="the other feet are lifted to mid-transfer",
+            mass_centre=pin.centerOfMass(robot.model, data, posture).copy(),
+        )
+
+    def zero_pose() -> Figure:
+        return joint_directions_figure(
+            *_scene(robot, zero),
+            leg,
+            title=f"{robot.spec.name}: zero pose and positive directions",
+            zero_pose=robot.spec.zero_pose,
+        )
+
+    def gait() -> Figure:
+        scene, _ = _scene(robot, zero)
+        trunk = next((p for p in scene if p.link == robot.spec.base_link), None)
+        return gait_figure(
+            robot.leg_names,
+            _gait_stretches(robot, walking),
+            shown=leg,
+            body=(0.0, 0.0) if trunk is None else (float(trunk.size[0]), float(trunk.size[1])),
+            title=f"{robot.spec.name}: tripod gait",
+            subtitle=f"transfer path '{robot.spec.transfer_path}'",
+        )
+
+    return [
+        Drawing("gait", gait),
+        Drawing("robot", standing_robot),
+        Drawing("zero_pose", zero_pose),
+    ]
+
+
+def _gait_stretches(robot: Robot, walking: Walking) -> list[GaitStretch]:
+    data = robot.model.createData()
+    out = []
+    for segment, contacts, margin in zip(
+        walking.motion.segments, walking.demand.contacts, walking.margins, strict=True
+    ):
+        assert contacts is not None
+        # As many as a picture can show, both ends and the middle among them.
+        rows = np.unique(np.linspace(0, segment.time.size - 1, 101).round().astype(int))
+        centres = [
+            pin.centerOfMass(robot.model, data, row).copy() - row[:3]
+            for row in segment.configuration[rows]
+        ]
+        out.append(
+            GaitStretch(
+                segment.time[rows],
+                contacts.position[rows],
+                segment.stance,
+                np.array(centres),
+                margin[rows],
+            )
+        )
+    return out
+
+
+def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:
+    """Energy per minute against the fraction of time standing, for every subject.
+
+    Args:
+        judgement: With its curves and crossings.
+        titles: Alternative to its title.
+        out: Folder.
+
+    Returns:
+        How many figures.
+    """
+    every = []
+    for row in judgement.break_even:
+        curves = [c for c in judgement.per_minute if c.subject == row.subject]
+        share = curves[0].fraction
+        mark = None
+        if not np.isnan(row.fraction):
+            reference = next(c for c in curves if c.alternative == "reversible")
+            energy = float(np.interp(row.fraction, share, reference.energy))
+            known = (v if np.isfinite(v) else None for v in row.prior)
+            mark = BreakEven(row.fraction, energy, *known)
+        figure = partial(
+            energy_per_minute_figure,
+            share,
+            [
+                EnergyLine(
+                    titles[c.alternative],
+                    c.energy,
+                    *(c.prior if c.prior is not None else (None, None)),
+                    *(c.left_out if c.left_out is not None else (None, None)),
+                )
+                for c in curves
+            ],
+            title=f"Energy in one minute: {SUBJECT_TITLES[row.subject]}",
+            subtitle=row.note.split(";")[0] if mark is None else _bands(curves),
+            break_even=mark,
+        )
+        every.append(Drawing(f"energy_per_minute_{row.subject}", figure))
+    return save_figures(every, out)
+
+
+def _bands(curves: list[EnergyPerMinute]) -> str:
+    """What the lines and bands are."""
+    if any(c.prior is None for c in curves):
+        return "computed anew with changed numbers"
+    return (
+        "line: fitted; faint band: 95 % of what data sheets and literature say; strong band: "
+        "fitted without the drive's own walking figure"
+    )

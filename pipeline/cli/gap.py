@@ -1,0 +1,220 @@
+"""The verb `gap`: compute everything, then write everything."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pipeline.cli.decimal_option import decimal_of
+from pipeline.cli.gap_figures import (
+    write_in_time,
+    write_signature,
+    write_waterfall,
+    write_where_map,
+)
+from pipeline.cli.gap_options import split_items
+from pipeline.cli.gap_tables import candidates_table, found_table, quality_table, where_table
+from pipeline.cli.staging import staged
+from pipeline.identification.compare.circumstances import WHOLE
+from pipeline.identification.workflow.forward import (
+    by_model,
+    forward,
+    forward_table,
+    rms,
+    rollout_tables,
+    say,
+)
+from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where, judged
+from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
+from pipeline.identification.workflow.story import Told, tell
+from pipeline.identification.workflow.validate import check
+from pipeline.logs.quality.finding import Finding
+from pipeline.logs.reading.table_file import sha256
+from reports.pages import gap_words as words
+from reports.pages.gap_report import Story, write_report
+from reports.table import Table
+from reports.writer import write_table, write_text
+
+logger = logging.getLogger("legwatt")
+PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
+EXPLAINED, UNEXPLAINED = 0, 1
+#: Remarks on the data that the terminal shows.
+SAID = 5
+
+
+def run_gap(options: argparse.Namespace) -> int:
+    """Run one step, or all of them.
+
+    Returns:
+        The exit code: 0 where the gap is down to noise, 1 where a part stays unexplained.
+
+    Raises:
+        PipelineError: Unusable robot.
+        ActuatorError: Unusable actuators.
+        GapError: Unusable log, mapping or model file.
+        ReportError: The folder cannot be written.
+    """
+    split_items(options)
+    check_options(options)
+    given = setup(options)
+    with Progress() as progress:
+        progress.step("reading and judging the logs")
+        intake, parts, fitted = take_in(given, options)
+        if options.step == "read":
+            found = judged(intake).findings
+            _write_tables(options, given, [quality_table(found)])
+            _say_findings(found)
+            return EXPLAINED
+        progress.step("simulating the logs' motion")
+        where = find_where(given, given.model, intake, parts, fitted)
+        tables = [quality_table(where.intake.findings), where_table(where.rows)]
+        if options.step == "where":
+            with _staged(options, given) as folder:
+                _tables_into(folder, options, given, tables)
+                write_where_map(where.rows, given.model.joints, given.model.name, folder)
+            _say_warnings(given, where.intake.findings)
+            _say_where(where)
+            return EXPLAINED
+        if options.step == "forward":
+            progress.step("driving the model by its servos")
+            return _drive(given, where, options)
+        if options.step == "shrink":
+            progress.step("weighing the model file's effects")
+            told = check(given, where)
+        else:
+            progress.step("letting effects compete")
+            told = tell(given, where, options, progress)
+        naming = told.story.naming
+        tables += [
+            candidates_table(naming.candidates, naming.found, given.model),
+            found_table(naming.found, given.model),
+            *told.tables,
+        ]
+        progress.step("writing")
+        if options.step == "name":
+            _write_tables(options, given, tables)
+        else:
+            with _staged(options, given) as folder:
+                _tables_into(folder, options, given, tables)
+                if told.model_file:
+                    write_text(folder / "model.toml", told.model_file)
+                if options.step != "add":
+                    _figures_and_page(told, tables, folder)
+    _say_warnings(given, where.intake.findings)
+    _say_answer(told.story, options.out)
+    return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
+
+
+def _drive(given: Setup, where: Whereabouts, options: argparse.Namespace) -> int:
+    """Step `forward`: 1 where the model file's effects bring positions no nearer."""
+    drives = forward(given, where, options)
+    joints = given.model.joints
+    found = [forward_table(drives, joints), *rollout_tables(drives, joints)]
+    _write_tables(options, given, found)
+    say(drives)
+    first, *rest = (rms(own) for own in by_model(drives).values())
+    return UNEXPLAINED if rest and rest[-1] >= first else EXPLAINED
+
+
+def _staged(options: argparse.Namespace, given: Setup) -> AbstractContextManager[Path]:
+    """Every step writes what the steps before it do, so a step's files replace any other's."""
+    step = "" if options.step == "all" else f" {options.step}"
+    return staged(options.out, f"gap{step}", inputs=_inputs(options, given))
+
+
+def _write_tables(options: argparse.Namespace, given: Setup, tables: Sequence[Table]) -> None:
+    with _staged(options, given) as folder:
+        _tables_into(folder, options, given, tables)
+
+
+def _tables_into(
+    folder: Path, options: argparse.Namespace, given: Setup, tables: Sequence[Table]
+) -> None:
+    meta = metadata(options, given)
+    for table in tables:
+        write_table(table, folder, meta=meta, decimal=decimal_of(options))
+
+
+def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None:
+    story, where = told.story, told.story.where
+    model, weighed = story.given.model, told.story.weighed
+    write_where_map(where.rows, model.joints, model.name, folder)
+    unit = story.naming.unit
+    write_waterfall(weighed.stages, story.noise, unit, model.name, folder)
+    write_in_time(where.measurements, weighed.stages[1], weighed.stages[-1], told.shown, folder)
+    shown = zip(story.naming.found, story.signatures, weighed.pairs, weighed.joints, strict=True)
+    for found, name, pair, joint in shown:
+        stem = Path(name).stem
+        write_signature(where.measurements, *pair, joint, found.effect, found.place, stem, folder)
+    footer = (
+        f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "
+        "input hashes, versions."
+    )
+    write_report(story, tables, folder, footer)
+
+
+def _say_findings(findings: Sequence[Finding]) -> None:
+    odd = [finding for finding in findings if finding.verdict != "ok"]
+    for finding in odd:
+        place = f" {finding.column}" if finding.column else ""
+        print(f"{finding.log}{place}: {finding.verdict}: {finding.detail}")
+    print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
+
+
+def _say_warnings(given: Setup, findings: Sequence[Finding]) -> None:
+    """What a reader of the answer should know about files and logs, the first few."""
+    lines = list(given.warnings)
+    for f in findings:
+        if f.verdict == "warning":
+            lines.append(f"{f.log}{' ' if f.column else ''}{f.column}: {f.detail}")
+    for line in lines[:SAID]:
+        print(f"note: {line}")
+    if len(lines) > SAID:
+        print(f"note: {len(lines) - SAID} more remarks of this kind in quality.csv")
+
+
+def _say_where(where: Whereabouts) -> None:
+    for row in [r for r in where.rows if r.by == WHOLE][:3]:
+        print(
+            f"{row.joint}: gap {row.gap:.3g} {row.unit}, {row.gap / row.noise_floor:.1f} times "
+            f"the noise floor, {row.share_of_total:.0%} of the whole"
+        )
+
+
+def _say_answer(story: Story, out: Path) -> None:
+    from reports.pages.gap_report import answer
+
+    for paragraph in answer(story):
+        print(words.plain(paragraph))
+    print(f"written to {out}")
+
+
+def _inputs(options: argparse.Namespace, given: Setup) -> list[Path]:
+    """Every file that was read."""
+    files = [*options.logs, *options.holdout, *given.sources]
+    return files + [path for path in (options.mapping, options.model) if path]
+
+
+def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
+    """What every sidecar says about the run: inputs by hash, versions, options."""
+    return {
+        "inputs_sha256": {path.name: sha256(path) for path in _inputs(options, given)},
+        "versions": {name: version(name) for name in PACKAGES},
+        "options": {
+            "step": options.step,
+            "base": options.base or "as the log and the robot say",
+            "alternative": given.alternative or "none: the torque is the joint's",
+            "effort": options.effort or "the log's most direct",
+            "cutoff_Hz": options.cutoff,
+            "gait_start_s": options.gait_start,
+            "prove_last": options.prove_last,
+        },
+        "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "
+        "direction; gap is measured less predicted",
+        "warnings": list(given.warnings),
+    }

@@ -1,0 +1,220 @@
+"""Which figures a run of `gap` draws, and from what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.effects.registry import effect_named
+from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
+from pipeline.identification.compare.stages import Stage, overall
+from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.simulation.predict import Prediction
+from reports.figures.gap.in_time import GapTrace, gap_time_figure
+from reports.figures.gap.signature import Signature, gap_signature_figure
+from reports.figures.gap.waterfall import GapStep, gap_waterfall_figure
+from reports.figures.gap.where import WhereGroup, where_map_figure
+from reports.figures.save import save_figure
+from reports.typeset import unit_text
+
+Array = NDArray[np.float64]
+#: A stretch of time that a picture can show [s].
+_LONGEST = 8.0
+#: Ways of sorting in the order in which the map shows them.
+SHOWN = (WHOLE, "phase", "direction", "speed", "load", "power", "reversal", "position", "time")
+TITLES = {WHOLE: "all", "power": "joint is"}
+
+
+def write_where_map(rows: Sequence[Where], joints: Sequence[str], robot: str, out: Path) -> None:
+    """Draw `where_map`."""
+    ratio = {(r.joint, r.by, r.band): r.gap / r.noise_floor for r in rows if r.noise_floor > 0}
+    groups = []
+    for by in SHOWN:
+        bands = tuple(dict.fromkeys(r.band for r in _in_order(rows) if r.by == by))
+        if not bands:
+            continue
+        table = np.array([[ratio.get((j, by, band), np.nan) for band in bands] for j in joints])
+        groups.append(WhereGroup(TITLES.get(by, by), bands, table))
+    figure = where_map_figure(
+        joints,
+        groups,
+        title=f"{robot}: where model and machine disagree",
+        subtitle="root mean square gap in units of the noise floor; 1 is noise",
+    )
+    save_figure(figure, out, "where_map")
+
+
+#: Order of bands within a group; bands not listed keep the order of their ranks.
+_ORDER = (
+    *("support", "transfer", "negative", "positive", "slow", "light", "low", "first", "middle"),
+    *("fast", "heavy", "high", "last", "driving", "driven", "near", "away"),
+)
+
+
+def _in_order(rows: Sequence[Where]) -> list[Where]:
+    place = {band: k for k, band in enumerate(_ORDER)}
+    return sorted(rows, key=lambda r: place.get(r.band, len(place)))
+
+
+def write_waterfall(
+    stages: Sequence[Stage], noise: float, unit: str, robot: str, out: Path
+) -> None:
+    """Draw `waterfall`: the gap of all joints, effect by effect."""
+    first, *rest = stages
+    figure = gap_waterfall_figure(
+        overall(first.gap),
+        [GapStep(_words(stage.label), overall(stage.gap)) for stage in rest],
+        noise,
+        unit,
+        title=f"{robot}: the gap, effect by effect",
+        subtitle="root mean square over all joints, on held-out data",
+    )
+    save_figure(figure, out, "waterfall")
+
+
+def _words(label: str) -> str:
+    """An effect's name in words; its place keeps the robot's own names."""
+    effect, at, place = label.partition(" at ")
+    return f"{effect.replace('_', ' ')}{at}{place}"
+
+
+def write_in_time(
+    measurements: Sequence[Measurement],
+    before: Stage,
+    after: Stage,
+    joints: Sequence[int],
+    out: Path,
+) -> None:
+    """Draw `in_time`: the joints around the longest stretch that proves.
+
+    Args:
+        measurements: One per log.
+        before: Without effects.
+        after: With all of them.
+        joints: Columns, one to three.
+        out: Folder.
+    """
+    log, rows = _stretch(measurements)
+    m = measurements[log]
+    traces = []
+    series = [m.lowpass(s.predictions[log].effort[..., 0]) for s in (before, after)]
+    for j in joints:
+        traces.append(
+            GapTrace(
+                joint=m.joints[j],
+                time=m.time[rows],
+                measured=m.effort[rows, j, 0],
+                compared=m.mask[rows, j],
+                before=series[0][rows, j],
+                after=series[1][rows, j],
+                noise_floor=float(m.noise[j, 0]),
+                unit=CHANNEL_UNITS[m.channels[0]],
+                proves=m.part[rows] == PROVE,
+            )
+        )
+    figure = gap_time_figure(
+        traces,
+        title="Measured and predicted, without and with what was found",
+        subtitle=f"log '{m.name}', low-passed at {m.bandwidth:.3g} Hz; shaded: held out; "
+        "grey band: noise, 2 sigma",
+        channel=m.channels[0],
+    )
+    save_figure(figure, out, "in_time")
+
+
+def _stretch(measurements: Sequence[Measurement]) -> tuple[int, slice]:
+    """Log and rows around the block of *prove* in which most rows of most joints count."""
+    best, found = -1.0, (0, slice(0, len(measurements[0])))
+    for k, m in enumerate(measurements):
+        proving = m.part == PROVE
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], proving.astype(np.int8), [0]])))
+        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+            count = float(m.mask[start:stop].sum())
+            if count > best:
+                size = max(2, int(_LONGEST * m.rate))
+                first = max(0, min((start + stop - size) // 2, len(m) - size))
+                best, found = count, (k, slice(first, min(first + size, len(m))))
+    return found
+
+
+def write_signature(
+    measurements: Sequence[Measurement],
+    without: Stage,
+    with_: Stage,
+    joint: int,
+    effect: str,
+    place: Sequence[str],
+    name: str,
+    out: Path,
+) -> None:
+    """Draw an effect's gap against the variable on which it depends.
+
+    Args:
+        measurements: One per log.
+        without: The model before the effect.
+        with_: The model with it.
+        joint: Column.
+        effect: Name of the effect.
+        place: Of the effect.
+        name: File name.
+        out: Folder.
+    """
+    variable = effect_named(effect).signature
+    label, x = "", []
+    rest: list[list[Array]] = [[], []]
+    for k, m in enumerate(measurements):
+        label, values = signature_variable(variable, m, without.predictions[k], joint, place)
+        x.append(values)
+        for part, stage in zip(rest, (without, with_), strict=True):
+            part.append(gap_of(m, stage.predictions[k])[:, joint])
+    first = measurements[0]
+    figure = gap_signature_figure(
+        Signature(
+            label,
+            np.concatenate(x),
+            np.concatenate(rest[0]),
+            np.concatenate(rest[1]),
+            float(first.noise[joint, 0]),
+            CHANNEL_UNITS[first.channels[0]],
+        ),
+        title=_words(f"{effect[:1].upper()}{effect[1:]} at {first.joints[joint]}"),
+        subtitle="all compared rows; line: running mean, band: noise, 2 sigma",
+    )
+    save_figure(figure, out, name)
+
+
+def signature_variable(
+    variable: str, m: Measurement, prediction: Prediction, joint: int, place: Sequence[str] = ()
+) -> tuple[str, Array]:
+    """Label and values (N,) of the variable against which an effect shows.
+
+    Args:
+        variable: Key of the effect's signature.
+        m: The log.
+        prediction: Of the model without the effect.
+        joint: Column.
+        place: Of the effect; a coupled joint's other joint stands in it.
+    """
+    name, load = m.joints[joint], prediction.torque[:, joint]
+    if variable == "position":
+        return f"position of {name} [rad]", m.q[:, joint]
+    if variable == "acceleration":
+        return f"acceleration of {name} [rad/s²]", m.a[:, joint]
+    if variable in ("load", "support"):
+        return f"load on {name} [N·m]", load
+    if variable == "torque rate":
+        return f"rate of the load on {name} [N·m/s]", m.derivative(load)
+    if variable == "effort rate":
+        unit = CHANNEL_UNITS[m.channels[0]]
+        rate = m.derivative(m.lowpass(prediction.effort[:, joint, 0]))
+        return f"rate of {name}'s {m.channels[0]} [{unit_text(unit)}/s]", rate
+    if variable == "time":
+        return "time [s]", m.time
+    others = [m.joints.index(p) for p in place if p in m.joints and p != name]
+    if variable == "velocity of the other joint" and others:
+        return f"velocity of {m.joints[others[0]]} [rad/s]", m.v[:, others[0]]
+    return f"velocity of {name} [rad/s]", m.v[:, joint]

@@ -1,0 +1,99 @@
+"""Options of the verb `gap` and its steps."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Final
+
+from pipeline.cli.decimal_option import add_decimal_option
+from pipeline.cli.named_path import named_path
+
+#: The steps; without one all but `forward` run, which needs goals and the servos' law.
+STEPS: Final = {
+    "read": "judge the logs: quality.csv",
+    "where": "where model and machine disagree: where.csv and the where-map",
+    "name": "which effects the model lacks: candidates.csv, found.csv",
+    "add": "the same, and write the effects into model.toml",
+    "forward": "drive the model under its servos' law and compare positions: forward.csv",
+    "shrink": "the gap with and without the effects of a model file (--model)",
+}
+DEFAULT_OUT: Final = Path("reports/out/gap")
+DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
+
+
+def add_gap_options(sub: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    sub.add_argument(
+        "items",
+        nargs="+",
+        metavar="[STEP] LOG",
+        help="logs (CSV or Parquet) to learn from; a step in front of them does that step only: "
+        + "; ".join(f"{name}: {text}" for name, text in STEPS.items()),
+    )
+    sub.add_argument(
+        "--robot",
+        type=named_path,
+        help="robot file, or URDF of a fixed robot; the model file's or the hexapod by default",
+    )
+    sub.add_argument("--model", type=named_path, help="model file with effects found earlier")
+    sub.add_argument(
+        "--holdout",
+        type=named_path,
+        nargs="+",
+        default=[],
+        metavar="LOG",
+        help="logs that only prove",
+    )
+    sub.add_argument(
+        "--base",
+        choices=["fixed", "level", "measured"],
+        help="how the base stands; measured where the log has roll or pitch, else level or fixed "
+        "as the robot file says",
+    )
+    sub.add_argument(
+        "--gait-start",
+        type=float,
+        metavar="SECONDS",
+        help="time in the log at which a period of the robot file's gait begins: tells which feet "
+        "stand where the log has neither foot forces nor contacts; the lowest feet without it",
+    )
+    sub.add_argument("--mapping", type=named_path, help="mapping file (TOML) for foreign columns")
+    sub.add_argument(
+        "--alternative",
+        metavar="NAME",
+        help="actuator between joint and supply: ideal, rotor (default), reversible or "
+        "irreversible, or one of --actuators; a bare URDF has none by default",
+    )
+    sub.add_argument(
+        "--actuators", type=named_path, metavar="DIR", help="folder of actuator files of your own"
+    )
+    sub.add_argument("--effort", metavar="CHANNEL", help="torque, current, voltage or power")
+    sub.add_argument("--cutoff", type=float, metavar="HZ", help="bandwidth of the comparison")
+    sub.add_argument(
+        "--prove-last",
+        type=float,
+        metavar="SHARE",
+        help="prove on this last share of every log instead of on blocks in between",
+    )
+    sub.add_argument(
+        "--keep-doubtful",
+        action="store_true",
+        help="write effects whose name is doubted into the model file, too, marked as such",
+    )
+    sub.add_argument(
+        "--out", type=named_path, default=DEFAULT_OUT, help="folder for everything written"
+    )
+    add_decimal_option(sub)
+    sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
+
+
+def split_items(options: argparse.Namespace) -> None:
+    """Tell the step from the logs: sets `step` ("all" without one) and `logs`."""
+    first, *rest = options.items
+    # A log file that is called like a step is a log.
+    if first in STEPS and not Path(first).is_file():
+        options.step, logs = first, rest
+    else:
+        options.step, logs = "all", options.items
+    options.logs = [Path(item) for item in logs]

@@ -1,0 +1,104 @@
+"""From the workflow's results to the rows of its tables."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from pipeline.effects.registry import effect_named
+from pipeline.identification.compare.circumstances import Where
+from pipeline.identification.results import INDISTINGUISHABLE, Candidate, Found
+from pipeline.logs.errors import EffectError
+from pipeline.logs.quality.finding import Finding
+from pipeline.machine.machine import MachineModel
+from reports.table import Table
+from reports.tables import gap as tables
+
+JOINED = "+"
+
+
+def quality_table(findings: Sequence[Finding]) -> Table:
+    """Rows of `quality.csv`."""
+    return tables.quality([asdict(finding) for finding in findings])
+
+
+def where_table(rows: Sequence[Where]) -> Table:
+    """Rows of `where.csv`."""
+    return tables.where([asdict(row) for row in rows])
+
+
+def candidates_table(
+    candidates: Sequence[Candidate], found: Sequence[Found], model: MachineModel
+) -> Table:
+    """Rows of `candidates.csv`; what was found and has rivals says so, too."""
+    rivals = {(f.effect, f.place): f.rivals for f in found}
+    rows = [
+        {
+            "effect": c.effect,
+            "joint": joint_of(model, c.effect, c.place),
+            "place": JOINED.join(c.place),
+            "validation_before": _known(c.before),
+            "validation_after": _known(c.after),
+            "unit": c.unit,
+            "identifiable": c.identifiable,
+            "verdict": _verdict(c, rivals.get((c.effect, c.place), ())),
+            "reason": c.reason,
+        }
+        for c in candidates
+    ]
+    return tables.candidates(rows)
+
+
+def _verdict(c: Candidate, rivals: Sequence[tuple[str, tuple[str, ...]]]) -> str:
+    if not rivals:
+        return c.verdict
+    return INDISTINGUISHABLE + "; ".join(f"{name} at {', '.join(p)}" for name, p in rivals)
+
+
+def found_table(found: Sequence[Found], model: MachineModel) -> Table:
+    """Rows of `found.csv`, one per parameter."""
+    rows: list[dict[str, Any]] = []
+    for f in found:
+        for p in f.parameters:
+            rows.append(
+                {
+                    "order": f.order,
+                    "effect": f.effect,
+                    "joint": joint_of(model, f.effect, f.place),
+                    "parameter": p.name,
+                    "value": p.value,
+                    "ci_low": p.low,
+                    "ci_high": p.high,
+                    "unit": p.unit,
+                    "gap_before": _known(f.gap_before),
+                    "gap_after": _known(f.gap_after),
+                    "gap_unit": f.unit,
+                    "noise_floor": f.noise_floor,
+                    "doubt": f.doubtful,
+                    "written": f.written,
+                }
+            )
+    return tables.found(rows)
+
+
+def _known(value: float) -> float | None:
+    """A number, or an empty cell where there is none."""
+    return None if math.isnan(value) else value
+
+
+def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
+    """The joint at which an effect acts: that carries its link; empty where it acts on all."""
+    if not place:
+        return ""
+    try:
+        kind = effect_named(effect).place_kind
+    except EffectError:
+        kind = "joint"
+    if kind == "link":
+        return model.links.get(place[0], "")
+    if kind == "effort column":
+        owner = place[0].partition("__")[0]
+        return owner if owner in model.joints else ""
+    return JOINED.join(name for name in place if name in model.joints)

@@ -1,0 +1,230 @@
+"""The command line: verbs, options, exit codes.
+
+Exit 0: it ran. Exit 1: it ran and the finding is negative. Exit 2: the input cannot be used; one
+line on standard error says where and what to do, and nothing is left half-written.
+"""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+
+from pipeline.cli.blind_options import add_blind_options, add_twin_options
+from pipeline.cli.decimal_option import add_decimal_option
+from pipeline.cli.gap_options import add_gap_options
+from pipeline.cli.named_path import named_path
+from pipeline.errors import PipelineError, TippingError
+
+EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
+DEFAULT_ROBOT = Path("urdf/hexapod.toml")
+DEFAULT_OUT = Path("reports/out")
+
+logger = logging.getLogger("legwatt")
+
+
+class _Parser(argparse.ArgumentParser):
+    """Errors in one line, as everywhere else."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        self.exit(EXIT_UNUSABLE, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line's grammar."""
+    root = _Parser(prog="python -m pipeline", description=__doc__.splitlines()[0])
+    root.add_argument("--version", action="version", version=f"legwatt {version('legwatt')}")
+    verbs = root.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=_Parser)
+
+    check = verbs.add_parser("check", help="judge a robot file or URDF for physical sense")
+    check.add_argument("file", type=named_path, help="robot file (.toml) or URDF")
+    check.add_argument("-v", "--verbose", action="store_true", help="list what passed, too")
+    check.set_defaults(run=_run_check)
+
+    urdf = verbs.add_parser("urdf", help="build the URDFs from their robot files")
+    urdf.add_argument(
+        "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
+    )
+    urdf.set_defaults(run=_run_urdf)
+
+    for verb, text in (
+        ("stand", "standing still: torques, currents, power of every alternative"),
+        ("walk", "one walking cycle: demand, stage energies, losses, limits"),
+        ("reports", "stand, walk and all figures"),
+    ):
+        sub = verbs.add_parser(verb, help=text)
+        _run_options(sub)
+        sub.set_defaults(run=_run_reports)
+
+    gap = verbs.add_parser(
+        "gap", help="find what the model lacks: from a measured log to a named effect"
+    )
+    add_gap_options(gap)
+    gap.set_defaults(run=_run_gap)
+
+    twin = verbs.add_parser("twin", help="make one blind trial: a log with something hidden")
+    add_twin_options(twin)
+    twin.set_defaults(run=_run_twin)
+
+    blind = verbs.add_parser("blind", help="make many blind trials and judge what gap says of them")
+    add_blind_options(blind)
+    blind.set_defaults(run=_run_blind)
+
+    calibrate = verbs.add_parser(
+        "calibrate", help="fit the unpublished numbers to the paper's figures and store them"
+    )
+    calibrate.add_argument("--robot", type=named_path, default=DEFAULT_ROBOT, help="robot file")
+    calibrate.add_argument("--workers", type=int, default=2, help="processes")
+    calibrate.add_argument("--seed", type=int, default=1, help="of everything random")
+    calibrate.set_defaults(run=_run_calibrate)
+    return root
+
+
+def _run_options(sub: argparse.ArgumentParser) -> None:
+    sub.add_argument(
+        "--robot", type=named_path, help="robot file; the model file's or the hexapod by default"
+    )
+    sub.add_argument(
+        "--model", type=named_path, help="model file: include the effects that `gap` found"
+    )
+    sub.add_argument(
+        "--actuators",
+        type=named_path,
+        metavar="DIR",
+        help="folder of actuator files of your own; actuators/catalog by default",
+    )
+    sub.add_argument(
+        "--out", type=named_path, default=DEFAULT_OUT, help="folder for CSV and figures"
+    )
+    sub.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a number for this run: NAME=VALUE in the unit the robot file writes, "
+        "COMPONENT.NAME=VALUE for an actuator, gait.transfer_path=NAME",
+    )
+    sub.add_argument("--samples", type=int, default=751, help="samples per segment of the gait")
+    sub.add_argument(
+        "--quasi-static", action="store_true", help="leave out the links' inertial terms"
+    )
+    sub.add_argument(
+        "--regeneration",
+        default="none",
+        metavar="POLICY",
+        help="what becomes of returned electrical energy: none, bus, or a fraction such as 0.5",
+    )
+    add_decimal_option(sub)
+    sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
+
+
+def _run_check(options: argparse.Namespace) -> int:
+    from pipeline.robot.check import check_file
+
+    findings = check_file(options.file)
+    failed = [finding for finding in findings if not finding.passed]
+    for finding in findings:
+        if finding.passed and not finding.note and not options.verbose:
+            continue
+        mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
+        print(f"{mark} {finding.subject}: {finding.check}: {finding.detail}")
+    print(f"{options.file}: {len(findings) - len(failed)} of {len(findings)} checks passed")
+    return EXIT_NEGATIVE if failed else EXIT_OK
+
+
+def _run_urdf(options: argparse.Namespace) -> int:
+    from pipeline.robot.robot_file import load_robot_file
+    from pipeline.robot.urdf_builder import build_urdf
+    from reports.writer import write_text
+
+    for path in options.files or sorted(Path("urdf").glob("*.toml")):
+        spec = load_robot_file(path)
+        if spec.build:
+            write_text(spec.urdf, build_urdf(spec))
+            print(spec.urdf)
+    return EXIT_OK
+
+
+@contextmanager
+def _folder_held(options: argparse.Namespace) -> Iterator[None]:
+    """Hold the folder of results from the start, and see that the model's folder is settled."""
+    from pipeline.cli.staging import holding, settled
+
+    if getattr(options, "model", None):
+        settled(options.model.parent)
+    with holding(options.out):
+        yield
+
+
+def _run_reports(options: argparse.Namespace) -> int:
+    with _folder_held(options):
+        from pipeline.cli.run import run
+
+        return run(options)
+
+
+def _run_gap(options: argparse.Namespace) -> int:
+    with _folder_held(options):
+        from pipeline.cli.gap import run_gap
+
+        return run_gap(options)
+
+
+def _run_twin(options: argparse.Namespace) -> int:
+    with _folder_held(options):
+        from pipeline.cli.twin import run_twin
+
+        return run_twin(options)
+
+
+def _run_blind(options: argparse.Namespace) -> int:
+    from pipeline.cli.staging import told
+
+    with _folder_held(options), told(options.out):
+        from pipeline.cli.blind import run_blind
+
+        return run_blind(options)
+
+
+def _run_calibrate(options: argparse.Namespace) -> int:
+    from pipeline.cli.calibrate import WORK, run_calibrate
+    from pipeline.cli.staging import holding, told
+
+    with holding(WORK), told(WORK):
+        return run_calibrate(options)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Args:
+        arguments: Without the program's name; those of the process by default.
+
+    Returns:
+        The exit code.
+    """
+    options = parser().parse_args(arguments)
+    logging.basicConfig(
+        level=logging.INFO if getattr(options, "verbose", False) else logging.WARNING,
+        format="%(message)s",
+    )
+    run: Callable[[argparse.Namespace], int] = options.run
+    from actuators.errors import ActuatorError
+    from pipeline.logs.errors import GapError
+    from reports.errors import ReportError
+
+    try:
+        return run(options)
+    except TippingError as error:
+        print(error, file=sys.stderr)
+        return EXIT_NEGATIVE
+    except (PipelineError, ActuatorError, GapError, ReportError) as error:
+        print(error, file=sys.stderr)
+        return EXIT_UNUSABLE
+    except KeyboardInterrupt:
+        print("interrupted; nothing is half-written", file=sys.stderr)
+        return 130

@@ -1,0 +1,1 @@
+"""Joint demand, ground forces, stability."""

@@ -1,0 +1,173 @@
+"""What an effect is: a named edit of a machine, with places, parameters and a signature."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+from actuators.errors import closest
+from pipeline.logs.errors import EffectError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+
+Place = tuple[str, ...]
+Values = Mapping[str, float]
+CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
+#: What a joint's column of a channel is called in the log format.
+CHANNEL_COLUMNS: Final = {
+    "torque": "torque_Nm",
+    "current": "current_A",
+    "voltage": "voltage_V",
+    "power": "power_W",
+}
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of an effect.
+
+    Attributes:
+        name: In the model file.
+        unit: ``"channel"`` stands for the unit of the compared channel.
+        low: Below this the effect makes no sense.
+        high: Above this likewise.
+        optional: Whether it may be left out and is zero then.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A number in which an effect is fitted; at zero the effect is not there.
+
+    Attributes:
+        name: Of the coordinate.
+        step: For finite differences; small against what matters.
+        signed: Whether negative values make sense.
+        required: Whether the effect is this effect only while this coordinate is not zero.
+    """
+
+    name: str
+    step: float
+    signed: bool = False
+    required: bool = True
+
+
+class Effect(ABC):
+    """A kind of thing that a model may lack.
+
+    An effect is fitted in `coordinates`, in which the prediction is linear or nearly so, at given
+    `shapes` (Stribeck speed, order of a ripple), and told in `parameters`.
+
+    Attributes:
+        name: In the field's terms; key of the registry.
+        place_kind: What it acts on: joint, joint pair, link, ground, effort channels or column.
+        parameters: As written to results and model files.
+        coordinates: As fitted.
+        signature: Variable against which its residual shows, a key of `signature.VARIABLES`.
+        excitation: The motion that shows it, in words.
+        is_tolerance: Whether every machine has it in small, as a tolerance that is always free.
+        reaches: Multiples of the coordinates' steps to look across, where the prediction bends.
+        contains: Effects that are special cases of this one at the same place.
+        rescales: Whether what bodies do to a channel is multiplied by it.
+    """
+
+    name: ClassVar[str]
+    place_kind: ClassVar[str] = "joint"
+    parameters: ClassVar[tuple[Parameter, ...]]
+    coordinates: ClassVar[tuple[Coordinate, ...]]
+    signature: ClassVar[str] = "velocity"
+    excitation: ClassVar[str]
+    is_tolerance: ClassVar[bool] = False
+    reaches: ClassVar[tuple[float, ...]] = (1.0,)
+    contains: ClassVar[tuple[str, ...]] = ()
+    rescales: ClassVar[bool] = False
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Where in this machine and log the effect could be."""
+        return [(joint,) for joint in model.joints]
+
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+        """Values of the nonlinear parameters to try first; one empty set where there are none."""
+        return [{}]
+
+    def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
+        """Whether this motion can show the effect at these nonlinear parameters at all."""
+        return True
+
+    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
+        """Shapes near one that did well; `factor` shrinks from round to round."""
+        return []
+
+    @abstractmethod
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """The machine with the effect at coordinates `x` and shape `shape`."""
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Coordinates and shape as parameters."""
+        return {**x, **shape}
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """Parameters as coordinates and shape."""
+        names = [c.name for c in self.coordinates]
+        return (
+            {n: float(v) for n, v in values.items() if n in names},
+            {n: float(v) for n, v in values.items() if n not in names},
+        )
+
+    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
+        """Standard deviation by coordinate that the machine's tolerances explain already.
+
+        Empty where the effect is no tolerance of every machine. An estimate counts only where it
+        exceeds `verdict.TOLERANCE_SIGMAS` of these.
+        """
+        return {}
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """Tolerances (kind, place) that are this effect in small: they stand back where it is."""
+        return ()
+
+    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
+        """Whether an estimate lies inside the bounds of what can be."""
+        values = self.physical(x, shape)
+        return all(
+            p.low <= values[p.name] <= p.high
+            for p in self.parameters
+            if p.name in values or not p.optional
+        )
+
+    def apply(self, model: MachineModel, place: Place, values: Values) -> MachineModel:
+        """The machine with the effect at the given parameters.
+
+        Raises:
+            EffectError: A parameter is missing, unknown or out of bounds.
+            ModelError: The place does not exist.
+        """
+        known = [p.name for p in self.parameters]
+        for name in values:
+            if name not in known:
+                raise EffectError(f"{self.name}: no parameter '{name}'; {closest(name, known)}")
+        for parameter in self.parameters:
+            if parameter.name not in values:
+                if parameter.optional:
+                    continue
+                raise EffectError(f"{self.name}: parameter '{parameter.name}' is missing")
+            value = values[parameter.name]
+            if not parameter.low <= value <= parameter.high:
+                raise EffectError(
+                    f"{self.name}: {parameter.name} = {value:g} lies outside "
+                    f"{parameter.low:g} to {parameter.high:g} {parameter.unit}"
+                )
+        return self.edit(model, place, *self.internal(values))
+
+    def unit(self, parameter: str, channel: str) -> str:
+        """Unit of a parameter in a log whose compared channel is `channel`."""
+        unit = next(p.unit for p in self.parameters if p.name == parameter)
+        return CHANNEL_UNITS[channel] if unit == "channel" else unit

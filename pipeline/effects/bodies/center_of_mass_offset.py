@@ -1,0 +1,52 @@
+"""A centre of mass that lies elsewhere than the robot file says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
+from pipeline.effects.bodies.link_mass import felt
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+
+LEVER_TOLERANCE = 0.03  # of the lever, one standard deviation [1]
+LEAST_TOLERANCE = 1.5e-3  # [m]
+
+
+class CenterOfMassOffset(Effect):
+    """Displacement of a link's centre of mass in the frame of its joint."""
+
+    name = "center_of_mass_offset"
+    place_kind = "link"
+    parameters: ClassVar = tuple(Parameter(axis, "m", -0.5, 0.5) for axis in "xyz")
+    coordinates: ClassVar = tuple(
+        Coordinate(axis, 1e-3, signed=True, required=False) for axis in "xyz"
+    )
+    signature = "position"
+    is_tolerance = True
+    excitation = "holds the link in postures all around its axis"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Every moving link whose body the torques feel."""
+        return [(link,) for link, joint in model.links.items() if felt(model, m, joint)]
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Displace it."""
+        joint = model.carrier(place[0])
+        body = model.bodies.body(joint)
+        moved = tuple(s + x[axis] for s, axis in zip(body.shift, "xyz", strict=True))
+        changed = replace(body, shift=(moved[0], moved[1], moved[2]))
+        return model.with_bodies(model.bodies.with_body(joint, changed))
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The centre's tolerances."""
+        return tuple((f"com_{axis}", place[0]) for axis in "xyz")
+
+    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
+        """Three per cent of the lever."""
+        joint = model.rigid.getJointId(model.carrier(place[0]))
+        lever = float(np.linalg.norm(model.rigid.inertias[joint].lever))
+        return dict.fromkeys("xyz", max(LEVER_TOLERANCE * lever, LEAST_TOLERANCE))

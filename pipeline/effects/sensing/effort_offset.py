@@ -1,0 +1,30 @@
+"""A sensor of torque, current or voltage whose zero is off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar
+
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
+from pipeline.machine.machine import MachineModel
+
+
+class EffortOffset(Effect):
+    """A constant added by the effort sensor."""
+
+    name = "effort_offset"
+    parameters: ClassVar = (Parameter("offset", "channel", -1e4, 1e4),)
+    coordinates: ClassVar = (Coordinate("offset", 1e-3, signed=True),)
+    signature = "time"
+    is_tolerance = True
+    excitation = "stands still without load, then moves both ways"
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The sensor's tolerance."""
+        return (("effort_zero", place[0]),)
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Shift the sensor's zero."""
+        actuator = model.actuator(place[0])
+        offset = actuator.effort_offset + x["offset"]
+        return model.with_actuator(replace(actuator, effort_offset=offset))

@@ -1,1 +1,0 @@
-"""From a measured log to a named effect and a smaller gap."""

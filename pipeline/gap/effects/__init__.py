@@ -1,1 +1,0 @@
-"""The effects a model may lack, one file each."""

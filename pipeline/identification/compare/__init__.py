@@ -1,0 +1,1 @@
+"""Where measured and predicted effort differ, and by how much."""

@@ -1,0 +1,157 @@
+"""One bandwidth for everything that follows: where the encoder's noise no longer speaks.
+
+Naming compares efforts with inertia times an acceleration that comes from a filtered encoder. Its
+noise grows with the 2.5th power of the cut-off, the effort's with the square root; where the first
+outweighs the second, columns built from accelerations fit noise (an elasticity that is not there).
+The cut-off is lowered until the encoder's noise in the prediction is at most half the effort's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.identification.compare.observe import observe_all
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.prepared.prepare import LONGEST_KERNEL, TOLERATED_SHARE, Prepared, Settings
+from pipeline.logs.signals.derivatives import LowPass
+from pipeline.logs.signals.noise import smoother_noise
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Prediction, Simulator
+
+Array = NDArray[np.float64]
+#: Encoder noise in the prediction over effort noise.
+LARGEST_RATIO: Final = 0.5
+#: Never below this; a robot's own motion reaches further [Hz].
+LEAST_CUTOFF: Final = 8.0
+
+
+#: Nor above this: a robot's motion does not reach there, resonances of its structure do [Hz].
+MOST_CUTOFF: Final = 30.0
+
+
+def naming_cutoff(model: MachineModel, prepared: Sequence[Prepared]) -> float:
+    """The cut-off for naming [Hz], at most that of the prepared logs."""
+    now = prepared[0].cutoff
+    share = 1.0
+    for one, m in zip(prepared, observe_all(model, prepared), strict=True):
+        felt = encoder_noise(model, one, m)[:, 0]
+        good = (felt > 0) & np.isfinite(m.noise[:, 0])
+        if good.any():
+            ratio = float(np.median(felt[good] / m.noise[good, 0]))
+            share = min(share, float(np.sqrt(LARGEST_RATIO / max(ratio, 1e-12))))
+    longest = max(float(one.time[-1] - one.time[0]) for one in prepared)
+    least = max(LEAST_CUTOFF, 4.0 / (LONGEST_KERNEL * longest))
+    return float(min(now, max(min(share * now, MOST_CUTOFF), least)))
+
+
+def with_encoder_noise(
+    model: MachineModel, prepared: Sequence[Prepared], measurements: Sequence[Measurement]
+) -> tuple[Measurement, ...]:
+    """Measurements whose noise floor includes what the encoder's noise does to the prediction."""
+    return tuple(
+        replace(m, noise=np.hypot(m.noise, encoder_noise(model, one, m)))
+        for one, m in zip(prepared, measurements, strict=True)
+    )
+
+
+def encoder_noise(model: MachineModel, one: Prepared, m: Measurement) -> Array:
+    """Standard deviation of the prediction from the encoder's noise, shape (J, C).
+
+    Velocity and acceleration noise are taken as independent of one another (an odd and an even
+    kernel) and of other joints.
+    """
+    base = Simulator(m).predict(model)
+    raw = np.nan_to_num(one.position_noise)
+    total = np.zeros(base.effort.shape[1:])
+    for order, jolt in ((1, replace(m, v=m.v + 0.1)), (2, replace(m, a=m.a + 1.0))):
+        size = 0.1 if order == 1 else 1.0
+        # In motion alone: the step of friction at a reversal is no noise.
+        change = np.abs(Simulator(jolt).predict(model).effort - base.effort) / size
+        slope = np.median(change, axis=0)
+        kernel = one.settings.lowpass.kernels[order]
+        noise = raw * float(np.sqrt((kernel**2).sum()))
+        total += (slope * noise[:, None]) ** 2
+    total += _force_noise(model, one, m, base) ** 2
+    return np.asarray(np.sqrt(total))
+
+
+def _force_noise(model: MachineModel, one: Prepared, m: Measurement, base: Prediction) -> Array:
+    """Standard deviation of the prediction from the noise of measured foot forces, (J, C)."""
+    total = np.zeros(base.effort.shape[1:])
+    raw = one.log.foot_force
+    if m.foot_force is None or raw is None or m.standing is None:
+        return total
+    # At the log's own rate, where the noise is white.
+    flat = np.nan_to_num(raw[one.row]).reshape(len(one), -1)
+    lowpass = one.settings.lowpass
+    sigma = smoother_noise(
+        flat, np.ones(flat.shape, dtype=np.bool_), one.pieces, lowpass, in_band=True
+    )
+    for axis in range(3):
+        known = np.nan_to_num(sigma.reshape(raw.shape[1:])[:, axis])
+        push = np.zeros_like(m.foot_force)
+        push[..., axis] = m.standing * float(np.median(known))
+        pushed = Simulator(replace(m, foot_force=m.foot_force + push)).predict(model)
+        total += np.mean((pushed.effort - base.effort) ** 2, axis=0)
+    return np.asarray(np.sqrt(total))
+
+
+def lowered(prepared: Sequence[Prepared], cutoff: float) -> tuple[Prepared, ...]:
+    """Prepared logs at a lower cut-off.
+
+    Args:
+        prepared: At one cut-off.
+        cutoff: At most that one [Hz].
+    """
+    if cutoff >= prepared[0].cutoff * (1 - 1e-9):
+        return tuple(prepared)
+    return tuple(_lowered(one, cutoff) for one in prepared)
+
+
+def _lowered(one: Prepared, cutoff: float) -> Prepared:
+    old = one.settings
+    reason = (
+        f"lowered from {old.cutoff:.3g} Hz ({old.reason}): above it the encoder's noise in the "
+        "prediction outweighs the effort's"
+    )
+    settings = Settings(old.dt, cutoff, reason, old.per_joint)
+    lowpass = settings.lowpass
+
+    def smooth(x: Array | None) -> Array | None:
+        if x is None:
+            return None
+        out = np.empty_like(x)
+        for piece in one.pieces:
+            out[piece] = lowpass.smooth(x[piece])
+        return out
+
+    gap = ~np.isfinite(one.effort)
+    effort = smooth(np.where(gap, 0.0, one.effort))
+    q, v, a = smooth(one.q), smooth(one.v), smooth(one.a)
+    assert effort is not None and q is not None and v is not None and a is not None  # noqa: PT018
+    mask, motion = one.mask.copy(), one.motion_ok.copy()
+    for piece in one.pieces:
+        mask[piece] &= lowpass.share(gap[piece]) <= TOLERATED_SHARE
+        mask[piece] &= lowpass.share(~one.mask[piece]) <= 0.5
+        motion[piece] &= lowpass.share(~one.motion_ok[piece]) <= 0.5
+    effort[gap] = np.nan
+    shrink = lowpass.noise_gain / LowPass(one.rate, old.cutoff).noise_gain
+    return replace(
+        one,
+        q=q,
+        v=v,
+        a=a,
+        effort=effort,
+        mask=mask,
+        motion_ok=motion,
+        noise=one.noise * shrink,
+        settings=settings,
+        foot_force=smooth(one.foot_force),
+        base_roll=smooth(one.base_roll),
+        base_pitch=smooth(one.base_pitch),
+    )

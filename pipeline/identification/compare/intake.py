@@ -1,0 +1,129 @@
+"""Step 1 of the workflow: read all logs, judge them, bring them to one grid and bandwidth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.identification.compare.long import LongLogs
+from pipeline.logs.errors import LogContentError
+from pipeline.logs.prepared.contact import Contact
+from pipeline.logs.prepared.cycles import period, with_repeated_noise
+from pipeline.logs.prepared.prepare import Prepared, Settings, choose_settings, prepare
+from pipeline.logs.quality.finding import Finding
+from pipeline.logs.quality.quality import judge
+from pipeline.logs.quality.unit_check import column_name
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.mapping import Mapping as MappingFile
+from pipeline.logs.reading.read import read_log
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Intake:
+    """Logs that were accepted.
+
+    Attributes:
+        prepared: One per log, in the order given.
+        findings: Rows of `quality.csv`.
+        settings: Common to all.
+        long: The logs chunk by chunk where `prepared` holds but stretches of them, else None.
+    """
+
+    prepared: tuple[Prepared, ...]
+    findings: tuple[Finding, ...]
+    settings: Settings
+    long: LongLogs | None = None
+
+
+def take_in(
+    paths: Sequence[Path],
+    expected: Expected,
+    mapping: MappingFile | None = None,
+    *,
+    cutoff: float | None = None,
+    largest: Mapping[str, Array] | None = None,
+    contact: Callable[[Log], Contact | None] | None = None,
+) -> Intake:
+    """Read, judge and prepare several logs of one robot.
+
+    Args:
+        paths: CSV or Parquet.
+        expected: The robot's names, limits and ratios.
+        mapping: For foreign columns.
+        cutoff: Of the low-pass, instead of the one the data ask for [Hz].
+        largest: Channel to the largest magnitude the drive can give, shape (J,).
+        contact: How to tell which feet stand; by the log's own forces or columns by default.
+
+    Raises:
+        GapError: A log is unreadable, unusable or does not fit the others; one line.
+    """
+    if not paths:
+        raise LogContentError("no log given; name at least one CSV or Parquet file")
+    logs = [read_log(path, expected, mapping) for path in paths]
+    return prepare_logs(logs, expected, cutoff=cutoff, largest=largest, contact=contact)
+
+
+def prepare_logs(
+    logs: Sequence[Log],
+    expected: Expected,
+    *,
+    cutoff: float | None = None,
+    largest: Mapping[str, Array] | None = None,
+    contact: Callable[[Log], Contact | None] | None = None,
+) -> Intake:
+    """Judge and prepare logs that were read already; see `take_in`.
+
+    Raises:
+        GapError: A log is unusable or does not fit the others.
+    """
+    qualities = []
+    for log in logs:
+        quality = judge(log, expected, largest=largest)
+        quality.refuse()
+        qualities.append(quality)
+    channels = {log.effort.channel for log in logs}
+    if len(channels) > 1:
+        raise LogContentError(
+            f"the logs are compared in different channels ({', '.join(sorted(channels))}); set "
+            "effort in a mapping file"
+        )
+    settings = choose_settings(logs, [q.usable for q in qualities], cutoff=cutoff)
+    prepared = [
+        prepare(log, settings, usable=q.usable, contact=contact(log) if contact else None)
+        for log, q in zip(logs, qualities, strict=True)
+    ]
+    prepared = with_repeated_noise(prepared)
+    findings = [finding for quality in qualities for finding in quality.findings]
+    for one in prepared:
+        findings += _filter_findings(one)
+    return Intake(tuple(prepared), tuple(findings), settings)
+
+
+def _filter_findings(one: Prepared) -> list[Finding]:
+    """Bandwidth, usable share and noise floor of one prepared log."""
+    name = one.log.name
+    out = [Finding(name, "", "cutoff", one.cutoff, "Hz", "ok", one.settings.reason)]
+    cycle = period(one)
+    if cycle is not None:
+        out.append(Finding(name, "", "period", cycle, "s", "ok", "the motion repeats"))
+    if one.contact is not None:
+        detail = f"contact from {one.contact.source}; {len(one.stances)} stretches of one stance"
+        out.append(Finding(name, "", "contact", len(one.stances), "1", "ok", detail))
+    for j, joint in enumerate(one.joints):
+        column = column_name(joint, one.channel)
+        usable = float(one.mask[:, j].mean())
+        verdict = "ok" if usable > 0.98 else "masked"
+        detail = f"{100 * usable:.1f} % of the rows can be compared"
+        out.append(Finding(name, column, "usable_share", usable, "1", verdict, detail))
+        floor = float(one.noise[j])
+        if np.isfinite(floor):
+            detail = f"within the bandwidth, from {one.noise_basis}"
+            out.append(Finding(name, column, "noise_floor", floor, one.unit, "ok", detail))
+    return out

@@ -1,0 +1,243 @@
+"""From prepared logs to what naming works on: channels, masks, speeds at which friction turns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.prepared.measurement import Measurement, near_rest
+from pipeline.logs.prepared.parts import Parts
+from pipeline.logs.prepared.prepare import Prepared
+from pipeline.logs.signals.derivatives import LowPass
+from pipeline.logs.signals.noise import smoother_noise
+from pipeline.machine.machine import MachineModel
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Speed over which friction changes sign, as a share of the joint's fast speed.
+REST_SHARE: Final = 0.003
+#: ... and at least this many standard deviations of the velocity's noise.
+REST_SIGMAS: Final = 3.0
+#: Rows kept per period of the cut-off; predictions are made and filtered at this rate.
+ROWS_PER_PERIOD: Final = 10.0
+#: Shortest piece over which scatter is taken, in reaches of the filter to one side.
+PIECE: Final = 3.0
+
+
+def observe(
+    model: MachineModel, prepared: Sequence[Prepared], parts: Parts
+) -> tuple[Measurement, ...]:
+    """Measurements of several logs, in their order.
+
+    Args:
+        model: Whose joints and legs the columns are.
+        prepared: Logs at one bandwidth.
+        parts: Of the same logs.
+    """
+    rest = _rest_speed(prepared)
+    return tuple(
+        _observe(model, one, parts.part[k], parts.block[k].astype(np.intp), rest)
+        for k, one in enumerate(prepared)
+    )
+
+
+def observe_all(model: MachineModel, prepared: Sequence[Prepared]) -> tuple[Measurement, ...]:
+    """Measurements whose rows all belong to *fit* and to one block: to look, not to judge."""
+    rest = _rest_speed(prepared)
+    return tuple(
+        _observe(model, one, np.zeros(len(one), np.int8), np.zeros(len(one), np.intp), rest)
+        for one in prepared
+    )
+
+
+def observe_chunk(
+    model: MachineModel, one: Prepared, part: NDArray[np.int8], like: Measurement
+) -> Measurement:
+    """Measurement of a chunk of a longer log.
+
+    Args:
+        model: Whose joints and legs the columns are.
+        one: The chunk; rows outside of its core do not count.
+        part: Of its rows, shape (N,).
+        like: Of the log as a whole: noise and rest speed.
+    """
+    block = np.full(len(one), -1, dtype=np.intp)
+    core = np.zeros(len(one), dtype=np.bool_)
+    core[one.core] = True
+    counted = replace(one, mask=one.mask & core[:, None])
+    m = _observe(model, counted, part, block, like.rest_speed)
+    return replace(m, noise=like.noise)
+
+
+def _subdivided(block: NDArray[np.intp], one: Prepared) -> NDArray[np.intp]:
+    """Blocks cut into pieces of a few reaches of the filter: enough of them to see scatter."""
+    length = max(2, int(np.ceil(PIECE * one.memory * one.rate)))
+    out = np.full_like(block, -1)
+    number = 0
+    for b in np.unique(block[block >= 0]):
+        rows = np.flatnonzero(block == b)
+        pieces = max(1, rows.size // length)
+        out[rows] = number + (np.arange(rows.size) * pieces) // rows.size
+        number += pieces
+    return out
+
+
+def _observe(
+    model: MachineModel,
+    one: Prepared,
+    part: NDArray[np.int8],
+    block: NDArray[np.intp],
+    rest: Array,
+) -> Measurement:
+    channels, effort, noise = _channels(model, one)
+    known = one.mask
+    idle = _idle(one, channels)
+    if idle is not None:
+        effort[idle] = 0.0
+        within = np.zeros(len(one), dtype=np.bool_)
+        within[one.core] = np.asarray(one.motion_ok[one.core]).all(axis=1)
+        known = known | (idle & within[:, None])
+    mask = known & np.isfinite(effort).all(axis=2) & ~_standing(one, rest)
+    if one.torque_off is not None:
+        mask &= ~one.torque_off if idle is None else ~one.torque_off | idle
+    standing, force = _contact(model, one)
+    if standing is not None:
+        mask &= ~one.near_event()[:, None]
+    rows, pieces, step = _thinned(one)
+    lowpass = LowPass(one.rate / step, one.cutoff)
+
+    def smooth(x: Array) -> Array:
+        out = np.empty_like(x)
+        for piece in pieces:
+            out[piece] = lowpass.smooth(x[piece])
+        return out
+
+    def kept(x: Array | None) -> Array | None:
+        return None if x is None else x[rows]
+
+    return Measurement(
+        name=one.log.name,
+        time=one.time[rows],
+        joints=one.joints,
+        q=one.q[rows],
+        v=one.v[rows],
+        a=one.a[rows],
+        channels=channels,
+        effort=np.nan_to_num(effort[rows]),
+        noise=noise,
+        mask=mask[rows],
+        part=part[rows],
+        block=_subdivided(block, one)[rows],
+        pieces=pieces,
+        lowpass=smooth,
+        kernel=lowpass.kernels[0],
+        bandwidth=one.cutoff,
+        at_motor=one.log.position_source == "motor",
+        rest_speed=rest,
+        base_roll=kept(one.base_roll),
+        base_pitch=kept(one.base_pitch),
+        standing=None if standing is None else standing[rows],
+        foot_force=kept(force),
+        open_winding=_open_winding(one, rows) if idle is not None else None,
+        temperature=kept(_temperature(one)),
+        sha256=one.log.sha256,
+    )
+
+
+def _idle(one: Prepared, channels: tuple[str, ...]) -> Mask | None:
+    """Rows whose filter sees nothing but a drive that is off and tells what flows, (N, J), or None.
+
+    With an open winding no current flows, with a shorted one no voltage is applied; either way the
+    compared effort is zero, and the motion alone says what friction and inertia are.
+    """
+    off, bridge = one.torque_off, one.log.torque_off_bridge
+    told = {"open": ("voltage", "current", "power"), "shorted": ("voltage",)}
+    if off is None or bridge is None or len(channels) > 1 or channels[0] not in told[bridge]:
+        return None
+    out = np.zeros(off.shape, dtype=np.bool_)
+    for piece in one.pieces:
+        out[piece] = one.settings.lowpass.share(~off[piece]) <= 1e-9
+    return out
+
+
+def _open_winding(one: Prepared, rows: NDArray[np.intp]) -> Mask | None:
+    if one.torque_off is None or one.log.torque_off_bridge != "open":
+        return None
+    return one.torque_off[rows]
+
+
+def _temperature(one: Prepared) -> Array | None:
+    """Of the motors, shape (N, J) [degC]; None where some joint's sensor is silent somewhere."""
+    temperature = one.other.get("temperature")
+    return None if temperature is None or not np.isfinite(temperature).all() else temperature
+
+
+def _thinned(one: Prepared) -> tuple[NDArray[np.intp], tuple[slice, ...], int]:
+    """Rows that say all that the bandwidth holds, their pieces, and the step between them.
+
+    A series filtered to a bandwidth repeats itself beyond a few samples per period of the cut-off.
+    """
+    step = max(1, int(one.rate / (ROWS_PER_PERIOD * one.cutoff)))
+    rows, pieces, at = [], [], 0
+    for piece in one.pieces:
+        part = np.arange(piece.start, piece.stop, step)
+        rows.append(part)
+        pieces.append(slice(at, at + part.size))
+        at += part.size
+    return np.concatenate(rows), tuple(pieces), step
+
+
+def _channels(model: MachineModel, one: Prepared) -> tuple[tuple[str, ...], Array, Array]:
+    """Compared channel, and voltage beside a current: it tells speed and resistance apart."""
+    efforts, noise, names = [one.effort], [one.noise], [one.channel]
+    motors = all(a.motor is not None for a in model.actuators)
+    if one.channel == "current" and "voltage" in one.other and motors:
+        raw = one.other["voltage"]  # at the log's own bandwidth or above this one
+        good = np.isfinite(raw)
+        filled = np.where(good, raw, 0.0)
+        names.append("voltage")
+        efforts.append(np.where(good, one.lowpass(filled), np.nan))
+        noise.append(smoother_noise(filled, good, one.pieces, one.settings.lowpass, in_band=True))
+    floor = np.stack(noise, axis=1)
+    # A joint without enough good samples has no floor of its own; it is masked anyway.
+    usual = np.nanmedian(floor, axis=0)
+    return tuple(names), np.stack(efforts, axis=2), np.where(np.isfinite(floor), floor, usual)
+
+
+def _rest_speed(prepared: Sequence[Prepared]) -> Array:
+    """Shape (J,) [rad/s]."""
+    fast = np.max([np.quantile(np.abs(one.v), 0.95, axis=0) for one in prepared], axis=0)
+    slope = prepared[0].settings.lowpass.kernels[1]
+    gain = float(np.sqrt((slope**2).sum()))
+    noise = gain * np.nanmax([one.position_noise for one in prepared], axis=0)
+    return np.maximum(np.maximum(REST_SHARE * fast, REST_SIGMAS * np.nan_to_num(noise)), 1e-6)
+
+
+def _standing(one: Prepared, rest: Array) -> Mask:
+    """Rows whose filter sees a joint stop or turn back, shape (N, J); see `near_rest`."""
+    return near_rest(one.v, rest, one.pieces, one.rate, one.cutoff)
+
+
+def _contact(model: MachineModel, one: Prepared) -> tuple[Mask | None, Array | None]:
+    """Which feet stand, and forces; in the model's order of legs."""
+    if not model.floating or model.legs is None or one.contact is None:
+        return None, None
+    order = [one.contact.feet.index(leg) for leg in model.legs.names]
+    standing = one.contact.standing[:, order]
+    if one.foot_force is None:
+        return standing, None
+    feet = [one.log.feet.index(leg) for leg in model.legs.names]
+    force = one.foot_force[:, feet]
+    raw = one.log.foot_force
+    assert raw is not None
+    # A component that no column gives is NaN from end to end.
+    absent = np.asarray(np.isnan(raw).all(axis=0))[feet]
+    force = np.where(absent[None], np.nan, np.nan_to_num(force))
+    # Sensors of feet in the air show noise alone.
+    force = np.where(standing[..., None] | absent[None], force, 0.0)
+    return standing, np.where(standing[..., None], force, 0.0)

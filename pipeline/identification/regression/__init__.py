@@ -1,0 +1,1 @@
+"""The least-squares problem: design matrix, normal equations, tolerances, intervals."""

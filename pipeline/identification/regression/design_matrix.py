@@ -1,0 +1,199 @@
+"""How the prediction changes with each unknown, whitened and cut into blocks.
+
+Every unknown's column comes from the simulation itself by a finite difference, so that losses
+upstream of an effect's shaft are in it. Rows are ordered by part of the data and block; a column is
+kept only at the joints it touches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.effects.base import Coordinate, Place
+from pipeline.logs.errors import NamingError
+from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Prediction, Simulator
+
+Array = NDArray[np.float64]
+Column = Mapping[int, Array]
+
+
+class Editing(Protocol):
+    """What has coordinates and changes a model: an effect."""
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """As fitted."""
+
+    def edit(
+        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
+    ) -> MachineModel:
+        """The changed model."""
+
+
+#: Key among nonlinear parameters: how many of its small steps a column reaches across.
+REACH = "reach"
+#: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
+ROWS_PER_PERIOD = 4.0
+#: Most informative rows of all logs together.
+LARGEST_ROWS = 50_000
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """One log made ready for least squares.
+
+    Attributes:
+        simulator: Of its motion.
+        rows: Rows of the measurement that count, ordered by part and block, shape (R,).
+        parts: Part of the data to its range among those rows.
+        edges: First row of each block among those rows, with the end, shape (B + 1,).
+        block_part: Part of each block, shape (B,).
+        weight: Square root of independent samples per row [1].
+    """
+
+    simulator: Simulator
+    rows: NDArray[np.intp]
+    parts: Mapping[int, slice]
+    edges: NDArray[np.intp]
+    block_part: NDArray[np.int8]
+    weight: float
+
+    @property
+    def measurement(self) -> Measurement:
+        """The log."""
+        return self.simulator.measurement
+
+    def whitened(self, values: Array, joints: Sequence[int], sigma: Array) -> dict[int, Array]:
+        """Series (N, len(joints), C) at the bandwidth, over sigma, masked rows zero, (R, C) each.
+
+        Args:
+            values: Before the low-pass.
+            joints: Columns they belong to.
+            sigma: Shape (J, C).
+        """
+        m = self.measurement
+        smooth = m.smooth(values)[self.rows]
+        out = {}
+        for k, j in enumerate(joints):
+            part = smooth[:, k] * (self.weight / sigma[j])
+            part[~m.mask[self.rows, j]] = 0.0
+            out[j] = part
+        return out
+
+
+def make_bench(measurement: Measurement, share: float = 1.0) -> Bench:
+    """Choose rows and order them.
+
+    Rows beyond `ROWS_PER_PERIOD` per period of the cut-off repeat what their neighbours say and
+    are skipped at even steps; where the logs together still have more than `LARGEST_ROWS`, whole
+    blocks are thinned evenly by `share`, so that every block, part and piece keeps its rows.
+
+    Args:
+        measurement: One log.
+        share: Of the rows that remain, to keep.
+    """
+    m = measurement
+    wanted = ROWS_PER_PERIOD * m.bandwidth
+    step = max(1, int(m.rate / wanted)) if np.isfinite(wanted) else 1
+    step = max(1, round(step / share))
+    kept = []
+    for piece in m.pieces:
+        kept.append(np.arange(piece.start, piece.stop, step))
+    rows = np.concatenate(kept)
+    rows = rows[(m.part[rows] >= FIT) & m.mask[rows].any(axis=1)]
+    order = np.lexsort((rows, m.block[rows], m.part[rows]))
+    rows = rows[order]
+    part, block = m.part[rows], m.block[rows]
+    new = np.flatnonzero((np.diff(block) != 0) | (np.diff(part) != 0)) + 1
+    edges = np.concatenate([[0], new, [rows.size]])
+    parts = {
+        p: slice(int(np.searchsorted(part, p)), int(np.searchsorted(part, p, side="right")))
+        for p in (FIT, CHOOSE, PROVE)
+    }
+    independent = 1.0
+    if np.isfinite(m.bandwidth):
+        independent = min(1.0, 2.0 * m.bandwidth * step / m.rate)
+    return Bench(Simulator(m), rows, parts, edges, part[edges[:-1]], float(np.sqrt(independent)))
+
+
+def make_benches(measurements: Sequence[Measurement]) -> tuple[Bench, ...]:
+    """Benches of several logs, with at most `LARGEST_ROWS` rows together.
+
+    Raises:
+        NamingError: A part of the data has no usable row in any log.
+    """
+    for part, name in ((FIT, "fit"), (CHOOSE, "choose"), (PROVE, "prove")):
+        if not any(((m.part == part) & m.mask.any(axis=1)).any() for m in measurements):
+            names = ", ".join(m.name for m in measurements)
+            raise NamingError(f"{names}: no usable row is left to {name} with; log longer")
+    benches = tuple(make_bench(m) for m in measurements)
+    rows = sum(b.rows.size for b in benches)
+    if rows <= LARGEST_ROWS:
+        return benches
+    return tuple(make_bench(m, LARGEST_ROWS / rows) for m in measurements)
+
+
+def effect_columns(
+    bench: Bench,
+    base: Prediction,
+    effect: Editing,
+    place: Place,
+    shape: Mapping[str, float],
+    sigma: Array,
+    at: Mapping[str, float] | None = None,
+) -> list[dict[int, Array]]:
+    """Columns of one effect, one per coordinate, by finite differences.
+
+    Args:
+        bench: The log.
+        base: Prediction of the model without the effect.
+        effect: The effect.
+        place: Where.
+        shape: Its nonlinear parameters.
+        sigma: Shape (J, C).
+        at: Coordinates to differentiate at; zero by default.
+    """
+    shape = dict(shape)
+    reach = shape.pop(REACH, 1.0)
+    zero = dict.fromkeys((c.name for c in effect.coordinates), 0.0)
+    centre = zero | dict(at or {})
+    start = (
+        base if not at else bench.simulator.predict(_edit(effect, base, place, centre, shape), base)
+    )
+    out = []
+    for c in effect.coordinates:
+        step = reach * c.step
+        moved = centre | {c.name: centre[c.name] + step}
+        change = bench.simulator.difference(start, _edit(effect, base, place, moved, shape))
+        out.append(bench.whitened(change.effort / step, change.joints, sigma))
+    return out
+
+
+def _edit(
+    effect: Editing,
+    base: Prediction,
+    place: Place,
+    x: Mapping[str, float],
+    shape: Mapping[str, float],
+) -> MachineModel:
+    return effect.edit(base.model, place, x, shape)
+
+
+def residual(bench: Bench, prediction: Prediction, sigma: Array) -> dict[int, Array]:
+    """Measured less predicted effort, whitened, of every joint."""
+    m = bench.measurement
+    predicted = m.smooth(prediction.effort)
+    rows = bench.rows
+    out = {}
+    for j in range(len(m.joints)):
+        rest = (m.effort[rows, j] - predicted[rows, j]) * (bench.weight / sigma[j])
+        rest[~m.mask[rows, j]] = 0.0
+        out[j] = rest
+    return out

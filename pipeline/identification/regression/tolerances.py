@@ -1,0 +1,221 @@
+"""What every machine differs in from its files: tolerances that are always estimated.
+
+They compete with no effect: each is free within its stated standard deviation (a Gaussian prior),
+and the part beyond is what a candidate of the same kind is named for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.elements.friction import Friction
+from pipeline.effects.bodies.center_of_mass_offset import CenterOfMassOffset
+from pipeline.effects.bodies.link_mass import MASS_TOLERANCE, felt
+from pipeline.effects.drive.joint_elasticity import COMPLIANCE_TOLERANCE
+from pipeline.effects.drive.torque_constant_error import CONSTANT_TOLERANCE
+from pipeline.effects.sensing.position_offset import ENCODER_TOLERANCE
+from pipeline.effects.sensing.time_delay import SKEW_TOLERANCE
+from pipeline.identification.regression.design_matrix import Bench
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Prediction
+from pipeline.simulation.rigid_bodies import legs_are_separate
+
+Array = NDArray[np.float64]
+
+INERTIA_TOLERANCE: Final = 0.10  # of a link's rotational inertia [1]
+#: Of a winding, where its file states no wider interval [1].
+RESISTANCE_TOLERANCE: Final = 0.02
+#: Friction that the actuator's files state already [1].
+FRICTION_TOLERANCE: Final = 0.005
+#: Tolerances beyond this many sigmas would stand in for something else.
+MOST_SIGMAS: Final = 4.0
+#: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
+OFFSET_SIGMAS: Final = 0.75
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """One tolerance of one part of the machine.
+
+    Attributes:
+        kind: ``"mass"``, ``"com_x"`` (y, z), ``"inertia"``, ``"torque_constant"``,
+            ``"resistance"``, ``"friction"`` (of the files), ``"encoder"``, ``"effort_zero"``,
+            ``"compliance"`` or ``"skew"`` (of all effort channels).
+        place: Link or joint.
+        sigma: Standard deviation before the log was seen.
+        unit: Of it.
+    """
+
+    kind: str
+    place: str
+    sigma: float
+    unit: str
+
+    @property
+    def of_body(self) -> bool:
+        """Whether inverse dynamics has to be run again."""
+        return self.kind in ("mass", "com_x", "com_y", "com_z", "inertia", "encoder")
+
+    def edit(self, model: MachineModel, value: float) -> MachineModel:
+        """The machine with this tolerance at a value."""
+        if self.kind in ("mass", "inertia") or self.kind.startswith("com_"):
+            return self._body(model, value)
+        if self.kind == "skew":
+            late = tuple(replace(a, delay=a.delay + value) for a in model.actuators)
+            return replace(model, actuators=late)
+        actuator = model.actuator(self.place)
+        if self.kind == "encoder":
+            changed = replace(actuator, encoder_offset=actuator.encoder_offset + value)
+        elif self.kind == "compliance":
+            changed = replace(actuator, compliance=actuator.compliance + value)
+        elif self.kind == "friction":
+            elements = tuple(
+                replace(e, coulomb=e.coulomb * (1.0 + value), viscous=e.viscous * (1.0 + value))
+                if isinstance(e, Friction)
+                else e
+                for e in actuator.elements
+            )
+            changed = replace(actuator, elements=elements)
+        elif self.kind == "effort_zero":
+            changed = replace(actuator, effort_offset=actuator.effort_offset + value)
+        else:
+            assert actuator.motor is not None
+            motor = actuator.motor
+            if self.kind == "torque_constant":
+                constant = float(np.asarray(motor.torque_constant)) * _factor(value)
+                motor = replace(motor, torque_constant=constant)
+            else:
+                resistance = float(np.asarray(motor.resistance)) * _factor(value)
+                motor = replace(motor, resistance=resistance)
+            changed = replace(actuator, motor=motor)
+        return model.with_actuator(changed)
+
+    def _body(self, model: MachineModel, value: float) -> MachineModel:
+        joint = model.carrier(self.place)
+        body = model.bodies.body(joint)
+        if self.kind == "mass":
+            body = replace(body, scale=body.scale * (1.0 + value))
+        elif self.kind == "inertia":
+            body = replace(body, inertia_scale=body.inertia_scale * (1.0 + value))
+        else:
+            shift = list(body.shift)
+            shift["xyz".index(self.kind[-1])] += value
+            body = replace(body, shift=(shift[0], shift[1], shift[2]))
+        return model.with_bodies(model.bodies.with_body(joint, body))
+
+
+def _factor(value: float) -> float:
+    """Factor on a constant that cannot be zero: 1 + value, and below a half it falls off smoothly.
+
+    A tolerance as wide as that of an unknown motor would else turn the constant's sign.
+    """
+    return 1.0 + value if value > -0.5 else 0.5 * float(np.exp(2.0 * (value + 0.5)))
+
+
+def with_tolerances(
+    model: MachineModel, tolerances: Mapping[tuple[str, str], tuple[float, float]]
+) -> MachineModel:
+    """The model with estimated tolerances: (kind, place) to (value, sigma)."""
+    for (kind, place), (value, sigma) in tolerances.items():
+        limit = MOST_SIGMAS * sigma
+        model = Nuisance(kind, place, sigma, "").edit(model, min(max(value, -limit), limit))
+    return model
+
+
+def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple[Nuisance, ...]:
+    """All tolerances of a machine that its log could show.
+
+    Args:
+        model: The machine.
+        measurements: Logs with the same channels.
+    """
+    m = measurements[0]
+    out = []
+    com = CenterOfMassOffset()
+    for link, joint in model.links.items():
+        if not felt(model, m, joint):
+            continue
+        lever = com.tolerance(model, (link,))
+        out.append(Nuisance("mass", link, MASS_TOLERANCE, "1"))
+        out += [Nuisance(f"com_{axis}", link, lever[axis], "m") for axis in "xyz"]
+        out.append(Nuisance("inertia", link, INERTIA_TOLERANCE, "1"))
+    electrical = "torque" not in m.channels
+    for k, actuator in enumerate(model.actuators):
+        out.append(Nuisance("encoder", actuator.name, ENCODER_TOLERANCE, "rad"))
+        zero = OFFSET_SIGMAS * float(m.noise[k, 0])
+        out.append(Nuisance("effort_zero", actuator.name, zero, "channel"))
+        if any(isinstance(e, Friction) for e in actuator.elements):
+            out.append(Nuisance("friction", actuator.name, FRICTION_TOLERANCE, "1"))
+        if actuator.motor is not None and electrical:
+            out.append(Nuisance("compliance", actuator.name, COMPLIANCE_TOLERANCE, "rad/(N*m)"))
+        if actuator.motor is not None and electrical:
+            motor = actuator.motor
+            constant = max(CONSTANT_TOLERANCE, motor.torque_constant_spread)
+            out.append(Nuisance("torque_constant", actuator.name, constant, "1"))
+            if "voltage" in m.channels or "power" in m.channels:
+                resistance = max(RESISTANCE_TOLERANCE, motor.resistance_spread)
+                out.append(Nuisance("resistance", actuator.name, resistance, "1"))
+    out.append(Nuisance("skew", "", SKEW_TOLERANCE, "s"))
+    return tuple(out)
+
+
+def nuisance_columns(
+    bench: Bench, base: Prediction, group: Sequence[Nuisance], sigma: Array
+) -> list[dict[int, Array]]:
+    """Columns of tolerances that touch different joints, from one prediction.
+
+    Args:
+        bench: The log.
+        base: The present prediction.
+        group: One tolerance, or the like ones of all legs where legs are separate.
+        sigma: Shape (J, C).
+    """
+    if len(group) == 1:
+        return [nuisance_column(bench, base, group[0], sigma)]
+    step, model = 0.1, base.model
+    for nuisance in group:
+        model = nuisance.edit(model, step * nuisance.sigma)
+    change = bench.simulator.difference(base, model)
+    whole = bench.whitened(change.effort / step, change.joints, sigma)
+    out = []
+    for nuisance in group:
+        leg = leg_of(base.model, nuisance.place)
+        out.append({j: column for j, column in whole.items() if j // 3 == leg})
+    return out
+
+
+def leg_of(model: MachineModel, place: str) -> int:
+    """Number of the leg that a link or joint belongs to; -1 for the base."""
+    joint = place if place in model.joints else model.carrier(place)
+    return model.index(joint) // 3 if joint in model.joints else -1
+
+
+def grouped(model: MachineModel, m: Measurement, every: Sequence[Nuisance]) -> list[list[Nuisance]]:
+    """Tolerances in groups that one prediction serves."""
+    if not legs_are_separate(model, m):
+        return [[n] for n in every]
+    groups: dict[tuple[str, int], list[Nuisance]] = {}
+    for n in every:
+        if not n.place:
+            groups[(n.kind, -2)] = [n]
+            continue
+        joint = n.place if n.place in model.joints else model.carrier(n.place)
+        at = model.index(joint) % 3 if joint in model.joints else -1
+        groups.setdefault((n.kind, at), []).append(n)
+    return list(groups.values())
+
+
+def nuisance_column(
+    bench: Bench, base: Prediction, nuisance: Nuisance, sigma: Array
+) -> dict[int, Array]:
+    """Its column, per standard deviation of the prior, so that its prior precision is one."""
+    step = 0.1
+    model = nuisance.edit(base.model, step * nuisance.sigma)
+    change = bench.simulator.difference(base, model)
+    return bench.whitened(change.effort / step, change.joints, sigma)

@@ -1,0 +1,1 @@
+"""Which effects the machine lacks, and which motion would decide."""

@@ -1,0 +1,186 @@
+"""What a model leaves of the gap, and what it looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.identification import results as limits
+from pipeline.identification.compare.circumstances import gap_of
+from pipeline.identification.regression.problem import Problem
+from pipeline.identification.results import Remainder
+from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
+from pipeline.simulation.predict import Prediction
+
+Array = NDArray[np.float64]
+_BINS: Final = 12
+#: Share of the remaining variance that a variable's curve explains, to be worth a word.
+_TELLING: Final = 0.08
+
+
+def remaining(problem: Problem, theta: Array) -> list[Array]:
+    """Residual with tolerances at their estimate, in sigmas, per log (R, J, C); NaN where masked.
+
+    Args:
+        problem: With all accepted effects.
+        theta: Estimate of its unknowns.
+    """
+    out = []
+    for stack in problem.stacks():
+        bench = stack.bench
+        m = bench.measurement
+        rest = np.full((bench.rows.size, len(m.joints), len(m.channels)), np.nan)
+        for j, r in stack.r.items():
+            value = r - np.tensordot(theta[stack.ids[j]], stack.X[j], axes=1)
+            good = m.mask[bench.rows, j]
+            rest[good, j] = value[good] / bench.weight
+        out.append(rest)
+    return out
+
+
+def errors(
+    problem: Problem, parts: Sequence[int], by: Sequence[int] = (FIT, CHOOSE)
+) -> tuple[Array, Array]:
+    """Mean square error by joint and channel (J, C), and rows (J,), unknowns at their estimate.
+
+    Args:
+        problem: With some effects accepted.
+        parts: Parts of the data to judge on.
+        by: Parts that estimate.
+    """
+    sums = problem.sums()
+    theta = sums.solve(sums.blocks(*by))
+    squares = np.zeros(problem.sigma.shape)
+    rows = np.zeros(problem.sigma.shape)
+    for rest, bench in zip(remaining(problem, theta), problem.benches, strict=True):
+        for part in parts:
+            values = rest[bench.parts[part]] * problem.sigma
+            squares += np.nansum(values**2, axis=0)
+            rows += np.isfinite(values).sum(axis=0)
+    return squares / np.maximum(rows, 1), rows[:, 0]
+
+
+def remainders(
+    measurements: Sequence[Measurement],
+    predictions: Sequence[Prediction],
+    floor: Array,
+    proved: Array | None = None,
+) -> tuple[Remainder, ...]:
+    """What a model leaves on *prove*, by joint and channel, described where it is significant.
+
+    Of a joint without rows there it is what is left on *fit* and *choose*.
+
+    Args:
+        measurements: One per log.
+        predictions: Of the model, one per log.
+        floor: Standard deviation of the noise, shape (J, C).
+        proved: Root mean square on *prove* by joint and channel, shape (J, C), NaN without a row,
+            where it is known from more rows than the measurements hold.
+    """
+    first = measurements[0]
+    out = []
+    for c, channel in enumerate(first.channels):
+        rests = [gap_of(m, p, c) for m, p in zip(measurements, predictions, strict=True)]
+        for j, joint in enumerate(first.joints):
+            held = _known(measurements, rests, j, PROVE)
+            # Where no row proves, those that were fitted are better than none.
+            seen = held if held.size else _known(measurements, rests, j, FIT, CHOOSE)
+            error = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
+            if proved is not None and np.isfinite(proved[j, c]):
+                error = float(proved[j, c])
+            level = float(floor[j, c])
+            significant = error > limits.UNEXPLAINED * level
+            text = _describe(measurements, predictions, rests, j) if significant else ""
+            unit = CHANNEL_UNITS[channel]
+            out.append(
+                Remainder(joint, channel, error, level, unit, significant, text, int(held.size))
+            )
+    return tuple(sorted(out, key=lambda r: first.joints.index(r.joint)))
+
+
+def _known(
+    measurements: Sequence[Measurement], rests: Sequence[Array], j: int, *parts: int
+) -> Array:
+    """What is left of one joint on some parts, masked rows left out."""
+    pairs = zip(measurements, rests, strict=True)
+    every = np.concatenate([rest[np.isin(m.part, parts), j] for m, rest in pairs])
+    return np.asarray(every[np.isfinite(every)])
+
+
+def variables(m: Measurement, joint: int, load: Array) -> dict[str, Array]:
+    """Series on which a remainder may depend, by name in words, each (N,)."""
+    out = {
+        "position": m.q[:, joint],
+        "velocity": m.v[:, joint],
+        "acceleration": m.a[:, joint],
+        "load": load,
+        "load in the direction of motion": load * np.sign(m.v[:, joint]),
+        "time": m.time,
+    }
+    for other, name in enumerate(m.joints):
+        if other != joint and len(m.joints) <= 8:
+            out[f"position of {name}"] = m.q[:, other]
+            out[f"velocity of {name}"] = m.v[:, other]
+    return out
+
+
+def explained(rest: Array, variable: Array) -> float:
+    """Share of a remainder's variance that a step curve over a variable explains, adjusted."""
+    good = np.isfinite(rest) & np.isfinite(variable)
+    y, x = rest[good], variable[good]
+    if y.size < 5 * _BINS or np.ptp(x) == 0:
+        return 0.0
+    edges = np.unique(np.quantile(x, np.linspace(0, 1, _BINS + 1)[1:-1]))
+    index = np.searchsorted(edges, x)
+    total = float(np.sum((y - y.mean()) ** 2))
+    within = 0.0
+    for k in range(edges.size + 1):
+        part = y[index == k]
+        if part.size:
+            within += float(np.sum((part - part.mean()) ** 2))
+    return 1.0 - within / max(total, 1e-300) - _BINS / y.size
+
+
+def _describe(
+    measurements: Sequence[Measurement],
+    predictions: Sequence[Prediction],
+    rests: Sequence[Array],
+    j: int,
+) -> str:
+    """In words: what the remainder depends on most."""
+    series: dict[str, list[Array]] = {}
+    for m, prediction in zip(measurements, predictions, strict=True):
+        for name, x in variables(m, j, prediction.torque[:, j]).items():
+            series.setdefault(name, []).append(x)
+    y = np.concatenate([rest[:, j] for rest in rests])
+    shares = {name: explained(y, np.concatenate(x)) for name, x in series.items()}
+    best = max(shares, key=lambda name: shares[name])
+    joint = measurements[0].joints[j]
+    if shares[best] < _TELLING:
+        return f"what is left in {joint} depends on no single variable of the motion"
+    text = f"what is left in {joint} depends on the {best} ({100 * shares[best]:.0f} % of it)"
+    if best == "position":
+        period = _period(y, np.concatenate(series[best]))
+        text += f", with a period of about {period:.3g} rad" if period else ""
+    return text
+
+
+def _period(y: Array, q: Array) -> float:
+    """Strongest period of a remainder over the position, 0 where the travel holds less than two."""
+    good = np.isfinite(y)
+    y, q = y[good] - y[good].mean(), q[good]
+    travel = float(np.ptp(q))
+    if travel <= 0:
+        return 0.0
+    orders = 2 * np.pi / travel * np.arange(1.0, 60.0, 0.25)
+    power = np.abs(
+        np.exp(-1j * orders[:, None] * q[None, :: max(1, q.size // 2000)])
+        @ y[:: max(1, q.size // 2000)]
+    )
+    best = float(orders[int(np.argmax(power))])
+    period = 2 * np.pi / best
+    return period if period < 0.5 * travel else 0.0

@@ -1,0 +1,1 @@
+"""The steps of the workflow, from files to what a run tells."""

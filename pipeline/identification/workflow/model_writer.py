@@ -1,0 +1,83 @@
+"""Model files as text, and edits from what naming found."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import tomlkit
+
+from pipeline.effects.model_file import SCHEMA, Edit, EditParameter, ModelFile
+from pipeline.identification.results import Found
+
+
+def edits_of(
+    found: Sequence[Found], source: str, *, keep_doubtful: bool = False
+) -> tuple[Edit, ...]:
+    """Edits of the effects that naming accepted.
+
+    Args:
+        found: From naming.
+        source: The logs and their hashes, in words.
+        keep_doubtful: Whether those whose name is doubted are among them.
+    """
+    return tuple(
+        Edit(
+            effect=one.effect,
+            place=one.place,
+            parameters=tuple(
+                EditParameter(p.name, p.value, p.unit, (p.low, p.high)) for p in one.parameters
+            ),
+            source=source,
+            basis="doubtful" if one.doubtful else "identified",
+        )
+        for one in found
+        if keep_doubtful or not one.doubtful
+    )
+
+
+def model_text(file: ModelFile, beside: Path) -> str:
+    """A model file as TOML.
+
+    Args:
+        file: Its contents.
+        beside: Folder it will lie in: the robot file is named relative to it.
+    """
+    document = tomlkit.document()
+    document.add(tomlkit.comment("What the robot and actuator files lack, as found in a log."))
+    document["schema"] = SCHEMA
+    robot = tomlkit.table()
+    robot["file"] = Path(os.path.relpath(file.robot, beside)).as_posix()
+    robot["sha256"] = file.robot_sha256
+    document["robot"] = robot
+    actuators = tomlkit.table()
+    actuators["alternative"] = file.alternative
+    hashes = tomlkit.table()
+    for name, value in sorted(file.actuators_sha256.items()):
+        hashes[name] = value
+    actuators["sha256"] = hashes
+    document["actuators"] = actuators
+    edits = tomlkit.aot()
+    for edit in file.edits:
+        edits.append(_edit(edit))
+    if file.edits:
+        document["edit"] = edits
+    return tomlkit.dumps(document)
+
+
+def _edit(edit: Edit) -> tomlkit.items.Table:
+    table = tomlkit.table()
+    table["effect"] = edit.effect
+    table["place"] = list(edit.place)
+    table["basis"] = edit.basis
+    table["source"] = edit.source
+    parameters = tomlkit.table()
+    for p in edit.parameters:
+        entry = tomlkit.table()
+        entry["value"] = float(p.value)
+        entry["unit"] = p.unit
+        entry["interval"] = [float(p.interval[0]), float(p.interval[1])]
+        parameters[p.name] = entry
+    table["parameters"] = parameters
+    return table

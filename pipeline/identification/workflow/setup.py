@@ -1,0 +1,318 @@
+"""From the options of `gap` to a machine, what its logs must look like, and the logs themselves."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from actuators.chain import Chain
+from actuators.loading.build import CATALOG, Catalog, load_catalog
+from pipeline.cli.gap_options import DEFAULT_ROBOT
+from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file, read_model_file
+from pipeline.errors import RobotFileError
+from pipeline.identification.compare.bandwidth import lowered, naming_cutoff
+from pipeline.identification.compare.intake import Intake, prepare_logs
+from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
+from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
+from pipeline.logs.prepared.contact import Contact, find_contact
+from pipeline.logs.prepared.parts import Parts, split
+from pipeline.logs.prepared.stream import Stream, Survey, survey
+from pipeline.logs.quality.repeats import refuse_repeats
+from pipeline.logs.reading.expected import Expected, expected_of_model, expected_of_robot
+from pipeline.logs.reading.log import EFFORTS, Log
+from pipeline.logs.reading.mapping import load_mapping
+from pipeline.logs.reading.read import plan_reading
+from pipeline.logs.reading.table_file import sha256
+from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.robot.check import refuse_impossible
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+
+#: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
+DEFAULT_ALTERNATIVE = "rotor"
+#: The channel that is compared without an actuator, for a robot file as for a bare URDF.
+AT_JOINT = "torque"
+BASES = ("fixed", "level", "measured")
+
+
+@dataclass(frozen=True)
+class Setup:
+    """The machine as its files describe it.
+
+    Attributes:
+        path: Robot file or URDF.
+        sources: Every file that was read, for hashes.
+        robot: None for a bare URDF.
+        model: As the workflow computes it.
+        expected: What a log of it looks like.
+        catalog: Actuator components and alternatives.
+        alternative: Name of the actuator chain; empty without one.
+        file: The model file whose edits are in `model`; without edits where none was given.
+        bare: The model before those edits.
+        warnings: What of the files a reader should know, in words.
+    """
+
+    path: Path
+    sources: tuple[Path, ...]
+    robot: Robot | None
+    model: MachineModel
+    expected: Expected
+    catalog: Catalog
+    alternative: str
+    file: ModelFile
+    bare: MachineModel
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def legged(self) -> bool:
+        """Whether the machine walks, so that its energy per gait cycle can be told."""
+        return self.robot is not None and self.robot.floating
+
+
+def setup(options: argparse.Namespace) -> Setup:
+    """Load the robot, its actuator and the model file.
+
+    Raises:
+        PipelineError: The robot file or URDF cannot be used.
+        ActuatorError: The catalogue cannot be used, or has no such alternative.
+        GapError: `--base` does not fit the robot, or the model file cannot be used.
+    """
+    folder = options.actuators or Path(CATALOG)
+    catalog = load_catalog(folder)
+    given_file = read_model_file(options.model, folder) if options.model else None
+    path: Path = options.robot or (given_file.robot if given_file else DEFAULT_ROBOT)
+    alternative = _alternative(options, given_file)
+    if not path.is_file():
+        fact = "is a folder" if path.is_dir() else "no such robot file"
+        raise RobotFileError(f"{path}: {fact}; name a robot file or URDF with --robot")
+    robot = _robot(path, options.base)
+    if robot is None:
+        chain = catalog.chain(alternative) if alternative else None
+        bare = machine_of_urdf(path, chain=chain)
+        ratio = _ratio(chain, len(bare.joints))
+        expected = expected_of_model(bare.rigid, bare.name, joints=bare.joints, ratio=ratio)
+        sources: tuple[Path, ...] = (path,)
+    else:
+        # Motor-side positions need a ratio whatever channel is compared.
+        usual = catalog.chain(alternative or DEFAULT_ALTERNATIVE)
+        expected = expected_of_robot(robot, ratio=_ratio(usual, len(robot.joints)))
+        if not alternative and _channel(options, expected) != AT_JOINT:
+            alternative = DEFAULT_ALTERNATIVE
+        chain = usual if alternative else None
+        bare = machine_of_robot(robot, chain)
+        sources = (*robot.spec.sources, *(() if robot.spec.build else (robot.spec.urdf,)))
+    edits = given_file.edits if given_file else ()
+    file = replace(new_model_file(path, alternative, folder), edits=edits)
+    return Setup(
+        path=path,
+        sources=(*sources, *(_catalog_files(folder) if chain else ())),
+        robot=robot,
+        model=apply_edits(bare, edits),
+        expected=expected,
+        catalog=catalog,
+        alternative=alternative,
+        file=file,
+        bare=bare,
+        warnings=given_file.changed if given_file else (),
+    )
+
+
+def _alternative(options: argparse.Namespace, file: ModelFile | None) -> str:
+    """The actuator that options or model file name; empty where neither does.
+
+    Raises:
+        GapError: They name different ones, and the file holds effects.
+    """
+    asked: str = options.alternative or ""
+    if file is None:
+        return asked
+    if asked and file.edits and file.alternative and asked != file.alternative:
+        raise ModelFileError(
+            f"{options.model}: its effects were found against '{file.alternative}', which "
+            f"--alternative {asked} contradicts; leave one of the two out"
+        )
+    return asked or file.alternative
+
+
+def _channel(options: argparse.Namespace, expected: Expected) -> str:
+    """The effort channel that will be compared, by the first log's header."""
+    if options.effort:
+        return str(options.effort)
+    mapping = load_mapping(options.mapping) if options.mapping else None
+    return plan_reading(options.logs[0], expected, mapping).channel
+
+
+def _robot(path: Path, base: str | None) -> Robot | None:
+    """The robot of a robot file, its base as asked for; None for a bare URDF."""
+    if path.suffix.lower() != ".toml":
+        if base in ("level", "measured"):
+            raise GapError(
+                f"{path}: a bare URDF stands on a fixed base; write a robot file for --base {base}"
+            )
+        return None
+    spec = load_robot_file(path)
+    if base == "fixed" and spec.floating:
+        spec = replace(spec, floating=False)
+    if base in ("level", "measured") and not spec.floating:
+        raise GapError(f"{path}: its base is fixed; leave --base {base} out")
+    robot = load_robot(spec)
+    refuse_impossible(robot)
+    return robot
+
+
+def _catalog_files(folder: Path) -> tuple[Path, ...]:
+    return tuple(sorted(folder.glob("*.toml")))
+
+
+def _ratio(chain: Chain | None, joints: int) -> np.ndarray | None:
+    return None if chain is None else np.full(joints, float(np.asarray(chain.ratio)))
+
+
+def open_logs(given: Setup, options: argparse.Namespace) -> list[Stream]:
+    """The logs that may be fitted, then those that only prove.
+
+    Raises:
+        GapError: The mapping cannot be used.
+    """
+    mapping = load_mapping(options.mapping) if options.mapping else None
+
+    def adjust(log: Log) -> Log:
+        return _adjusted(log, given, options)
+
+    paths = (*options.logs, *options.holdout)
+    return [Stream(path, given.expected, mapping, adjust) for path in paths]
+
+
+def _adjusted(log: Log, given: Setup, options: argparse.Namespace) -> Log:
+    """A log, or a piece of one, as the options want it.
+
+    Raises:
+        GapError: It does not hold what they ask for.
+    """
+    if options.effort:
+        log = log.with_changes(chosen_effort=options.effort)
+        _ = log.effort  # refuses a channel that is not there
+    if options.base == "measured" and log.base_roll is None and log.base_pitch is None:
+        raise LogContentError(
+            f"{log.name}: --base measured needs base__roll_rad and base__pitch_rad; log them or "
+            "use --base level"
+        )
+    if options.base in ("level", "fixed"):
+        log = log.with_changes(base_roll=None, base_pitch=None)
+    actuators = given.model.actuators
+    if actuators and actuators[0].motor is None and log.effort.channel != "torque":
+        raise LogContentError(
+            f"{log.name}: measures {log.effort.channel} and a bare URDF has no motor; name "
+            "the actuator with --alternative"
+        )
+    return log
+
+
+def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, int]:
+    """Step 1: read, judge and prepare all logs, and cut them into fit, choose and prove.
+
+    All scores are taken at one bandwidth: `--cutoff`, else where the encoders' noise is silent.
+    Of logs with more than `LONG_ROWS` rows together only the stretches that tell most are held.
+
+    Returns:
+        The logs, their parts, and how many of them may be fitted (the first ones).
+
+    Raises:
+        GapError: Unusable input; one line.
+    """
+    streams = open_logs(given, options)
+    count = len(options.logs)
+    surveys: tuple[Survey, ...] = ()
+    if sum(stream.rows for stream in streams) > LONG_ROWS:
+        lasts = [options.prove_last if k < count else None for k in range(len(streams))]
+        surveys = tuple(survey(s, prove_last=t) for s, t in zip(streams, lasts, strict=True))
+    logs = [s.log for s in surveys] or [stream.whole for stream in streams]
+    refuse_repeats(logs)
+    largest, contact = _largest(given), _contact(given, options.gait_start)
+    intake = prepare_logs(
+        logs, given.expected, cutoff=options.cutoff, largest=largest, contact=contact
+    )
+    if options.cutoff is None and options.step != "read":
+        cutoff = naming_cutoff(given.model, intake.prepared)
+        prepared = lowered(intake.prepared, cutoff)
+        intake = replace(intake, prepared=prepared, settings=prepared[0].settings)
+    prepared = intake.prepared
+    last = None if surveys else options.prove_last
+    parts = split(prepared[:count], holdout=prepared[count:], prove_last=last)
+    if surveys:
+        parts = parts_of_surveys(parts, prepared, surveys)
+        long = LongLogs(tuple(streams), surveys, prepared, parts, largest, contact)
+        intake = replace(intake, long=long)
+    return intake, parts, count
+
+
+def _contact(given: Setup, start: float | None) -> Callable[[Log], Contact | None] | None:
+    robot = given.robot
+    if robot is None or not robot.floating:
+        if start is not None:
+            raise GapError(f"{given.path}: its base is fixed; leave --gait-start out")
+        return None
+    return lambda log: find_contact(log, robot, start=start)
+
+
+def _largest(given: Setup) -> dict[str, np.ndarray]:
+    """What the drives can give at most, by channel; empty where no motor is known."""
+    motors = [a.motor for a in given.model.actuators if a.motor is not None]
+    if len(motors) < len(given.model.joints):
+        return {}
+    return {
+        "current": np.array([m.peak_current for m in motors]),
+        "voltage": np.array([m.supply_voltage for m in motors]),
+        "power": np.array([m.peak_current * m.supply_voltage for m in motors]),
+    }
+
+
+def check_options(options: argparse.Namespace) -> None:
+    """Refuse options that cannot be, before anything is read.
+
+    Raises:
+        GapError: A file that does not exist.
+    """
+    if not options.logs:
+        raise LogContentError(f"gap {options.step}: no log given; name a CSV or Parquet file")
+    for path in (*options.logs, *options.holdout):
+        if path.is_dir():
+            raise LogContentError(f"{path}: is a folder; name its CSV or Parquet files")
+        if not path.is_file():
+            raise LogContentError(f"{path}: no such log; name a CSV or Parquet file")
+    _refuse_twice((*options.logs, *options.holdout))
+    for file, what, error in (
+        (options.mapping, "mapping", MappingError),
+        (options.model, "model", ModelFileError),
+    ):
+        if file and not file.is_file():
+            fact = "is a folder, expected a" if file.is_dir() else "no such"
+            raise error(f"{file}: {fact} {what} file")
+    if options.step == "shrink" and not options.model:
+        raise ModelFileError("gap shrink: name the model file to check with --model")
+    if options.gait_start is not None and not math.isfinite(options.gait_start):
+        raise GapError(f"--gait-start {options.gait_start}: expected a time in the log [s]")
+    if options.effort and options.effort not in EFFORTS:
+        raise GapError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")
+
+
+def _refuse_twice(paths: Sequence[Path]) -> None:
+    """Refuse a file that is given twice, under whatever name.
+
+    Raises:
+        LogContentError: Names both.
+    """
+    seen: dict[str, Path] = {}
+    for path in paths:
+        digest = sha256(path)
+        if digest in seen:
+            raise LogContentError(
+                f"{path}: the same data as {seen[digest]}; what proves must be data of its own, "
+                "and data given twice count twice; leave one out"
+            )
+        seen[digest] = path

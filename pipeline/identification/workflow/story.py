@@ -1,0 +1,178 @@
+"""Steps 3 to 5 of a run: name, add, shrink, gathered for tables, figures and the page."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.effects.model_file import Edit, apply_edits, edits_in
+from pipeline.effects.registry import effect_named
+from pipeline.errors import TippingError
+from pipeline.identification.compare.stages import Stage
+from pipeline.identification.results import Found, Naming
+from pipeline.identification.selection.deciding_motion import Deciding
+from pipeline.identification.selection.identify import identify
+from pipeline.identification.workflow.deciding import decide, motion_table
+from pipeline.identification.workflow.locate import Progress, Whereabouts
+from pipeline.identification.workflow.model_writer import edits_of, model_text
+from pipeline.identification.workflow.setup import Setup
+from pipeline.identification.workflow.written import Weighed, weigh_found
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.edited import Effects, effects
+from pipeline.simulation.energy_change import EnergyChange, energy_change
+from reports.pages.gap_report import Story
+from reports.pages.gap_words import place_text
+from reports.table import Table
+
+#: Joints that the figure in time shows.
+SHOWN = 3
+#: ... where the gap shrinks by this share at least.
+WORTH_SHOWING = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """What a run writes.
+
+    Attributes:
+        story: For the page.
+        tables: Besides those of the steps.
+        model_file: Text of the model file; empty where there is nothing to add.
+        shown: Columns of the joints that the figure in time shows.
+    """
+
+    story: Story
+    tables: tuple[Table, ...]
+    model_file: str
+    shown: tuple[int, ...]
+
+
+def with_found(model: MachineModel, found: Sequence[Found]) -> MachineModel:
+    """The model with effects, in order."""
+    return reduce(lambda m, f: effect_named(f.effect).apply(m, f.place, f.values), found, model)
+
+
+def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -> Effects:
+    """Found effects on top of the model file's, ready for standing and walking."""
+    assert given.robot is not None
+    edits = given.file.edits if known else ()
+    names = (*(edit.effect for edit in edits), *(f.effect for f in found))
+    # A log that was compared without an actuator: what bodies and ground change needs none.
+    chain = given.catalog.chain(given.alternative or next(iter(given.catalog.alternatives)))
+
+    def apply(model: MachineModel) -> MachineModel:
+        return with_found(apply_edits(model, edits), found)
+
+    return effects(given.robot, chain, apply, names, "model.toml", found_with=given.alternative)
+
+
+def cost(
+    given: Setup, found: Sequence[Found], *, known: bool = True
+) -> tuple[EnergyChange | None, tuple[str, ...]]:
+    """Energy with and without found effects, and remarks; None for a robot that does not walk.
+
+    Args:
+        given: Robot, actuators and the effects known before.
+        found: Effects.
+        known: Whether those of the model file stand on both sides of the comparison.
+    """
+    if not given.legged or not found or given.robot is None or not given.robot.spec.tripods:
+        return None, ()
+    edits = found_effects(given, found, known=known)
+    start = found_effects(given, ()) if known and given.file.edits else None
+    try:
+        return energy_change(given.robot, given.catalog.chains(), edits, start), edits.remarks
+    except TippingError as error:
+        return None, (f"With these effects {error}",)
+
+
+def most_improved(before: Stage, after: Stage, found: Sequence[int]) -> tuple[int, ...]:
+    """Columns of the joints to show: those of effects first, then those with the largest gap."""
+    gain = np.nan_to_num(before.gap - after.gap, nan=-np.inf)
+    better = [k for k in np.argsort(-gain).tolist() if gain[k] > WORTH_SHOWING * before.gap[k]]
+    rank = [*found, *better] or np.argsort(-np.nan_to_num(before.gap, nan=-1.0)).tolist()[:1]
+    return tuple(dict.fromkeys(k for k in rank if np.isfinite(before.gap[k])))[:SHOWN]
+
+
+def added(
+    given: Setup, where: Whereabouts, found: Sequence[Found], out: Path, *, keep_doubtful: bool
+) -> tuple[str, tuple[Edit, ...]]:
+    """Step 4: the model file with what was found, and what of it is new, read back from its text.
+
+    The text is empty where there is nothing to write.
+    """
+    logs = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in where.measurements)
+    edits = edits_of(found, logs, keep_doubtful=keep_doubtful)
+    if not edits and not given.file.edits:
+        return "", ()
+    text = model_text(given.file.with_edits(edits), out)
+    return text, edits_in(text)[len(given.file.edits) :]
+
+
+def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress: Progress) -> Told:
+    """Name what is missing and gather everything that a run tells.
+
+    Raises:
+        GapError: Nothing can be compared.
+    """
+    named = identify(given.model, where.measurements)
+    progress.step("weighing what was found")
+
+    def written(found: Sequence[Found]) -> tuple[str, tuple[Edit, ...]]:
+        return added(given, where, found, options.out, keep_doubtful=options.keep_doubtful)
+
+    weighed = weigh_found(given.model, where, named.naming.found, written)
+    naming = replace(named.naming, found=weighed.found)
+    energy = cost(given, [f for f in naming.found if f.written])
+    decided = decide(given, given.model, where.measurements, naming.found)
+    return gathered(given, where, naming, weighed, energy, decided)
+
+
+def gathered(
+    given: Setup,
+    where: Whereabouts,
+    naming: Naming,
+    weighed: Weighed,
+    energy: tuple[EnergyChange | None, tuple[str, ...]],
+    decided: tuple[Deciding, str] | None,
+) -> Told:
+    """What a run writes, from what it found.
+
+    Args:
+        given: Robot and actuators.
+        where: Steps 1 and 2.
+        naming: Effects.
+        weighed: The model as written against the logs.
+        energy: With and without the effects, and remarks.
+        decided: Deciding motion, and it in words.
+    """
+    signatures = {
+        f"effect_{f.order}_{f.effect}.svg": (
+            f"{f.effect} at {place_text(f.place)}: the gap of {given.model.joints[j]} against the "
+            f"variable on which the effect depends, without it and with it."
+            + ("" if f.written else " The model file written leaves it out.")
+        )
+        for f, j in zip(naming.found, weighed.joints, strict=True)
+    }
+    story = Story(
+        given=given,
+        where=where,
+        naming=naming,
+        weighed=weighed,
+        energy=energy[0],
+        signatures=signatures,
+        decides=decided[1] if decided else "",
+        remarks=energy[1],
+    )
+    columns = [j for f, j in zip(naming.found, weighed.joints, strict=True) if f.written]
+    return Told(
+        story=story,
+        tables=(motion_table(decided[0], given.model.joints),) if decided else (),
+        model_file=weighed.text,
+        shown=most_improved(weighed.stages[1], weighed.stages[-1], columns),
+    )

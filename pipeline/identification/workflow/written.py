@@ -1,0 +1,214 @@
+"""The model file that a run writes, held against rows that had no say: the gap that is quoted.
+
+What is quoted, drawn and decides the exit code is the gap of the model *as written*: the edits are
+read back from the file's text, put into the machine, its tolerances estimated beside them, and the
+whole is simulated. Names that the file leaves out are listed with what each would close beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.effects.model_file import Edit, apply_edits
+from pipeline.effects.registry import effect_named
+from pipeline.identification.compare.stages import Stage, noise_floor, stages
+from pipeline.identification.results import IDLE_NAME, Found, Remainder
+from pipeline.identification.selection.residual import remainders
+from pipeline.identification.selection.weigh import Weighing, floor_of
+from pipeline.identification.workflow.locate import Whereabouts
+from pipeline.logs.prepared.measurement import PROVE
+from pipeline.machine.machine import MachineModel
+from reports.pages.gap_words import place_text
+
+Array = NDArray[np.float64]
+AS_IT_WAS = "model as it was"
+TOLERANCES = "tolerances of its parts"
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """A model file against the logs.
+
+    Attributes:
+        found: Effects, with what each closes on *prove* and whether the file holds it.
+        stages: The model as it was, with tolerances, with one effect of the file after another.
+        pairs: Per effect, the stage without it and the stage with it.
+        joints: Per effect, the column at which it shows.
+        left: What the model as written leaves.
+        text: Of the file; empty where there is none.
+    """
+
+    found: tuple[Found, ...]
+    stages: tuple[Stage, ...]
+    pairs: tuple[tuple[Stage, Stage], ...]
+    joints: tuple[int, ...]
+    left: tuple[Remainder, ...]
+    text: str = ""
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether the model as written leaves more than noise somewhere."""
+        return any(r.significant for r in self.left)
+
+
+def weigh_found(
+    model: MachineModel,
+    where: Whereabouts,
+    found: Sequence[Found],
+    written: Callable[[Sequence[Found]], tuple[str, tuple[Edit, ...]]],
+) -> Weighed:
+    """Hold what was found against the logs, as far as it is written.
+
+    Args:
+        model: Before anything found.
+        where: Steps 1 and 2.
+        found: From naming.
+        written: From effects to the text of the model file, and the edits in it that are theirs,
+            read back.
+    """
+    weighing = Weighing(model, where.measurements)
+    while True:
+        text, edits = written(found)
+        keys = [(edit.effect, edit.place) for edit in edits]
+        models = _models(weighing, model, edits)
+        seen = stages(models, where.measurements)
+        doubted = _worse(model, found, keys, seen)
+        if not doubted:
+            break
+        found = [replace(f, doubtful=IDLE_NAME) if f in doubted else f for f in found]
+    last = apply_edits(model, edits)
+    beside = [
+        (_label(f.effect, f.place), weighing.calibrated(_with(last, f)))
+        for f in found
+        if (f.effect, f.place) not in keys
+    ]
+    models = [(AS_IT_WAS, model), *models, *beside]
+    seen = stages(models, where.measurements, where.intake.long)
+    first = 1 + len(edits)
+    pairs = {key: (seen[k + 1], seen[k + 2]) for k, key in enumerate(keys)}
+    others = [(f.effect, f.place) for f in found if (f.effect, f.place) not in keys]
+    pairs |= {key: (seen[first], seen[first + 1 + k]) for k, key in enumerate(others)}
+    return gathered(model, where, found, seen[: first + 1], pairs, keys, text)
+
+
+def weigh_edits(
+    model: MachineModel, where: Whereabouts, edits: Sequence[Edit], found: Sequence[Found]
+) -> Weighed:
+    """Hold the edits of a model file against the logs.
+
+    Args:
+        model: Before the edits.
+        where: Steps 1 and 2.
+        edits: Of the file.
+        found: One per edit.
+    """
+    weighing = Weighing(model, where.measurements)
+    models = [(AS_IT_WAS, model), *_models(weighing, model, edits)]
+    seen = stages(models, where.measurements, where.intake.long)
+    keys = [(edit.effect, edit.place) for edit in edits]
+    # A file may hold an effect twice: each edit has a pair of its own.
+    pairs = [(seen[k + 1], seen[k + 2]) for k in range(len(keys))]
+    joints = [effect_column(model, f.place, *pair) for f, pair in zip(found, pairs, strict=True)]
+    floor = noise_floor(where.measurements)
+    told = tuple(
+        _told(f, pair, j, float(floor[j]), where, written=True)
+        for f, pair, j in zip(found, pairs, joints, strict=True)
+    )
+    return Weighed(told, seen, tuple(pairs), tuple(joints), _left(where, seen[-1]))
+
+
+def gathered(
+    model: MachineModel,
+    where: Whereabouts,
+    found: Sequence[Found],
+    seen: tuple[Stage, ...],
+    pairs: dict[tuple[str, tuple[str, ...]], tuple[Stage, Stage]],
+    keys: Sequence[tuple[str, tuple[str, ...]]],
+    text: str,
+) -> Weighed:
+    """Effects with their proofs, those of the file first to last."""
+    floor = noise_floor(where.measurements)
+    told, joints, own = [], [], []
+    for f in found:
+        key = (f.effect, f.place)
+        pair = pairs[key]
+        j = effect_column(model, f.place, *pair)
+        told.append(_told(f, pair, j, float(floor[j]), where, written=key in keys))
+        joints.append(j)
+        own.append(pair)
+    left = _left(where, seen[-1])
+    return Weighed(tuple(told), seen, tuple(own), tuple(joints), left, text)
+
+
+def _told(
+    f: Found, pair: tuple[Stage, Stage], j: int, floor: float, where: Whereabouts, *, written: bool
+) -> Found:
+    return replace(
+        f,
+        gap_before=float(pair[0].gap[j]),
+        gap_after=float(pair[1].gap[j]),
+        unit=CHANNEL_UNITS[where.measurements[0].channels[0]],
+        noise_floor=floor,
+        written=written,
+    )
+
+
+def _left(where: Whereabouts, last: Stage) -> tuple[Remainder, ...]:
+    floor = floor_of(where.measurements, PROVE)
+    return remainders(where.measurements, last.predictions, floor, last.gaps)
+
+
+def _models(
+    weighing: Weighing, model: MachineModel, edits: Sequence[Edit]
+) -> list[tuple[str, MachineModel]]:
+    """Labels and models: with tolerances, then with one edit after another."""
+    out = [(TOLERANCES, weighing.calibrated(model))]
+    for k, edit in enumerate(edits, start=1):
+        with_it = weighing.calibrated(apply_edits(model, edits[:k]))
+        out.append((_label(edit.effect, edit.place), with_it))
+    return out
+
+
+def _worse(
+    model: MachineModel,
+    found: Sequence[Found],
+    keys: Sequence[tuple[str, tuple[str, ...]]],
+    seen: Sequence[Stage],
+) -> list[Found]:
+    """Trusted names with which the simulated gap on *choose* is larger than without.
+
+    Naming judges by a linear step. What a tolerance would have taken up is its own merit.
+    """
+    out = []
+    for f in found:
+        key = (f.effect, f.place)
+        if f.doubtful or key not in keys or effect_named(f.effect).is_tolerance:
+            continue
+        before, after = seen[keys.index(key)], seen[keys.index(key) + 1]
+        j = effect_column(model, f.place, before, after)
+        if after.valid[j] > before.valid[j]:
+            out.append(f)
+    return out
+
+
+def effect_column(model: MachineModel, place: Sequence[str], before: Stage, after: Stage) -> int:
+    """Column at which an effect shows: its joint, the one that carries its link, or the largest."""
+    for name in place:
+        owner = name.partition("__")[0]  # of a column of the log
+        joint = owner if owner in model.joints else model.links.get(owner, "")
+        if joint in model.joints:
+            return model.index(joint)
+    return int(np.argmax(np.nan_to_num(before.gap - after.gap, nan=-np.inf)))
+
+
+def _with(model: MachineModel, f: Found) -> MachineModel:
+    return effect_named(f.effect).apply(model, f.place, f.values)
+
+
+def _label(effect: str, place: Sequence[str]) -> str:
+    return f"{effect} at {place_text(place)}"

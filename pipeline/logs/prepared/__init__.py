@@ -1,0 +1,1 @@
+"""Logs on one grid and bandwidth, in parts for training and proof."""

@@ -1,0 +1,201 @@
+"""Three parts of the data: *fit* estimates, *choose* decides between candidates, *prove* judges.
+
+Whole logs are held out where there are several, since cycles of one gait resemble each other;
+within a log, blocks of rows alternate, with a guard between them longer than what the filter sees
+to both sides, so that no part contains a trace of another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.errors import PreparationError
+from pipeline.logs.prepared.cycles import period
+from pipeline.logs.prepared.prepare import Prepared
+
+Mask = NDArray[np.bool_]
+
+FIT, CHOOSE, PROVE, NONE = 0, 1, 2, -1
+NAMES: Final = ("fit", "choose", "prove")
+#: Guard between blocks per reach of the filter to one side: more than both sides together.
+GUARD: Final = 2.2
+#: Blocks are at least this many guards long, so that little is lost between them.
+BLOCK_GUARDS: Final = 5.0
+#: Blocks a log is cut into where it is long enough.
+MOST_BLOCKS: Final = 48
+FEWEST_BLOCKS: Final = 6
+#: The order in which blocks go to the parts: half to fit, a quarter each to choose and prove.
+PATTERN: Final = (FIT, CHOOSE, FIT, PROVE)
+PATTERN_WITHOUT_PROVE: Final = (FIT, CHOOSE, FIT)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Which rows of which log belong to which part.
+
+    Attributes:
+        part: Per log, shape (N,): `FIT`, `CHOOSE`, `PROVE` or `NONE` (guards).
+        block: Per log, shape (N,): number of the block, unique over all logs; -1 in guards.
+        guard: Between blocks [s].
+        rule: How the parts were cut, in words.
+        warning: What *prove* cannot prove, or empty.
+    """
+
+    part: tuple[NDArray[np.int8], ...]
+    block: tuple[NDArray[np.int32], ...]
+    guard: float
+    rule: str
+    warning: str
+
+    def rows(self, log: int, part: int) -> Mask:
+        """Rows of one log in one part, shape (N,)."""
+        return np.asarray(self.part[log] == part)
+
+    def blocks(self, part: int) -> list[tuple[int, slice]]:
+        """Blocks of one part: log and rows."""
+        out = []
+        for k, (kind, number) in enumerate(zip(self.part, self.block, strict=True)):
+            for b in np.unique(number[(kind == part) & (number >= 0)]):
+                rows = np.flatnonzero(number == b)
+                out.append((k, slice(int(rows[0]), int(rows[-1]) + 1)))
+        return out
+
+
+def split(
+    prepared: Sequence[Prepared],
+    *,
+    holdout: Sequence[Prepared] = (),
+    prove_last: float | None = None,
+) -> Parts:
+    """Cut logs into fit, choose and prove.
+
+    Args:
+        prepared: Logs that may be fitted.
+        holdout: Logs that only prove.
+        prove_last: Share of every log, at its end, that proves instead.
+
+    Returns:
+        Parts of `prepared` followed by `holdout`.
+
+    Raises:
+        PreparationError: Too little data for three parts.
+    """
+    every = [*prepared, *holdout]
+    guard = GUARD * max(one.memory for one in every)
+    if prove_last is not None and not 0.05 <= prove_last <= 0.8:
+        raise PreparationError(f"share to prove on is {prove_last:g}; expected 0.05 to 0.8")
+    proving = set(range(len(prepared), len(every)))
+    rule, warning = "", ""
+    if holdout:
+        rule = "proved on the held-out logs"
+    elif prove_last is not None:
+        rule = f"proved on the last {100 * prove_last:g} % of every log"
+    elif len(prepared) > 1:
+        proving, rule = _held_out(prepared)
+    if not proving and prove_last is None:
+        rule = "proved on every fourth block of the log"
+        warning = _periodic_warning(prepared)
+    part, block, count = [], [], 0
+    for k, one in enumerate(every):
+        if k in proving:
+            kinds, numbers = _cut(one, guard, (PROVE,), 0.0)
+        elif proving:
+            kinds, numbers = _cut(one, guard, PATTERN_WITHOUT_PROVE, 0.0)
+        elif prove_last is not None:
+            kinds, numbers = _cut(one, guard, PATTERN_WITHOUT_PROVE, prove_last)
+        else:
+            kinds, numbers = _cut(one, guard, PATTERN, 0.0)
+        block.append(np.where(numbers >= 0, numbers + count, -1).astype(np.int32))
+        count += int(numbers.max(initial=-1)) + 1
+        part.append(kinds)
+    for number, name in enumerate(NAMES):
+        rows = sum(
+            int((kind == number)[one.core].sum()) for kind, one in zip(part, every, strict=True)
+        )
+        if rows < 20:
+            duration = sum(float(one.time[-1] - one.time[0]) for one in every)
+            raise PreparationError(
+                f"{every[0].log.name}: {duration:.3g} s at a cut-off of {every[0].cutoff:.3g} Hz "
+                f"leave {rows} rows to {name}; log longer, or raise the cut-off"
+            )
+    return Parts(tuple(part), tuple(block), guard, rule, warning)
+
+
+def _held_out(prepared: Sequence[Prepared]) -> tuple[set[int], str]:
+    """Which of several logs prove: one condition, else the last log.
+
+    Of the condition that takes most values, the median one is left out: to predict between what
+    was seen is fair, at the ends it is extrapolation.
+    """
+    conditions = [dict(one.log.condition) for one in prepared]
+    keys = sorted(set.intersection(*(set(c) for c in conditions)))
+    best: tuple[int, str, list[float | str]] | None = None
+    for key in keys:
+        values = sorted({c[key] for c in conditions}, key=lambda v: (isinstance(v, str), v))
+        if len(values) > 1 and (best is None or len(values) > best[0]):
+            best = (len(values), key, values)
+    if best is not None:
+        _, key, values = best
+        # With two values the larger one; with more the one in the middle.
+        left_out = values[len(values) // 2]
+        chosen = {k for k, c in enumerate(conditions) if c[key] == left_out}
+        return chosen, f"proved on the logs with {key} = {left_out}"
+    last = len(prepared) - 1
+    return {last}, f"proved on the log {prepared[last].log.name}"
+
+
+def _periodic_warning(prepared: Sequence[Prepared]) -> str:
+    cycles = [period(one) for one in prepared]
+    known = [c for c in cycles if c is not None]
+    if len(known) < len(cycles):
+        return ""
+    return (
+        f"the log repeats one motion every {known[0]:.3g} s: held-out cycles of it prove nothing "
+        "about other motions; give a log of another motion, speed or load with --holdout"
+    )
+
+
+def _cut(
+    one: Prepared, guard: float, pattern: Sequence[int], prove_last: float
+) -> tuple[NDArray[np.int8], NDArray[np.int32]]:
+    """Blocks of one log, with a guard wherever neighbours belong to different parts."""
+    part = np.full(len(one), NONE, dtype=np.int8)
+    block = np.full(len(one), -1, dtype=np.int32)
+    margin = int(np.ceil(guard / one.settings.dt))
+    number = 0
+    for piece in one.pieces:
+        size = piece.stop - piece.start
+        fitted = size - round(prove_last * size)
+        count = _block_count(fitted, margin)
+        edges = np.round(np.linspace(0, fitted, count + 1)).astype(int).tolist()
+        kinds = [pattern[b % len(pattern)] for b in range(count)]
+        if prove_last:
+            # What proves is cut into blocks too: intervals are taken over blocks.
+            more = _block_count(size - fitted, margin)
+            edges += np.round(np.linspace(fitted, size, more + 1)).astype(int).tolist()[1:]
+            kinds += [PROVE] * more
+        for b, kind in enumerate(kinds):
+            start, stop = edges[b], edges[b + 1]
+            # Between two parts the guard is taken from the one that does not prove.
+            if b > 0 and kinds[b - 1] == PROVE != kind:
+                start += margin
+            if b + 1 < len(kinds) and kinds[b + 1] != kind != PROVE:
+                stop -= margin
+            if stop - start < 3:
+                continue
+            rows = slice(piece.start + start, piece.start + stop)
+            part[rows], block[rows] = kind, number
+            number += 1
+    outside = np.ones(len(one), dtype=np.bool_)
+    outside[one.core] = False
+    part[outside], block[outside] = NONE, -1
+    return part, block
+
+
+def _block_count(rows: int, margin: int) -> int:
+    return min(MOST_BLOCKS, max(int(rows / ((1 + BLOCK_GUARDS) * margin)), FEWEST_BLOCKS))

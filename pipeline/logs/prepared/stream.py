@@ -1,0 +1,243 @@
+"""A long log in overlapping chunks whose filtered output is that of the whole."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.errors import LogContentError
+from pipeline.logs.prepared.contact import Contact
+from pipeline.logs.prepared.informative import STRETCH, Scan, choose, scan
+from pipeline.logs.prepared.prepare import Prepared, Settings, choose_settings, prepare
+from pipeline.logs.quality.finding import Quality
+from pipeline.logs.quality.quality import judge
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.mapping import Mapping as MappingFile
+from pipeline.logs.reading.read import read_log, stream_log
+from pipeline.logs.reading.table_file import open_table, row_count, sha256
+
+Array = NDArray[np.float64]
+#: Refusals that concern a log as a whole and not a chunk of it.
+FINE_IN_A_CHUNK: Final = ("rows", "constant", "empty")
+#: Rows that are surveyed, and that naming works on, per log.
+SURVEYED: Final = 6 * STRETCH
+#: Rows of a chunk: with 18 joints, voltages and foot forces about a quarter of a gigabyte.
+CHUNK_ROWS: Final = 50_000
+
+
+def as_read(log: Log) -> Log:
+    """No change."""
+    return log
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A log that is read piece by piece, as often as needed; a CSV is read once and kept.
+
+    Attributes:
+        path: CSV or Parquet.
+        expected: The robot's names and limits.
+        mapping: For foreign columns.
+        adjust: What is changed in every piece after reading.
+    """
+
+    path: Path
+    expected: Expected
+    mapping: MappingFile | None = None
+    adjust: Callable[[Log], Log] = as_read
+
+    @cached_property
+    def rows(self) -> int:
+        """Rows of the log."""
+        return row_count(open_table(self.path, self.mapping.dialect if self.mapping else None))
+
+    @cached_property
+    def whole(self) -> Log:
+        """All of it.
+
+        Raises:
+            GapError: As for `read_log`.
+        """
+        return self.adjust(read_log(self.path, self.expected, self.mapping))
+
+    def pieces(self, rows: int = CHUNK_ROWS) -> Iterator[Log]:
+        """Consecutive pieces of at most `rows` rows.
+
+        Raises:
+            GapError: As for `read_log`.
+        """
+        if open_table(self.path, self.mapping.dialect if self.mapping else None).parquet:
+            read = stream_log(self.path, self.expected, self.mapping, rows=rows, digest=self.digest)
+            for piece in read:
+                yield self.adjust(piece)
+            return
+        for start in range(0, len(self.whole), rows):
+            yield self.whole.rows(slice(start, start + rows))
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the file."""
+        return sha256(self.path)
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What stands for a long log where not every row is needed.
+
+    Attributes:
+        log: The stretches that tell most; what lies between them is a gap.
+        found: All stretches.
+        proves_from: Time from which the log only proves [s]; infinite where nothing was said.
+    """
+
+    log: Log
+    found: Scan
+    proves_from: float
+
+
+def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:
+    """Read the stretches of a long log that tell most.
+
+    Args:
+        stream: The log.
+        prove_last: Share at its end that only proves: a quarter of the stretches come from there.
+
+    Raises:
+        GapError: As for `read_log`.
+    """
+    found = scan(stream.pieces())
+    count = SURVEYED // STRETCH
+    proves_from = np.inf
+    if prove_last is None:
+        taken = choose(found, count)
+    else:
+        first = round((1.0 - prove_last) * found.rows)
+        late = found.first >= first
+        early = found.first + 2 * STRETCH <= first
+        taken = np.union1d(
+            choose(found, count - count // 4, early), choose(found, count // 4, late)
+        )
+    wanted = found.first[taken]
+    parts: list[Log] = []
+    at = 0
+    for piece in stream.pieces():
+        for start in wanted[(wanted >= at) & (wanted < at + len(piece))] - at:
+            parts.append(piece.rows(slice(int(start), int(start) + STRETCH)))
+        if prove_last is not None and at <= first < at + len(piece):
+            proves_from = float(piece.time[first - at])
+        at += len(piece)
+    if not parts:
+        raise LogContentError(f"{stream.path.name}: no row can be compared")
+    return Survey(join_logs(*parts), found, proves_from)
+
+
+def join_logs(*parts: Log) -> Log:
+    """Rows of pieces of one log, one after the other."""
+    first = parts[0]
+    changes: dict[str, Any] = {}
+    for name, value in vars(first).items():
+        if isinstance(value, np.ndarray) and value.shape and value.shape[0] == len(first):
+            changes[name] = np.concatenate([getattr(part, name) for part in parts])
+    changes["extra"] = {
+        key: np.concatenate([part.extra[key] for part in parts]) for key in first.extra
+    }
+    return first.with_changes(**changes)
+
+
+def stream_prepared(
+    path: Path,
+    expected: Expected,
+    mapping: MappingFile | None = None,
+    *,
+    settings: Settings | None = None,
+    rows: int = CHUNK_ROWS,
+    largest: Mapping[str, Array] | None = None,
+) -> Iterator[tuple[Quality, Prepared]]:
+    """Prepare a long log chunk by chunk; see `prepared_chunks`.
+
+    Args:
+        path: CSV or Parquet.
+        expected: The robot's names and limits.
+        mapping: For foreign columns.
+        settings: Grid and cut-off; from a survey by default.
+        rows: Per chunk.
+        largest: As for `judge`.
+
+    Raises:
+        GapError: As for `read_log`, `judge` and `prepare`.
+    """
+    stream = Stream(path, expected, mapping)
+    seen = survey(stream).log
+    quality = judge(seen, expected, largest=largest)
+    quality.refuse()
+    settings = settings or choose_settings([seen], [quality.usable])
+    ready = prepare(seen, settings, usable=quality.usable)
+    noise = (ready.noise, ready.position_noise)
+    yield from prepared_chunks(stream, settings, noise, rows=rows, largest=largest)
+
+
+def prepared_chunks(
+    stream: Stream,
+    settings: Settings,
+    noise: tuple[Array, Array],
+    *,
+    rows: int = CHUNK_ROWS,
+    largest: Mapping[str, Array] | None = None,
+    contact: Callable[[Log], Contact | None] | None = None,
+) -> Iterator[tuple[Quality, Prepared]]:
+    """Prepare a long log chunk by chunk.
+
+    Every chunk carries the filter's reach of its neighbours at both ends; its `core` are the rows
+    that count, and the cores together are the whole log, each row once. Held values and saturation
+    are judged within each chunk; that a joint rests, or a drive is off, throughout a chunk is no
+    defect.
+
+    Args:
+        stream: The log.
+        settings: Grid and cut-off.
+        noise: Of effort and position, each shape (J,).
+        rows: Per chunk.
+        largest: As for `judge`.
+        contact: How to tell which feet stand; by the log's own forces or columns by default.
+
+    Raises:
+        GapError: As for `read_log`, `judge` and `prepare`.
+    """
+    reach = 2 * settings.lowpass.half + 2
+    origin: float | None = None
+    kept: Log | None = None  # rows not yet given out, with the reach before them
+    before = 0  # rows at the start of `kept` that were given out already
+
+    def chunk(log: Log, core: slice, origin: float) -> tuple[Quality, Prepared]:
+        quality = judge(log, stream.expected, largest=largest)
+        quality.refuse(overlooked=FINE_IN_A_CHUNK)
+        ready = prepare(
+            log,
+            settings,
+            usable=quality.usable,
+            contact=contact(log) if contact else None,
+            core=core,
+            origin=origin,
+            noise=noise,
+        )
+        return quality, ready
+
+    for piece in stream.pieces(rows):
+        origin = float(piece.time[0]) if origin is None else origin
+        log = piece if kept is None else join_logs(kept, piece)
+        last = len(log) - reach
+        if last <= before:
+            kept = log
+            continue
+        yield chunk(log, slice(before, last), origin)
+        start = max(0, last - reach)
+        kept, before = log.rows(slice(start, None)), last - start
+    if kept is not None and before < len(kept) and origin is not None:
+        yield chunk(kept, slice(before, len(kept)), origin)

@@ -1,0 +1,86 @@
+"""One line of the judgement on a log, and the judgement as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.errors import LogContentError
+
+Mask = NDArray[np.bool_]
+
+#: What follows from a finding, from nothing to refusal.
+VERDICTS: Final = ("ok", "masked", "warning", "refused")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check of one column.
+
+    Attributes:
+        log: Name of the log.
+        column: Header in the log format, or the joint, or empty for the log as a whole.
+        check: What was looked at.
+        value: The number found.
+        unit: Of `value`.
+        verdict: One of `VERDICTS`.
+        detail: In words, with the remedy where there is one.
+    """
+
+    log: str
+    column: str
+    check: str
+    value: float
+    unit: str
+    verdict: str
+    detail: str
+
+
+@dataclass(frozen=True)
+class Quality:
+    """The judgement on one log.
+
+    Attributes:
+        findings: In the order of the checks.
+        position_ok: Positions that may be used, shape (N, J).
+        effort_ok: Efforts that may be used, shape (N, J).
+    """
+
+    findings: tuple[Finding, ...]
+    position_ok: Mask
+    effort_ok: Mask
+
+    @property
+    def usable(self) -> tuple[Mask, Mask]:
+        """What `prepare` asks for."""
+        return self.position_ok, self.effort_ok
+
+    def refuse(self, *, overlooked: Collection[str] = ()) -> None:
+        """Refuse the log where a finding says so.
+
+        Args:
+            overlooked: Checks that do not lead to refusal.
+
+        Raises:
+            LogContentError: Names the first refused column and how many there are.
+        """
+        refuse([f for f in self.findings if f.check not in overlooked])
+
+
+def refuse(findings: Sequence[Finding]) -> None:
+    """Stop where a finding refuses its log.
+
+    Raises:
+        LogContentError: Names the log, the first refused column and how many there are.
+    """
+    refused = [finding for finding in findings if finding.verdict == "refused"]
+    if not refused:
+        return
+    first = refused[0]
+    column = f", column '{first.column}'" if first.column else ""
+    more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
+    raise LogContentError(f"{first.log}{column}: {first.detail}{more}")

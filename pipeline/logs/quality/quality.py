@@ -1,0 +1,383 @@
+"""The judgement on a log before anything is computed from it: what is refused, masked, noted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.quality.finding import Finding, Quality
+from pipeline.logs.quality.glitches import glitches
+from pipeline.logs.quality.sampling import clock, held, quantum, saturated, standstill
+from pipeline.logs.quality.unit_check import (
+    column_name,
+    effort_units,
+    position_units,
+    velocity_units,
+)
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import EFFORTS, Log
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Fewer rows say nothing about anything.
+FEWEST_ROWS: Final = 100
+#: Slower logs show no dynamics [Hz].
+SLOWEST: Final = 5.0
+#: Share of repeats from which a channel counts as held.
+HELD: Final = 0.1
+
+
+class _Findings(list[Finding]):
+    """A list that fills in the log's name."""
+
+    def __init__(self, log: Log) -> None:
+        super().__init__()
+        self._log = log.name
+
+    def note(
+        self, column: str, check: str, value: float, unit: str, verdict: str, detail: str
+    ) -> None:
+        self.append(Finding(self._log, column, check, float(value), unit, verdict, detail))
+
+
+def judge(log: Log, expected: Expected, *, largest: Mapping[str, Array] | None = None) -> Quality:
+    """Judge a log; see `Quality.refuse` for turning refusals into an error.
+
+    Args:
+        log: From `read_log`.
+        expected: The robot's limits.
+        largest: Channel to the largest magnitude the drive can give, shape (J,); torque from the
+            joints' effort limits by default.
+    """
+    found = _Findings(log)
+    position_ok = np.isfinite(log.position)
+    n = len(log)
+    found.note(
+        "",
+        "rows",
+        n,
+        "1",
+        "refused" if n < FEWEST_ROWS else "ok",
+        f"{n} rows; at least {FEWEST_ROWS} are needed",
+    )
+    if n < FEWEST_ROWS:
+        effort_ok = log.valid & np.isfinite(log.effort.values)
+        return Quality(tuple(found), position_ok, effort_ok)
+    beat = _rate(log, found)
+    still = standstill(_bridged(log.position), beat)
+    dead = _presence(log, still, found)
+    stale = _positions(log, position_ok, still, found)
+    position_ok = position_ok & ~stale & ~_jumps(log, found)
+    effort_ok = _efforts(log, still, found)
+    _repeated_rows(log, still, found)
+    if not dead:
+        found += position_units(log, expected, position_ok)
+        found += velocity_units(log, expected, position_ok, beat)
+    found += effort_units(log, {"torque": expected.effort_limit, **(largest or {})})
+    _feet(log, found)
+    for column, meant in log.misspelt.items():
+        detail = f"is ignored: no column of the log format; did you mean '{meant}'?"
+        found.note(column, "misspelt", 1, "1", "warning", detail)
+    if log.ignored:
+        found.note("", "ignored_columns", len(log.ignored), "1", "ok", ", ".join(log.ignored))
+    for channel, formula in log.derived.items():
+        found.note("", "derived", 1, "1", "ok", f"{channel} computed as {formula}")
+    return Quality(tuple(found), position_ok, effort_ok)
+
+
+def _feet(log: Log, found: _Findings) -> None:
+    """What the feet's sensors tell, and what not."""
+    if log.foot_force is None:
+        return
+    absent = [axis for k, axis in enumerate("xy") if not np.isfinite(log.foot_force[..., k]).any()]
+    number = len(log.feet)
+    if not absent:
+        detail = "forces in three directions: taken as the ground's; they tell contact too"
+        found.note("", "foot_forces", number, "1", "ok", detail)
+        return
+    detail = (
+        f"no force_{' and no force_'.join(absent)} at every foot: the others tell contact and "
+        "loads, the rest is computed as the least tangential forces, so that feet that squeeze "
+        "the ground cannot be told"
+    )
+    found.note("", "foot_forces", number, "1", "warning", detail)
+
+
+def _bridged(x: Array) -> Array:
+    """Empty cells take the last value before them: good enough to see whether a joint moves."""
+    bad = ~np.isfinite(x)
+    if not bad.any():
+        return x
+    index = np.where(bad, 0, np.arange(x.shape[0])[:, None])
+    out = np.take_along_axis(x, np.maximum.accumulate(index, axis=0), axis=0)
+    return np.nan_to_num(out)
+
+
+def _unit(rate: float) -> str:
+    """The unit in which a time column of too low a rate [Hz] was written: the first that fits."""
+    names = {1e3: ("milliseconds", "ms"), 1e6: ("microseconds", "us"), 1e9: ("nanoseconds", "ns")}
+    for factor, (name, unit) in names.items():
+        if rate * factor >= SLOWEST:
+            return f'{name}, write [time] unit = "{unit}"'
+    return "no time, name the column under [time]"
+
+
+def _rate(log: Log, found: _Findings) -> float:
+    beat = clock(log.time)
+    rate = 1.0 / beat.dt
+    slow = rate < SLOWEST
+    hint = f"; time_s looks like {_unit(rate)} in a mapping file" if slow else ""
+    found.note(
+        "time_s",
+        "rate",
+        rate,
+        "Hz",
+        "refused" if slow else "ok",
+        f"{rate:.5g} Hz over {log.time[-1] - log.time[0]:.4g} s{hint}",
+    )
+    uneven = beat.jitter > 0.05 * beat.dt
+    found.note(
+        "time_s",
+        "jitter",
+        beat.jitter,
+        "s",
+        "warning" if uneven else "ok",
+        "resampled by interpolation" if uneven else "rows are evenly spaced",
+    )
+    if beat.gaps:
+        found.note(
+            "time_s",
+            "gaps",
+            beat.gaps,
+            "1",
+            "masked",
+            f"{beat.gaps} gaps, the longest {beat.longest:.4g} s; filtered piece by piece",
+        )
+    return beat.dt
+
+
+def _presence(log: Log, still: Mask, found: _Findings) -> bool:
+    """Empty and constant columns. Returns whether positions are beyond further checks."""
+    dead = False
+    effort = log.effort
+    quantity = "motor_position" if log.position_source == "motor" else "position"
+    constant = [_is_constant(log.position[:, j]) for j in range(len(log.joints))]
+    for j, joint in enumerate(log.joints):
+        column = column_name(joint, quantity)
+        finite = np.isfinite(log.position[:, j])
+        good = np.isfinite(effort.values[:, j])
+        if not finite.any():
+            found.note(column, "empty", 1, "1", "refused", "holds no number at all")
+            dead = True
+        elif joint in log.locked:
+            found.note(column, "locked", 1, "1", "masked", "locked by the mapping; left out")
+        elif not good.any():
+            found.note(
+                column_name(joint, effort.channel),
+                "empty",
+                1,
+                "1",
+                "refused",
+                "holds no number at all",
+            )
+        elif constant[j] and not _is_constant(effort.values[:, j]):
+            found.note(
+                column,
+                "constant",
+                1,
+                "1",
+                "refused",
+                f"never changes from {log.position[finite, j][0]:.6g} rad while its "
+                f"{effort.channel} does; a dead sensor? If the joint stood still on "
+                "purpose, list it under locked in a mapping file",
+            )
+        elif _is_constant(effort.values[:, j]) and not constant[j]:
+            found.note(
+                column_name(joint, effort.channel),
+                "constant",
+                1,
+                "1",
+                "refused",
+                f"never changes from {effort.values[good, j][0]:.6g} {effort.unit} while "
+                "the joint moves; a dead sensor? Map another effort channel, or list the "
+                "joint under locked in a mapping file",
+            )
+        elif constant[j]:
+            found.note(
+                column,
+                "constant",
+                1,
+                "1",
+                "masked",
+                "position and effort never change: the joint is left out",
+            )
+        share = float(still[:, j].mean())
+        found.note(column, "standstill_share", share, "1", "ok", f"{100 * share:.1f} % at rest")
+    if all(constant):
+        found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
+    return dead
+
+
+def _is_constant(x: Array) -> bool:
+    if not np.isfinite(x[0]) or not np.isfinite(x[-1]):
+        x = x[np.isfinite(x)]
+    return x.size > 0 and not np.any(np.isfinite(x) & (x != x[0]))
+
+
+def _positions(log: Log, ok: Mask, still: Mask, found: _Findings) -> Mask:
+    """Quantisation, held values and missing cells of the positions. Returns stale samples."""
+    quantity = "motor_position" if log.position_source == "motor" else "position"
+    stale = np.zeros_like(ok)
+    for j, joint in enumerate(log.joints):
+        column = column_name(joint, quantity)
+        x = log.position[:, j]
+        step = _channel(found, column, x, "rad")
+        share, repeats = held(x, step)
+        if share > HELD:
+            stale[:, j] = repeats
+            found.note(
+                column,
+                "held",
+                share,
+                "1",
+                "masked",
+                f"{100 * share:.0f} % of the rows repeat while the joint moves: about one "
+                f"new value in {1 / max(1 - share, 1e-3):.1f} rows; repeats are bridged "
+                f"({int(repeats.sum())} rows)",
+            )
+    return stale
+
+
+def _jumps(log: Log, found: _Findings) -> Mask:
+    """Positions that jump away and back. Returns the samples."""
+    quantity = "motor_position" if log.position_source == "motor" else "position"
+    out = np.zeros(log.position.shape, dtype=np.bool_)
+    for j, joint in enumerate(log.joints):
+        rows = glitches(log.position[:, j])
+        if rows.any():
+            out[:, j] = rows
+            _note_jumps(log, found, column_name(joint, quantity), log.position[:, j], rows, "rad")
+    return out
+
+
+def _note_jumps(log: Log, found: _Findings, column: str, x: Array, rows: Mask, unit: str) -> None:
+    count = int(rows.sum())
+    first = int(np.argmax(rows))
+    many = f"{count} rows jump away and back, the first" if count > 1 else "one row jumps away"
+    detail = (
+        f"{many} at {log.time[first]:.6g} s to {x[first]:.5g} {unit}: no motion does that; "
+        f"bridged as if {'they were' if count > 1 else 'it were'} empty"
+    )
+    found.note(column, "glitches", count, "1", "warning", detail)
+
+
+def _efforts(log: Log, still: Mask, found: _Findings) -> Mask:
+    """Quantisation, held values, saturation and missing cells of the compared effort."""
+    effort = log.effort
+    ok = log.valid & np.isfinite(effort.values)
+    for j, joint in enumerate(log.joints):
+        column = column_name(joint, effort.channel)
+        x = effort.values[:, j]
+        off = _is_constant(log.position[:, j]) and _is_constant(x)
+        if joint in log.locked or off:
+            ok[:, j] = False
+            continue
+        if _is_constant(x) or not np.isfinite(x).any():
+            continue
+        step = _channel(found, column, x, effort.unit)
+        share, repeats = held(x, step)
+        if share > HELD:
+            ok[:, j] &= ~repeats
+            found.note(
+                column,
+                "held",
+                share,
+                "1",
+                "masked",
+                f"{100 * share:.0f} % of the rows repeat while it changes: about one new "
+                f"value in {1 / max(1 - share, 1e-3):.1f} rows; repeats are bridged "
+                f"({int(repeats.sum())} rows)",
+            )
+        jumps = glitches(x)
+        if jumps.any():
+            ok[:, j] &= ~jumps
+            _note_jumps(log, found, column, x, jumps, effort.unit)
+        fresh = ~repeats if share > HELD else np.ones_like(repeats)
+        limit = saturated(x, ~still[:, j] & fresh, step)
+        if limit.any():
+            # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
+            hard = effort.channel != "voltage"
+            if hard:
+                ok[:, j] &= ~limit
+            found.note(
+                column,
+                "saturated",
+                float(limit.mean()),
+                "1",
+                "masked" if hard else "warning",
+                f"{int(limit.sum())} rows stick at {np.nanmax(np.abs(x[limit])):.5g} {effort.unit}",
+            )
+        if log.torque_off is not None and log.torque_off[:, j].any():
+            rows = log.torque_off[:, j]
+            found.note(
+                column,
+                "torque_off",
+                float(rows.mean()),
+                "1",
+                "masked",
+                f"{int(rows.sum())} rows with the drive off; bridge "
+                f"{log.torque_off_bridge or 'not stated (open or shorted?)'}",
+            )
+    if log.chosen_effort is None and len(log.channels) > 1:
+        found.note(
+            "",
+            "effort",
+            1,
+            "1",
+            "ok",
+            f"{effort.channel} is compared; also there: "
+            + ", ".join(c for c in EFFORTS if c in log.channels and c != effort.channel),
+        )
+    return ok
+
+
+def _channel(found: _Findings, column: str, x: Array, unit: str) -> float:
+    """Missing cells and quantum of one column. Returns the quantum."""
+    missing = int((~np.isfinite(x)).sum())
+    if 0 < missing < x.size:
+        found.note(column, "missing", missing / x.size, "1", "masked", f"{missing} empty cells")
+    step, whole = quantum(x)
+    if step > 0:
+        found.note(
+            column,
+            "quantum",
+            step,
+            unit,
+            "ok",
+            f"{100 * whole:.0f} % of the values lie on it",
+        )
+    return step
+
+
+def _repeated_rows(log: Log, still: Mask, found: _Findings) -> None:
+    """Rows that repeat the one before in every channel while something moves."""
+    same = np.ones(len(log) - 1, dtype=np.bool_)
+    for block in (log.position, log.velocity, *(getattr(log, c) for c in log.channels)):
+        if block is not None:
+            with np.errstate(invalid="ignore"):
+                same &= (block[1:] == block[:-1]).all(axis=1)
+    same &= ~np.asarray(still[1:].all(axis=1))
+    share = float(same.mean())
+    if share > 0.001:
+        found.note(
+            "",
+            "repeated_rows",
+            share,
+            "1",
+            "warning",
+            f"{int(same.sum())} rows repeat the one before in every channel while a joint moves",
+        )

@@ -1,0 +1,1 @@
+"""From files to a log in SI units and joint order."""

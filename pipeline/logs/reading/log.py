@@ -1,0 +1,166 @@
+"""A measured log: what was sensed at every joint and instant, in SI units and joint order."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.errors import closest
+from pipeline.logs.errors import LogContentError
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Channels in which measurement and simulation are compared, the most direct first, with unit.
+EFFORTS: Final[Mapping[str, str]] = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
+
+
+@dataclass(frozen=True)
+class Effort:
+    """The channel that is compared.
+
+    Attributes:
+        channel: Key of `EFFORTS`.
+        unit: Its unit.
+        values: Shape (N, J).
+    """
+
+    channel: str
+    unit: str
+    values: Array
+
+
+@dataclass(frozen=True)
+class Log:
+    """One measured log; samples along the first axis, joints in the robot's order.
+
+    The sign of torque, current, voltage and velocity is the joint's; power is positive from supply
+    to motor. What a channel did not measure is NaN there.
+
+    Attributes:
+        name: Short name, the file's stem.
+        time: Strictly increasing, shape (N,) [s].
+        joints: Names of the columns.
+        position: Joint side, shape (N, J) [rad].
+        position_source: ``"joint"`` or ``"motor"``: which side of the gear the encoder sits on;
+            motor angles are divided by the ratio.
+        velocity: As measured, shape (N, J) [rad/s].
+        torque: At the joint side, shape (N, J) [N*m].
+        current: Of the motor, shape (N, J) [A].
+        voltage: Of the motor, shape (N, J) [V].
+        power: Electrical, shape (N, J) [W].
+        goal_position: Shape (N, J) [rad].
+        temperature: Shape (N, J) [degC].
+        feet: Names of the legs whose feet were measured.
+        foot_force: Of the world on the robot, shape (N, F, 3) [N].
+        contact: Shape (N, F).
+        base_roll: Shape (N,) [rad].
+        base_pitch: Shape (N,) [rad].
+        valid: False where position or effort is unusable, shape (N, J).
+        torque_off: True where the drive was switched off, shape (N, J).
+        supply: Supply voltage, shape (N,) [V].
+        gain: Of the controller, duty per position error [1/rad].
+        torque_off_bridge: ``"open"`` (no current flows) or ``"shorted"`` where the drive is off.
+        locked: Joints that stood still on purpose.
+        constants: Further numbers the mapping names, SI.
+        condition: What distinguishes this log from others, e.g. ``{"payload": 0.5}``.
+        extra: Numeric columns the mapping keeps under their own names, each shape (N,).
+        ignored: Columns of the file that were not used.
+        misspelt: Columns that were not used though they are nearly ones of the log format, and
+            those.
+        chosen_effort: Channel to compare, overriding the order of `EFFORTS`.
+        derived: Channels that were computed from others by the mapping, with the formula.
+        sha256: Of the file.
+        source: The file's name.
+    """
+
+    name: str
+    time: Array
+    joints: tuple[str, ...]
+    position: Array
+    position_source: str
+    velocity: Array | None = None
+    torque: Array | None = None
+    current: Array | None = None
+    voltage: Array | None = None
+    power: Array | None = None
+    goal_position: Array | None = None
+    temperature: Array | None = None
+    feet: tuple[str, ...] = ()
+    foot_force: Array | None = None
+    contact: Mask | None = None
+    base_roll: Array | None = None
+    base_pitch: Array | None = None
+    valid: Mask = field(default_factory=lambda: np.ones((0, 0), dtype=np.bool_))
+    torque_off: Mask | None = None
+    supply: Array | None = None
+    gain: float | None = None
+    torque_off_bridge: str | None = None
+    locked: tuple[str, ...] = ()
+    constants: Mapping[str, float] = field(default_factory=dict)
+    condition: Mapping[str, float | str] = field(default_factory=dict)
+    extra: Mapping[str, Array] = field(default_factory=dict)
+    ignored: tuple[str, ...] = ()
+    misspelt: Mapping[str, str] = field(default_factory=dict)
+    chosen_effort: str | None = None
+    derived: Mapping[str, str] = field(default_factory=dict)
+    sha256: str = ""
+    source: Path = Path()
+
+    def __post_init__(self) -> None:
+        n, j = self.position.shape
+        if self.valid.size == 0:
+            object.__setattr__(self, "valid", np.isfinite(self.position))
+        shapes = {"time": (n,), "valid": (n, j), "torque_off": (n, j)}
+        shapes |= dict.fromkeys(("base_roll", "base_pitch", "supply"), (n,))
+        shapes |= dict.fromkeys(("velocity", *EFFORTS, "goal_position", "temperature"), (n, j))
+        for key, shape in shapes.items():
+            value = getattr(self, key)
+            if value is not None and value.shape != shape:
+                raise LogContentError(
+                    f"{self.name}: {key} has shape {value.shape}; positions of shape {(n, j)} "
+                    f"need {shape}"
+                )
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Effort channels the log has, the most direct first."""
+        return tuple(key for key in EFFORTS if getattr(self, key) is not None)
+
+    @property
+    def effort(self) -> Effort:
+        """The channel in which measurement and simulation are compared.
+
+        Raises:
+            LogContentError: The chosen channel is not in the log.
+        """
+        channels = self.channels
+        channel = self.chosen_effort or (channels[0] if channels else "")
+        if channel not in channels:
+            raise LogContentError(
+                f"{self.name}: no {channel or 'effort'} channel in the log; "
+                f"{closest(channel, channels)}"
+            )
+        return Effort(channel, EFFORTS[channel], getattr(self, channel))
+
+    def rows(self, part: slice | NDArray[np.intp] | Mask) -> Log:
+        """The same log with some of its rows, in order."""
+        changes: dict[str, Any] = {}
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if isinstance(value, np.ndarray):
+                changes[f.name] = value[part]
+        changes["extra"] = {key: value[part] for key, value in self.extra.items()}
+        return self.with_changes(**changes)
+
+    def with_changes(self, **changes: Any) -> Log:
+        """The same log with some attributes replaced."""
+        return Log(**{f.name: getattr(self, f.name) for f in fields(self)} | changes)

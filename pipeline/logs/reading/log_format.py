@@ -1,0 +1,149 @@
+"""Column names of the wide log format: `<owner>__<quantity>_<unit>`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+from actuators.errors import closest, one_line
+from actuators.units import known_units
+from pipeline.logs.errors import LogFormatError
+from pipeline.logs.reading.expected import Expected
+
+TIME: Final = "time_s"
+#: Suffix of a joint's column -> (attribute of `Log`, unit as `actuators.units` writes it).
+JOINT_COLUMNS: Final = {
+    "position_rad": ("position", "rad"),
+    "motor_position_rad": ("motor_position", "rad"),
+    "velocity_rad_s": ("velocity", "rad/s"),
+    "torque_Nm": ("torque", "N*m"),
+    "current_A": ("current", "A"),
+    "voltage_V": ("voltage", "V"),
+    "power_W": ("power", "W"),
+    "goal_position_rad": ("goal_position", "rad"),
+    "temperature_degC": ("temperature", "degC"),
+}
+FOOT_COLUMNS: Final = {
+    "force_x_N": ("force_x", "N"),
+    "force_y_N": ("force_y", "N"),
+    "force_z_N": ("force_z", "N"),
+    "contact": ("contact", "1"),
+}
+BASE_COLUMNS: Final = {"roll_rad": ("base_roll", "rad"), "pitch_rad": ("base_pitch", "rad")}
+#: Letters that may be off in a header for it to be taken for a slip of the pen.
+_SLIPS: Final = 2
+#: Units as they are written at the end of a header, and none at all.
+_UNIT_SUFFIXES: Final = frozenset(
+    {"", "degrees", "radians", "Ncm", "nm"}
+    | {unit.replace("*", "").replace("/", "_").replace("^", "") for unit in known_units()}
+)
+
+
+@dataclass(frozen=True)
+class Target:
+    """Where a column's numbers go.
+
+    Attributes:
+        kind: ``"time"``, ``"joint"``, ``"foot"`` or ``"base"``.
+        owner: Joint or leg; empty for time and base.
+        quantity: Attribute of the log, or part of one.
+        unit: In which the log keeps it.
+    """
+
+    kind: str
+    owner: str
+    quantity: str
+    unit: str
+
+
+def parse_column(column: str, expected: Expected, where: str) -> Target | None:
+    """What a column of the log format means; None for a column that means nothing to us.
+
+    Args:
+        column: Its header.
+        expected: The robot's names.
+        where: File, for messages.
+
+    Raises:
+        LogFormatError: A quantity of the format in another unit, or misspelt at a known joint.
+    """
+    if column == TIME:
+        return Target("time", "", "time", "s")
+    owner, separator, quantity = column.rpartition("__")
+    if not separator:
+        if column.startswith("time_"):
+            raise LogFormatError(_unit_message(column, TIME, where))
+        return None
+    owner = expected.foot_alias.get(owner, owner)
+    # A leg and a joint may share a name; the quantity tells them apart.
+    for kind, owners, table in (
+        ("joint", expected.joints, JOINT_COLUMNS),
+        ("foot", expected.feet, FOOT_COLUMNS),
+        ("base", ("base",), BASE_COLUMNS),
+    ):
+        if owner not in owners:
+            continue
+        if quantity in table:
+            attribute, unit = table[quantity]
+            return Target(kind, "" if kind == "base" else owner, attribute, unit)
+        for known, (attribute, _) in table.items():
+            written = quantity.removeprefix(attribute).removeprefix("_")
+            if quantity.startswith(attribute) and written in _UNIT_SUFFIXES:
+                raise LogFormatError(_unit_message(column, f"{owner}__{known}", where))
+    return None
+
+
+def misspelt(column: str, expected: Expected) -> str:
+    """The column of the log format that a header nearly is; empty where it is none.
+
+    One or two letters off in the quantity of a joint, foot or base count as a slip of the pen.
+    """
+    owner, separator, quantity = column.rpartition("__")
+    owner = expected.foot_alias.get(owner, owner)
+    if not separator:
+        return TIME if _slips(column.lower(), TIME) <= 1 else ""
+    for owners, table in (
+        (expected.joints, JOINT_COLUMNS),
+        (expected.feet, FOOT_COLUMNS),
+        (("base",), BASE_COLUMNS),
+    ):
+        if owner in owners and quantity not in table:
+            slips = {known: _slips(quantity.lower(), known.lower()) for known in table}
+            best = min(slips, key=lambda known: slips[known])
+            if slips[best] <= _SLIPS:
+                return f"{owner}__{best}"
+    return ""
+
+
+def _slips(a: str, b: str) -> int:
+    """Letters to insert, drop, replace or exchange with their neighbour (Damerau, restricted)."""
+    if abs(len(a) - len(b)) > _SLIPS:
+        return _SLIPS + 1
+    before: list[int] = []
+    row = list(range(len(b) + 1))
+    for i, x in enumerate(a, start=1):
+        now = [i]
+        for j, y in enumerate(b, start=1):
+            best = min(row[j] + 1, now[j - 1] + 1, row[j - 1] + (x != y))
+            if i > 1 and j > 1 and x == b[j - 2] and a[i - 2] == y:
+                best = min(best, before[j - 2] + 1)
+            now.append(best)
+        before, row = row, now
+    return row[-1]
+
+
+def _unit_message(column: str, known: str, where: str) -> str:
+    return (
+        f"{where}: column '{one_line(column)}' is not in the unit of the log format, '{known}'; "
+        "rename it, or give its unit in a mapping file"
+    )
+
+
+def suggest_column(wanted: str, header: tuple[str, ...]) -> str:
+    """A hint which column of the file may be the one that is missing."""
+    hint = closest(wanted, header)
+    return (
+        hint
+        if hint.startswith("did")
+        else f"the file has {len(header)} columns: " + (one_line(", ".join(header)))
+    )

@@ -1,0 +1,291 @@
+"""Numbers by column from CSV and Parquet files, with one clear line for whatever is wrong."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.errors import one_line
+from pipeline.logs.errors import LogFormatError
+
+Array = NDArray[np.float64]
+_HEADER_BYTES: Final = 1 << 20
+_DECIMAL_COMMA: Final = re.compile(r"^\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*$")
+
+
+@dataclass(frozen=True)
+class CsvDialect:
+    """How a CSV file is written: the log format's own is comma and dot."""
+
+    delimiter: str = ","
+    decimal: str = "."
+
+
+@dataclass(frozen=True)
+class TableFile:
+    """A file of columns whose header has been read.
+
+    Attributes:
+        path: The file.
+        header: Column names, unique.
+        parquet: Whether it is Parquet; else CSV.
+        dialect: Of a CSV file.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    parquet: bool
+    dialect: CsvDialect
+
+    @property
+    def where(self) -> str:
+        """The file's name, for messages."""
+        return one_line(self.path.name)
+
+
+def sha256(path: Path) -> str:
+    """SHA-256 of a file's bytes, in hexadecimal."""
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def open_table(path: Path, dialect: CsvDialect | None = None) -> TableFile:
+    """Open a CSV or Parquet file and read its header.
+
+    Args:
+        path: The file; Parquet is recognised by its first bytes, not by its name.
+        dialect: Of a CSV file; the log format's own by default.
+
+    Raises:
+        LogFormatError: No such file, empty, wrong bytes, no header, names that occur twice.
+    """
+    where = one_line(path.name)
+    dialect = dialect or CsvDialect()
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_HEADER_BYTES)
+    except OSError as error:
+        raise LogFormatError(
+            f"{one_line(path)}: cannot be read ({error.strerror or 'no such file'}); give a log "
+            "as CSV or Parquet"
+        ) from None
+    if not head.strip():
+        raise LogFormatError(f"{where}: the file is empty; give a log as CSV or Parquet")
+    if head.startswith(b"PAR1"):
+        return TableFile(path, _checked(_parquet_header(path, where), where), True, dialect)
+    return TableFile(path, _checked(_csv_header(head, dialect, where), where), False, dialect)
+
+
+def _parquet_header(path: Path, where: str) -> list[str]:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return [str(name) for name in pq.read_schema(path).names]
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise LogFormatError(f"{where}: not a readable Parquet file ({one_line(error)})") from None
+
+
+def _csv_header(head: bytes, dialect: CsvDialect, where: str) -> list[str]:
+    if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:4096]:
+        raise LogFormatError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
+    line = head.lstrip(b"\xef\xbb\xbf").split(b"\n", 1)[0]
+    try:
+        text = line.decode("utf-8").rstrip("\r")
+        names = next(csv.reader(io.StringIO(text), delimiter=dialect.delimiter, strict=True), [])
+    except (UnicodeDecodeError, csv.Error):
+        raise LogFormatError(
+            f"{where}: line 1 is no header of column names in UTF-8; save the log as CSV in UTF-8"
+        ) from None
+    if len(names) == 1 and dialect.delimiter == ",":
+        for other in (";", "\t"):
+            if other in names[0]:
+                raise LogFormatError(
+                    f"{where}: columns are separated by {other!r}, expected commas; export it with "
+                    "commas and decimal dots, or give [csv] delimiter and decimal in a mapping file"
+                )
+    if names and all(_is_number(name) for name in names):
+        raise LogFormatError(f"{where}: line 1 holds numbers; expected a header of column names")
+    return [name.strip() for name in names]
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _checked(names: Sequence[str], where: str) -> tuple[str, ...]:
+    seen: set[str] = set()
+    for k, name in enumerate(names, start=1):
+        if name in seen:
+            raise LogFormatError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
+        if not name:
+            raise LogFormatError(f"{where}: column {k} has no name; give it one in line 1")
+        seen.add(name)
+    return tuple(names)
+
+
+def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
+    """Read some columns whole.
+
+    Args:
+        table: The open file.
+        columns: Names from its header.
+
+    Returns:
+        Name to numbers, shape (N,); empty cells are NaN, true and false 1 and 0.
+
+    Raises:
+        LogFormatError: A cell is no number, rows are ragged, bytes are not UTF-8.
+    """
+    import pyarrow as pa
+
+    where = table.where
+    trouble = (pa.ArrowException, OSError, ValueError, OverflowError)
+    try:
+        data = _read_parquet(table, columns) if table.parquet else _read_csv(table, columns)
+    except trouble as error:
+        if table.parquet:
+            raise LogFormatError(_reason(error, table)) from None
+        try:
+            # Only a single thread counts rows, so that the message can say where.
+            data = _read_csv(table, columns, threads=False)
+        except trouble as located:
+            raise LogFormatError(_reason(located, table)) from None
+    if data.num_rows == 0:
+        raise LogFormatError(f"{where}: a header and no rows; nothing was logged")
+    return {name: _numbers(data.column(name), name, where) for name in columns}
+
+
+def stream_columns(
+    table: TableFile, columns: Sequence[str], rows: int
+) -> Iterator[dict[str, Array]]:
+    """Read some columns of a Parquet file in consecutive batches of at most `rows` rows.
+
+    Raises:
+        LogFormatError: The file is not Parquet or breaks off.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not table.parquet:
+        raise LogFormatError(f"{table.where}: streaming needs Parquet; convert the CSV first")
+    try:
+        # Without a memory map or pre-buffering, one row group at a time is in memory.
+        with pq.ParquetFile(table.path, memory_map=False, pre_buffer=False) as file:
+            for batch in file.iter_batches(batch_size=rows, columns=list(columns)):
+                whole = pa.table(batch)
+                yield {name: _numbers(whole.column(name), name, table.where) for name in columns}
+    except (pa.ArrowException, OSError) as error:
+        raise LogFormatError(_reason(error, table)) from None
+
+
+def row_count(table: TableFile) -> int:
+    """Rows of a Parquet file from its footer, of a CSV file from its line ends.
+
+    Raises:
+        LogFormatError: The footer cannot be read.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    if not table.parquet:
+        with table.path.open("rb") as stream:
+            return max(
+                0, sum(part.count(b"\n") for part in iter(lambda: stream.read(1 << 22), b"")) - 1
+            )
+    try:
+        return int(pq.read_metadata(table.path).num_rows)
+    except (pa.ArrowException, OSError) as error:
+        raise LogFormatError(_reason(error, table)) from None
+
+
+def _read_parquet(table: TableFile, columns: Sequence[str]) -> Any:
+    import pyarrow.parquet as pq
+
+    return pq.read_table(table.path, columns=list(columns))
+
+
+def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool = True) -> Any:
+    import pyarrow as pa
+    import pyarrow.csv as pc
+
+    return pc.read_csv(
+        table.path,
+        read_options=pc.ReadOptions(
+            column_names=list(table.header), skip_rows=1, use_threads=threads
+        ),
+        parse_options=pc.ParseOptions(delimiter=table.dialect.delimiter),
+        convert_options=pc.ConvertOptions(
+            include_columns=list(columns),
+            column_types={
+                name: pa.string() if name.endswith("__contact") else pa.float64()
+                for name in columns
+            },
+            decimal_point=table.dialect.decimal,
+            strings_can_be_null=True,
+        ),
+    )
+
+
+def _numbers(column: Any, name: str, where: str) -> Array:
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    kind = column.type
+    try:
+        if pa.types.is_string(kind) or pa.types.is_large_string(kind):
+            lower = pc.utf8_lower(pc.utf8_trim_whitespace(column))
+            lower = pc.if_else(pc.equal(lower, "true"), "1", lower)
+            lower = pc.if_else(pc.equal(lower, "false"), "0", lower)
+            column = pc.cast(lower, pa.float64())
+        elif pa.types.is_null(kind):
+            return np.full(len(column), np.nan)
+        elif pa.types.is_boolean(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind):
+            column = pc.cast(column, pa.float64(), safe=False)
+        else:
+            raise LogFormatError(
+                f"{where}: column '{one_line(name)}' holds {one_line(kind)}; expected numbers"
+            )
+        return np.array(column.to_numpy(), dtype=np.float64)
+    except pa.ArrowException as error:
+        raise LogFormatError(
+            f"{where}: column '{one_line(name)}': {one_line(error)}; expected numbers"
+        ) from None
+
+
+def _reason(error: Exception, table: TableFile) -> str:
+    """Say in one line what the reader met."""
+    text = one_line(error)
+    where = table.where
+    row = re.search(r"Row #(\d+)", text)
+    place = f"row {row[1]}" if row else "a row"
+    ragged = re.search(r"Expected (\d+) columns, got (\d+)", text)
+    if ragged:
+        want, got = int(ragged[1]), int(ragged[2])
+        hint = "a row is cut off or has a cell too many"
+        if got == 2 * want or (got == 2 * want - 1 and want > 2):
+            hint = "decimal commas? export the log with decimal dots"
+        return f"{where}: {place} has {got} cells, the header {want}; {hint}"
+    cell = re.search(r"column #(\d+): .*invalid value '(.*)'", text)
+    if cell:
+        number = int(cell[1])
+        name = table.header[number] if number < len(table.header) else f"#{number}"
+        hint = "expected a number"
+        if _DECIMAL_COMMA.match(cell[2]):
+            hint = "a decimal comma; export the log with decimal dots"
+        place = f"{place}, " if row else ""
+        return f"{where}: {place}column '{one_line(name)}' holds '{cell[2][:40]}', {hint}"
+    return f"{where}: cannot be read: {text}"

@@ -1,0 +1,1 @@
+"""Filters, derivatives, noise and time grids."""

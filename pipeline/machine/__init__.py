@@ -1,0 +1,1 @@
+"""A machine: robot, one drivetrain per joint, sensors."""

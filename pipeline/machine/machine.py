@@ -1,0 +1,272 @@
+"""The machine as the workflow computes it: bodies, an actuator per joint, sensors.
+
+A model is never changed: effects return another one. What an effect leaves alone keeps its
+identity, and that is how the simulation knows what need not be computed again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from actuators.chain import Chain
+from actuators.elements.element import Element
+from actuators.elements.heating import Heating
+from actuators.elements.motor import DCMotor
+from actuators.elements.position_torque import PositionTorque
+from actuators.errors import closest
+from pipeline.logs.errors import ModelError
+from pipeline.robot.check import refuse_urdf
+from pipeline.robot.kinematics import LegChains
+from pipeline.robot.robot import Robot, parse_urdf
+from pipeline.robot.urdf_source import read_urdf
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+BASE = "base"
+
+
+@dataclass(frozen=True)
+class BodyChange:
+    """How one body differs from the robot file.
+
+    Attributes:
+        payload: Point mass added at the centre of mass [kg].
+        shift: Displacement of the centre of mass in the frame of the body's joint [m].
+        scale: Factor on mass and rotational inertia [1].
+        inertia_scale: Further factor on the rotational inertia about the centre of mass [1].
+    """
+
+    payload: float = 0.0
+    shift: Vector = (0.0, 0.0, 0.0)
+    scale: float = 1.0
+    inertia_scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What the rigid-body torque depends on beside the motion.
+
+    Attributes:
+        changes: Joint that carries the body to its change.
+        tilt: Roll and pitch of the ground or stand [rad].
+        squeeze: Lateral force with which the ground pushes the standing feet outward, of all feet
+            on one side together [N].
+    """
+
+    changes: tuple[tuple[str, BodyChange], ...] = ()
+    tilt: tuple[float, float] = (0.0, 0.0)
+    squeeze: float = 0.0
+
+    def body(self, joint: str) -> BodyChange:
+        """The change of one body."""
+        return dict(self.changes).get(joint, BodyChange())
+
+    def with_body(self, joint: str, change: BodyChange) -> Bodies:
+        """The same with another change of one body."""
+        table = dict(self.changes) | {joint: change}
+        return replace(self, changes=tuple(table.items()))
+
+
+@dataclass(frozen=True, eq=False)
+class JointModel:
+    """One joint's actuator and sensors.
+
+    Attributes:
+        name: Of the joint.
+        elements: From the joint to the motor; those that effects add stand first.
+        motor: The converter; None where the log's torque is the actuator's, as of a bare URDF.
+        position_torques: Torques that depend on the joint's position alone.
+        compliance: Of the transmission [rad/(N*m)].
+        backlash: Whole width [rad].
+        crossing: Torque over which the joint passes from one flank to the other [N*m].
+        coupled_to: Joint with which this one's motor also turns; empty without.
+        coupling: Turns of the motor, at the joint side, per turn of that other joint [1].
+        heating: Thermal node of the motor; None for a motor that stays cold.
+        encoder_offset: The position sensor reads high by this [rad].
+        effort_offset: The effort sensor reads high by this, in the unit of its channel.
+        delay: The effort channels lag behind the position by this [s].
+        gains: Channel to how many times what it should its column reads; once where absent.
+    """
+
+    name: str
+    elements: tuple[Element, ...] = ()
+    motor: DCMotor | None = None
+    position_torques: tuple[PositionTorque, ...] = ()
+    compliance: float = 0.0
+    backlash: float = 0.0
+    crossing: float = 0.0
+    coupled_to: str = ""
+    coupling: float = 0.0
+    heating: Heating | None = None
+    encoder_offset: float = 0.0
+    effort_offset: float = 0.0
+    delay: float = 0.0
+    gains: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def ratio(self) -> float:
+        """Motor speed over joint speed."""
+        total = 1.0
+        for element in self.elements:
+            total *= float(np.asarray(element.gearing))
+        return total
+
+    @property
+    def wound(self) -> bool:
+        """Whether motor and joint turn apart from one another."""
+        return self.compliance != 0.0 or self.backlash != 0.0
+
+    def with_element(self, element: Element, *, at_motor: bool = False) -> JointModel:
+        """The same with an element more, at the joint's or the motor's shaft; names made unique."""
+        taken = {e.name for e in self.elements}
+        name, k = element.name, 2
+        while name in taken:
+            name, k = f"{element.name}_{k}", k + 1
+        named = replace(element, name=name)
+        elements = (*self.elements, named) if at_motor else (named, *self.elements)
+        return replace(self, elements=elements)
+
+
+@dataclass(frozen=True, eq=False)
+class MachineModel:
+    """Robot, actuators and sensors.
+
+    Attributes:
+        name: Of the robot.
+        rigid: Pinocchio model as the robot file states it; armature zero.
+        joints: In the order of every column.
+        legs: Geometry of the legs; None for a robot without.
+        left: Which legs are on the left side.
+        floating: Whether the base floats.
+        bodies: Changes of bodies, ground and contact.
+        actuators: One per joint.
+        links: Moving link's name to the joint that carries it.
+    """
+
+    name: str
+    rigid: pin.Model
+    joints: tuple[str, ...]
+    legs: LegChains | None
+    left: tuple[bool, ...]
+    floating: bool
+    bodies: Bodies = field(default_factory=Bodies)
+    actuators: tuple[JointModel, ...] = ()
+    links: Mapping[str, str] = field(default_factory=dict)
+
+    def index(self, joint: str) -> int:
+        """Column of a joint.
+
+        Raises:
+            ModelError: No such joint.
+        """
+        if joint not in self.joints:
+            raise ModelError(f"{self.name}: no joint '{joint}'; {closest(joint, self.joints)}")
+        return self.joints.index(joint)
+
+    def actuator(self, joint: str) -> JointModel:
+        """The actuator of a joint."""
+        return self.actuators[self.index(joint)]
+
+    def with_actuator(self, actuator: JointModel) -> MachineModel:
+        """The same with another actuator at the joint it names."""
+        at = self.index(actuator.name)
+        return replace(self, actuators=(*self.actuators[:at], actuator, *self.actuators[at + 1 :]))
+
+    def with_bodies(self, bodies: Bodies) -> MachineModel:
+        """The same with other bodies, ground or contact."""
+        return replace(self, bodies=bodies)
+
+    def __post_init__(self) -> None:
+        if not self.links:
+            object.__setattr__(self, "links", _links(self.rigid))
+
+    def carrier(self, link: str) -> str:
+        """Joint that carries a link.
+
+        Raises:
+            ModelError: No moving link of that name.
+        """
+        if link not in self.links:
+            raise ModelError(
+                f"{self.name}: no moving link '{link}'; {closest(link, list(self.links))}"
+            )
+        return self.links[link]
+
+
+def _links(rigid: pin.Model) -> dict[str, str]:
+    out = {}
+    for index in range(1, len(rigid.names)):
+        if rigid.inertias[index].mass > 0:
+            out[link_name(rigid, index)] = str(rigid.names[index])
+    return out
+
+
+def link_name(model: pin.Model, joint: int) -> str:
+    """Name of the link that a joint carries (of the first, where fixed joints merged several)."""
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY and frame.parentJoint == joint:
+            return str(frame.name)
+    return str(model.names[joint])
+
+
+def machine_of_robot(robot: Robot, chain: Chain | None) -> MachineModel:
+    """A machine whose joints all have the same actuator.
+
+    Args:
+        robot: From a robot file.
+        chain: Actuator; None where the log's torque is the actuator's at the joint side.
+    """
+    return MachineModel(
+        name=robot.spec.name,
+        rigid=robot.model,
+        joints=robot.joints,
+        legs=robot.chains,
+        left=tuple(leg.side == "left" for leg in robot.spec.legs),
+        floating=robot.floating,
+        actuators=_actuators(robot.joints, chain),
+    )
+
+
+def machine_of_urdf(
+    path: Path, joints: Sequence[str] | None = None, chain: Chain | None = None
+) -> MachineModel:
+    """A machine of a bare URDF: fixed base, no legs.
+
+    Args:
+        path: The URDF.
+        joints: Columns; all joints of one degree of freedom by default.
+        chain: As for `machine_of_robot`.
+
+    Raises:
+        ModelError: It moves in joints that are not columns.
+        pipeline.errors.UrdfError: The file cannot be read, or is no URDF.
+        pipeline.errors.UnphysicalModelError: Its bodies or joints cannot be.
+    """
+    text = read_urdf(path)
+    refuse_urdf(text, str(path))
+    model = parse_urdf(text, str(path), floating=False)
+    found = tuple(str(n) for n in list(model.names)[1:])
+    names = tuple(joints) if joints is not None else found
+    if set(names) != set(found) or any(j.nv != 1 for j in list(model.joints)[1:]):
+        raise ModelError(f"{path}: joints {', '.join(found)} are expected, got {', '.join(names)}")
+    return MachineModel(
+        name=path.stem,
+        rigid=model,
+        joints=names,
+        legs=None,
+        left=(),
+        floating=False,
+        actuators=_actuators(names, chain),
+    )
+
+
+def _actuators(joints: Sequence[str], chain: Chain | None) -> tuple[JointModel, ...]:
+    if chain is None:
+        return tuple(JointModel(name) for name in joints)
+    return tuple(JointModel(name, elements=chain.elements, motor=chain.motor) for name in joints)

@@ -1,0 +1,1 @@
+"""Motions as segments: gaits and paths of the feet."""

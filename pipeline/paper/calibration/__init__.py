@@ -1,0 +1,1 @@
+"""Fitting what the paper does not print."""

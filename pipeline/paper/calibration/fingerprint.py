@@ -1,0 +1,54 @@
+"""Which numbers a calibration was made with, so that its judgement is not lent to others."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from actuators.loading.build import Catalog
+from pipeline.paper.calibration.prior import Prior
+from pipeline.paper.published import Published
+from pipeline.robot.robot_file import RobotSpec
+
+Fingerprint = dict[str, float | str]
+#: Stored numbers have nine digits.
+_SAME = 1e-8
+
+
+def fingerprint(
+    spec: RobotSpec, catalog: Catalog, published: Mapping[str, Published], prior: Prior
+) -> Fingerprint:
+    """Everything a judgement depends on, by name: SI numbers and texts.
+
+    Args:
+        spec: The robot file.
+        catalog: The actuators.
+        published: The printed values.
+        prior: What was known before.
+    """
+    out: Fingerprint = {f"robot.{name}": value for name, value in spec.parameters.items()}
+    out["gait.transfer_path"] = spec.transfer_path
+    out["gait.tripods"] = repr(spec.tripods)
+    out["standing.feet"] = repr(spec.standing_feet)
+    out["legs"] = repr([(leg.name, leg.joints, leg.foot, leg.side) for leg in spec.legs])
+    out |= {f"{component}.{p.name}": p.value for component, p in catalog.rows()}
+    for name, a in catalog.alternatives.items():
+        elements = [(e.name, e.law, e.stage, sorted(e.arguments.items())) for e in a.elements]
+        out[f"alternatives.{name}"] = repr((a.motor, a.ratio, elements))
+    for row in published.values():
+        out[f"published.{row.id}"] = repr((row.unit, row.value, row.half_width, row.role))
+    for free in prior.free:
+        out[f"prior.{free.key}"] = repr((free.centre, free.interval, free.bounds, free.logarithmic))
+    return out
+
+
+def differences(stored: Mapping[str, float | str], now: Mapping[str, float | str]) -> list[str]:
+    """Names under which two fingerprints differ, in order; empty where they are the same."""
+    names = [*now, *(name for name in stored if name not in now)]
+    return [name for name in names if not _same(stored.get(name), now.get(name))]
+
+
+def _same(a: float | str | None, b: float | str | None) -> bool:
+    if isinstance(a, str) or isinstance(b, str) or a is None or b is None:
+        return a == b
+    return math.isclose(a, b, rel_tol=_SAME, abs_tol=1e-12)

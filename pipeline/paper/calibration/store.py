@@ -1,0 +1,326 @@
+"""The calibration's results: one file of numbers, and the calibrated values in their own files.
+
+Everything is prepared first and then moved into place, so that an interrupted calibration leaves
+the old files as they were.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import tomlkit
+
+from actuators.loading.build import CATALOG, load_catalog
+from actuators.units import from_si
+from pipeline.paper.calibration.fingerprint import Fingerprint, fingerprint
+from pipeline.paper.calibration.machine import POSTURE, ROBOT
+from pipeline.paper.calibration.prior import Free, Prior, load_prior
+from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
+from pipeline.paper.constants.motor_constants import KEYS, UNITS
+from pipeline.paper.errors import CalibrationError
+from pipeline.paper.published import load_published
+from pipeline.robot.robot_file import load_robot_file
+
+RESULTS_FILE = Path(__file__).parent / "results" / "calibration.json"
+_DIGITS = 9
+#: Standard deviation of the ensemble, in the prior's, below which a number counts as known.
+DETERMINED_BELOW = 0.3
+#: Ensemble spread over prior spread above which the targets tell nothing of a number.
+FREE_ABOVE = 0.85
+#: Shift of the ensemble's mean, in the prior's standard deviations, that is no chance of the draw.
+MOVED_ABOVE = 0.5
+#: Beyond this many standard deviations a number has left the prior's 95 % belief.
+BELIEF = 1.96
+#: Coordinates this close to a bound count as lying at it.
+AT_BOUND = 0.02
+#: Share of the ensemble at a bound that is worth a word.
+AT_LEAST = 0.05
+FIXED = "fixed by Tables IV to VI"
+#: What the targets did to a number.
+VERDICTS = {
+    "determined": f"ensemble narrower than {DETERMINED_BELOW:g} prior standard deviations",
+    "narrowed": f"narrower than the prior, its mean within {MOVED_ABOVE:g} of the prior's centre",
+    "moved": f"its mean more than {MOVED_ABOVE:g} prior standard deviations from the centre",
+    "against the prior": "its mean outside what the prior believes at 95 %",
+    "not determined": "as wide as the prior and where the prior is",
+    FIXED: "one of all motor constants that give these tables",
+}
+#: The same as the reason of a number whose source is what the sets meet.
+_REASONS = {
+    "determined": "determined by them",
+    "narrowed": "narrowed by them",
+    "moved": "moved by them",
+    "against the prior": "driven out of the prior's 95 % by them",
+    "not determined": "not determined by them",
+    FIXED: "no data sheet resolves what these tables leave",
+}
+_SOURCE = "nearest to the prior among all sets that meet the paper's figures"
+_FIXED_SOURCE = "middle of all motor constants that give Tables IV to VI as printed"
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """One number after calibration, SI.
+
+    Attributes:
+        key: ``robot.<name>`` or ``<component>.<name>``.
+        unit: As its file writes it.
+        prior: Centre before; None for the motor's constants, which Tables IV to VI fix.
+        prior_interval: 95 % belief before; None likewise.
+        value: At the nearest point.
+        low: 2.5 % quantile over the ensemble.
+        high: 97.5 % quantile.
+        shift: Mean of the ensemble less the prior's centre, in prior standard deviations.
+        spread: Standard deviation over the ensemble, in prior standard deviations.
+        at_lower: Share of the ensemble at the lower bound [1].
+        at_upper: Share of the ensemble at the upper bound [1].
+        verdict: One of `VERDICTS`.
+    """
+
+    key: str
+    unit: str
+    prior: float | None
+    prior_interval: tuple[float, float] | None
+    value: float
+    low: float
+    high: float
+    shift: float | None
+    spread: float | None
+    at_lower: float
+    at_upper: float
+    verdict: str
+
+    @property
+    def at_bound(self) -> float:
+        """Share of the ensemble at either bound [1]."""
+        return self.at_lower + self.at_upper
+
+    @property
+    def bound(self) -> str:
+        """The bound at which most of those sets lie: ``lower``, ``upper``, or empty for none."""
+        if self.at_bound == 0:
+            return ""
+        return "lower" if self.at_lower > self.at_upper else "upper"
+
+
+def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibrated]:
+    """What the calibration says of every free number and of the motor's constants."""
+    best = np.array(results["nearest"]["z"])
+    members = np.array([m["z"] for m in results["ensemble"]])
+    out = []
+    for i, free in enumerate(prior.free):
+        own = members[:, i]
+        low, high = (free.value(float(q)) for q in np.quantile(own, [0.025, 0.975]))
+        value = free.value(float(best[i]))
+        spread, shift = float(own.std()), float(own.mean())
+        at_lower = float(np.mean(own - free.coordinate(free.bounds[0]) < AT_BOUND))
+        at_upper = float(np.mean(free.coordinate(free.bounds[1]) - own < AT_BOUND))
+        out.append(
+            Calibrated(
+                free.key,
+                free.unit,
+                free.centre,
+                free.interval,
+                value,
+                min(low, value),
+                max(high, value),
+                shift,
+                spread,
+                at_lower,
+                at_upper,
+                number_verdict(shift, spread, _prior_spread(free)),
+            )
+        )
+    return out + _constants(results)
+
+
+def number_verdict(shift: float, spread: float, prior_spread: float) -> str:
+    """What the targets did to a number, one of `VERDICTS`.
+
+    Args:
+        shift: Mean of the ensemble, in prior standard deviations from the prior's centre.
+        spread: Standard deviation of the ensemble, in the same.
+        prior_spread: Standard deviation of the prior itself, cut off at the bounds, in the same.
+    """
+    if abs(shift) > BELIEF:
+        return "against the prior"
+    if spread < DETERMINED_BELOW:
+        return "determined"
+    if abs(shift) > MOVED_ABOVE:
+        return "moved"
+    return "not determined" if spread >= FREE_ABOVE * prior_spread else "narrowed"
+
+
+def _constants(results: Mapping[str, Any]) -> list[Calibrated]:
+    """The motor's three constants over the ensemble."""
+    out = []
+    for key in KEYS:
+        own = [m["constants"][key] for m in results["ensemble"]]
+        value = results["nearest"]["constants"][key]
+        low, high = (float(q) for q in np.quantile(own, [0.025, 0.975]))
+        low, high = min(low, value), max(high, value)
+        out.append(
+            Calibrated(
+                *(key, UNITS[key], None, None, value, low, high),
+                *(None, None, 0.0, 0.0, FIXED),
+            )
+        )
+    return out
+
+
+def _prior_spread(free: Free) -> float:
+    """Standard deviation of the unit Gaussian cut off at the number's bounds."""
+    from scipy.stats import truncnorm
+
+    low, high = (free.coordinate(bound) for bound in free.bounds)
+    return float(truncnorm.std(low, high))
+
+
+def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[Path]:
+    """Write the results and the calibrated values, all or nothing.
+
+    Args:
+        results: From `pipeline.paper.calibration.calibrate.calibrate`.
+        robot: Robot file whose numbers are replaced; comments and order stay.
+        catalog: Folder of the component files.
+
+    Returns:
+        The files written.
+    """
+    numbers = calibrated_numbers(results, load_prior())
+    documents = {robot: tomlkit.parse(robot.read_text(encoding="utf-8"))}
+    for number in numbers:
+        component, name = number.key.split(".")
+        path = robot if component == ROBOT else catalog / f"{component}.toml"
+        if path not in documents:
+            documents[path] = tomlkit.parse(path.read_text(encoding="utf-8"))
+        reason = _REASONS[number.verdict] + (
+            f"; at its {number.bound} bound in {100 * number.at_bound:.0f} % of the sets"
+            if number.at_bound >= AT_LEAST
+            else ""
+        )
+        _replace(documents[path], name, number.value, number.low, number.high, reason)
+        if number.verdict == FIXED:
+            documents[path]["parameters"][name]["source"] = _FIXED_SOURCE
+    _posture(documents[robot], results)
+    _splits(documents, catalog, results, {n.key: n.value for n in numbers})
+    documents[robot]["gait"]["transfer_path"] = results["nearest"]["path"]
+    contents = {path: tomlkit.dumps(document) for path, document in documents.items()}
+    temporary = {
+        path: path.with_name(f".{path.name}.{os.getpid()}.tmp")
+        for path in (*contents, RESULTS_FILE)
+    }
+    try:
+        for path, text in contents.items():
+            temporary[path].write_text(text, encoding="utf-8")
+        results["numbers"] = _written(temporary, robot, catalog)
+        contents[RESULTS_FILE] = json.dumps(_rounded(results), separators=(",", ":")) + "\n"
+        for path, text in contents.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
+            temporary[path].write_text(text, encoding="utf-8")
+        for path in contents:
+            os.replace(temporary[path], path)
+    finally:
+        for leftover in temporary.values():
+            leftover.unlink(missing_ok=True)
+    return list(contents)
+
+
+def _written(temporary: Mapping[Path, Path], robot: Path, catalog: Path) -> Fingerprint:
+    """The numbers of the files as they are about to be."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for path in catalog.glob("*.toml"):
+            shutil.copyfile(temporary.get(path, path), folder / path.name)
+        return fingerprint(
+            load_robot_file(temporary[robot]),
+            load_catalog(folder),
+            load_published(IDS, DIMENSIONS),
+            load_prior(),
+        )
+
+
+def _replace(
+    document: tomlkit.TOMLDocument, name: str, value: float, low: float, high: float, reason: str
+) -> None:
+    entry: Any = document["parameters"][name]
+    unit = str(entry["unit"])
+    written = [float(f"{from_si(x, unit):.8g}") for x in (value, low, high)]
+    entry["value"] = written[0]
+    entry["basis"] = "calibrated"
+    entry["source"] = _SOURCE
+    entry["reason"] = reason
+    entry["interval"] = [min(written), max(written)]
+
+
+def _posture(document: tomlkit.TOMLDocument, results: dict[str, Any]) -> None:
+    """Numbers solved from section II.C and Table III."""
+    rows = ("the reaction of 192.6 N", "joint 2 in Table III", "joint 3 in Table III")
+    for name, row in zip(POSTURE, rows, strict=True):
+        spread = [m["posture"][name] for m in results["ensemble"]]
+        low, high = (float(q) for q in np.quantile(spread, [0.025, 0.975]))
+        value = results["nearest"]["posture"][name]
+        reason = f"solved from {row}"
+        _replace(document, name, value, min(low, value), max(high, value), reason)
+
+
+def _splits(
+    documents: dict[Path, Any], catalog: Path, results: dict[str, Any], values: dict[str, float]
+) -> None:
+    """The second ratio of each pair follows from the first and the published 400."""
+    requirement = tomlkit.parse((catalog / "requirement.toml").read_text(encoding="utf-8"))
+    total = float(requirement["parameters"]["ratio"]["value"])
+    for first, second in (("harmonic_drive", "timing_belt"), ("planetary", "hypoid")):
+        path = catalog / f"{second}.toml"
+        if path not in documents:
+            documents[path] = tomlkit.parse(path.read_text(encoding="utf-8"))
+        own = documents[catalog / f"{first}.toml"]["parameters"]["ratio"]
+        entry = documents[path]["parameters"]["ratio"]
+        low, high = own["interval"]
+        entry["value"] = total / float(own["value"])
+        entry["interval"] = [
+            float(f"{total / float(high):.8g}"),
+            float(f"{total / float(low):.8g}"),
+        ]
+        entry["basis"] = "derived"
+        entry["source"] = f"{total:g} over the ratio of {first}"
+        entry["reason"] = ""
+
+
+def _rounded(value: Any) -> Any:
+    if isinstance(value, float):
+        return float(f"{value:.{_DIGITS}g}") if np.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _rounded(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(entry) for entry in value]
+    return value
+
+
+def load_results(path: Path = RESULTS_FILE) -> dict[str, Any]:
+    """Read the stored results.
+
+    Raises:
+        CalibrationError: Missing or damaged.
+    """
+    try:
+        results: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError):
+        raise CalibrationError(
+            f"{path.name}: no calibration results; run `make calibrate`"
+        ) from None
+    return results
+
+
+def results_hash(path: Path = RESULTS_FILE) -> str:
+    """SHA-256 of the stored results."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,1 @@
+"""What is held against the paper, and how sure it is."""

@@ -1,0 +1,77 @@
+"""What a stored calibration knows of a computed quantity: before the fit, and with it left out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.paper.calibration.whole_robot import Totals
+
+Array = NDArray[np.float64]
+#: Quantiles shown as low and high.
+BAND = (0.025, 0.975)
+#: Fewer values than this have no 95 % that is worth showing.
+LEAST = 10
+Interval = tuple[float, float]
+NONE: Interval = (math.nan, math.nan)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One set of numbers: what the paper prints, computed in SI, and the whole robot's energy."""
+
+    values: Mapping[str, float]
+    totals: Totals
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Sets of numbers, by what they were asked to meet.
+
+    Attributes:
+        ensemble: Every printed value but contradicted ones and predictions.
+        prior: Nothing but the standing posture, the motor's constants, which Tables III to V
+            fix, and the motor's limits: what data sheets and literature say of the rest.
+        left_out: Everything but some targets, by the targets' names joined with ``+``.
+    """
+
+    ensemble: Sequence[Point]
+    prior: Sequence[Point]
+    left_out: Mapping[str, Sequence[Point]]
+
+
+def evidence(results: Mapping[str, Any]) -> Evidence:
+    """The sets of a stored calibration."""
+    return Evidence(
+        [_point(p) for p in results["ensemble"]],
+        [_point(p) for p in results["prior"]],
+        {key: [_point(p) for p in points] for key, points in results["left_out"].items()},
+    )
+
+
+def _point(stored: Mapping[str, Any]) -> Point:
+    return Point(numbers(stored["values"]), stored["totals"])
+
+
+def numbers(values: Mapping[str, Any]) -> dict[str, float]:
+    """Stored values, with NaN where none was."""
+    return {key: math.nan if value is None else float(value) for key, value in values.items()}
+
+
+def quantiles(values: Sequence[float]) -> Interval:
+    """The middle 95 % of the values that are known; NaN where fewer than `LEAST` are."""
+    known = np.array([v for v in values if not math.isnan(v)])
+    if known.size < LEAST:
+        return NONE
+    low, high = np.quantile(known, BAND)
+    return float(low), float(high)
+
+
+def share(points: Sequence[Point], holds: Callable[[Mapping[str, float]], bool]) -> float:
+    """Share of the points whose values satisfy a condition; NaN without any."""
+    return float(np.mean([holds(p.values) for p in points])) if points else math.nan

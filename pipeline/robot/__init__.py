@@ -1,0 +1,1 @@
+"""A robot as data: file, URDF, Pinocchio model, kinematics, checks."""

@@ -1,0 +1,189 @@
+"""A robot file or a URDF held against physics, against what it states, and against its mirror."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from pipeline.errors import UnphysicalModelError
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import RobotSpec, load_robot_file
+from pipeline.robot.urdf_check import MERGED, Finding, check_urdf
+from pipeline.robot.urdf_source import read_urdf
+
+__all__ = ["Finding", "check_file", "check_robot", "check_urdf", "refuse_impossible", "refuse_urdf"]
+
+SYMMETRY_TOLERANCE = 0.01  # relative, lengths to the leg's; left and right of CAD exports differ
+#: Of the stated mass, where the robot file gives no interval: masses are stated in three digits.
+MASS_TOLERANCE = 0.005
+
+
+def check_file(path: Path) -> list[Finding]:
+    """Check a robot file or a bare URDF.
+
+    Args:
+        path: ``.toml`` robot file or URDF.
+
+    Returns:
+        Every check with its outcome.
+
+    Raises:
+        PipelineError: The file cannot be read at all.
+    """
+    if path.suffix.lower() == ".toml":
+        return check_robot(load_robot(load_robot_file(path)))
+    return check_urdf(read_urdf(path), str(path))
+
+
+def check_robot(robot: Robot) -> list[Finding]:
+    """Check a loaded robot: its URDF, the stated mass, the symmetry of its legs."""
+    spec = robot.spec
+    findings = [*check_urdf(robot.urdf, source_of(robot)), *_masses(robot)]
+    findings.append(
+        Finding(
+            spec.name,
+            "joints and feet found",
+            True,  # loading refuses a robot whose names do not resolve
+            f"{len(robot.joints)} joints, {len(spec.legs)} feet",
+        )
+    )
+    return findings + _symmetry(robot, spec)
+
+
+def source_of(robot: Robot) -> str:
+    """The file to correct: the robot file where the URDF is built from it."""
+    return str(robot.spec.path if robot.spec.build else robot.spec.urdf)
+
+
+def _masses(robot: Robot) -> list[Finding]:
+    """What the bodies weigh against what the robot file states."""
+    spec = robot.spec
+    row = spec.parameters.parameter("total_mass")
+    total, stated = robot.mass, row.value
+    apart = abs(total - stated) / stated
+    low, high = row.interval or (stated, stated)
+    near = low <= total <= high or apart <= MASS_TOLERANCE
+    factor = max(total, stated) / min(total, stated) if total > 0 else np.inf
+    by = f"{100 * apart:.2g} % apart" if factor < 2 else f"{factor:.3g} times apart"
+    detail = f"links add up to {total:.8g} kg, stated {stated:.8g} kg, {by}"
+    if not near:
+        detail += f" ({100 * MASS_TOLERANCE:g} % or the stated interval allowed); correct one"
+    findings = [Finding(spec.name, "total mass", near, detail)]
+    base = robot.model.inertias[1 if robot.floating else 0].mass
+    if robot.floating:
+        findings.append(
+            Finding(spec.base_link, "floating base has mass", base > 0, f"{base:.6g} kg")
+        )
+    return findings
+
+
+def refuse_impossible(robot: Robot) -> tuple[str, ...]:
+    """Stop before a body that cannot exist gives numbers that look like any other.
+
+    Returns:
+        What was found and does no harm, for the run's record.
+
+    Raises:
+        UnphysicalModelError: A body's mass or inertia is impossible, a limit missing or in another
+            unit, a joint without a drive of its own, or another mass than the stated one.
+    """
+    where = source_of(robot)
+    return refused([*check_urdf(robot.urdf, where), *_masses(robot)], where, str(robot.spec.path))
+
+
+def refuse_urdf(text: str, where: str) -> tuple[str, ...]:
+    """The same for a bare URDF on a fixed base.
+
+    Raises:
+        UnphysicalModelError: As for `refuse_impossible`.
+        UrdfError: A fault of structure.
+    """
+    return refused(check_urdf(text, where), where, where)
+
+
+def refused(findings: list[Finding], where: str, file: str) -> tuple[str, ...]:
+    """Raise the first finding that failed; return the notes.
+
+    Raises:
+        UnphysicalModelError: One failed.
+    """
+    failed = [finding for finding in findings if not finding.passed]
+    if failed:
+        first, more = failed[0], len(failed) - 1
+        raise UnphysicalModelError(
+            f"{where}: {first.subject}: {first.check} fails ({first.detail})"
+            + (f", and {more} more" if more else "")
+            + f"; `python -m pipeline check {file}` lists all"
+        )
+    return tuple(
+        f"{f.subject}: {f.check}: {f.detail}" for f in findings if f.note and f.check != MERGED
+    )
+
+
+def _symmetry(robot: Robot, spec: RobotSpec) -> list[Finding]:
+    """A leg and its counterpart must be mirror images in masses, places and inertias."""
+    partner = {"left": "right", "right": "left"}
+    findings = []
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
+    for leg in spec.legs:
+        if leg.side != "left":
+            continue
+        x, y, z = leg.neutral_foot
+        mirrored = [
+            other
+            for other in spec.legs
+            if other.side == partner[leg.side]
+            and np.allclose(other.neutral_foot, (x, -y, z), atol=1e-9)
+        ]
+        subject = leg.name if not mirrored else f"{leg.name}/{mirrored[0].name}"
+        if not mirrored:
+            findings.append(
+                Finding(subject, "mirror symmetry", False, "no right leg with the mirrored foot")
+            )
+            continue
+        worst = max(
+            _mirror_difference(robot, data, a, b)
+            for a, b in zip(leg.joints, mirrored[0].joints, strict=True)
+        )
+        findings.append(
+            Finding(
+                subject,
+                "mirror symmetry",
+                worst <= SYMMETRY_TOLERANCE,
+                f"largest relative difference {worst:.2g}",
+            )
+        )
+    return findings
+
+
+def _mirror_difference(robot: Robot, data: pin.Data, left: str, right: str) -> float:
+    """Largest relative difference of one body and its axis from the mirror image of another.
+
+    In the base frame at the zero pose: which way a file turns its joint frames is its own matter.
+    """
+    flip = np.diag([1.0, -1.0, 1.0])
+    model = robot.model
+    i, j = model.getJointId(left), model.getJointId(right)
+    base = data.oMi[1 if robot.floating else 0].inverse()
+    place_a, place_b = base * data.oMi[i], base * data.oMi[j]
+    a, b = place_a.act(model.inertias[i]), place_b.act(model.inertias[j])
+    scale_inertia = max(float(np.abs(b.inertia).max()), 1e-12)
+    legs = robot.spec.legs
+    axes, length = [], 0.0
+    for joint, place in ((left, place_a), (right, place_b)):
+        leg, k = next((n, m.joints.index(joint)) for n, m in enumerate(legs) if joint in m.joints)
+        axes.append(place.rotation @ robot.chains.axis[k, leg])
+        links = [*robot.chains.offset[1:, leg], robot.chains.foot[leg]]
+        length = sum(float(np.linalg.norm(link)) for link in links)
+    # An axis is a pseudo-vector, and a joint may count either way.
+    turn = min(float(np.abs(flip @ axes[0] - sign * axes[1]).max()) for sign in (1.0, -1.0))
+    return max(
+        abs(a.mass - b.mass) / max(b.mass, 1e-12),
+        float(np.abs(flip @ a.lever - b.lever).max()) / max(length, 1e-6),
+        float(np.abs(flip @ a.inertia @ flip - b.inertia).max()) / scale_inertia,
+        float(np.abs(flip @ place_a.translation - place_b.translation).max()) / max(length, 1e-6),
+        turn,
+    )

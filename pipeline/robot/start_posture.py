@@ -1,0 +1,120 @@
+"""The posture from which every leg's inverse kinematics starts: it names the knee's branch.
+
+A leg of three joints reaches a point in several postures. Which one is meant stands in the robot
+file, as ``start_posture``; zero is taken where it does not. Where the iteration does not come from
+there to the neutral foot inside the joints' limits, every branch is sought, so that a branch that
+is merely not named is not called a foot out of reach.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import GaitError
+from pipeline.robot.inverse_kinematics import ACCEPTED, approach, beyond_reach
+from pipeline.robot.robot import Robot
+
+Array = NDArray[np.float64]
+_STARTS = 5  # per joint, inside its limits
+_OTHER = 0.02  # [rad] two postures closer than this are one
+_NEAR = 1e-4  # [m]
+_SHOWN = 2  # postures offered per leg
+_UNLIMITED = 2 * np.pi  # [rad] a range beyond this is searched over one turn
+
+
+def neutral_postures(robot: Robot) -> Array:
+    """Joint positions with every foot at mid-stroke [rad], shape (L, 3), each on its branch.
+
+    Raises:
+        OutOfReachError: No posture of a leg reaches its neutral foot.
+        GaitError: Only other branches than that of ``start_posture`` do, or only beyond a joint's
+            limits; offers postures to choose from.
+    """
+    spec = robot.spec
+    target = np.array([leg.neutral_foot for leg in spec.legs])[None]
+    start = np.array([leg.start_posture for leg in spec.legs])
+    q, miss = approach(robot.chains, target, start)
+    lower, upper = _limits(robot)
+    inside = ((q[0] >= lower - ACCEPTED) & (q[0] <= upper + ACCEPTED)).all(axis=1)
+    lost = np.flatnonzero((miss[0] > ACCEPTED) | ~inside)
+    if lost.size:
+        raise _explained(robot, target[0], lost, miss[0])
+    return q[0]
+
+
+def _limits(robot: Robot) -> tuple[Array, Array]:
+    shape = (len(robot.leg_names), -1)
+    lower = robot.model.lowerPositionLimit[robot.position_index].reshape(shape)
+    upper = robot.model.upperPositionLimit[robot.position_index].reshape(shape)
+    return lower, upper
+
+
+def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array) -> Exception:
+    lower, upper = _limits(robot)
+    offers = []
+    for i in lost:
+        leg = robot.spec.legs[i]
+        found, least = _branches(robot, int(i), target[i])
+        if not found:
+            return beyond_reach(leg.name, target[i], min(least, float(miss[i])), 0.0)
+        good = [q for q in found if ((q >= lower[i]) & (q <= upper[i])).all()]
+        if not good:
+            best = min(found, key=lambda q: float(_beyond(q, lower[i], upper[i]).max()))
+            worst = int(_beyond(best, lower[i], upper[i]).argmax())
+            return GaitError(
+                f"leg '{leg.name}': to stand on its neutral foot joint '{leg.joints[worst]}' would "
+                f"have to reach {np.degrees(best[worst]):.1f} deg, its limits are "
+                f"{np.degrees(lower[i, worst]):.1f} to {np.degrees(upper[i, worst]):.1f} deg; "
+                "change the stroke, the neutral foot or the limits"
+            )
+        shown = " or ".join(_written(q) for q in good[:_SHOWN])
+        offers.append(f"legs.{leg.name}: {shown}")
+    stated = all(robot.spec.legs[i].start_stated for i in lost)
+    what = "start_posture lies on another branch" if stated else "start_posture is missing"
+    return GaitError(
+        f"{robot.spec.path}: {what}: from {'there' if stated else 'zero'} the inverse kinematics "
+        "does not come to the neutral foot within the limits; these postures do, choose the knee's "
+        f"branch: {'; '.join(offers)} [rad]"
+    )
+
+
+def _beyond(q: Array, lower: Array, upper: Array) -> Array:
+    out: Array = np.maximum(np.maximum(q - upper, lower - q), 0.0)
+    return out
+
+
+def _written(q: Array) -> str:
+    return "[" + ", ".join(f"{float(x):.2f}" for x in q) + "]"
+
+
+def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float]:
+    """Postures of one leg that reach a point, those nearest to the middle of the limits first.
+
+    Returns:
+        Each of shape (3,) [rad], and the least distance that was left [m].
+    """
+    lower, upper = (limit[leg] for limit in _limits(robot))
+    wide = ~np.isfinite(upper - lower) | (upper - lower > _UNLIMITED) | (upper <= lower)
+    low, high = np.where(wide, -np.pi, lower), np.where(wide, np.pi, upper)
+    shares = (np.arange(_STARTS) + 0.5) / _STARTS
+    starts = np.array(
+        [low + (high - low) * np.array(s) for s in itertools.product(shares, repeat=3)]
+    )
+    chains = robot.chains.of([leg])
+    points = np.broadcast_to(target, (len(starts), 1, 3))
+    # A start that never arrives keeps the damping of all up; those that come close go on alone.
+    near, left = approach(chains, points, starts[:, None])
+    found: list[Array] = []
+    for start in near[left[:, 0] < _NEAR]:
+        q, miss = approach(chains, target[None, None], start)
+        if miss[0, 0] > ACCEPTED:
+            continue
+        # Whole turns lead to the same posture; take the one inside the limits.
+        own = q[0, 0] - 2 * np.pi * np.round((q[0, 0] - (low + high) / 2) / (2 * np.pi))
+        if all(np.abs(own - other).max() > _OTHER for other in found):
+            found.append(own)
+    middle = (low + high) / 2
+    return sorted(found, key=lambda q: float(np.abs(q - middle).sum())), float(left.min())

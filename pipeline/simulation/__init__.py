@@ -1,0 +1,1 @@
+"""What a machine does: walk, stand, what its sensors show, how it moves."""

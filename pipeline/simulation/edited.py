@@ -1,0 +1,172 @@
+"""What a model file's effects change in standing and walking.
+
+Bodies and ground change what is demanded of the joints; so do springs and ripples, which act beside
+the actuators. They count in every alternative, and so does what is found of the motor, which all of
+them share. Friction, inertia and coupling of a drivetrain belong to the alternative they were found
+against: what was found beside a motor's data sheet alone is all that the machine's gears lose.
+Another alternative has gears, and losses of their own in the catalogue; to add one to the other
+would count gears twice, and to put one in place of the other would make a self-locking gear lock no
+more. So there they do not count, and it is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.chain import Chain
+from pipeline.dynamics.joint_demand import JointDemand
+from pipeline.machine.edited_chain import edited_chain
+from pipeline.machine.machine import JointModel, MachineModel, machine_of_robot
+from pipeline.motion.motion import Segment
+from pipeline.robot.kinematics import foot_force_torques
+from pipeline.robot.robot import Robot
+from pipeline.simulation.rigid_bodies import changed_model
+
+Array = NDArray[np.float64]
+#: The alternative that stays without losses.
+IDEAL = "ideal"
+#: What acts on sensors alone.
+SENSORS = ("effort_offset", "effort_gain", "position_offset", "time_delay")
+#: What moves the motor by so little, or changes so slowly, that one cycle does not see it.
+LEFT_OUT = {
+    "joint_elasticity": "the motor's own motion differs by the wind-up only",
+    "backlash": "the motor's own motion differs by the gap only",
+    "winding_heating": "one cycle is too short to warm a winding; numbers are for cold motors",
+}
+
+
+@dataclass(frozen=True)
+class Effects:
+    """A model file's effects, ready for standing and walking.
+
+    Attributes:
+        robot: With the bodies and the ground that the effects change.
+        file: The model file's name.
+        names: Of the effects in order.
+        found_with: Alternative against which they were found; empty for none.
+        apply: Puts them into a machine.
+        warnings: What of the model file a reader should know.
+    """
+
+    robot: Robot
+    file: str
+    names: tuple[str, ...]
+    found_with: str
+    apply: Callable[[MachineModel], MachineModel]
+    _bare: MachineModel
+    _machine: MachineModel
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def of_drivetrain(self) -> tuple[str, ...]:
+        """Joints whose drivetrain the effects change."""
+        pairs = zip(self._bare.actuators, self._machine.actuators, strict=True)
+        return tuple(new.name for old, new in pairs if _drivetrain(old) != _drivetrain(new))
+
+    def counts_in(self, alternative: str) -> bool:
+        """Whether all that the effects change in actuators counts in an alternative.
+
+        The ideal one has no losses by definition; there is nothing to tell about it.
+        """
+        return alternative in (IDEAL, self.found_with) or not self.of_drivetrain
+
+    def chain(self, chain: Chain) -> Chain:
+        """The chain of one alternative with the effects in it that count there."""
+        if chain.name == IDEAL:
+            return chain
+        edited = self.apply(machine_of_robot(self.robot, chain)).actuators
+        if not self.counts_in(chain.name):
+            edited = tuple(
+                replace(a, elements=chain.elements, coupled_to="", coupling=0.0) for a in edited
+            )
+        return edited_chain(chain, edited)
+
+    def chains(self, chains: Mapping[str, Chain]) -> dict[str, Chain]:
+        """Every alternative with the effects in it."""
+        return {name: self.chain(chain) for name, chain in chains.items()}
+
+    def demand(self, segment: Segment, demand: JointDemand) -> JointDemand:
+        """What the actuators supply besides: springs, ripples, feet that squeeze the ground.
+
+        Args:
+            segment: The motion.
+            demand: Of the bodies and the ground.
+        """
+        torque = np.array(demand.torque)
+        for k, actuator in enumerate(self._machine.actuators):
+            for law in actuator.position_torques:
+                torque[:, k] += law.torque(demand.position[:, k])
+        squeeze = self._machine.bodies.squeeze
+        if squeeze and segment.stance:
+            robot = self.robot
+            force = np.zeros((segment.time.size, len(robot.leg_names), 3))
+            for side, sign in (("left", 1.0), ("right", -1.0)):
+                legs = [leg for leg in robot.spec.legs if leg.side == side]
+                standing = [leg.name for leg in legs if leg.name in segment.stance]
+                for name in standing:
+                    force[:, robot.leg_names.index(name), 1] = sign * squeeze / len(standing)
+            q = robot.leg_positions(segment.configuration)
+            part = foot_force_torques(robot.chains, q, force)
+            torque[:, robot.leg_columns.ravel()] -= part.reshape(part.shape[0], -1)
+        return replace(demand, torque=torque)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What of the file does not hold, and which effects leave standing and walking be."""
+        out = [*self.warnings]
+        out += [
+            f"{name} acts on a sensor: standing and walking stay as they are"
+            for name in self.names
+            if name in SENSORS
+        ]
+        out += [f"{n} is left out: {LEFT_OUT[n]}" for n in self.names if n in LEFT_OUT]
+        if self.of_drivetrain:
+            against = f"'{self.found_with}'" if self.found_with else "no actuator at all"
+            out.append(
+                f"what was found of the drivetrain of {', '.join(self.of_drivetrain)} was found "
+                f"against {against} and counts there alone: other actuators have gears with losses "
+                "of their own, to which it cannot be added"
+            )
+        return tuple(dict.fromkeys(out))
+
+
+def _drivetrain(actuator: JointModel) -> tuple[object, ...]:
+    """What stands between joint and motor."""
+    return (*map(id, actuator.elements), actuator.coupled_to, actuator.coupling)
+
+
+def effects(
+    robot: Robot,
+    chain: Chain,
+    apply: Callable[[MachineModel], MachineModel],
+    names: tuple[str, ...],
+    file: str,
+    *,
+    found_with: str | None = None,
+    warnings: tuple[str, ...] = (),
+) -> Effects:
+    """Effects on a robot.
+
+    Args:
+        robot: As its file states it.
+        chain: Of the alternative they were found against, or of any with a motor.
+        apply: Puts the effects into a machine.
+        names: Of the effects in order.
+        file: The model file's name.
+        found_with: Alternative against which they were found, empty for none; the chain's by
+            default.
+        warnings: What of the model file a reader should know.
+
+    Raises:
+        GapError: An effect does not fit the robot.
+    """
+    bare = machine_of_robot(robot, chain)
+    machine = apply(bare)
+    model = changed_model(robot.model, machine.bodies)
+    edited = robot if model is robot.model else replace(robot, model=model)
+    own = chain.name if found_with is None else found_with
+    return Effects(edited, file, names, own, apply, bare, machine, warnings)

@@ -1,0 +1,106 @@
+"""What effects cost: electrical energy per gait cycle and the break-even, with and without them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from actuators.chain import Chain
+from pipeline.robot.robot import Robot
+from pipeline.simulation.edited import Effects
+from pipeline.simulation.walk_stand import Adjust, stand, walk
+
+#: Samples per segment of the gait: energies within 1 % and a fraction of a second.
+SAMPLES = 151
+PAIR = ("reversible", "irreversible")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Energies with one alternative.
+
+    Attributes:
+        cycle: Electrical energy of one gait cycle, whole robot [J].
+        standing: Electrical power, standing as the robot file says, whole robot [W].
+        middle_cycle: Of the middle legs alone, on which the paper's break-even rests [J].
+        middle_standing: Likewise [W].
+    """
+
+    cycle: float
+    standing: float
+    middle_cycle: float
+    middle_standing: float
+
+
+@dataclass(frozen=True)
+class EnergyChange:
+    """Before and after effects.
+
+    Attributes:
+        before: By alternative.
+        after: By alternative; of those alone in which all the effects count.
+        break_even_before: Fraction of time standing above which the irreversible actuator uses
+            less in the middle legs (Fig. 21 of the paper); NaN where there is none.
+        break_even_after: The same with the effects.
+    """
+
+    before: Mapping[str, Cost]
+    after: Mapping[str, Cost]
+    break_even_before: float
+    break_even_after: float
+
+
+def energy_change(
+    robot: Robot, chains: Mapping[str, Chain], effects: Effects, known: Effects | None = None
+) -> EnergyChange:
+    """Walk and stand with and without effects.
+
+    Args:
+        robot: With a floating base and a gait.
+        chains: By alternative.
+        effects: All of them.
+        known: Those among them that the comparison starts with; none by default.
+
+    Raises:
+        TippingError: With the effects a foot would have to pull.
+    """
+    period = robot.spec.parameters["gait_period"]
+    before = _costs(robot, chains, None)
+    if known is not None:
+        before = _costs(known.robot, known.chains(chains), known.demand)
+    told = {name: chain for name, chain in chains.items() if effects.counts_in(name)}
+    after = _costs(effects.robot, effects.chains(told), effects.demand)
+    return EnergyChange(before, after, break_even(before, period), break_even(after, period))
+
+
+def _costs(robot: Robot, chains: Mapping[str, Chain], adjust: Adjust | None) -> dict[str, Cost]:
+    walking = walk(robot, chains, samples=SAMPLES, adjust=adjust)
+    standing = stand(robot, chains, adjust=adjust)
+    legs = [leg for leg in robot.spec.legs if leg.station == "middle"] or robot.spec.legs
+    middle = [robot.joints.index(joint) for leg in legs for joint in leg.joints]
+    out = {}
+    for name in chains:
+        energy, power = walking.supplies[name].supplied_energy, standing.holding[name].power
+        out[name] = Cost(*(float(x.sum()) for x in (energy, power, energy[middle], power[middle])))
+    return out
+
+
+def break_even(costs: Mapping[str, Cost], period: float) -> float:
+    """Fraction of time standing at which both alternatives of `PAIR` cost the same.
+
+    (1 - f) dW / T = f dP with dW the extra walking energy of the irreversible actuator and dP the
+    power it saves standing. NaN where it never costs more walking, or saves nothing standing.
+
+    Args:
+        costs: By alternative.
+        period: Of the gait [s].
+    """
+    if any(name not in costs for name in PAIR):
+        return math.nan
+    reversible, irreversible = (costs[name] for name in PAIR)
+    extra = (irreversible.middle_cycle - reversible.middle_cycle) / period  # [W]
+    saved = reversible.middle_standing - irreversible.middle_standing  # [W]
+    if extra <= 0 or saved <= 0:
+        return math.nan
+    return extra / (extra + saved)

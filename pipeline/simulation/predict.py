@@ -1,0 +1,333 @@
+"""Predict what the sensors of a machine show along a measured motion.
+
+Measured motion -> bodies and ground (`rigid`) -> an actuator per joint -> sensors. Two predictions
+that share a part of their model share its computation: a change at one joint costs one joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
+from actuators.shaft import ShaftSeries
+from pipeline.logs.errors import ModelError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import JointModel, MachineModel
+from pipeline.simulation.rigid_bodies import RigidBodies
+
+Array = NDArray[np.float64]
+_LEAST_CROSSING = 1e-9  # [N*m]
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """What a model says the sensors show, before the low-pass.
+
+    Attributes:
+        model: The model.
+        q: Joint positions, link side, shape (N, J) [rad].
+        torque: Demanded of the actuators by the rigid bodies, shape (N, J) [N*m].
+        motor_torque: Of the motors brought to the joint side, shape (N, J) [N*m].
+        effort: Shape (N, J, C) in the measurement's channels.
+        computed: Joints computed for it; the others were taken over.
+    """
+
+    model: MachineModel
+    q: Array
+    torque: Array
+    motor_torque: Array
+    effort: Array
+    computed: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Difference:
+    """Change of a prediction where it changed at all.
+
+    Attributes:
+        joints: Columns that changed.
+        effort: Shape (N, len(joints), C).
+    """
+
+    joints: tuple[int, ...]
+    effort: Array
+
+
+class Simulator:
+    """Predictions of many models along one motion."""
+
+    def __init__(self, measurement: Measurement) -> None:
+        self.measurement = measurement
+        self._bodies = RigidBodies(measurement)
+
+    def predict(self, model: MachineModel, near: Prediction | None = None) -> Prediction:
+        """Predict with a model.
+
+        Args:
+            model: With the measurement's joints.
+            near: A prediction of a similar model, whose equal parts are taken over.
+
+        Raises:
+            ModelError: The model's joints are not the measurement's.
+        """
+        m = self.measurement
+        if model.joints != m.joints:
+            raise ModelError(f"{model.name}: the model's joints are not those of log '{m.name}'")
+        changed = self._changed(model, near)
+        if near is None or self._moves_bodies(model, near, changed):
+            q, torque = self._rigid(model)
+            if near is None:
+                changed = tuple(range(len(m.joints)))
+            else:
+                differs = np.abs(torque - near.torque).max(axis=0)
+                scale = 1e-12 * (1.0 + np.abs(torque).max(axis=0))
+                changed = tuple({*changed, *np.flatnonzero(differs > scale).tolist()})
+        else:
+            q, torque = near.q, near.torque
+        changed = self._with_coupled(model, near, changed)
+        n, j = m.q.shape
+        effort = np.empty((n, j, len(m.channels))) if near is None else near.effort.copy()
+        motor = np.empty((n, j)) if near is None else near.motor_torque.copy()
+        for k in self._order(model, changed):
+            motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
+        return Prediction(model, q, torque, motor, effort, changed)
+
+    def difference(self, base: Prediction, model: MachineModel) -> Difference:
+        """Prediction of a model less that of another, at the joints where they differ."""
+        new = self.predict(model, base)
+        joints = list(new.computed)
+        delta = new.effort[:, joints] - base.effort[:, joints]
+        live = [k for k in range(len(joints)) if delta[:, k].any()]
+        return Difference(tuple(joints[k] for k in live), delta[:, live])
+
+    def _changed(self, model: MachineModel, near: Prediction | None) -> tuple[int, ...]:
+        if near is None:
+            return ()
+        before = near.model.actuators
+        return tuple(k for k, a in enumerate(model.actuators) if a is not before[k])
+
+    def _moves_bodies(
+        self, model: MachineModel, near: Prediction, changed: tuple[int, ...]
+    ) -> bool:
+        if model.rigid is not near.model.rigid or model.bodies != near.model.bodies:
+            return True
+        for k in changed:
+            new, old = model.actuators[k], near.model.actuators[k]
+            if new.encoder_offset != old.encoder_offset:
+                return True
+            wound = _winding(new) != _winding(old)
+            if self.measurement.at_motor and wound:
+                return True
+        return False
+
+    def _with_coupled(
+        self, model: MachineModel, near: Prediction | None, changed: tuple[int, ...]
+    ) -> tuple[int, ...]:
+        """Add joints whose torque a changed joint's motor takes part in."""
+        out = set(changed)
+        for machine in (model, *((near.model,) if near else ())):
+            for k in changed:
+                other = machine.actuators[k].coupled_to
+                if other:
+                    out.add(machine.index(other))
+        return tuple(sorted(out))
+
+    def _order(self, model: MachineModel, joints: tuple[int, ...]) -> list[int]:
+        """Coupled motors first: what they supply to the other joint must be known."""
+        return sorted(joints, key=lambda k: (not model.actuators[k].coupled_to, k))
+
+    def _rigid(self, model: MachineModel) -> tuple[Array, Array]:
+        m = self.measurement
+        offset = np.array([a.encoder_offset for a in model.actuators])
+        q = m.q - offset if offset.any() else m.q
+        torque = self._bodies.torque(model, (q, m.v, m.a))
+        if not m.at_motor or not any(a.wound for a in model.actuators):
+            return q, torque
+        # The encoder sits on the motor: the link lags behind by what winds up.
+        wind = np.zeros_like(q)
+        for k, a in enumerate(model.actuators):
+            if a.wound:
+                wind[:, k] = self._wind(a, self._with_position_torque(a, q[:, k], torque[:, k]))
+        rate = m.derivative(wind)
+        bend = m.derivative(rate)
+        q = q - wind
+        return q, self._bodies.torque(model, (q, m.v - rate, m.a - bend))
+
+    def _with_position_torque(self, a: JointModel, q: Array, torque: Array) -> Array:
+        for law in a.position_torques:
+            torque = torque + law.torque(q)
+        return torque
+
+    def _wind(self, a: JointModel, torque: Array) -> Array:
+        """Motor angle less joint angle at the joint side, (N,) [rad], at the log's bandwidth."""
+        wind = a.compliance * torque
+        if a.backlash:
+            wind = wind + 0.5 * a.backlash * np.tanh(torque / max(a.crossing, _LEAST_CROSSING))
+        return self.measurement.lowpass(wind)
+
+    def _load(self, model: MachineModel, k: int, q: Array, torque: Array) -> Array:
+        """What one motor's transmission has to supply, at the joint side, (N,) [N*m].
+
+        With motor angles theta = C q the joints' torques are C^T times the motors': a motor that
+        also turns with another joint carries a part of that joint's torque.
+        """
+        a = model.actuators[k]
+        load = self._with_position_torque(a, q[:, k], torque[:, k])
+        for i, other in enumerate(model.actuators):
+            if other.coupled_to == a.name:
+                load = load - other.coupling * self._load(model, i, q, torque)
+        return load
+
+    def _joint(
+        self, model: MachineModel, k: int, q: Array, torque: Array, motor: Array
+    ) -> tuple[Array, Array]:
+        """Motor torque at the joint side (N,) and effort channels (N, C) of one joint."""
+        m, a = self.measurement, model.actuators[k]
+        load = self._load(model, k, q, torque)
+        carried = np.zeros_like(load)
+        for i, other in enumerate(model.actuators):
+            if other.coupled_to == a.name:
+                carried = carried + other.coupling * motor[:, i]
+        position, velocity, acceleration = m.q[:, k], m.v[:, k], m.a[:, k]
+        if a.wound and not m.at_motor:
+            wind = self._wind(a, load)
+            rate = m.derivative(wind)
+            position, velocity = position + wind, velocity + rate
+            acceleration = acceleration + m.derivative(rate)
+        if a.coupled_to:
+            i = model.index(a.coupled_to)
+            position = position + a.coupling * m.q[:, i]
+            velocity = velocity + a.coupling * m.v[:, i]
+            acceleration = acceleration + a.coupling * m.a[:, i]
+        side = ShaftSeries(
+            joints=(a.name,),
+            time=m.time,
+            position=position[:, None],
+            velocity=velocity[:, None],
+            acceleration=acceleration[:, None],
+            torque=load[:, None],
+            direction=np.tanh(velocity / m.rest_speed[k])[:, None],
+        )
+        for element in a.elements:
+            side = element.moving(side)
+        shaft_torque, speed = side.torque[:, 0], side.velocity[:, 0]
+        at_joint = shaft_torque * a.ratio
+        return at_joint, self._channels(a, k, at_joint + carried, shaft_torque, speed)
+
+    def _channels(
+        self, a: JointModel, k: int, brought: Array, torque: Array, speed: Array
+    ) -> Array:
+        """Effort channels of one joint, (N, C)."""
+        m = self.measurement
+        out = np.empty((torque.size, len(m.channels)))
+        if "torque" in m.channels:
+            # What the motor supplies, brought to the joint side, as drives tell it: with every
+            # friction and inertia of the elements that the model has, of which there may be none.
+            out[:, 0] = brought
+        elif a.motor is None:
+            raise ModelError(
+                f"joint '{a.name}': the log measures {m.channels[0]} and the model has no "
+                "motor; name the actuator with --alternative"
+            )
+        else:
+            self._electrical(out, a, k, torque, speed)
+        if a.delay:
+            for piece in m.pieces:
+                t = m.time[piece]
+                for c in range(out.shape[1]):
+                    out[piece, c] = _delayed(t, out[piece, c], a.delay)
+        if "voltage" in m.channels and "current" in m.channels and a.motor is not None:
+            c = m.channels.index("voltage")
+            cold = float(np.asarray(a.motor.resistance))
+            resistance: Array | float = cold
+            current = self._drawn(a, k)
+            if a.heating is not None:
+                rise = self._rise(a.heating, k, cold * current**2)
+                resistance = warm_resistance(cold, rise)
+            out[:, c] += resistance * current
+        for c, channel in enumerate(m.channels):
+            if channel in a.gains:
+                out[:, c] *= a.gains[channel]
+        out[:, 0] += a.effort_offset
+        return out
+
+    def _drawn(self, a: JointModel, k: int) -> Array:
+        """Current that a motor draws by its sensor, the sensor's zero and gain taken out, (N,)."""
+        m = self.measurement
+        seen = m.effort[:, k, m.channels.index("current")] - a.effort_offset
+        return np.asarray(seen / a.gains.get("current", 1.0))
+
+    def _rise(self, heating: Heating, k: int, loss: Array) -> Array:
+        """How much warmer than its data sheet one motor is, (N,) [K]."""
+        m = self.measurement
+        rise = heating.temperature_rise(m.time, loss)
+        if not heating.sensor_gain:
+            return rise
+        if m.temperature is None:
+            raise ModelError(
+                f"log '{m.name}' has no temperature of joint '{m.joints[k]}', from which the "
+                "model's winding_heating takes the winding's"
+            )
+        return rise + heating.sensed(m.temperature[:, k])
+
+    def _electrical(self, out: Array, a: JointModel, k: int, torque: Array, speed: Array) -> None:
+        """Current, voltage, power of one motor; with measured current voltage is k speed alone."""
+        assert a.motor is not None
+        m = self.measurement
+        k0, r0 = float(np.asarray(a.motor.torque_constant)), float(np.asarray(a.motor.resistance))
+        constant: Array | float = k0
+        resistance: Array | float = r0
+        if a.heating is not None:
+            measured = "current" in m.channels
+            drawn = self._drawn(a, k) if measured else torque / k0
+            rise = self._rise(a.heating, k, r0 * drawn**2)
+            resistance = warm_resistance(r0, rise)
+            constant = warm_torque_constant(k0, rise)
+        motor = replace(a.motor, torque_constant=constant, resistance=resistance)
+        current = motor.current(torque)
+        driven = speed if m.open_winding is None else np.where(m.open_winding[:, k], 0.0, speed)
+        voltage = motor.voltage(current, driven)
+        for c, channel in enumerate(m.channels):
+            if channel == "current":
+                out[:, c] = current
+            elif channel == "voltage" and "current" in m.channels:
+                out[:, c] = constant * speed
+            elif channel == "voltage":
+                out[:, c] = voltage
+            elif channel == "power":
+                out[:, c] = voltage * current
+            else:
+                raise ModelError(
+                    f"channel '{channel}' is not known; torque, current, voltage, power"
+                )
+
+
+def _winding(a: JointModel) -> tuple[float, float, float]:
+    return a.compliance, a.backlash, a.crossing
+
+
+def _delayed(time: Array, x: Array, delay: float) -> Array:
+    """A series (N,) as a channel shows it that lags by `delay` [s]; the ends keep their value.
+
+    Cubic interpolation through the four nearest samples of a uniform grid.
+    """
+    n = time.size
+    if n < 4:
+        return x
+    shift = delay * (n - 1) / (time[-1] - time[0])  # [samples]
+    whole = int(np.floor(shift))
+    u = 1.0 - (shift - whole)  # from the earlier of the two middle samples
+    weights = (
+        -u * (u - 1.0) * (u - 2.0) / 6.0,
+        (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
+        -(u + 1.0) * u * (u - 2.0) / 2.0,
+        (u + 1.0) * u * (u - 1.0) / 6.0,
+    )
+    first = np.arange(n) - whole - 2
+    out = np.zeros(n)
+    for k, weight in enumerate(weights):
+        out += weight * x[np.clip(first + k, 0, n - 1)]
+    return out

@@ -1,0 +1,1 @@
+"""Figures of demand, power and energy."""

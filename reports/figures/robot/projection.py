@@ -1,0 +1,196 @@
+"""Orthographic views of boxes and spheres with hidden surfaces removed, one lamp, drawn edges.
+
+A depth buffer decides pixel by pixel what is in front; it is exact where bodies touch or enter one
+another, which sorting polygons is not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.figures.robot.visuals import Primitive
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+#: Towards the lamp, in the camera's frame: right, up, towards the viewer.
+_LAMP = np.array([-0.35, 0.75, 0.56]) / np.linalg.norm([-0.35, 0.75, 0.56])
+_CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
+_OVERSAMPLED = 2  # per pixel and direction, for smooth edges
+#: A body nearer by less than this does not cover what was drawn before: coplanar faces.
+_TOUCHING = 1e-6  # [m]
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera at infinity.
+
+    Attributes:
+        name: E.g. ``"front"``.
+        axes: Rows are the image's right, its up, and the direction towards the viewer, in the
+            world, shape (3, 3); right-handed.
+    """
+
+    name: str
+    axes: Array
+
+    def project(self, points: Array) -> Array:
+        """World points to (right, up, nearness), shape (..., 3) [m]."""
+        return points @ self.axes.T
+
+
+def camera(name: str, towards_viewer: Sequence[float], up: Sequence[float] = (0, 0, 1)) -> View:
+    """A view from a direction, with another direction upwards in the image."""
+    toward = np.asarray(towards_viewer, float) / np.linalg.norm(towards_viewer)
+    right = np.cross(up, toward)
+    right /= np.linalg.norm(right)
+    return View(name, np.array([right, np.cross(toward, right), toward]))
+
+
+FRONT = camera("from ahead", (1, 0, 0))
+SIDE = camera("from the right", (0, -1, 0))
+TOP = camera("from above", (0, 0, 1), up=(0, 1, 0))
+OBLIQUE = camera("oblique", (1.0, -1.35, 0.85))
+
+
+def extent(view: View, scene: Sequence[Primitive]) -> tuple[Array, Array]:
+    """Lower left and upper right corner of a scene in the image, each of shape (2,) [m]."""
+    points = np.concatenate(
+        [(p.size * _CORNERS) @ p.placement[:3, :3].T + p.placement[:3, 3] for p in scene]
+    )
+    seen = view.project(points)[:, :2]
+    return seen.min(axis=0), seen.max(axis=0)
+
+
+def draw_scene(
+    axes: Axes, view: View, scene: Sequence[Primitive], fade: float = 0.0, pixels: int = 600
+) -> None:
+    """Draw a scene into axes whose unit is the metre.
+
+    Args:
+        axes: Matplotlib axes; its aspect is set to equal.
+        view: The camera.
+        scene: What to draw; at least one primitive.
+        fade: From 0 to 1, towards white, for a robot behind its annotation.
+        pixels: Along the longer side of the picture.
+    """
+    low, high = extent(view, scene)
+    step = float((high - low).max()) / (pixels * _OVERSAMPLED)
+    canvas = _Canvas(low - 4 * step, high + 4 * step, step)
+    for primitive in scene:
+        if primitive.sphere:
+            canvas.sphere(view, primitive)
+        else:
+            canvas.box(view, primitive)
+    image = canvas.picture()
+    image[..., :3] += fade * (1 - image[..., :3])
+    axes.imshow(image, extent=canvas.extent, origin="lower", zorder=2, interpolation="antialiased")
+    axes.set_aspect("equal")
+
+
+class _Canvas:
+    """Colour, depth and identity of the foremost surface at every sample."""
+
+    def __init__(self, low: Array, high: Array, step: float) -> None:
+        n = np.ceil((high - low) / step / _OVERSAMPLED).astype(int) * _OVERSAMPLED
+        self.low, self.step = low, step
+        # Single precision is 1e-7 of a robot's size: enough, and half the time.
+        self.x = (low[0] + step * (np.arange(n[0]) + 0.5)).astype(np.float32)
+        self.y = (low[1] + step * (np.arange(n[1]) + 0.5)).astype(np.float32)
+        self.color = np.ones((n[1], n[0], 3), dtype=np.float32)
+        self.depth = np.full((n[1], n[0]), -np.inf, dtype=np.float32)
+        self.surface = np.zeros((n[1], n[0]), dtype=int)
+        self.surfaces = 0
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Left, right, bottom, top [m]."""
+        left, bottom = self.low
+        right = left + self.x.size * self.step
+        return float(left), float(right), float(bottom), float(bottom + self.y.size * self.step)
+
+    def box(self, view: View, box: Primitive) -> None:
+        """The three faces at most that look at the viewer."""
+        rotation, centre = view.axes @ box.placement[:3, :3], view.project(box.placement[:3, 3])
+        for k in range(3):
+            facing = rotation[2, k]
+            if abs(facing) < 1e-6:
+                continue
+            normal = np.sign(facing) * rotation[:, k]
+            sides = [rotation[:, i] * box.size[i] / 2 for i in range(3) if i != k]
+            middle = centre + normal * box.size[k] / 2
+            reach = np.abs(sides).sum(axis=0)
+            rows, columns = self._window(middle - reach, middle + reach)
+            u, v = (side.tolist() for side in sides)
+            dx = self.x[columns][None, :] - float(middle[0])
+            dy = self.y[rows][:, None] - float(middle[1])
+            det = u[0] * v[1] - u[1] * v[0]
+            a = (dx * v[1] - dy * v[0]) / det
+            b = (dy * u[0] - dx * u[1]) / det
+            inside = (np.abs(a) <= 1) & (np.abs(b) <= 1)
+            depth = float(middle[2]) + a * u[2] + b * v[2]
+            color = np.broadcast_to(_shaded(box.color, normal), (*depth.shape, 3))
+            self._cover(rows, columns, inside, depth, color)
+
+    def sphere(self, view: View, ball: Primitive) -> None:
+        """A ball, shaded round."""
+        centre, radius = view.project(ball.placement[:3, 3]), float(ball.size[0]) / 2
+        rows, columns = self._window(centre - radius, centre + radius)
+        dx = (self.x[columns][None, :] - float(centre[0])) / radius
+        dy = (self.y[rows][:, None] - float(centre[1])) / radius
+        rest = 1 - dx * dx - dy * dy
+        dz = np.sqrt(np.maximum(rest, 0))
+        normal = np.stack(np.broadcast_arrays(dx, dy, dz), axis=-1)
+        self._cover(
+            rows, columns, rest >= 0, float(centre[2]) + radius * dz, _shaded(ball.color, normal)
+        )
+
+    def picture(self) -> Array:
+        """Red, green, blue and opacity, with a dark line where one surface ends."""
+        edge = np.zeros(self.surface.shape, dtype=bool)
+        for axis in (0, 1):
+            change = np.diff(self.surface, axis=axis) != 0
+            before: tuple[slice, ...] = (slice(None, -1), slice(None))
+            after: tuple[slice, ...] = (slice(1, None), slice(None))
+            edge[before if axis == 0 else before[::-1]] |= change
+            edge[after if axis == 0 else after[::-1]] |= change
+        color = self.color.copy()
+        color[edge] *= np.float32(0.35)
+        opaque = (edge | (self.surface > 0)).astype(np.float32)[..., None]
+        k = _OVERSAMPLED
+
+        def averaged(values: NDArray[np.float32]) -> NDArray[np.float32]:
+            parts = [values[i::k, j::k] for i in range(k) for j in range(k)]
+            return sum(parts[1:], parts[0]) / np.float32(k * k)
+
+        cover = averaged(opaque)
+        mixed = averaged(color * opaque) / np.maximum(cover, 1e-9)
+        return np.concatenate([mixed, cover], axis=-1)
+
+    def _window(self, low: Array, high: Array) -> tuple[slice, slice]:
+        first = np.floor((low[:2] - self.low) / self.step).astype(int)
+        last = np.ceil((high[:2] - self.low) / self.step).astype(int) + 1
+        first = np.maximum(first, 0)
+        return slice(first[1], max(last[1], 0)), slice(first[0], max(last[0], 0))
+
+    def _cover(
+        self, rows: slice, columns: slice, inside: NDArray[np.bool_], depth: Array, color: Array
+    ) -> None:
+        self.surfaces += 1
+        nearer = inside & (depth > self.depth[rows, columns] + _TOUCHING)
+        self.depth[rows, columns][nearer] = depth[nearer]
+        self.color[rows, columns][nearer] = color[nearer]
+        self.surface[rows, columns][nearer] = self.surfaces
+
+
+def _shaded(color: tuple[float, float, float], normal: Array) -> Array:
+    """Lambert's law with some ambient light; lightened, so that labels stay legible on top."""
+    light = 0.66 + 0.34 * np.maximum(0.0, normal @ _LAMP)
+    shaded: Array = (0.22 + 0.78 * np.asarray(color)) * light[..., None]
+    return np.clip(shaded, 0, 1)

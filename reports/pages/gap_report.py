@@ -1,0 +1,347 @@
+"""The page of a run of `gap`: the answer first, then what it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.identification.compare.circumstances import WHOLE
+from pipeline.identification.compare.stages import noise_floor, overall
+from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Naming, Remainder
+from pipeline.identification.workflow.constants import voltage_remarks
+from pipeline.identification.workflow.locate import Whereabouts
+from pipeline.identification.workflow.setup import Setup
+from pipeline.identification.workflow.written import Weighed
+from pipeline.simulation.energy_change import EnergyChange
+from reports.html import write_html
+from reports.markdown import write_markdown
+from reports.page import (
+    Block,
+    FigureBlock,
+    Page,
+    Points,
+    Section,
+    TableBlock,
+    Text,
+    table_block,
+)
+from reports.pages import gap_words as words
+from reports.pages.names import legs_text
+from reports.table import Table
+
+TONES = {
+    "accepted": "good",
+    "rejected": "quiet",
+    "not identifiable on this motion": "quiet",
+    "noise": "good",
+    "unexplained": "bad",
+    "ok": "good",
+    "warning": "bad",
+    "refused": "bad",
+    "masked": "quiet",
+}
+#: Candidates that the page lists; `candidates.csv` has all.
+SHOWN_CANDIDATES = 15
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """Everything a page tells.
+
+    Attributes:
+        given: Robot and actuators.
+        where: Steps 1 and 2.
+        naming: Step 3; without candidates where a model file was checked.
+        weighed: The model as written against the logs, effect by effect.
+        energy: With and without the effects; None for a robot that does not walk.
+        signatures: File name to caption, one per effect.
+        decides: What the deciding motion is, in words; empty without one.
+        remarks: What else a reader should know.
+    """
+
+    given: Setup
+    where: Whereabouts
+    naming: Naming
+    weighed: Weighed
+    energy: EnergyChange | None
+    signatures: dict[str, str]
+    decides: str
+    remarks: tuple[str, ...]
+
+    @property
+    def noise(self) -> float:
+        """Noise floor of all joints in the compared channel, of the logs that prove."""
+        return overall(noise_floor(self.where.measurements))
+
+
+def write_report(story: Story, tables: Sequence[Table], folder: Path, footer: str) -> None:
+    """Write ``report.md`` and ``index.html``; the figures must be there already."""
+    page = report(story, {t.name: t for t in tables}, folder, footer)
+    write_markdown(page, folder / "report.md")
+    write_html(page, folder / "index.html")
+
+
+def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) -> Page:
+    """The page; see `write_report`."""
+    names = ", ".join(m.name for m in story.where.measurements)
+    files = {f"{t.name}.csv": t.description for t in tables.values()}
+    if story.weighed.text:
+        files["model.toml"] = "Model file with the effects found; give it to any command as --model"
+    return Page(
+        title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
+        answer=answer(story),
+        sections=(
+            _where(story, tables, folder),
+            _what(story, tables, folder),
+            _smaller(story, folder),
+            *_energy(story),
+            _left(story),
+            _data(story, tables),
+        ),
+        files=files,
+        footer=footer,
+    )
+
+
+def answer(story: Story) -> tuple[str, ...]:
+    """The first lines: where, what, how much smaller, what it costs, what is left."""
+    naming, weighed = story.naming, story.weighed
+    out = [
+        words.where_words(story.where.rows),
+        words.what_words(
+            naming, story.where.measurements[0].channels, unexplained=weighed.unexplained
+        ),
+        words.shrink_words(naming.found, _joints(story), _whole(story), naming.unit, story.noise),
+    ]
+    if story.energy is not None:
+        out.append(words.energy_words(story.energy, story.given.alternative))
+    undecided = words.rival_words(naming.found, bool(story.decides))
+    out += [undecided] if undecided else []
+    return (*out, words.left_words(weighed.left))
+
+
+def _joints(story: Story) -> list[str]:
+    """Per effect, the joint at which it shows."""
+    return [story.given.model.joints[j] for j in story.weighed.joints]
+
+
+def _whole(story: Story) -> tuple[float, float, float]:
+    """Gap of all joints of the model as it was, with tolerances, and as written."""
+    first, tolerances, *_ = story.weighed.stages
+    last = story.weighed.stages[-1]
+    return overall(first.gap), overall(tolerances.gap), overall(last.gap)
+
+
+def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
+    by = tables["where"].columns["by"]
+    whole = [value == WHOLE for value in by]
+    shown = ("joint", "gap", "mean", "noise_floor", "unit", "share_of_total", "share_above_noise")
+    robot = story.given.robot
+    named = () if robot is None or not robot.floating else (Text(legs_text(robot)),)
+    return Section(
+        "Where model and machine disagree",
+        (
+            *named,
+            FigureBlock(
+                folder / "where_map.svg",
+                "Gap of the model as it was, by joint and circumstance, over the noise floor. A "
+                "dark row points to a joint, a dark band in it to a circumstance; blank: too few "
+                "rows.",
+            ),
+            table_block(
+                tables["where"],
+                shown,
+                keep=whole,
+                caption="Measured less predicted before anything is added, all compared rows, the "
+                "largest part of the gap above the noise first.",
+                digits=3,
+            ),
+        ),
+    )
+
+
+def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
+    blocks: list[Block] = []
+    if story.naming.found:
+        blocks.append(
+            table_block(
+                tables["found"],
+                ("order", "effect", "joint", "parameter", "value", "ci_low", "ci_high", "unit"),
+                caption="What the model lacked; torques and frictions at the joint. The interval "
+                "holds what the log's scatter, the stated tolerances and one per cent for the law "
+                "leave open.",
+                digits=3,
+            )
+        )
+    told = voltage_remarks(story.given.model.actuators, story.naming, story.where.measurements)
+    blocks += [Text(sentence) for sentence in told]
+    blocks += [FigureBlock(folder / name, caption) for name, caption in story.signatures.items()]
+    if story.naming.candidates:
+        blocks.append(_candidates(story))
+    return Section("What is missing", tuple(blocks))
+
+
+def _candidates(story: Story) -> TableBlock:
+    every = sorted(
+        story.naming.candidates,
+        key=lambda c: (c.verdict != ACCEPTED, c.verdict == REJECTED, -c.gain),
+    )
+    rows = tuple(
+        (c.effect, words.place_text(c.place), c.before, c.after, c.unit, c.verdict, c.reason)
+        for c in every[:SHOWN_CANDIDATES]
+    )
+    return TableBlock(
+        ("effect", "place", "validation without", "with", "unit", "verdict", "why"),
+        rows,
+        f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried. "
+        "Without and with: gap on rows that choose, by estimates from others, tolerances anew "
+        "for either, so that what they take up speaks for no candidate; a dash: left out after "
+        "screening.",
+        "candidates.csv",
+        TONES,
+        3,
+    )
+
+
+def _smaller(story: Story, folder: Path) -> Section:
+    first, parts, *_ = story.weighed.stages
+    last = story.weighed.stages[-1]
+    floor = noise_floor(story.where.measurements)
+    joints = story.given.model.joints
+    unit = story.naming.unit
+    order = np.argsort(-np.nan_to_num(parts.gap - last.gap))
+    rows = tuple(
+        (
+            joints[j],
+            float(first.gap[j]),
+            float(parts.gap[j]),
+            float(last.gap[j]),
+            float(floor[j]),
+            unit,
+        )
+        for j in order.tolist()
+    )
+    blocks: list[Block] = [
+        FigureBlock(folder / "waterfall.svg", "The gap of all joints, effect by effect."),
+        FigureBlock(
+            folder / "in_time.svg",
+            "Measured and predicted, and what is left, without and with what the model file holds.",
+        ),
+        TableBlock(
+            ("joint", "as it was", "with tolerances", "as written", "noise floor", "unit"),
+            rows,
+            "Gap, root mean square, on held-out data. Tolerances are what every machine "
+            "differs in from its files: masses, torque constants, encoder zeros, each within its "
+            "stated uncertainty. As written: with the effects of the model file, read back.",
+            digits=3,
+        ),
+    ]
+    return Section("How much smaller the gap is", tuple(blocks))
+
+
+def _energy(story: Story) -> tuple[Section, ...]:
+    change = story.energy
+    if change is None:
+        return ()
+    rows = tuple(
+        (
+            name,
+            change.before[name].cycle,
+            change.after[name].cycle if name in change.after else None,
+            change.before[name].standing,
+            change.after[name].standing if name in change.after else None,
+        )
+        for name in change.before
+    )
+    block = TableBlock(
+        ("alternative", "cycle before [J]", "after [J]", "standing before [W]", "after [W]"),
+        rows,
+        "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
+        "energy lost, and power to stand as the robot file says, without and with what the model "
+        "file holds; a dash: it cannot be told.",
+    )
+    catalog = story.given.catalog
+    titles = [
+        f"`{name}`: {catalog.alternatives[name].title.split(': ', 1)[-1]}"
+        for name in change.before
+        if name in catalog.alternatives
+    ]
+    own = story.given.alternative
+    against = f"`{own}`" if own else "no actuator: its torque is the joint's"
+    told = Text(
+        f"The log was compared with {against}. The actuators: "
+        f"{'; '.join(titles)}. Bodies, ground, springs, ripples and motors that were found count "
+        "in all of them; friction, inertia and coupling of a drivetrain in the one they were found "
+        "against."
+    )
+    return (Section("What it costs", (block, told, *map(Text, story.remarks))),)
+
+
+def _left(story: Story) -> Section:
+    every = sorted(story.weighed.left, key=_ratio, reverse=True)
+    shown = [r for r in every if r.significant] or every[:5]
+    rows = tuple(
+        (
+            r.joint,
+            r.channel,
+            r.error,
+            r.noise_floor,
+            r.unit,
+            "unexplained" if r.significant else "noise",
+            r.description or None,
+        )
+        for r in shown
+    )
+    block = TableBlock(
+        ("joint", "channel", "left", "noise floor", "unit", "verdict", "what it looks like"),
+        rows,
+        f"What the model as written leaves on held-out data; {len(every) - len(shown)} pairs of "
+        f"joint and channel are not listed. Up to {UNEXPLAINED:g} times the noise floor counts as "
+        "noise.",
+        "",
+        TONES,
+        3,
+    )
+    blocks: list[Block] = [block]
+    if story.decides:
+        blocks.append(Text(f"The motion that decides: {story.decides}."))
+    uncertain = words.doubts(story.naming.found)
+    if len(uncertain) > words.TOLD:
+        blocks += [Text("Names that are not certain:"), Points(tuple(uncertain))]
+    if story.naming.notes:
+        blocks.append(Points(story.naming.notes))
+    return Section("What is left", tuple(blocks))
+
+
+def _ratio(r: Remainder) -> float:
+    return r.error / r.noise_floor if r.noise_floor > 0 else 0.0
+
+
+def _data(story: Story, tables: dict[str, Table]) -> Section:
+    parts = story.where.parts
+    settings = story.where.intake.settings
+    shares = [float(m.mask.mean()) for m in story.where.measurements]
+    texts = [f"**Note:** {warning}." for warning in story.given.warnings]
+    texts += [
+        f"Compared at a bandwidth of {settings.cutoff:.3g} Hz ({settings.reason}). "
+        f"{words.percent(float(np.mean(shares)))} of the rows count, by joint: not those whose "
+        "filter sees the joint stop or turn back, where friction takes any value, nor the ends of "
+        "the log.",
+        f"Blocks of the log fit, choose between candidates or are held out to prove: {parts.rule}, "
+        f"{parts.guard:.2g} s apart, so that none holds a trace of another. "
+        + words.held_out_words(story.where.measurements),
+    ]
+    texts += words.one_way_words(story.where.measurements, story.weighed.joints)
+    if parts.warning:
+        texts.append(f"**Note:** {parts.warning}.")
+    odd = [value != "ok" for value in tables["quality"].columns["verdict"]]
+    block: Block = Text(
+        f"Every one of the {len(odd)} checks passed; [quality.csv](quality.csv) lists them."
+    )
+    if any(odd):
+        caption = "Checks with a remark; `quality.csv` lists all."
+        block = table_block(tables["quality"], keep=odd, tones=TONES, caption=caption)
+    return Section("What the data are worth", (*map(Text, texts), block))

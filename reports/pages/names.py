@@ -1,0 +1,52 @@
+"""What the short names of legs and actuators stand for, in words."""
+
+from __future__ import annotations
+
+from pipeline.cli.settings import Settings
+from pipeline.robot.robot import Robot
+
+#: The leg the paper follows; the first leg of a robot that has no such leg.
+SHOWN_LEG = "rm"
+#: What the letters of the paper's leg names stand for, the side first.
+_SIDES = {"l": "left", "r": "right"}
+_PLACES = {"f": "front", "m": "middle", "r": "rear"}
+
+
+def shown_leg(robot: Robot) -> str:
+    """The leg whose figures are drawn."""
+    return SHOWN_LEG if SHOWN_LEG in robot.leg_names else robot.leg_names[0]
+
+
+def leg_words(leg: str) -> str:
+    """A leg's name with what it says: ``rm`` is the middle right leg."""
+    if _is_two_letters(leg):
+        return f"{_PLACES[leg[1]]} {_SIDES[leg[0]]} leg ({leg})"
+    return f"leg {leg}"
+
+
+def _is_two_letters(leg: str) -> bool:
+    return len(leg) == 2 and leg[0] in _SIDES and leg[1] in _PLACES
+
+
+def names_text(given: Settings) -> str:
+    """A paragraph for the first place where a reader meets the names."""
+    titles = [
+        f"`{name}` ({alternative.title.split(': ', 1)[-1]})"
+        for name, alternative in given.catalog.alternatives.items()
+    ]
+    return (
+        f"An *alternative* is one way to build the actuators of all joints: {', '.join(titles)}. "
+        f"{legs_text(given.robot)} `robot` is all {len(given.robot.leg_names)} legs together."
+    )
+
+
+def legs_text(robot: Robot) -> str:
+    """What the legs' names say and how their joints are numbered."""
+    leg = shown_leg(robot)
+    if not _is_two_letters(leg):
+        return f"The leg shown is `{leg}`; a leg's joints are in order from the body outward."
+    words = leg_words(leg).split(" (")[0]
+    return (
+        f"A leg's name is its side and its place: `{leg}` is the {words}; its joints are in order "
+        "from the body outward."
+    )

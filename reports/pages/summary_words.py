@@ -1,0 +1,250 @@
+"""The summary's first paragraphs: what was fitted, predicted, contradicted, and what it costs.
+
+Every number and every count in them is computed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from pipeline.cli.judgement import Judged
+from pipeline.paper.calibration.machine import PUBLISHED_LEG
+from pipeline.paper.calibration.problem import EVEN, EXTRA
+from pipeline.paper.calibration.quantities import STANDING_SECONDS
+from pipeline.paper.judgement.evidence import Interval
+from pipeline.paper.judgement.price import NOTABLE
+from pipeline.paper.judgement.reproduction import REPRODUCED, ReproducedRow, headline
+from pipeline.paper.published import ROLES
+from reports.table import Table
+
+_REAL = ("rotor", "reversible", "irreversible")
+_WORDS = {1: "one", 2: "two", 3: "three", 4: "four"}
+
+
+def answer(judged: Judged, tables: Mapping[str, Table]) -> tuple[str, ...]:
+    """The paragraphs a reader in a hurry reads."""
+    if judged.by.results is None:
+        return (_changed(judged), _energies(judged, tables), " ".join(_counted(judged)))
+    return (first_paragraph(judged), _energies(judged, tables), _ensemble(judged))
+
+
+def first_paragraph(judged: Judged) -> str:
+    """What is fitted, predicted and contradicted, and what the fit costs, for a cold reader.
+
+    Args:
+        judged: With the calibration's sets.
+    """
+    rows = _rows(judged)
+    mass, even = rows["robot_mass"].published.value, rows[EVEN].computed
+    ratios = [rows[f"walking_ratio_{name}"].computed for name in _REAL]
+    return " ".join(
+        (
+            f"A paper compares four drives for the joints of a {mass:g} kg six-legged robot: an "
+            "ideal one, the same with a real motor's rotor, *reversible* gears, and *irreversible* "
+            "gears, which lock when the motor is off. It prints the electrical energy that each "
+            "takes, but not the friction behind it. **Fitted:** friction was chosen here so that "
+            f"walking takes {_listed(f'{r:.1f}' for r in ratios)} times the ideal drive's energy "
+            "(printed: 4, more than 10, almost 15) and irreversible gears pay only for a robot "
+            f"that stands still over {percent(even)} of the time; that these agree is no evidence.",
+            *_counted(judged),
+            _price(judged),
+        )
+    )
+
+
+def _rows(judged: Judged) -> dict[str, ReproducedRow]:
+    return {row.published.id: row for row in judged.judgement.reproduction}
+
+
+def _listed(words: Iterable[str]) -> str:
+    """One, two and three."""
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def _word(count: int) -> str:
+    return _WORDS.get(count, str(count))
+
+
+def _counted(judged: Judged) -> tuple[str, ...]:
+    """How many printed numbers play which part; what is predicted, contradicted, missed."""
+    count = headline(judged.judgement.reproduction)
+    total = sum(of for _, of in count.values())
+    met, of = count["prediction"]
+    text = (
+        f"**Predicted:** only {_word(of)} of the {total} printed numbers, both zeros: standing "
+        "still, friction alone holds the knee with reversible gears and the whole leg with "
+        f"irreversible ones. {'Both' if met == of == 2 else f'{met} of {of}'} come out"
+    )
+    shares = [
+        row.met
+        for row in judged.judgement.reproduction
+        if row.published.role == "prediction" and not math.isnan(row.met)
+    ]
+    if shares and judged.by.results is not None:
+        text += (
+            f" (in {_listed(percent(s) for s in shares)} of the "
+            f"{len(judged.by.results['ensemble'])} sets of numbers that fit)"
+        )
+    text += (
+        f". {count['input'][1]} were put in, {count['target'][1]} "
+        f"{'fitted' if judged.by.results is not None else 'are what was fitted'}, "
+        f"{count['consequence'][1]} follow from those by Ohm's law and the like, "
+        f"{count['symmetry'][1]} is zero by symmetry."
+    )
+    return tuple(part for part in (text, _against(judged), _missed(judged)) if part)
+
+
+def _against(judged: Judged) -> str:
+    """The rows that the paper contradicts, with the two numbers."""
+    judgement = judged.judgement
+    met, of = headline(judgement.reproduction)["contradicted"]
+    if of == 0:
+        return ""
+    first, second = judgement.contradiction.asked
+    unmet = [
+        _beside(row)
+        for row in judgement.reproduction
+        if row.published.role == "contradicted" and row.verdict != REPRODUCED
+    ]
+    text = (
+        f"**Contradicted:** the other {_word(of)} cannot be met together. Two motor torques of "
+        f"Table V ask for a rotor friction of {first:.3f} and of {second:.3f} mN·m, and an energy "
+        f"was computed from a rounded power; {_word(met) if met else 'none'} "
+        f"{'is' if met < 2 else 'are'} met"
+    )
+    if unmet:
+        text += (
+            f", {_word(len(unmet))} {'is' if len(unmet) == 1 else 'are'} not ({'; '.join(unmet)})"
+        )
+    return text + "."
+
+
+def _beside(row: ReproducedRow) -> str:
+    """Ours instead of the paper's, with the printed digits."""
+    published, ours, unit = row.published.value, row.computed, row.published.unit
+    half = row.published.half_width
+    if unit == "N*m":
+        published, ours, half, unit = 1e3 * published, 1e3 * ours, 1e3 * half, "mN·m"
+    digits = max(0, -math.floor(math.log10(half))) - 1 if half > 0 else 3
+    joint = f" of joint {row.published.joint}" if row.published.joint else ""
+    return (
+        f"{row.published.quantity}{joint}, {ours:.{digits}f} instead of {published:.{digits}f} "
+        f"{unit}"
+    )
+
+
+def _named(row: ReproducedRow) -> str:
+    joint = f" of joint {row.published.joint}" if row.published.joint else ""
+    return f"the {row.published.quantity}{joint} ({row.published.where})"
+
+
+def _missed(judged: Judged) -> str:
+    """Rows not reproduced that nothing contradicts."""
+    missed = [
+        row.published.id
+        for row in judged.judgement.reproduction
+        if row.verdict != REPRODUCED and row.published.role != "contradicted"
+    ]
+    return f"**Not reproduced:** {', '.join(missed)}." if missed else ""
+
+
+def _price(judged: Judged) -> str:
+    """What the fit asks of single numbers."""
+    p = judged.judgement.price
+    _, high = p.gear_interval
+    return (
+        '**The price of the fit:** "almost 15" needs a planetary gear with '
+        f"{p.gear_friction:.1f} mN·m of constant friction, {p.gear_friction / p.gear_prior:.1f} "
+        f"times what gear data suggest ({p.gear_prior:g} mN·m, at most {high:g}); it alone turns "
+        f"{p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle into heat. And "
+        f"{percent(p.no_load_share)} of the sets that fit ask for a motor that draws over "
+        f"{percent(NOTABLE - 1)} more current without load than the "
+        f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
+    )
+
+
+def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
+    """What a leg draws, and when the irreversible drive pays."""
+    energy = tables["walking_energy"].columns
+    legs = {
+        name: joules
+        for name, leg, joules in zip(
+            energy["alternative"], energy["leg"], energy["electrical_J"], strict=True
+        )
+        if leg == PUBLISHED_LEG
+    }
+    rows = _rows(judged)
+    power = {
+        name: rows[f"{name}_leg_energy_3s"].computed / STANDING_SECONDS
+        for name in ("reversible", "irreversible")
+    }
+    text = (
+        f"**What it costs:** walking one 3 s cycle, the middle right leg draws "
+        f"**{legs['ideal']:.1f} J** with ideal drives, {legs['rotor']:.1f} J once the rotor has "
+        f"inertia and friction, **{legs['reversible']:.1f} J** with belt and Harmonic Drive "
+        f"(reversible) and **{legs['irreversible']:.1f} J** with planetary and hypoid gears "
+        "(irreversible). Standing still, the loaded leg draws "
+        f"{power['reversible']:.2f} W with reversible and {power['irreversible']:.2g} W with "
+        "irreversible gears"
+    )
+    even = rows[EVEN]
+    if math.isnan(even.computed):
+        return text + "; there is no share of standing above which the irreversible ones pay."
+    text += f", which pay only above {percent(even.computed, 1)} of the time standing."
+    if judged.by.results is None:
+        return text
+    row = next(c for c in judged.judgement.conclusions if c.sentence.name == EVEN)
+    more = next(c for c in judged.judgement.conclusions if c.sentence.name == EXTRA)
+    return text + (
+        " Data sheets and literature alone, before any fit, put the irreversible gears at "
+        f"{_span(rows['walking_ratio_irreversible'].prior)} times the ideal drive's energy; in "
+        f"{percent(1 - more.prior_share)} of their draws walking takes less with irreversible than "
+        "with reversible gears, and where it takes more, the irreversible ones pay above "
+        f"{_percent(row.prior)} of the time standing. Fitted to everything but the irreversible "
+        f"gears' own two figures, they take {_span(rows['walking_ratio_irreversible'].left_out)} "
+        "times the ideal drive's energy."
+    )
+
+
+def percent(share: float, digits: int = 0) -> str:
+    """A share in percent."""
+    return f"{100 * share:.{digits}f} %"
+
+
+def _percent(interval: Interval) -> str:
+    return f"{100 * interval[0]:.0f} to {percent(interval[1])}"
+
+
+def _span(interval: Interval) -> str:
+    return f"{interval[0]:.1f} to {interval[1]:.1f}"
+
+
+def _ensemble(judged: Judged) -> str:
+    """What the ensemble is."""
+    results = judged.by.results
+    assert results is not None
+    count = headline(judged.judgement.reproduction)
+    unmet = judged.judgement.contradiction.best.unmet
+    return (
+        "**How sure it is:** the paper does not print friction, inertia, masses or gear angles, "
+        f"and {count['target'][1]} figures cannot determine {len(results['nearest']['z'])} "
+        "numbers. The values here are the set nearest to data sheets and literature that fits. "
+        f"Beside it stand {len(results['ensemble'])} sets of numbers that fit as well, from "
+        f"{results['draws']} draws of prior knowledge, each moved as little as needed: every one "
+        "gives every printed number at printed precision, but for "
+        f"{_listed(_named(_rows(judged)[name]) for name in unmet)}, and was not asked for the "
+        "predictions. That they can is no wonder: the motor's torque constant, resistance and "
+        "rotor friction have no prior, all are drawn from the sliver in which Tables IV to VI "
+        "come out and which no data sheet resolves."
+    )
+
+
+def _changed(judged: Judged) -> str:
+    return f"**Changed numbers:** {judged.by.word}."
+
+
+def roles_text() -> str:
+    """What the roles of printed numbers mean."""
+    return " ".join(f"*{role}*: {meaning}." for role, meaning in ROLES.items())
