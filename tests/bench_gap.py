@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import time
 from pathlib import Path
@@ -11,14 +10,15 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+import pipeline.identification.workflow.setup as setup_module
 from pipeline.blind.twin.trial import make_trial
-from pipeline.cli.gap_options import add_gap_options, split_items
 from pipeline.effects.registry import catalogue
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.regression.design_matrix import make_benches
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.selection.screen import Screen, score_all
 from pipeline.identification.workflow.locate import Whereabouts, find_where
+from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, setup, take_in
 
 ROOT = Path(__file__).parents[1]
@@ -39,8 +39,8 @@ def gap_costs() -> None:
 
 def _rows(log: dict[str, np.ndarray], path: Path) -> None:
     print("gap, one leg, log in chunks: CPU seconds and their ratio to the shortest log")
-    shortest = setup.LONG_ROWS
-    setup.LONG_ROWS = 0  # all of them in chunks, so that they compare
+    shortest = setup_module.LONG_ROWS
+    setup_module.LONG_ROWS = 0  # all of them in chunks, so that they compare
     first: tuple[int, float] | None = None
     try:
         for repeats in (1, *REPEATS):
@@ -58,7 +58,7 @@ def _rows(log: dict[str, np.ndarray], path: Path) -> None:
                 f"  {rows:8d} rows {spent:6.2f} s   {longer:5.1f} times the rows cost {more:5.2f}"
             )
     finally:
-        setup.LONG_ROWS = shortest
+        setup_module.LONG_ROWS = shortest
 
 
 def _candidates(log: dict[str, np.ndarray], path: Path) -> None:
@@ -93,9 +93,6 @@ def _write(log: dict[str, np.ndarray], path: Path, repeats: int) -> int:
 
 
 def _where(path: Path) -> tuple[Setup, Whereabouts]:
-    parser = argparse.ArgumentParser()
-    add_gap_options(parser)
-    options = parser.parse_args([str(path), "--robot", str(ROOT / "urdf" / "leg.toml")])
-    split_items(options)
+    options = Options((path,), robot=ROOT / "urdf" / "leg.toml")
     given = setup(options)
     return given, find_where(given, given.model, *take_in(given, options))

@@ -132,12 +132,15 @@ RATES = {
 
 def agreement(out: Path) -> str:
     """What is fitted, predicted and contradicted: the first paragraph of `summary.md`."""
-    from pipeline.cli.judgement import basis, judged
+    from pipeline.cli.judgement import judged
     from pipeline.cli.main import parser
-    from pipeline.cli.settings import settings
+    from pipeline.cli.run import settings_of
+    from pipeline.paper.judgement.basis import basis
     from reports.pages.summary_words import first_paragraph
 
-    given = settings(parser().parse_args(["reports", "--robot", str(ROOT / "urdf/hexapod.toml")]))
+    given = settings_of(
+        parser().parse_args(["reports", "--robot", str(ROOT / "urdf/hexapod.toml")])
+    )
     by = basis(given)
     if isinstance(by, str) or by.results is None:
         raise ValueError(f"the calibration does not belong to the files: {by}")

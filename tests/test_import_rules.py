@@ -19,7 +19,7 @@ ORDER = (
 #: Seen by everybody: errors of the pipeline, and what knows the standard library only.
 LEAVES = {
     *("actuators.units", "actuators.parameters", "actuators.errors", "actuators.text_file"),
-    "pipeline.errors",
+    *("pipeline.errors", "reports.atomic", "reports.errors"),
 }
 #: No room stands on the actuators' laws before there is a machine.
 WITHOUT_LAWS = {"robot", "motion", "dynamics"}

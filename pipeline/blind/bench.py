@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.blind.twin.files import csv_bytes
-from pipeline.cli.gap_options import add_gap_options, split_items
 from pipeline.identification.compare.observe import observe
 from pipeline.identification.regression.design_matrix import Bench, make_bench
+from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, setup, take_in
 from pipeline.logs.errors import PreparationError
 from pipeline.logs.prepared.measurement import Measurement
@@ -42,7 +41,7 @@ def trial_bench(
     for name, columns in exact.items():
         path = scratch / f"{name}.csv"
         path.write_bytes(csv_bytes(dict(columns)))
-        _, other = _measured(path, robot, actuators, f"--cutoff={seen.bandwidth!r}")
+        _, other = _measured(path, robot, actuators, seen.bandwidth)
         if len(other) != len(seen):
             raise PreparationError(f"{name}: {len(other)} rows where the trial has {len(seen)}")
         out[name] = other
@@ -52,13 +51,10 @@ def trial_bench(
     return given, bench, {name: replace(m, **same) for name, m in out.items()}
 
 
-def _measured(log: Path, robot: Path, actuators: Path, *more: str) -> tuple[Setup, Measurement]:
-    parser = argparse.ArgumentParser()
-    add_gap_options(parser)
-    options = parser.parse_args(
-        [str(log), "--robot", str(robot), "--actuators", str(actuators), *more]
-    )
-    split_items(options)
+def _measured(
+    log: Path, robot: Path, actuators: Path, cutoff: float | None = None
+) -> tuple[Setup, Measurement]:
+    options = Options((log,), robot=robot, actuators=actuators, cutoff=cutoff)
     given = setup(options)
     intake, parts, _ = take_in(given, options)
     (measurement,) = observe(given.model, intake.prepared, parts)

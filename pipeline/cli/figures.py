@@ -11,10 +11,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.energy.energy import stage_energies
-from pipeline.cli.settings import Settings
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.robot.robot import Robot
+from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from pipeline.cli.blind_options import add_blind_options, add_twin_options
 from pipeline.cli.decimal_option import add_decimal_option
-from pipeline.cli.gap_options import add_gap_options
+from pipeline.cli.gap.options import add_gap_options
 from pipeline.cli.named_path import named_path
 from pipeline.errors import PipelineError, TippingError
 
@@ -169,7 +169,7 @@ def _run_reports(options: argparse.Namespace) -> int:
 
 def _run_gap(options: argparse.Namespace) -> int:
     with _folder_held(options):
-        from pipeline.cli.gap import run_gap
+        from pipeline.cli.gap.run import run_gap
 
         return run_gap(options)
 

@@ -11,10 +11,10 @@ from typing import Any
 
 from actuators.loading.build import CATALOG
 from pipeline.cli.decimal_option import decimal_of
-from pipeline.cli.settings import Settings, settings
 from pipeline.cli.staging import staged
 from pipeline.errors import RobotFileError
 from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.settings import Settings, settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand, walk
 from reports.table import Table
 from reports.tables import parameters as parameter_tables
@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> int:
         ActuatorError: Unusable catalogue.
         ReportError: The folder cannot be written.
     """
-    given = settings(options)
+    given = settings_of(options)
     if not given.robot.floating:
         raise RobotFileError(
             f"{given.robot.spec.path}: a robot on a stand neither stands nor walks; "
@@ -62,8 +62,9 @@ def run(options: argparse.Namespace) -> int:
     judgement = None
     if options.verb == "reports":
         from pipeline.cli import judgement as judging
+        from pipeline.paper.judgement.basis import basis
 
-        by = judging.basis(given)
+        by = basis(given)
         if isinstance(by, str):
             print(f"not held against the paper: {by}")
         else:
@@ -94,6 +95,20 @@ def run(options: argparse.Namespace) -> int:
     ):
         print(line)
     return 0
+
+
+def settings_of(options: argparse.Namespace) -> Settings:
+    """What the command line asks for, loaded."""
+    return settings(
+        robot=options.robot,
+        model=options.model,
+        changes=options.set,
+        samples=options.samples,
+        quasi_static=options.quasi_static,
+        regeneration=options.regeneration,
+        actuators=options.actuators,
+        walks=options.verb != "stand",
+    )
 
 
 def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:

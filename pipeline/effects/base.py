@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
@@ -14,6 +14,8 @@ from pipeline.machine.machine import MachineModel
 
 Place = tuple[str, ...]
 Values = Mapping[str, float]
+#: Key among nonlinear parameters: how many of its small steps a column reaches across.
+REACH: Final = "reach"
 CHANNEL_UNITS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 #: What a joint's column of a channel is called in the log format.
 CHANNEL_COLUMNS: Final = {
@@ -58,6 +60,11 @@ class Coordinate:
     step: float
     signed: bool = False
     required: bool = True
+
+
+def place_text(place: Sequence[str]) -> str:
+    """A place as a reader sees it."""
+    return " with ".join(place) if place else "the whole machine"
 
 
 class Effect(ABC):

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from actuators.errors import closest, one_line
 from actuators.parameters import REQUIRED_KEYS, ParameterSet, parameters_from_table
@@ -15,6 +15,8 @@ from actuators.units import si_unit
 from pipeline.errors import RobotFileError
 
 #: Numbers every walking robot needs, with their dimension.
+#: Of the project, from the folder it is run in.
+DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
 GAIT_SCHEMA = {
     "total_mass": "mass",
     "foot_stroke": "length",

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from pipeline.effects.base import place_text
 from pipeline.identification.compare.circumstances import WHOLE
 from pipeline.identification.compare.stages import noise_floor, overall
-from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Naming, Remainder
+from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Remainder
 from pipeline.identification.workflow.constants import voltage_remarks
-from pipeline.identification.workflow.locate import Whereabouts
-from pipeline.identification.workflow.setup import Setup
-from pipeline.identification.workflow.written import Weighed
-from pipeline.simulation.energy_change import EnergyChange
+from pipeline.identification.workflow.story import Story
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import (
@@ -45,36 +42,6 @@ TONES = {
 }
 #: Candidates that the page lists; `candidates.csv` has all.
 SHOWN_CANDIDATES = 15
-
-
-@dataclass(frozen=True, eq=False)
-class Story:
-    """Everything a page tells.
-
-    Attributes:
-        given: Robot and actuators.
-        where: Steps 1 and 2.
-        naming: Step 3; without candidates where a model file was checked.
-        weighed: The model as written against the logs, effect by effect.
-        energy: With and without the effects; None for a robot that does not walk.
-        signatures: File name to caption, one per effect.
-        decides: What the deciding motion is, in words; empty without one.
-        remarks: What else a reader should know.
-    """
-
-    given: Setup
-    where: Whereabouts
-    naming: Naming
-    weighed: Weighed
-    energy: EnergyChange | None
-    signatures: dict[str, str]
-    decides: str
-    remarks: tuple[str, ...]
-
-    @property
-    def noise(self) -> float:
-        """Noise floor of all joints in the compared channel, of the logs that prove."""
-        return overall(noise_floor(self.where.measurements))
 
 
 def write_report(story: Story, tables: Sequence[Table], folder: Path, footer: str) -> None:
@@ -190,7 +157,7 @@ def _candidates(story: Story) -> TableBlock:
         key=lambda c: (c.verdict != ACCEPTED, c.verdict == REJECTED, -c.gain),
     )
     rows = tuple(
-        (c.effect, words.place_text(c.place), c.before, c.after, c.unit, c.verdict, c.reason)
+        (c.effect, place_text(c.place), c.before, c.after, c.unit, c.verdict, c.reason)
         for c in every[:SHOWN_CANDIDATES]
     )
     return TableBlock(

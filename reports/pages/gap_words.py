@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.effects.base import CHANNEL_COLUMNS
+from pipeline.effects.base import CHANNEL_COLUMNS, place_text
 from pipeline.effects.drive.torque_constant_error import TorqueConstantError
 from pipeline.effects.registry import effect_named
 from pipeline.effects.sensing.effort_gain import EffortGain
@@ -31,11 +31,6 @@ TOLD = 3
 ONE_WAY = 0.05
 #: A change of energy below this is none, as a share.
 NO_CHANGE = 5e-4
-
-
-def place_text(place: Sequence[str]) -> str:
-    """A place as a reader sees it."""
-    return " with ".join(place) if place else "the whole machine"
 
 
 def number(value: float, digits: int = 3) -> str:

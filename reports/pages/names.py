@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from pipeline.cli.settings import Settings
 from pipeline.robot.robot import Robot
+from pipeline.simulation.settings import Settings
 
 #: The leg the paper follows; the first leg of a robot that has no such leg.
 SHOWN_LEG = "rm"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from pipeline.cli.judgement import Basis, Judged
-from pipeline.cli.settings import Settings
 from pipeline.paper.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
+from pipeline.paper.judgement.basis import Basis, Judged
 from pipeline.paper.judgement.readings import readings, verdict
 from pipeline.paper.judgement.sensitivity import Index, leading, ranking
+from pipeline.simulation.settings import Settings
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block

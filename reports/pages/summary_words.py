@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from pipeline.cli.judgement import Judged
 from pipeline.paper.calibration.machine import PUBLISHED_LEG
 from pipeline.paper.calibration.problem import EVEN, EXTRA
 from pipeline.paper.calibration.quantities import STANDING_SECONDS
+from pipeline.paper.judgement.basis import Judged
 from pipeline.paper.judgement.evidence import Interval
 from pipeline.paper.judgement.price import NOTABLE
 from pipeline.paper.judgement.reproduction import REPRODUCED, ReproducedRow, headline

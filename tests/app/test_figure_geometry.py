@@ -8,7 +8,7 @@ import pytest
 
 from pipeline.cli.figures import drawings
 from pipeline.cli.main import parser
-from pipeline.cli.settings import settings
+from pipeline.cli.run import settings_of
 from pipeline.simulation.walk_stand import stand, walk
 from reports.figures.several import Drawing
 from reports.pages.names import leg_words, names_text
@@ -26,7 +26,7 @@ NAMES = (
 
 
 def run(robot: Path) -> dict[str, Drawing]:
-    given = settings(parser().parse_args(["reports", "--robot", str(robot), "--samples", "151"]))
+    given = settings_of(parser().parse_args(["reports", "--robot", str(robot), "--samples", "151"]))
     standing = stand(given.machine, given.chains())
     walking = walk(given.machine, given.chains(), samples=given.samples)
     return {drawing.name: drawing for drawing in drawings(given, standing, walking)}
@@ -84,7 +84,7 @@ def test_leg_names_are_explained() -> None:
 
 
 def test_names_are_explained_where_the_page_first_uses_them(root: Path) -> None:
-    text = names_text(settings(parser().parse_args(["reports"])))
+    text = names_text(settings_of(parser().parse_args(["reports"])))
     assert "`rm` is the middle right leg" in text
     assert "`rotor` (actuator with ideal transmission)" in text
     assert "`robot` is all 6 legs" in text

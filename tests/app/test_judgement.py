@@ -10,14 +10,16 @@ import pytest
 from actuators.loading.build import CATALOG, load_catalog
 from pipeline.cli import judgement as judging
 from pipeline.cli.main import parser
-from pipeline.cli.settings import Settings, settings
+from pipeline.cli.run import settings_of
 from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import load_prior
 from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
 from pipeline.paper.calibration.store import load_results
+from pipeline.paper.judgement.basis import Basis, Judged, basis
 from pipeline.paper.judgement.sensitivity import Index
 from pipeline.paper.published import load_published
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.settings import Settings
 from reports.pages.summary import measure_next
 from reports.pages.summary_words import first_paragraph
 
@@ -27,19 +29,19 @@ OF_THE_SETS = {"readings", "leave_one_out", "calibration", "sensitivities"}
 
 def given(root: Path, *options: str, robot: Path | None = None) -> Settings:
     file = robot or root / "urdf" / "hexapod.toml"
-    return settings(parser().parse_args(["reports", "--robot", str(file), *options]))
+    return settings_of(parser().parse_args(["reports", "--robot", str(file), *options]))
 
 
 @pytest.fixture(scope="module")
-def shipped(root: Path) -> judging.Judged:
+def shipped(root: Path) -> Judged:
     run = given(root)
-    by = judging.basis(run)
-    assert isinstance(by, judging.Basis)
+    by = basis(run)
+    assert isinstance(by, Basis)
     return judging.judged(run, by)[0]
 
 
 def test_the_shipped_files_hold_the_numbers_the_calibration_was_made_with(
-    shipped: judging.Judged,
+    shipped: Judged,
 ) -> None:
     assert shipped.by.changed == ()
     assert shipped.by.word == ""
@@ -47,8 +49,8 @@ def test_the_shipped_files_hold_the_numbers_the_calibration_was_made_with(
 
 def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(root: Path) -> None:
     run = given(root, "--set", "harmonic_drive.load=0.1")
-    by = judging.basis(run)
-    assert isinstance(by, judging.Basis)
+    by = basis(run)
+    assert isinstance(by, Basis)
     assert by.changed == ("harmonic_drive.load",)
     assert by.word.startswith("harmonic_drive.load differs")
     judged, tables = judging.judged(run, by)
@@ -66,13 +68,13 @@ def test_a_number_edited_in_the_robot_file_is_noticed(root: Path, tmp_path: Path
     for name in ("hexapod.toml", "hexapod.urdf"):
         shutil.copyfile(root / "urdf" / name, tmp_path / name)
     robot = tmp_path / "hexapod.toml"
-    by = judging.basis(given(root, robot=robot))
-    assert isinstance(by, judging.Basis)
+    by = basis(given(root, robot=robot))
+    assert isinstance(by, Basis)
     assert by.changed == ()  # a copy is the same robot
     text = robot.read_text(encoding="utf-8")
     robot.write_text(text.replace("value = 600", "value = 601", 1), encoding="utf-8")
-    by = judging.basis(given(root, robot=robot))
-    assert isinstance(by, judging.Basis)
+    by = basis(given(root, robot=robot))
+    assert isinstance(by, Basis)
     assert by.changed == ("robot.body_length",)
 
 
@@ -119,18 +121,18 @@ def test_a_printed_value_or_a_prior_that_is_edited_is_noticed(root: Path) -> Non
 def test_a_run_the_paper_says_nothing_of_is_left_out_with_a_word(
     root: Path, options: tuple[str, ...], word: str
 ) -> None:
-    reason = judging.basis(given(root, *options))
+    reason = basis(given(root, *options))
     assert isinstance(reason, str)
     assert word in reason
 
 
 def test_another_robot_is_not_held_against_the_paper(root: Path) -> None:
-    reason = judging.basis(given(root, robot=root / "urdf" / "hexapod_axis90.toml"))
+    reason = basis(given(root, robot=root / "urdf" / "hexapod_axis90.toml"))
     assert reason == "hexapod_axis90.toml is not the paper's robot"
 
 
 def test_the_first_paragraph_says_what_is_fitted_predicted_contradicted_and_what_it_costs(
-    shipped: judging.Judged,
+    shipped: Judged,
 ) -> None:
     text = first_paragraph(shipped)
     for word in ("Fitted", "Predicted", "Contradicted", "price of the fit"):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli import memory
 from pipeline.errors import GaitError
+from pipeline.simulation import memory
 from tests.app.conftest import Command
 
 

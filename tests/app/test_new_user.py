@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.judgement import basis
 from pipeline.cli.main import parser
-from pipeline.cli.settings import settings
+from pipeline.cli.run import settings_of
+from pipeline.paper.judgement.basis import basis
 from tests.app.conftest import Command, exit_code, rows_of
 from tests.app.robots import changed, edited_robot, own_robot
 from tests.app.test_bad_input import refused
@@ -471,6 +471,6 @@ def test_the_projects_robot_with_other_actuators_is_not_held_against_the_paper(
         ["reports", "--actuators", str(without_ideal(root, tmp_path / "actuators"))]
     )
     options.robot = root / "urdf" / "hexapod.toml"
-    assert isinstance(basis(settings(options)), str)
+    assert isinstance(basis(settings_of(options)), str)
     options.actuators = None
-    assert not isinstance(basis(settings(options)), str)
+    assert not isinstance(basis(settings_of(options)), str)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import re
 import string
 from pathlib import Path
@@ -16,9 +15,9 @@ from hypothesis import strategies as st
 from actuators.errors import ActuatorError
 from actuators.loading.build import load_catalog
 from actuators.units import to_si
-from pipeline.cli.settings import Settings, settings
 from pipeline.errors import PipelineError
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.settings import Settings, settings
 from tests.app.conftest import Command, exit_code, rows_of, sidecar_of, stand_and_walk
 
 ROBOT = Path(__file__).parents[2] / "urdf" / "hexapod.toml"
@@ -28,8 +27,7 @@ NUMBERS = [*SPEC.parameters, *(f"{component}.{p.name}" for component, p in CATAL
 
 
 def with_changes(*changes: str, **options: Any) -> Settings:
-    defaults = {"samples": 751, "regeneration": "none", "quasi_static": False}
-    return settings(argparse.Namespace(robot=ROBOT, set=list(changes), **{**defaults, **options}))
+    return settings(robot=ROBOT, changes=changes, **options)
 
 
 def outcome(change: str) -> tuple[Settings | None, str]:

@@ -5,7 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar, Final
 
-from pipeline.effects.base import CHANNEL_COLUMNS, Coordinate, Effect, Parameter, Place, Values
+from pipeline.effects.base import (
+    CHANNEL_COLUMNS,
+    REACH,
+    Coordinate,
+    Effect,
+    Parameter,
+    Place,
+    Values,
+)
 from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
@@ -49,8 +57,6 @@ class EffortGain(Effect):
 
     def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
         """Other reaches beside one that did well."""
-        from pipeline.identification.regression.design_matrix import REACH
-
         reach = shape.get(REACH, 1.0)
         if abs(reach) <= 1.0:
             return []

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.effects.base import Coordinate, Place
+from pipeline.effects.base import REACH, Coordinate, Place
 from pipeline.logs.errors import NamingError
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
 from pipeline.machine.machine import MachineModel
@@ -37,8 +37,6 @@ class Editing(Protocol):
         """The changed model."""
 
 
-#: Key among nonlinear parameters: how many of its small steps a column reaches across.
-REACH = "reach"
 #: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
 ROWS_PER_PERIOD = 4.0
 #: Most informative rows of all logs together.

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.effects.base import Effect, Place
+from pipeline.effects.base import REACH, Effect, Place
 from pipeline.effects.drive.torque_ripple import TorqueRipple
-from pipeline.identification.regression.design_matrix import REACH
 from pipeline.identification.regression.normal_equations import inverse_spd
 from pipeline.identification.regression.problem import Problem
 from pipeline.logs.prepared.measurement import CHOOSE, FIT

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from pipeline.effects.base import Effect, Place
+from pipeline.effects.base import REACH, Effect, Place
 from pipeline.effects.drive.transmission_coupling import BareCoupling
 from pipeline.effects.registry import catalogue, effect_named
 from pipeline.identification import results as limits
-from pipeline.identification.regression.design_matrix import REACH
 from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.refit import pruned, refit, runs_away
 from pipeline.identification.selection.candidate import Trial, joint_gain, try_candidate

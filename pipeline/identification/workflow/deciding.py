@@ -16,8 +16,6 @@ from pipeline.machine.machine import MachineModel
 from pipeline.motion.gait import standing_posture
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
-from reports.table import Table
-from reports.tables.gap import deciding_motion as deciding_table
 
 Array = NDArray[np.float64]
 #: Of a moving foot from the ground and from other feet [m].
@@ -119,8 +117,3 @@ def _clear(robot: Robot, stance: Sequence[str]) -> Callable[[Array], bool]:
         return True
 
     return allowed
-
-
-def motion_table(motion: Deciding, joints: Sequence[str]) -> Table:
-    """`deciding_motion.csv`."""
-    return deciding_table(motion.time, joints, motion.position)

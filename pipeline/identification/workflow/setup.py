@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -12,12 +11,12 @@ import numpy as np
 
 from actuators.chain import Chain
 from actuators.loading.build import CATALOG, Catalog, load_catalog
-from pipeline.cli.gap_options import DEFAULT_ROBOT
 from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file, read_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.compare.bandwidth import lowered, naming_cutoff
 from pipeline.identification.compare.intake import Intake, prepare_logs
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
+from pipeline.identification.workflow.options import Options
 from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.logs.prepared.contact import Contact, find_contact
 from pipeline.logs.prepared.parts import Parts, split
@@ -31,7 +30,7 @@ from pipeline.logs.reading.table_file import sha256
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
 
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
 DEFAULT_ALTERNATIVE = "rotor"
@@ -74,7 +73,7 @@ class Setup:
         return self.robot is not None and self.robot.floating
 
 
-def setup(options: argparse.Namespace) -> Setup:
+def setup(options: Options) -> Setup:
     """Load the robot, its actuator and the model file.
 
     Raises:
@@ -122,7 +121,7 @@ def setup(options: argparse.Namespace) -> Setup:
     )
 
 
-def _alternative(options: argparse.Namespace, file: ModelFile | None) -> str:
+def _alternative(options: Options, file: ModelFile | None) -> str:
     """The actuator that options or model file name; empty where neither does.
 
     Raises:
@@ -139,7 +138,7 @@ def _alternative(options: argparse.Namespace, file: ModelFile | None) -> str:
     return asked or file.alternative
 
 
-def _channel(options: argparse.Namespace, expected: Expected) -> str:
+def _channel(options: Options, expected: Expected) -> str:
     """The effort channel that will be compared, by the first log's header."""
     if options.effort:
         return str(options.effort)
@@ -173,7 +172,7 @@ def _ratio(chain: Chain | None, joints: int) -> np.ndarray | None:
     return None if chain is None else np.full(joints, float(np.asarray(chain.ratio)))
 
 
-def open_logs(given: Setup, options: argparse.Namespace) -> list[Stream]:
+def open_logs(given: Setup, options: Options) -> list[Stream]:
     """The logs that may be fitted, then those that only prove.
 
     Raises:
@@ -188,7 +187,7 @@ def open_logs(given: Setup, options: argparse.Namespace) -> list[Stream]:
     return [Stream(path, given.expected, mapping, adjust) for path in paths]
 
 
-def _adjusted(log: Log, given: Setup, options: argparse.Namespace) -> Log:
+def _adjusted(log: Log, given: Setup, options: Options) -> Log:
     """A log, or a piece of one, as the options want it.
 
     Raises:
@@ -213,7 +212,7 @@ def _adjusted(log: Log, given: Setup, options: argparse.Namespace) -> Log:
     return log
 
 
-def take_in(given: Setup, options: argparse.Namespace) -> tuple[Intake, Parts, int]:
+def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
     """Step 1: read, judge and prepare all logs, and cut them into fit, choose and prove.
 
     All scores are taken at one bandwidth: `--cutoff`, else where the encoders' noise is silent.
@@ -272,7 +271,7 @@ def _largest(given: Setup) -> dict[str, np.ndarray]:
     }
 
 
-def check_options(options: argparse.Namespace) -> None:
+def check_options(options: Options) -> None:
     """Refuse options that cannot be, before anything is read.
 
     Raises:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
@@ -10,24 +9,23 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.effects.base import place_text
 from pipeline.effects.model_file import Edit, apply_edits, edits_in
 from pipeline.effects.registry import effect_named
 from pipeline.errors import TippingError
-from pipeline.identification.compare.stages import Stage
+from pipeline.identification.compare.stages import Stage, noise_floor, overall
 from pipeline.identification.results import Found, Naming
 from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.identification.selection.identify import identify
-from pipeline.identification.workflow.deciding import decide, motion_table
+from pipeline.identification.workflow.deciding import decide
 from pipeline.identification.workflow.locate import Progress, Whereabouts
 from pipeline.identification.workflow.model_writer import edits_of, model_text
+from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import Weighed, weigh_found
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.edited import Effects, effects
 from pipeline.simulation.energy_change import EnergyChange, energy_change
-from reports.pages.gap_report import Story
-from reports.pages.gap_words import place_text
-from reports.table import Table
 
 #: Joints that the figure in time shows.
 SHOWN = 3
@@ -36,18 +34,48 @@ WORTH_SHOWING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
+class Story:
+    """Everything a page tells.
+
+    Attributes:
+        given: Robot and actuators.
+        where: Steps 1 and 2.
+        naming: Step 3; without candidates where a model file was checked.
+        weighed: The model as written against the logs, effect by effect.
+        energy: With and without the effects; None for a robot that does not walk.
+        signatures: File name to caption, one per effect.
+        decides: What the deciding motion is, in words; empty without one.
+        remarks: What else a reader should know.
+    """
+
+    given: Setup
+    where: Whereabouts
+    naming: Naming
+    weighed: Weighed
+    energy: EnergyChange | None
+    signatures: dict[str, str]
+    decides: str
+    remarks: tuple[str, ...]
+
+    @property
+    def noise(self) -> float:
+        """Noise floor of all joints in the compared channel, of the logs that prove."""
+        return overall(noise_floor(self.where.measurements))
+
+
+@dataclass(frozen=True, eq=False)
 class Told:
     """What a run writes.
 
     Attributes:
         story: For the page.
-        tables: Besides those of the steps.
+        deciding: Motion that decides between a found effect and its rivals; None without one.
         model_file: Text of the model file; empty where there is nothing to add.
         shown: Columns of the joints that the figure in time shows.
     """
 
     story: Story
-    tables: tuple[Table, ...]
+    deciding: Deciding | None
     model_file: str
     shown: tuple[int, ...]
 
@@ -114,7 +142,7 @@ def added(
     return text, edits_in(text)[len(given.file.edits) :]
 
 
-def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress: Progress) -> Told:
+def tell(given: Setup, where: Whereabouts, options: Options, progress: Progress) -> Told:
     """Name what is missing and gather everything that a run tells.
 
     Raises:
@@ -172,7 +200,7 @@ def gathered(
     columns = [j for f, j in zip(naming.found, weighed.joints, strict=True) if f.written]
     return Told(
         story=story,
-        tables=(motion_table(decided[0], given.model.joints),) if decided else (),
+        deciding=decided[0] if decided else None,
         model_file=weighed.text,
         shown=most_improved(weighed.stages[1], weighed.stages[-1], columns),
     )

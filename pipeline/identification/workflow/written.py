@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.effects.base import CHANNEL_UNITS, place_text
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.stages import Stage, noise_floor, stages
@@ -23,7 +23,6 @@ from pipeline.identification.selection.weigh import Weighing, floor_of
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.logs.prepared.measurement import PROVE
 from pipeline.machine.machine import MachineModel
-from reports.pages.gap_words import place_text
 
 Array = NDArray[np.float64]
 AS_IT_WAS = "model as it was"

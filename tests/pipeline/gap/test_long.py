@@ -15,7 +15,7 @@ import pytest
 
 import pipeline.identification.workflow.setup
 from pipeline.blind.twin.trial import make_trial
-from pipeline.cli.gap_options import add_gap_options, split_items
+from pipeline.cli.gap.options import add_gap_options, options_of
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.locate import Whereabouts, find_where
@@ -46,8 +46,10 @@ def long_leg(path: Path, effects: list[str], logs: int, seed: int = 5) -> Path:
 def taken_in(root: Path, *arguments: str) -> tuple[Setup, Whereabouts]:
     parser = argparse.ArgumentParser()
     add_gap_options(parser)
-    options = parser.parse_args([*arguments, "--robot", str(root / "urdf" / "leg.toml")])
-    split_items(options)
+    options = options_of(
+        parser.parse_args([*arguments, "--robot", str(root / "urdf" / "leg.toml")])
+    )
+
     given = setup(options)
     return given, find_where(given, given.model, *take_in(given, options))
 

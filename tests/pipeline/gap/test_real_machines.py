@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.cli.gap_options import split_items
+from pipeline.cli.gap.options import options_of
 from pipeline.cli.main import main, parser
 from pipeline.identification.results import Found
 from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where
@@ -39,8 +39,8 @@ class Run:
 
 
 def run(arguments: Sequence[str]) -> Run:
-    options = parser().parse_args(["gap", *arguments])
-    split_items(options)
+    options = options_of(parser().parse_args(["gap", *arguments]))
+
     given = setup(options)
     where = find_where(given, given.model, *take_in(given, options))
     return Run(given, where, tell(given, where, options, Progress()).story.weighed)

@@ -10,6 +10,7 @@ from typing import Any
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Where
 from pipeline.identification.results import INDISTINGUISHABLE, Candidate, Found
+from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.logs.errors import EffectError
 from pipeline.logs.quality.finding import Finding
 from pipeline.machine.machine import MachineModel
@@ -102,3 +103,8 @@ def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
         owner = place[0].partition("__")[0]
         return owner if owner in model.joints else ""
     return JOINED.join(name for name in place if name in model.joints)
+
+
+def motion_table(motion: Deciding, joints: Sequence[str]) -> Table:
+    """`deciding_motion.csv`."""
+    return tables.deciding_motion(motion.time, joints, motion.position)

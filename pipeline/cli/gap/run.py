@@ -10,33 +10,33 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from pipeline.cli.decimal_option import decimal_of
-from pipeline.cli.gap_figures import (
+from pipeline.cli.gap.figures import (
     write_in_time,
     write_signature,
     write_waterfall,
     write_where_map,
 )
-from pipeline.cli.gap_options import split_items
-from pipeline.cli.gap_tables import candidates_table, found_table, quality_table, where_table
+from pipeline.cli.gap.forward import forward_table, rollout_tables, say
+from pipeline.cli.gap.options import options_of
+from pipeline.cli.gap.tables import (
+    candidates_table,
+    found_table,
+    motion_table,
+    quality_table,
+    where_table,
+)
 from pipeline.cli.staging import staged
 from pipeline.identification.compare.circumstances import WHOLE
-from pipeline.identification.workflow.forward import (
-    by_model,
-    forward,
-    forward_table,
-    rms,
-    rollout_tables,
-    say,
-)
+from pipeline.identification.workflow.forward import by_model, forward, rms
 from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where, judged
+from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
-from pipeline.identification.workflow.story import Told, tell
+from pipeline.identification.workflow.story import Story, Told, tell
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.reading.table_file import sha256
 from reports.pages import gap_words as words
-from reports.pages.gap_report import Story, write_report
+from reports.pages.gap_report import write_report
 from reports.table import Table
 from reports.writer import write_table, write_text
 
@@ -47,8 +47,16 @@ EXPLAINED, UNEXPLAINED = 0, 1
 SAID = 5
 
 
-def run_gap(options: argparse.Namespace) -> int:
+def run_gap(given: argparse.Namespace) -> int:
+    """Run what the command line asks for; see `run`."""
+    return run(options_of(given))
+
+
+def run(options: Options) -> int:
     """Run one step, or all of them.
+
+    Args:
+        options: Of the run.
 
     Returns:
         The exit code: 0 where the gap is down to noise, 1 where a part stays unexplained.
@@ -59,7 +67,6 @@ def run_gap(options: argparse.Namespace) -> int:
         GapError: Unusable log, mapping or model file.
         ReportError: The folder cannot be written.
     """
-    split_items(options)
     check_options(options)
     given = setup(options)
     with Progress() as progress:
@@ -93,7 +100,7 @@ def run_gap(options: argparse.Namespace) -> int:
         tables += [
             candidates_table(naming.candidates, naming.found, given.model),
             found_table(naming.found, given.model),
-            *told.tables,
+            *([motion_table(told.deciding, given.model.joints)] if told.deciding else []),
         ]
         progress.step("writing")
         if options.step == "name":
@@ -110,7 +117,7 @@ def run_gap(options: argparse.Namespace) -> int:
     return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
 
 
-def _drive(given: Setup, where: Whereabouts, options: argparse.Namespace) -> int:
+def _drive(given: Setup, where: Whereabouts, options: Options) -> int:
     """Step `forward`: 1 where the model file's effects bring positions no nearer."""
     drives = forward(given, where, options)
     joints = given.model.joints
@@ -121,23 +128,21 @@ def _drive(given: Setup, where: Whereabouts, options: argparse.Namespace) -> int
     return UNEXPLAINED if rest and rest[-1] >= first else EXPLAINED
 
 
-def _staged(options: argparse.Namespace, given: Setup) -> AbstractContextManager[Path]:
+def _staged(options: Options, given: Setup) -> AbstractContextManager[Path]:
     """Every step writes what the steps before it do, so a step's files replace any other's."""
     step = "" if options.step == "all" else f" {options.step}"
     return staged(options.out, f"gap{step}", inputs=_inputs(options, given))
 
 
-def _write_tables(options: argparse.Namespace, given: Setup, tables: Sequence[Table]) -> None:
+def _write_tables(options: Options, given: Setup, tables: Sequence[Table]) -> None:
     with _staged(options, given) as folder:
         _tables_into(folder, options, given, tables)
 
 
-def _tables_into(
-    folder: Path, options: argparse.Namespace, given: Setup, tables: Sequence[Table]
-) -> None:
+def _tables_into(folder: Path, options: Options, given: Setup, tables: Sequence[Table]) -> None:
     meta = metadata(options, given)
     for table in tables:
-        write_table(table, folder, meta=meta, decimal=decimal_of(options))
+        write_table(table, folder, meta=meta, decimal=options.decimal)
 
 
 def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None:
@@ -194,13 +199,13 @@ def _say_answer(story: Story, out: Path) -> None:
     print(f"written to {out}")
 
 
-def _inputs(options: argparse.Namespace, given: Setup) -> list[Path]:
+def _inputs(options: Options, given: Setup) -> list[Path]:
     """Every file that was read."""
     files = [*options.logs, *options.holdout, *given.sources]
     return files + [path for path in (options.mapping, options.model) if path]
 
 
-def metadata(options: argparse.Namespace, given: Setup) -> dict[str, Any]:
+def metadata(options: Options, given: Setup) -> dict[str, Any]:
     """What every sidecar says about the run: inputs by hash, versions, options."""
     return {
         "inputs_sha256": {path.name: sha256(path) for path in _inputs(options, given)},

@@ -1,9 +1,9 @@
-"""From the command line's options to a robot and its actuators."""
+"""From files and changed numbers to a robot and its actuators."""
 
 from __future__ import annotations
 
-import argparse
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -12,20 +12,20 @@ from actuators.errors import ActuatorError, CatalogError, closest, one_line
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.parameters import ParameterSet
 from actuators.units import to_si
-from pipeline.cli.gap_options import DEFAULT_ROBOT
-from pipeline.cli.memory import refuse_beyond_memory
 from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.motion.transfer_path import transfer_path
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import RobotSpec, check_parameters, load_robot_file
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, check_parameters, load_robot_file
 from pipeline.simulation.edited import IDEAL, Effects, effects
+from pipeline.simulation.memory import refuse_beyond_memory
 from pipeline.simulation.walk_stand import Adjust, Regeneration
 
 TRANSFER_PATH_KEY = "gait.transfer_path"
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES = 51
+SAMPLES = 751
 #: Between these a ratio looks like a slip by a prefix of the unit, the value itself a little off.
 _THOUSAND = (200.0, 5000.0)
 
@@ -74,49 +74,67 @@ class Settings:
         return None if self.effects is None else self.effects.demand
 
 
-def settings(options: argparse.Namespace) -> Settings:
-    """Load what the options name and apply their changes.
+def settings(
+    *,
+    robot: Path | None = None,
+    model: Path | None = None,
+    changes: Sequence[str] = (),
+    samples: int = SAMPLES,
+    quasi_static: bool = False,
+    regeneration: str = "none",
+    actuators: Path | None = None,
+    walks: bool = True,
+) -> Settings:
+    """Load robot, actuators and effects, and apply changes; defaults are the command line's.
+
+    Args:
+        robot: Robot file; the model file's or the hexapod by default.
+        model: Model file with effects that `gap` found.
+        changes: ``KEY=VALUE`` each, as ``--set`` takes them.
+        samples: Per segment of the gait.
+        quasi_static: Whether the links' inertial terms are left out.
+        regeneration: ``none``, ``bus`` or a fraction of returned energy that is used again.
+        actuators: Folder of actuator files; the project's catalogue by default.
+        walks: Whether a gait cycle will be computed, which must fit into memory.
 
     Raises:
         PipelineError: The robot file or a change cannot be used.
         ActuatorError: A catalogue file or a changed parameter cannot be used.
         GapError: The model file cannot be used, or its effects do not fit the robot.
     """
-    model: Path | None = getattr(options, "model", None)
     file = read_model_file(model) if model else None
-    spec = load_robot_file(options.robot or (file.robot if file else DEFAULT_ROBOT))
-    actuators: Path | None = getattr(options, "actuators", None)
+    spec = load_robot_file(robot or (file.robot if file else DEFAULT_ROBOT))
     catalog = load_catalog(actuators or CATALOG)
-    if options.samples < LEAST_SAMPLES:
+    if samples < LEAST_SAMPLES:
         raise GaitError(
-            f"--samples {options.samples}: at least {LEAST_SAMPLES} samples per segment are needed "
+            f"--samples {samples}: at least {LEAST_SAMPLES} samples per segment are needed "
             "for energies within 1 %"
         )
     remarks = []
-    for change in options.set:
+    for change in changes:
         key, equals, value = (part.strip() for part in change.partition("="))
         if not equals or not key or not value:
             raise RobotFileError(f"--set {one_line(change)}: expected KEY=VALUE")
         before = spec.parameters
         spec, catalog = _changed(spec, catalog, key, value)
         remarks += _thousandfold(before, spec.parameters, key)
-    if options.set:
+    if changes:
         # After all changes: two numbers that bind each other may be changed together.
         check_parameters(spec.parameters, spec.build, "--set")
-    robot = load_robot(spec)
-    remarks += refuse_impossible(robot)
-    if getattr(options, "verb", "walk") != "stand":
-        refuse_beyond_memory(options.samples, len(robot.joints), len(catalog.alternatives))
+    loaded = load_robot(spec)
+    remarks += refuse_impossible(loaded)
+    if walks:
+        refuse_beyond_memory(samples, len(loaded.joints), len(catalog.alternatives))
     return Settings(
-        robot=robot,
+        robot=loaded,
         catalog=catalog,
-        regeneration=_regeneration(options.regeneration),
-        samples=options.samples,
-        quasi_static=options.quasi_static,
-        changes=tuple(options.set),
+        regeneration=_regeneration(regeneration),
+        samples=samples,
+        quasi_static=quasi_static,
+        changes=tuple(changes),
         remarks=tuple(remarks),
         actuators=actuators,
-        effects=_effects(file, model, robot, catalog) if file and model else None,
+        effects=_effects(file, model, loaded, catalog) if file and model else None,
         model=model,
     )
 

@@ -3,23 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import fields
 from pathlib import Path
-from typing import Final
 
-from pipeline.cli.decimal_option import add_decimal_option
+from pipeline.cli.decimal_option import add_decimal_option, decimal_of
 from pipeline.cli.named_path import named_path
-
-#: The steps; without one all but `forward` run, which needs goals and the servos' law.
-STEPS: Final = {
-    "read": "judge the logs: quality.csv",
-    "where": "where model and machine disagree: where.csv and the where-map",
-    "name": "which effects the model lacks: candidates.csv, found.csv",
-    "add": "the same, and write the effects into model.toml",
-    "forward": "drive the model under its servos' law and compare positions: forward.csv",
-    "shrink": "the gap with and without the effects of a model file (--model)",
-}
-DEFAULT_OUT: Final = Path("reports/out/gap")
-DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
+from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
 
 
 def add_gap_options(sub: argparse.ArgumentParser) -> None:
@@ -88,12 +77,13 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 
 
-def split_items(options: argparse.Namespace) -> None:
-    """Tell the step from the logs: sets `step` ("all" without one) and `logs`."""
-    first, *rest = options.items
+def options_of(given: argparse.Namespace) -> Options:
+    """What the command line asks for."""
+    first, *rest = given.items
     # A log file that is called like a step is a log.
-    if first in STEPS and not Path(first).is_file():
-        options.step, logs = first, rest
-    else:
-        options.step, logs = "all", options.items
-    options.logs = [Path(item) for item in logs]
+    step, logs = (
+        (first, rest) if first in STEPS and not Path(first).is_file() else ("all", given.items)
+    )
+    named = {f.name: getattr(given, f.name) for f in fields(Options) if hasattr(given, f.name)}
+    named |= {"step": step, "logs": tuple(Path(item) for item in logs)}
+    return Options(**{**named, "holdout": tuple(given.holdout), "decimal": decimal_of(given)})

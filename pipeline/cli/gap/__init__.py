@@ -1,0 +1,1 @@
+"""The verb `gap`: options, what it writes, what it says."""

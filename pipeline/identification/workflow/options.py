@@ -1,0 +1,59 @@
+"""What a run of the workflow is asked to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+#: The steps; without one all but `forward` run, which needs goals and the servos' law.
+STEPS: Final = {
+    "read": "judge the logs: quality.csv",
+    "where": "where model and machine disagree: where.csv and the where-map",
+    "name": "which effects the model lacks: candidates.csv, found.csv",
+    "add": "the same, and write the effects into model.toml",
+    "forward": "drive the model under its servos' law and compare positions: forward.csv",
+    "shrink": "the gap with and without the effects of a model file (--model)",
+}
+DEFAULT_OUT: Final = Path("reports/out/gap")
+
+
+@dataclass(frozen=True)
+class Options:
+    """Logs, machine and choices of one run; names and defaults are those of the command line.
+
+    Attributes:
+        logs: CSV or Parquet, to learn from.
+        step: One of `STEPS`, or ``all``.
+        robot: Robot file or URDF; the model file's or the hexapod by default.
+        model: Model file with effects found earlier.
+        holdout: Logs that only prove.
+        base: ``fixed``, ``level`` or ``measured``; as log and robot say by default.
+        gait_start: Time in the log at which a period of the gait begins [s].
+        mapping: Mapping file for foreign columns.
+        alternative: Actuator between joint and supply, by name.
+        actuators: Folder of actuator files of one's own.
+        effort: Channel to compare; the log's most direct by default.
+        cutoff: Bandwidth of the comparison [Hz]; the data's own by default.
+        prove_last: Last share of every log that only proves; blocks in between by default.
+        keep_doubtful: Whether doubted effects are written into the model file, too.
+        out: Folder for what is written; the model file names its robot relative to it.
+        decimal: Sign of decimals in copies of the tables.
+    """
+
+    logs: tuple[Path, ...]
+    step: str = "all"
+    robot: Path | None = None
+    model: Path | None = None
+    holdout: tuple[Path, ...] = ()
+    base: str | None = None
+    gait_start: float | None = None
+    mapping: Path | None = None
+    alternative: str | None = None
+    actuators: Path | None = None
+    effort: str | None = None
+    cutoff: float | None = None
+    prove_last: float | None = None
+    keep_doubtful: bool = False
+    out: Path = DEFAULT_OUT
+    decimal: str = "."
