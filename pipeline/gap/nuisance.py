@@ -33,6 +33,8 @@ INERTIA_TOLERANCE: Final = 0.10  # of a link's rotational inertia [1]
 RESISTANCE_TOLERANCE: Final = 0.02
 #: Friction that the actuator's files state already [1].
 FRICTION_TOLERANCE: Final = 0.005
+#: Tolerances that are shares of what they scale.
+SCALES: Final = ("mass", "inertia", "friction", "torque_constant", "resistance")
 #: Tolerances beyond this many sigmas would stand in for something else.
 MOST_SIGMAS: Final = 4.0
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
@@ -56,6 +58,11 @@ class Nuisance:
     place: str
     sigma: float
     unit: str
+
+    @property
+    def lowest(self) -> float:
+        """Least value that makes sense: what scales a mass or a constant leaves a tenth of it."""
+        return -0.9 if self.unit == "1" else -np.inf
 
     @property
     def of_body(self) -> bool:
@@ -116,7 +123,9 @@ def with_tolerances(
     """The model with estimated tolerances: (kind, place) to (value, sigma)."""
     for (kind, place), (value, sigma) in tolerances.items():
         limit = MOST_SIGMAS * sigma
-        model = Nuisance(kind, place, sigma, "").edit(model, min(max(value, -limit), limit))
+        nuisance = Nuisance(kind, place, sigma, "1" if kind in SCALES else "")
+        value = max(min(max(value, -limit), limit), nuisance.lowest)
+        model = nuisance.edit(model, value)
     return model
 
 
