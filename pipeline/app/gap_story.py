@@ -22,7 +22,7 @@ from pipeline.app.gap_written import Weighed, weigh_found
 from pipeline.errors import TippingError
 from pipeline.gap.deciding import Deciding
 from pipeline.gap.effects.registry import effect_named
-from pipeline.gap.identify import identify
+from pipeline.gap.identify import estimated_alone, identify
 from pipeline.gap.model import MachineModel
 from pipeline.gap.model_file import Edit, apply_edits, edits_in
 from pipeline.gap.model_writer import edits_of, model_text
@@ -123,8 +123,12 @@ def tell(given: Setup, where: Whereabouts, options: argparse.Namespace, progress
     named = identify(given.model, where.measurements)
     progress.step("weighing what was found")
 
-    def written(found: Sequence[Found]) -> tuple[str, tuple[Edit, ...]]:
-        return added(given, where, found, options.out, keep_doubtful=options.keep_doubtful)
+    def written(found: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
+        keep = bool(options.keep_doubtful)
+        own = estimated_alone(named, [f for f in found if keep or not f.doubtful])
+        alone = {(f.effect, f.place): f for f in own}
+        told = tuple(alone.get((f.effect, f.place), f) for f in found)
+        return told, *added(given, where, told, options.out, keep_doubtful=keep)
 
     weighed = weigh_found(given.model, where, named.naming.found, written)
     naming = replace(named.naming, found=weighed.found)
