@@ -252,8 +252,8 @@ def store_blind(folder: Path) -> int:
 
 
 def main() -> int:
-    """Run, renew the tables and pictures; with `--blind DIR` those of the blind trials."""
-    if sys.argv[1:2] == ["--blind"]:
+    """Run, renew the tables and pictures; with `blind DIR` those of the blind trials."""
+    if sys.argv[1:2] == ["blind"]:
         return store_blind(Path(sys.argv[2]))
     from pipeline.cli.main import main as command
 

@@ -42,7 +42,7 @@ SUSPECT_SCATTER: Final = 2.5
 #: A law is not doubted where what is left is less than this share of what the effect does, both
 #: root mean square.
 DWARFED: Final = 0.2
-#: Remaining error over the noise floor, in the naming channel, that counts as unexplained.
+#: What a model leaves over the noise floor, in any channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
 #: A name that leaves more than this share of the gap on *choose* has closed nothing.
 IDLE: Final = 0.95

@@ -12,6 +12,7 @@ from pipeline.effects.model_file import Edit, ModelFile, edits_in
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.results import Estimate, Found
+from pipeline.identification.selection.identify import estimated_alone, identify
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.written import Weighed, weigh_found
 from reports.pages.gap_words import shrink_words
@@ -19,6 +20,7 @@ from tests.pipeline.gap import bench_leg as leg
 
 JOINT = "rm_joint_1"
 FRICTION = 0.5  # [N*m]
+VISCOUS = {"coefficient": 0.8}  # [N*m*s/rad]
 
 
 def found(effect: str, parameter: str, value: float, unit: str, doubt: str = "") -> Found:
@@ -45,11 +47,11 @@ def where() -> Any:
 
 
 def weighed(where: Any, *names: Found, keep: bool = False) -> Weighed:
-    def written(among: Sequence[Found]) -> tuple[str, tuple[Edit, ...]]:
+    def written(among: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
         edits = edits_of(among, "log", keep_doubtful=keep)
         robot = ModelFile(leg.ROOT / "urdf" / "leg.toml", "0" * 64, "rotor")
         text = model_text(robot.with_edits(edits), leg.ROOT)
-        return text, edits_in(text)
+        return tuple(among), text, edits_in(text)
 
     return weigh_found(leg.leg_model(), where, names, written)
 
@@ -100,3 +102,17 @@ def test_a_name_with_which_the_simulation_is_worse_is_doubted(where: Any) -> Non
     assert "validation" in one.doubtful
     assert not one.written
     assert "viscous_friction" not in result.text
+
+
+def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
+    truth = leg.leg_model()
+    for effect, values in (("coulomb_friction", {"torque": 0.5}), ("viscous_friction", VISCOUS)):
+        truth = effect_named(effect).apply(truth, (JOINT,), values)
+    both = leg.measured(truth, leg.leg_motion())
+    named = identify(leg.leg_model(), [both])
+    assert {f.effect for f in named.naming.found} == {"coulomb_friction", "viscous_friction"}
+    (dry,) = [f for f in named.naming.found if f.effect == "coulomb_friction"]
+    (alone,) = estimated_alone(named, [dry])
+    # Without the viscous part dry friction has to carry it.
+    assert alone.values["torque"] > dry.parameters[0].high
+    assert estimated_alone(named, named.naming.found) == named.naming.found

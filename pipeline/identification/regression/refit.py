@@ -36,7 +36,8 @@ def refit(problem: Problem) -> Problem:
         count = len(problem.tolerances)
         # Beyond a few sigmas a tolerance only stands in for an effect not yet found.
         reach = np.array([_HELD if n.kind in _RELINEARISED else 0.0 for n in problem.tolerances])
-        held = np.clip(problem.held + theta[:count], -reach, reach)
+        lowest = np.array([n.lowest / n.sigma for n in problem.tolerances])
+        held = np.clip(problem.held + theta[:count], np.maximum(-reach, lowest), reach)
         largest = max(largest, 0.02 * float(np.abs(held - problem.held).max(initial=0.0)))
         problem = problem.with_accepted(moved, held)
         if largest < 2e-3:

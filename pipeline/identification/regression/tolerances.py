@@ -33,6 +33,8 @@ INERTIA_TOLERANCE: Final = 0.10  # of a link's rotational inertia [1]
 RESISTANCE_TOLERANCE: Final = 0.02
 #: Friction that the actuator's files state already [1].
 FRICTION_TOLERANCE: Final = 0.005
+#: Tolerances that are shares of what they scale.
+SCALES: Final = ("mass", "inertia", "friction", "torque_constant", "resistance")
 #: Tolerances beyond this many sigmas would stand in for something else.
 MOST_SIGMAS: Final = 4.0
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
@@ -56,6 +58,11 @@ class Nuisance:
     place: str
     sigma: float
     unit: str
+
+    @property
+    def lowest(self) -> float:
+        """Least value that makes sense: what scales a mass or a constant leaves a tenth of it."""
+        return -0.9 if self.unit == "1" else -np.inf
 
     @property
     def of_body(self) -> bool:
@@ -88,10 +95,10 @@ class Nuisance:
             assert actuator.motor is not None
             motor = actuator.motor
             if self.kind == "torque_constant":
-                constant = float(np.asarray(motor.torque_constant)) * _factor(value)
+                constant = float(np.asarray(motor.torque_constant)) * (1.0 + value)
                 motor = replace(motor, torque_constant=constant)
             else:
-                resistance = float(np.asarray(motor.resistance)) * _factor(value)
+                resistance = float(np.asarray(motor.resistance)) * (1.0 + value)
                 motor = replace(motor, resistance=resistance)
             changed = replace(actuator, motor=motor)
         return model.with_actuator(changed)
@@ -110,21 +117,15 @@ class Nuisance:
         return model.with_bodies(model.bodies.with_body(joint, body))
 
 
-def _factor(value: float) -> float:
-    """Factor on a constant that cannot be zero: 1 + value, and below a half it falls off smoothly.
-
-    A tolerance as wide as that of an unknown motor would else turn the constant's sign.
-    """
-    return 1.0 + value if value > -0.5 else 0.5 * float(np.exp(2.0 * (value + 0.5)))
-
-
 def with_tolerances(
     model: MachineModel, tolerances: Mapping[tuple[str, str], tuple[float, float]]
 ) -> MachineModel:
     """The model with estimated tolerances: (kind, place) to (value, sigma)."""
     for (kind, place), (value, sigma) in tolerances.items():
         limit = MOST_SIGMAS * sigma
-        model = Nuisance(kind, place, sigma, "").edit(model, min(max(value, -limit), limit))
+        nuisance = Nuisance(kind, place, sigma, "1" if kind in SCALES else "")
+        value = max(min(max(value, -limit), limit), nuisance.lowest)
+        model = nuisance.edit(model, value)
     return model
 
 

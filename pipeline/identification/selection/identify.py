@@ -77,6 +77,24 @@ def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identi
     return Identified(naming, plain, problem)
 
 
+def estimated_alone(named: Identified, found: Sequence[Found]) -> tuple[Found, ...]:
+    """Effects with values and intervals as they are without the others that were found.
+
+    What is left out of a model takes its part of the log with it: beside a friction that is not
+    there, what was named with it has other values.
+
+    Args:
+        named: From `identify`.
+        found: Some of what was found, in its order.
+    """
+    keys = [(f.effect, f.place) for f in found]
+    kept = [a for a in named.problem.accepted if (a.effect.name, a.place) in keys]
+    if len(kept) == len(named.problem.accepted):
+        return tuple(found)
+    sized = estimates(refit(named.problem.with_accepted(kept)), named.naming.channel)
+    return tuple(replace(f, parameters=s.parameters) for f, s in zip(found, sized, strict=True))
+
+
 def _found(selection: Selection, channel: str) -> tuple[Found, ...]:
     """Accepted effects in order, each with what it closes on *choose* by estimates from *fit*."""
     problem = selection.problem

@@ -16,7 +16,7 @@ from pipeline.errors import TippingError
 from pipeline.identification.compare.stages import Stage, noise_floor, overall
 from pipeline.identification.results import Found, Naming
 from pipeline.identification.selection.deciding_motion import Deciding
-from pipeline.identification.selection.identify import identify
+from pipeline.identification.selection.identify import estimated_alone, identify
 from pipeline.identification.workflow.deciding import decide
 from pipeline.identification.workflow.locate import Progress, Whereabouts
 from pipeline.identification.workflow.model_writer import edits_of, model_text
@@ -151,8 +151,12 @@ def tell(given: Setup, where: Whereabouts, options: Options, progress: Progress)
     named = identify(given.model, where.measurements)
     progress.step("weighing what was found")
 
-    def written(found: Sequence[Found]) -> tuple[str, tuple[Edit, ...]]:
-        return added(given, where, found, options.out, keep_doubtful=options.keep_doubtful)
+    def written(found: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
+        keep = bool(options.keep_doubtful)
+        own = estimated_alone(named, [f for f in found if keep or not f.doubtful])
+        alone = {(f.effect, f.place): f for f in own}
+        told = tuple(alone.get((f.effect, f.place), f) for f in found)
+        return told, *added(given, where, told, options.out, keep_doubtful=keep)
 
     weighed = weigh_found(given.model, where, named.naming.found, written)
     naming = replace(named.naming, found=weighed.found)

@@ -59,7 +59,7 @@ def weigh_found(
     model: MachineModel,
     where: Whereabouts,
     found: Sequence[Found],
-    written: Callable[[Sequence[Found]], tuple[str, tuple[Edit, ...]]],
+    written: Callable[[Sequence[Found]], tuple[tuple[Found, ...], str, tuple[Edit, ...]]],
 ) -> Weighed:
     """Hold what was found against the logs, as far as it is written.
 
@@ -67,19 +67,22 @@ def weigh_found(
         model: Before anything found.
         where: Steps 1 and 2.
         found: From naming.
-        written: From effects to the text of the model file, and the edits in it that are theirs,
-            read back.
+        written: From effects to the same with the values that the model file gives them, its text,
+            and the edits in it that are theirs, read back.
     """
     weighing = Weighing(model, where.measurements)
     while True:
-        text, edits = written(found)
+        told, text, edits = written(found)
         keys = [(edit.effect, edit.place) for edit in edits]
         models = _models(weighing, model, edits)
         seen = stages(models, where.measurements)
-        doubted = _worse(model, found, keys, seen)
+        doubted = _worse(model, told, keys, seen)
         if not doubted:
+            found = told
             break
-        found = [replace(f, doubtful=IDLE_NAME) if f in doubted else f for f in found]
+        found = [
+            replace(f, doubtful=IDLE_NAME) if (f.effect, f.place) in doubted else f for f in found
+        ]
     last = apply_edits(model, edits)
     beside = [
         (_label(f.effect, f.place), weighing.calibrated(_with(last, f)))
@@ -178,12 +181,12 @@ def _worse(
     found: Sequence[Found],
     keys: Sequence[tuple[str, tuple[str, ...]]],
     seen: Sequence[Stage],
-) -> list[Found]:
+) -> list[tuple[str, tuple[str, ...]]]:
     """Trusted names with which the simulated gap on *choose* is larger than without.
 
     Naming judges by a linear step. What a tolerance would have taken up is its own merit.
     """
-    out = []
+    out: list[tuple[str, tuple[str, ...]]] = []
     for f in found:
         key = (f.effect, f.place)
         if f.doubtful or key not in keys or effect_named(f.effect).is_tolerance:
@@ -191,7 +194,7 @@ def _worse(
         before, after = seen[keys.index(key)], seen[keys.index(key) + 1]
         j = effect_column(model, f.place, before, after)
         if after.valid[j] > before.valid[j]:
-            out.append(f)
+            out.append(key)
     return out
 
 
