@@ -13,7 +13,12 @@ from pipeline.errors import GaitError, OutOfReachError, UrdfError
 from pipeline.gait import standing_posture, tripod_gait
 from pipeline.inverse_kinematics import solve_positions, solve_rates
 from pipeline.joint_demand import segment_demand
-from pipeline.kinematics import foot_jacobians, foot_positions
+from pipeline.kinematics import (
+    foot_force_torques,
+    foot_jacobian_rates,
+    foot_jacobians,
+    foot_positions,
+)
 from pipeline.leg_chains import leg_chains
 from pipeline.motion import Motion, Segment
 from pipeline.robot import Robot, load_robot
@@ -57,6 +62,29 @@ def test_columns_go_where_pinocchio_has_them(hexapod: Robot) -> None:
     np.testing.assert_array_equal(v[:, :3], base)
     assert not v[:, 3:6].any()
     np.testing.assert_array_equal(hexapod.leg_positions(q), joints.reshape(3, 6, 3))
+
+
+def test_the_order_of_legs_in_the_file_changes_the_columns_alone(hexapod: Robot) -> None:
+    """Also where the URDF has the joints in another order than the file."""
+    order = [3, 0, 5, 1, 4, 2]
+    legs = tuple(hexapod.spec.legs[k] for k in order)
+    other = replace(hexapod, spec=replace(hexapod.spec, legs=legs))
+    pairs = zip(
+        tripod_gait(hexapod, samples=21).segments,
+        tripod_gait(other, samples=21).segments,
+        strict=True,
+    )
+    columns = [other.joints.index(name) for name in hexapod.joints]
+    for segment, same in pairs:
+        (one, own), (two, mixed) = segment_demand(hexapod, segment), segment_demand(other, same)
+        assert own is not None
+        assert mixed is not None
+        assert two.joints != one.joints
+        for name in ("position", "velocity", "acceleration", "torque"):
+            np.testing.assert_allclose(
+                getattr(two, name)[:, columns], getattr(one, name), atol=1e-9, err_msg=name
+            )
+        np.testing.assert_allclose(mixed.force_world, own.force_world[:, order], atol=1e-9)
 
 
 @pytest.mark.parametrize("rpy", [(0.0, 0.0, 0.7), (0.02, 0.01, 0.0), (-0.01, 0.02, -1.2)])
@@ -241,6 +269,36 @@ def test_axes_are_those_of_the_urdf() -> None:
     np.testing.assert_allclose(chains.axis[:, 0], [[0, 0, 1], [0, 0.6, -0.8], [1, 0, 0]])
     assert [None if a is None else a[0] for a in chains.along] == [2, None, 0]
     assert chains.turned == (False, False, False)
+
+
+def test_a_leg_of_axes_in_any_direction_agrees_with_pinocchio() -> None:
+    """Feet, Jacobians, their rates and J^T f, with no component of an axis being zero."""
+    text = LEG.format(kind="revolute", mass=MASS, axis="0.48 0.6 -0.64")
+    text = text.replace('<axis xyz="0 0 1"/>', '<axis xyz="-0.64 0.48 0.6"/>')
+    text = text.replace('<axis xyz="1 0 0"/>', '<axis xyz="0.6 -0.64 0.48"/>')
+    for child, xyz in (("l2", "0.3 -0.2 0.1"), ("l3", "-0.1 0.25 0.4"), ("foot", "0.2 0.1 -0.5")):
+        place = f'<child link="{child}"/>'
+        text = text.replace(place, f'{place}<origin xyz="{xyz}" rpy="0 0 0"/>')
+    model = pin.buildModelFromXML(text)
+    data, frame = model.createData(), model.getFrameId("foot")
+    chains = leg_chains(model, [("leg", ("a", "b", "c"), "foot")], 0)
+    assert chains.along == (None, None, None)
+    rng = np.random.default_rng(7)
+    q, rate = rng.uniform(-2.0, 2.0, (2, 20, 1, 3))
+    force = rng.normal(size=q.shape)
+    feet, jacobian = foot_jacobians(chains, q)
+    torque, bias = foot_force_torques(chains, q, force), foot_jacobian_rates(chains, q, rate)
+    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    for n in range(20):
+        pin.forwardKinematics(model, data, q[n, 0], rate[n, 0], np.zeros(3))
+        pin.computeJointJacobians(model, data, q[n, 0])
+        pin.updateFramePlacements(model, data)
+        expected = pin.getFrameJacobian(model, data, frame, world)[:3]
+        np.testing.assert_allclose(feet[n, 0], data.oMf[frame].translation, atol=1e-12)
+        np.testing.assert_allclose(jacobian[n, 0], expected, atol=1e-12)
+        np.testing.assert_allclose(torque[n, 0], expected.T @ force[n, 0], atol=1e-12)
+        drift = pin.getFrameClassicalAcceleration(model, data, frame, world).linear
+        np.testing.assert_allclose(bias[n, 0], drift, atol=1e-12)
 
 
 def test_a_joint_of_no_leg_is_refused(hexapod: Robot) -> None:
