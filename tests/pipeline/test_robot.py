@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -22,6 +23,7 @@ from pipeline.kinematics import (
 from pipeline.leg_chains import leg_chains
 from pipeline.motion import Motion, Segment
 from pipeline.robot import Robot, load_robot
+from pipeline.robot_file import load_robot_file
 from pipeline.stability import stability_margins
 
 
@@ -299,6 +301,19 @@ def test_a_leg_of_axes_in_any_direction_agrees_with_pinocchio() -> None:
         np.testing.assert_allclose(torque[n, 0], expected.T @ force[n, 0], atol=1e-12)
         drift = pin.getFrameClassicalAcceleration(model, data, frame, world).linear
         np.testing.assert_allclose(bias[n, 0], drift, atol=1e-12)
+
+
+def test_a_joint_of_no_leg_is_refused_on_a_stand_too(root: Path, tmp_path: Path) -> None:
+    spec = load_robot_file(root / "urdf" / "leg.toml")
+    limits = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+    arm = (
+        f'<joint name="aa" type="revolute"><parent link="{spec.base_link}"/><child link="arm"/>'
+        f'<axis xyz="0 0 1"/>{limits}</joint><link name="arm">{MASS}</link></robot>'
+    )
+    text = spec.urdf.read_text(encoding="utf-8").replace("</robot>", arm)
+    (tmp_path / "own.urdf").write_text(text, encoding="utf-8")
+    with pytest.raises(UrdfError, match="joint 'aa' of the URDF belongs to no leg"):
+        load_robot(replace(spec, build=None, urdf=tmp_path / "own.urdf"))
 
 
 def test_a_joint_of_no_leg_is_refused(hexapod: Robot) -> None:
