@@ -52,7 +52,7 @@ mutants: $(STAMP)  ## Put faults into the code and see whether tests notice (SHA
 	$(PY) -m tests.mutants --share $(SHARE) $(ARGS)
 
 readme: $(STAMP)  ## Renew the README's tables and pictures from a run (BLIND=: those of a run of blind)
-	$(PY) -m tests.readme $(if $(BLIND),--blind $(call quoted,$(BLIND)))
+	$(PY) -m tests.readme $(if $(BLIND),blind $(call quoted,$(BLIND)))
 
 # Exit 1 is a finding (something stays unexplained), not an error of make. LOG= is one file, whose
 # name may hold spaces, or several.

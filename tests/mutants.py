@@ -15,6 +15,7 @@ import importlib
 import json
 import os
 import random
+import resource
 import shutil
 import signal
 import subprocess
@@ -70,6 +71,8 @@ OPERATORS = (
     *(f"ReplaceComparisonOperator_{a}_{b}" for a, others in COMPARISON.items() for b in others),
     *OTHERS,
 )
+#: After this long a process waits for something that does not come [s].
+HANGS = 3600.0
 KILLED, SURVIVED, UNCOVERED, EQUIVALENT = "killed", "survived", "no coverage", "equivalent"
 
 
@@ -234,9 +237,7 @@ def baseline(
             out.write_text(json.dumps(lines), encoding="utf-8")
             return code
 
-        start = time.monotonic()
-        code, log = in_child(copy, measured, limit=900.0)
-        seconds[test] = time.monotonic() - start
+        code, log, seconds[test] = in_child(copy, measured)
         if code != 0:
             raise SystemExit(f"{log}\n{test} fails without any fault: mend it first")
         lines = json.loads(out.read_text(encoding="utf-8"))
@@ -326,7 +327,8 @@ def verdict_on(
         return 0
 
     try:
-        code, _ = in_child(copy, work, limit=20.0 + 5.0 * sum(seconds[t] for t in mutant.tests))
+        limit = 20.0 + 5.0 * sum(seconds[t] for t in mutant.tests)
+        code, _, _ = in_child(copy, work, limit)
     finally:
         target.write_bytes(original)
         os.utime(target, (stamp.st_atime, stamp.st_mtime))
@@ -344,13 +346,18 @@ def run_pytest(tests: Sequence[str]) -> int:
     return int(pytest.main([*own, *tests]))
 
 
-def in_child(copy: Path, work: Callable[[], int], limit: float) -> tuple[int, str]:
-    """Do work in a forked process that sees the copy alone; its exit code and what it printed.
+def in_child(
+    copy: Path, work: Callable[[], int], limit: float | None = None
+) -> tuple[int, str, float]:
+    """Do work in a forked process that sees the copy alone.
 
     Args:
         copy: Becomes the working folder and the place of the project's modules.
         work: Returns the exit code.
-        limit: After this long the process ends with code 124 [s].
+        limit: Of the processor's time, which other work on the machine does not change [s].
+
+    Returns:
+        Its exit code, what it printed, and the processor's time it took [s].
     """
     log = copy.parent / "output.txt"
     shutil.rmtree(copy / ".hypothesis", ignore_errors=True)  # no memory of earlier faults
@@ -359,6 +366,8 @@ def in_child(copy: Path, work: Callable[[], int], limit: float) -> tuple[int, st
         code = 70
         try:
             os.setpgid(0, 0)
+            if limit is not None:
+                resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, int(limit) + 1))
             with log.open("w", encoding="utf-8") as file:
                 os.dup2(file.fileno(), 1)
                 os.dup2(file.fileno(), 2)
@@ -366,7 +375,7 @@ def in_child(copy: Path, work: Callable[[], int], limit: float) -> tuple[int, st
             sys.path[:] = [str(copy), *(p for p in sys.path if Path(p).resolve() != ROOT)]
             for name in [n for n in sys.modules if n.split(".")[0] in PROJECT]:
                 del sys.modules[name]
-            sys.dont_write_bytecode = limit < 900.0
+            sys.dont_write_bytecode = limit is not None
             os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
             code = work()
         except BaseException:
@@ -378,29 +387,29 @@ def in_child(copy: Path, work: Callable[[], int], limit: float) -> tuple[int, st
             sys.stderr.flush()
             os._exit(code)
     try:
-        code = wait(child, limit)
+        code, seconds = wait(child)
     finally:
         with contextlib.suppress(ProcessLookupError):
             os.killpg(child, signal.SIGKILL)  # and what it started
-    return code, log.read_text(encoding="utf-8", errors="replace")
+    return code, log.read_text(encoding="utf-8", errors="replace"), seconds
 
 
-def wait(child: int, limit: float) -> int:
-    """The exit code of a process, 124 where it takes longer than `limit` [s]."""
-    end = time.monotonic() + limit
+def wait(child: int) -> tuple[int, float]:
+    """Exit code and processor's time [s] of a process; one that hangs is ended."""
+    end = time.monotonic() + HANGS
     try:
         while time.monotonic() < end:
-            done, status = os.waitpid(child, os.WNOHANG)
+            done, status, used = os.wait4(child, os.WNOHANG)
             if done:
-                return os.waitstatus_to_exitcode(status)
+                return os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime
             time.sleep(0.02)
     except BaseException:
-        os.killpg(child, signal.SIGKILL)
+        os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
         raise
-    os.killpg(child, signal.SIGKILL)
+    os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    return 124
+    return 124, HANGS
 
 
 def report(tallies: Mapping[str, Tally], options: argparse.Namespace) -> None:

@@ -98,6 +98,16 @@ def test_released_feet_bear_nothing_and_the_rest_share_anew() -> None:
         np.testing.assert_allclose(null_space(lift).T @ force[kept, 2], 0.0, atol=1e-9)
 
 
+def test_weight_beside_the_feet_leaves_three_and_one_of_them_would_pull() -> None:
+    """It is for the caller to refuse; the wrench is met all the same."""
+    weight = np.array([0.0, 0.0, 400.0])
+    wrench = np.concatenate([weight, np.cross([0.35, 0.1, 0.0], weight)])
+    force = least_tangential_forces(wrench[None], SIX[None])[0]
+    np.testing.assert_allclose(wrench_of(SIX, force), wrench, atol=1e-9)
+    assert (force[:, 2] != 0).sum() == 3
+    assert force[:, 2].min() < 0
+
+
 def test_rows_of_a_batch_are_released_on_their_own() -> None:
     weight = np.array([0.0, 0.0, 400.0])
     points = ((0.26, 0.2), (0.0, 0.0), (-0.26, -0.2))
