@@ -193,7 +193,7 @@ marks = {"interpreter": clock()}
 start = clock()
 import numpy, pinocchio, pyarrow.csv, matplotlib.figure, matplotlib.backends.backend_agg
 import matplotlib.backends.backend_svg, matplotlib.path
-import pipeline.cli.main, pipeline.cli.figures, pipeline.cli.judgement, pipeline.cli.run as run
+import pipeline.cli.main, pipeline.api.figures, pipeline.api.judgement, pipeline.cli.run as run
 marks["imports"] = clock() - start
 def count(module, name, phase):
     real = getattr(module, name)
@@ -208,9 +208,9 @@ count(run, "settings", "loading")
 count(run, "stand", "computing")
 count(run, "walk", "computing")
 count(run, "write_table", "CSV and sidecars")
-count(pipeline.cli.judgement, "judged", "judging")
-count(pipeline.cli.figures, "write_figures", "figures")
-count(pipeline.cli.judgement, "pages", "pages")
+count(pipeline.api.judgement, "judged", "judging")
+count(pipeline.api.figures, "write_figures", "figures")
+count(pipeline.api.judgement, "pages", "pages")
 begin = clock()
 sys.stdout = sys.stderr
 code = pipeline.cli.main.main(sys.argv[1:])

@@ -132,7 +132,7 @@ RATES = {
 
 def agreement(out: Path) -> str:
     """What is fitted, predicted and contradicted: the first paragraph of `summary.md`."""
-    from pipeline.cli.judgement import judged
+    from pipeline.api.judgement import judged
     from pipeline.cli.main import parser
     from pipeline.cli.run import settings_of
     from pipeline.paper.judgement.basis import basis

@@ -13,7 +13,17 @@ import pytest
 ROOT = Path(__file__).parents[1]
 #: From the top down; a room imports itself and what stands below it.
 ORDER = (
-    *("cli", "reports", "blind", "paper", "identification", "simulation", "effects", "machine"),
+    *(
+        "cli",
+        "api",
+        "reports",
+        "blind",
+        "paper",
+        "identification",
+        "simulation",
+        "effects",
+        "machine",
+    ),
     *("logs", "dynamics", "motion", "robot", "actuators"),
 )
 #: Seen by everybody: errors of the pipeline, and what knows the standard library only.

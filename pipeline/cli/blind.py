@@ -33,12 +33,12 @@ from pipeline.blind.summary import Scored, by_effect, confusion, rates, trial_ro
 from pipeline.blind.truth import hidden_truths
 from pipeline.blind.twin.matrix import TrialSpec, trial_matrix
 from pipeline.blind.twin.trial import ROBOT_FILES
-from pipeline.cli.staging import staged
 from pipeline.logs.errors import GapError
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.paper.calibration.checkpoint import Checkpoint
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
+from reports.folder.staging import staged
 
 _ROOT: Final = Path(__file__).parents[2]
 #: What a trial is made of, and what an answer hangs on beside it.

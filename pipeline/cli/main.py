@@ -152,7 +152,7 @@ def _run_urdf(options: argparse.Namespace) -> int:
 @contextmanager
 def _folder_held(options: argparse.Namespace) -> Iterator[None]:
     """Hold the folder of results from the start, and see that the model's folder is settled."""
-    from pipeline.cli.staging import holding, settled
+    from reports.folder.staging import holding, settled
 
     if getattr(options, "model", None):
         settled(options.model.parent)
@@ -182,7 +182,7 @@ def _run_twin(options: argparse.Namespace) -> int:
 
 
 def _run_blind(options: argparse.Namespace) -> int:
-    from pipeline.cli.staging import told
+    from reports.folder.staging import told
 
     with _folder_held(options), told(options.out):
         from pipeline.cli.blind import run_blind
@@ -192,7 +192,7 @@ def _run_blind(options: argparse.Namespace) -> int:
 
 def _run_calibrate(options: argparse.Namespace) -> int:
     from pipeline.cli.calibrate import WORK, run_calibrate
-    from pipeline.cli.staging import holding, told
+    from reports.folder.staging import holding, told
 
     with holding(WORK), told(WORK):
         return run_calibrate(options)

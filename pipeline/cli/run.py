@@ -3,28 +3,25 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import logging
-from importlib.metadata import version
-from pathlib import Path
-from typing import Any
 
-from actuators.loading.build import CATALOG
+from pipeline.api.tables import (
+    findings,
+    inputs_of,
+    metadata,
+    table_of_parameters,
+    tables_of_standing,
+    tables_of_walking,
+)
 from pipeline.cli.decimal_option import decimal_of
-from pipeline.cli.staging import staged
 from pipeline.errors import RobotFileError
-from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings, settings
-from pipeline.simulation.walk_stand import Standing, Walking, stand, walk
+from pipeline.simulation.walk_stand import stand, walk
+from reports.folder.staging import staged
 from reports.table import Table
-from reports.tables import parameters as parameter_tables
-from reports.tables import standing as standing_tables
-from reports.tables import walking as walking_tables
 from reports.writer import write_table
 
 logger = logging.getLogger("legwatt")
-IDEAL = "ideal"
-PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -61,7 +58,7 @@ def run(options: argparse.Namespace) -> int:
     tables.append(table_of_parameters(given))
     judgement = None
     if options.verb == "reports":
-        from pipeline.cli import judgement as judging
+        from pipeline.api import judgement as judging
         from pipeline.paper.judgement.basis import basis
 
         by = basis(given)
@@ -79,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
             write_table(table, out, meta=meta, decimal=decimal_of(options))
         files = len(tables)
         if options.verb == "reports":
-            from pipeline.cli.figures import write_figures
+            from pipeline.api.figures import write_figures
 
             assert standing is not None
             assert walking is not None
@@ -109,113 +106,3 @@ def settings_of(options: argparse.Namespace) -> Settings:
         actuators=options.actuators,
         walks=options.verb != "stand",
     )
-
-
-def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
-    """Each leg's joints."""
-    return {leg.name: leg.joints for leg in spec.legs}
-
-
-def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:
-    """The four tables of standing still."""
-    return [
-        standing_tables.standing(standing.demand, standing.holding),
-        standing_tables.standing_energy(
-            standing.demand, standing.holding, leg_joints(given.robot.spec)
-        ),
-        standing_tables.standing_posture(standing.demand),
-        standing_tables.standing_contacts(standing.contacts),
-    ]
-
-
-def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
-    """The tables of one walking cycle."""
-    legs = leg_joints(given.robot.spec)
-    chains = given.chains()
-    p = given.robot.spec.parameters
-    tables = [
-        walking_tables.walking_joint_demand(walking.demand),
-        walking_tables.walking_contact_forces(walking.demand),
-        walking_tables.walking_stability(walking.demand, walking.margins),
-        walking_tables.walking_stage_energy(
-            walking.results, {n: a.stage_names for n, a in given.catalog.alternatives.items()}
-        ),
-        walking_tables.walking_losses(walking.results, walking.supplies),
-        walking_tables.walking_energy(walking.supplies, legs, IDEAL),
-        walking_tables.robot_energy(
-            walking.demand,
-            walking.supplies,
-            legs,
-            given.machine.mass * p["gravity"],  # the mass that the forces rest on
-            p["walking_speed"],
-        ),
-        walking_tables.motor_limits(walking.results, chains),
-    ]
-    if not given.quasi_static:
-        static = walk(
-            given.machine,
-            chains,
-            samples=given.samples,
-            quasi_static=True,
-            regeneration=given.regeneration,
-            adjust=given.adjust,
-        )
-        tables += walking_tables.quasi_static_difference(
-            walking.demand, static.demand, walking.supplies, static.supplies, legs
-        )
-    return tables
-
-
-def table_of_parameters(given: Settings) -> Table:
-    """Every number that went in."""
-    groups = [(given.robot.spec.name, given.robot.spec.parameters.rows())]
-    groups += [(c.name, c.parameters.rows()) for c in given.catalog.components.values()]
-    return parameter_tables.parameters(groups)
-
-
-def inputs_of(given: Settings) -> list[Path]:
-    """Every file that was read."""
-    spec = given.robot.spec
-    files = [*spec.sources, *([] if spec.build else [spec.urdf])]
-    files += sorted((given.actuators or Path(CATALOG)).glob("*.toml"))
-    return [*files, given.model] if given.model else files
-
-
-def metadata(given: Settings) -> dict[str, Any]:
-    """What every sidecar says about the run: inputs by hash, versions, options."""
-    spec = given.robot.spec
-    files = inputs_of(given)
-    return {
-        "inputs_sha256": {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in files},
-        "urdf_sha256": hashlib.sha256(given.robot.urdf.encode()).hexdigest(),
-        "versions": {name: version(name) for name in PACKAGES},
-        "options": {
-            "set": list(given.changes),
-            "samples_per_segment": given.samples,
-            "quasi_static": given.quasi_static,
-            "regeneration": given.regeneration.policy,
-            "regeneration_fraction": given.regeneration.fraction,
-            "transfer_path": spec.transfer_path,
-            "effects": list(given.effects.names) if given.effects else [],
-        },
-        "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
-        "joint's direction; electrical power positive from supply to motor",
-        "zero_pose": spec.zero_pose,
-        "warnings": [*given.remarks, *(given.effects.remarks if given.effects else ())],
-    }
-
-
-def findings(walking: Walking, given: Settings) -> list[str]:
-    """Lines for the terminal: what a reader should not overlook."""
-    from actuators.energy.limits import limit_rows
-
-    lines = []
-    for name, chain in given.chains().items():
-        breaches = [row for row in limit_rows(walking.results[name], chain.motor) if row.breach]
-        if breaches:
-            worst = max(breaches, key=lambda row: row.peak / row.limit)
-            lines.append(
-                f"motor limit: '{name}' asks {worst.peak:.4g} {worst.unit} ({worst.quantity}) of "
-                f"{worst.joint}, the data sheet allows {worst.limit:.4g}; see motor_limits.csv"
-            )
-    return lines

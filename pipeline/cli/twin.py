@@ -10,8 +10,8 @@ from pathlib import Path
 from pipeline.blind.twin.errors import TwinError
 from pipeline.blind.twin.files import TrialFiles, check_seal, write_trial
 from pipeline.blind.twin.trial import Trial, make_trial
-from pipeline.cli.staging import staged
-from reports.exchange import PREFIX
+from reports.folder.exchange import PREFIX
+from reports.folder.staging import staged
 
 
 def run_twin(options: argparse.Namespace) -> int:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.figures import drawings
+from pipeline.api.figures import drawings
 from pipeline.cli.main import parser
 from pipeline.cli.run import settings_of
 from pipeline.simulation.walk_stand import stand, walk

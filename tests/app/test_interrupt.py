@@ -16,10 +16,10 @@ import pytest
 from pipeline.cli import figures
 from pipeline.cli.demo import DEMO
 from pipeline.cli.main import main
-from pipeline.cli.staging import holding
 from reports.errors import FigureError
-from reports.exchange import EXCHANGE
-from reports.manifest import MANIFEST, read_manifest
+from reports.folder.exchange import EXCHANGE
+from reports.folder.manifest import MANIFEST, read_manifest
+from reports.folder.staging import holding
 from tests.app.conftest import Command, exit_code, results
 
 #: Kills its own process at the given call of os.rename, by which a finished set is put in place.
@@ -162,7 +162,7 @@ def test_many_kills_at_random_instants_leave_whole_sets(
 
 def test_two_at_once(root: Path, tmp_path: Path, command: Command) -> None:
     """The second is refused in one line while the first goes on; after it, it is welcome."""
-    code = "import sys\nfrom pipeline.cli.staging import holding\nfrom pathlib import Path\n"
+    code = "import sys\nfrom reports.folder.staging import holding\nfrom pathlib import Path\n"
     code += "with holding(Path(sys.argv[1])):\n    print(flush=True)\n    sys.stdin.read()\n"
     first = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path)],

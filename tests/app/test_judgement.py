@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from actuators.loading.build import CATALOG, load_catalog
-from pipeline.cli import judgement as judging
+from pipeline.api import judgement as judging
 from pipeline.cli.main import parser
 from pipeline.cli.run import settings_of
 from pipeline.paper.calibration.fingerprint import differences, fingerprint

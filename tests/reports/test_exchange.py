@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.staging import holding, settled, staged
 from reports.errors import OutputError
-from reports.exchange import EXCHANGE
-from reports.manifest import MANIFEST, read_manifest
+from reports.folder.exchange import EXCHANGE
+from reports.folder.manifest import MANIFEST, read_manifest
+from reports.folder.staging import holding, settled, staged
 
 OLD = {f"old_{k}.csv": f"old {k}" for k in range(3)} | {"both.csv": "old", "sub/both.txt": "old"}
 NEW = {f"new_{k}.csv": f"new {k}" for k in range(3)} | {"both.csv": "new", "deep/er/a.txt": "new"}

@@ -10,22 +10,21 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from pipeline.cli.gap.figures import (
+from pipeline.api.gap_figures import (
     write_in_time,
     write_signature,
     write_waterfall,
     write_where_map,
 )
-from pipeline.cli.gap.forward import forward_table, rollout_tables, say
-from pipeline.cli.gap.options import options_of
-from pipeline.cli.gap.tables import (
+from pipeline.api.gap_tables import (
     candidates_table,
     found_table,
     motion_table,
     quality_table,
     where_table,
 )
-from pipeline.cli.staging import staged
+from pipeline.cli.gap.forward import forward_table, rollout_tables, say
+from pipeline.cli.gap.options import options_of
 from pipeline.identification.compare.circumstances import WHOLE
 from pipeline.identification.workflow.forward import by_model, forward, rms
 from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where, judged
@@ -35,6 +34,7 @@ from pipeline.identification.workflow.story import Story, Told, tell
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.reading.table_file import sha256
+from reports.folder.staging import staged
 from reports.pages import gap_words as words
 from reports.pages.gap_report import write_report
 from reports.table import Table

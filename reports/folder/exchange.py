@@ -26,7 +26,7 @@ from pathlib import Path
 from types import FrameType
 
 from reports.errors import OutputError
-from reports.manifest import MANIFEST, Manifest, read_manifest, sha256
+from reports.folder.manifest import MANIFEST, Manifest, read_manifest, sha256
 
 #: Of every hidden folder made here.
 PREFIX = ".legwatt-"

@@ -2,7 +2,7 @@
 
 A folder of results holds the files of one run of one verb, and what a person put there. A run of
 any verb replaces what the run before left, whichever verb that was, and nothing else. It gathers
-its files beside them and exchanges the sets at its end (`reports/exchange.py` says what a killed
+its files beside them and exchanges the sets at its end (`reports/folder/exchange.py` says what a killed
 process leaves). While it runs it holds the folder; a second one is refused.
 """
 
@@ -18,8 +18,8 @@ from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from reports.errors import OutputError
-from reports.exchange import PREFIX, Replaced, exchange, gathering, settle, unsettled
-from reports.lock import locked
+from reports.folder.exchange import PREFIX, Replaced, exchange, gathering, settle, unsettled
+from reports.folder.lock import locked
 
 logger = logging.getLogger("legwatt")
 #: What a system says when it will not write.

@@ -42,7 +42,7 @@ def pages(given: Settings, judged: Judged, every: list[Table], out: Path) -> int
     Returns:
         How many figures and pages.
     """
-    from pipeline.cli.figures import write_fig_21
+    from pipeline.api.figures import write_fig_21
     from reports.pages.summary import write_summary
 
     titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}

@@ -1,0 +1,1 @@
+"""The public Python API: one function per question, one result each."""

@@ -1,0 +1,1 @@
+"""A folder of results: one run at a time, replaced as a whole."""
