@@ -5,13 +5,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reports.errors import TableError
 from reports.typeset import unit_suffix, unit_text
+
+if TYPE_CHECKING:
+    import pandas
 
 #: What a column may hold: a NumPy vector, or a sequence in which None stands for "no value".
 Column = Sequence[Any] | NDArray[Any]
@@ -86,6 +89,12 @@ class Table:
                     f"'{first}' has {lengths[first]}"
                 )
         object.__setattr__(self, "rows", lengths[first])
+
+    def frame(self) -> pandas.DataFrame:
+        """The table as a pandas frame: columns are named as in the CSV, units in their names."""
+        import pandas
+
+        return pandas.DataFrame({h: list(values) for h, values in self.columns.items()})
 
     @property
     def unit_columns(self) -> frozenset[str]:

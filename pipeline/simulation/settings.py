@@ -77,7 +77,7 @@ class Settings:
 def settings(
     *,
     robot: Path | None = None,
-    model: Path | None = None,
+    model: Path | ModelFile | None = None,
     changes: Sequence[str] = (),
     samples: int = SAMPLES,
     quasi_static: bool = False,
@@ -89,7 +89,7 @@ def settings(
 
     Args:
         robot: Robot file; the model file's or the hexapod by default.
-        model: Model file with effects that `gap` found.
+        model: Model file with effects that `gap` found, or what it holds.
         changes: ``KEY=VALUE`` each, as ``--set`` takes them.
         samples: Per segment of the gait.
         quasi_static: Whether the links' inertial terms are left out.
@@ -102,7 +102,8 @@ def settings(
         ActuatorError: A catalogue file or a changed parameter cannot be used.
         GapError: The model file cannot be used, or its effects do not fit the robot.
     """
-    file = read_model_file(model) if model else None
+    path = model if isinstance(model, Path) else None
+    file = read_model_file(path) if path else model if isinstance(model, ModelFile) else None
     spec = load_robot_file(robot or (file.robot if file else DEFAULT_ROBOT))
     catalog = load_catalog(actuators or CATALOG)
     if samples < LEAST_SAMPLES:
@@ -134,8 +135,8 @@ def settings(
         changes=tuple(changes),
         remarks=tuple(remarks),
         actuators=actuators,
-        effects=_effects(file, model, loaded, catalog) if file and model else None,
-        model=model,
+        effects=_effects(file, path or Path("model.toml"), loaded, catalog) if file else None,
+        model=path,
     )
 
 

@@ -2,7 +2,7 @@
 
 A folder of results holds the files of one run of one verb, and what a person put there. A run of
 any verb replaces what the run before left, whichever verb that was, and nothing else. It gathers
-its files beside them and exchanges the sets at its end (`reports/folder/exchange.py` says what a killed
+its files beside them and exchanges the sets at its end (`exchange.py` says what a killed
 process leaves). While it runs it holds the folder; a second one is refused.
 """
 

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 from pipeline.api.gap_figures import (
     write_in_time,
@@ -16,6 +15,8 @@ from pipeline.api.gap_figures import (
     write_waterfall,
     write_where_map,
 )
+from pipeline.api.gap_forward import forward_table, rollout_tables
+from pipeline.api.gap_meta import inputs_of, metadata
 from pipeline.api.gap_tables import (
     candidates_table,
     found_table,
@@ -23,17 +24,15 @@ from pipeline.api.gap_tables import (
     quality_table,
     where_table,
 )
-from pipeline.cli.gap.forward import forward_table, rollout_tables, say
 from pipeline.cli.gap.options import options_of
 from pipeline.identification.compare.circumstances import WHOLE
-from pipeline.identification.workflow.forward import by_model, forward, rms
+from pipeline.identification.workflow.forward import Drive, by_model, forward, rms
 from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where, judged
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
 from pipeline.identification.workflow.story import Story, Told, tell
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
-from pipeline.logs.reading.table_file import sha256
 from reports.folder.staging import staged
 from reports.pages import gap_words as words
 from reports.pages.gap_report import write_report
@@ -41,7 +40,6 @@ from reports.table import Table
 from reports.writer import write_table, write_text
 
 logger = logging.getLogger("legwatt")
-PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 EXPLAINED, UNEXPLAINED = 0, 1
 #: Remarks on the data that the terminal shows.
 SAID = 5
@@ -123,7 +121,7 @@ def _drive(given: Setup, where: Whereabouts, options: Options) -> int:
     joints = given.model.joints
     found = [forward_table(drives, joints), *rollout_tables(drives, joints)]
     _write_tables(options, given, found)
-    say(drives)
+    _say_drives(drives)
     first, *rest = (rms(own) for own in by_model(drives).values())
     return UNEXPLAINED if rest and rest[-1] >= first else EXPLAINED
 
@@ -131,7 +129,7 @@ def _drive(given: Setup, where: Whereabouts, options: Options) -> int:
 def _staged(options: Options, given: Setup) -> AbstractContextManager[Path]:
     """Every step writes what the steps before it do, so a step's files replace any other's."""
     step = "" if options.step == "all" else f" {options.step}"
-    return staged(options.out, f"gap{step}", inputs=_inputs(options, given))
+    return staged(options.out, f"gap{step}", inputs=inputs_of(options, given))
 
 
 def _write_tables(options: Options, given: Setup, tables: Sequence[Table]) -> None:
@@ -199,27 +197,10 @@ def _say_answer(story: Story, out: Path) -> None:
     print(f"written to {out}")
 
 
-def _inputs(options: Options, given: Setup) -> list[Path]:
-    """Every file that was read."""
-    files = [*options.logs, *options.holdout, *given.sources]
-    return files + [path for path in (options.mapping, options.model) if path]
-
-
-def metadata(options: Options, given: Setup) -> dict[str, Any]:
-    """What every sidecar says about the run: inputs by hash, versions, options."""
-    return {
-        "inputs_sha256": {path.name: sha256(path) for path in _inputs(options, given)},
-        "versions": {name: version(name) for name in PACKAGES},
-        "options": {
-            "step": options.step,
-            "base": options.base or "as the log and the robot say",
-            "alternative": given.alternative or "none: the torque is the joint's",
-            "effort": options.effort or "the log's most direct",
-            "cutoff_Hz": options.cutoff,
-            "gait_start_s": options.gait_start,
-            "prove_last": options.prove_last,
-        },
-        "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "
-        "direction; gap is measured less predicted",
-        "warnings": list(given.warnings),
-    }
+def _say_drives(drives: Sequence[Drive]) -> None:
+    """What a person wants to know first."""
+    logs = len({d.log.name for d in drives})
+    for model, own in by_model(drives).items():
+        print(
+            f"{model}: position misses by {1e3 * rms(own):.1f} mrad root mean square, {logs} logs"
+        )

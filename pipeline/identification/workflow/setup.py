@@ -73,8 +73,12 @@ class Setup:
         return self.robot is not None and self.robot.floating
 
 
-def setup(options: Options) -> Setup:
+def setup(options: Options, known: ModelFile | None = None) -> Setup:
     """Load the robot, its actuator and the model file.
+
+    Args:
+        options: Of the run.
+        known: What a model file would hold, where it was not written; `options.model` otherwise.
 
     Raises:
         PipelineError: The robot file or URDF cannot be used.
@@ -83,7 +87,7 @@ def setup(options: Options) -> Setup:
     """
     folder = options.actuators or Path(CATALOG)
     catalog = load_catalog(folder)
-    given_file = read_model_file(options.model, folder) if options.model else None
+    given_file = read_model_file(options.model, folder) if options.model else known
     path: Path = options.robot or (given_file.robot if given_file else DEFAULT_ROBOT)
     alternative = _alternative(options, given_file)
     if not path.is_file():
@@ -271,7 +275,7 @@ def _largest(given: Setup) -> dict[str, np.ndarray]:
     }
 
 
-def check_options(options: Options) -> None:
+def check_options(options: Options, known: ModelFile | None = None) -> None:
     """Refuse options that cannot be, before anything is read.
 
     Raises:
@@ -292,7 +296,7 @@ def check_options(options: Options) -> None:
         if file and not file.is_file():
             fact = "is a folder, expected a" if file.is_dir() else "no such"
             raise error(f"{file}: {fact} {what} file")
-    if options.step == "shrink" and not options.model:
+    if options.step == "shrink" and not (options.model or known):
         raise ModelFileError("gap shrink: name the model file to check with --model")
     if options.gait_start is not None and not math.isfinite(options.gait_start):
         raise GapError(f"--gait-start {options.gait_start}: expected a time in the log [s]")

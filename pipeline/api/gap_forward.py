@@ -1,4 +1,4 @@
-"""What step `forward` writes and says."""
+"""The tables of step `forward`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.identification.workflow.forward import Drive, by_model, rms
+from pipeline.identification.workflow.forward import Drive, by_model
 from reports.table import Table
 from reports.tables import forward as tables
 
@@ -55,12 +55,3 @@ def rollout_tables(drives: Sequence[Drive], joints: Sequence[str]) -> list[Table
         )
         for before, after in zip(first, last, strict=True)
     ]
-
-
-def say(drives: Sequence[Drive]) -> None:
-    """What a person wants to know first."""
-    logs = len({d.log.name for d in drives})
-    for model, own in by_model(drives).items():
-        print(
-            f"{model}: position misses by {1e3 * rms(own):.1f} mrad root mean square, {logs} logs"
-        )

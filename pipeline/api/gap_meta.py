@@ -1,0 +1,39 @@
+"""What the sidecars of a run of the workflow say of it."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import Setup
+from pipeline.logs.reading.table_file import sha256
+
+PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
+
+
+def inputs_of(options: Options, given: Setup) -> list[Path]:
+    """Every file that was read."""
+    files = [*options.logs, *options.holdout, *given.sources]
+    return files + [path for path in (options.mapping, options.model) if path]
+
+
+def metadata(options: Options, given: Setup) -> dict[str, Any]:
+    """What every sidecar says about the run: inputs by hash, versions, options."""
+    return {
+        "inputs_sha256": {path.name: sha256(path) for path in inputs_of(options, given)},
+        "versions": {name: version(name) for name in PACKAGES},
+        "options": {
+            "step": options.step,
+            "base": options.base or "as the log and the robot say",
+            "alternative": given.alternative or "none: the torque is the joint's",
+            "effort": options.effort or "the log's most direct",
+            "cutoff_Hz": options.cutoff,
+            "gait_start_s": options.gait_start,
+            "prove_last": options.prove_last,
+        },
+        "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "
+        "direction; gap is measured less predicted",
+        "warnings": list(given.warnings),
+    }

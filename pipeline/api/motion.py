@@ -1,0 +1,149 @@
+"""Standing and walking: one call, one result."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from actuators.chain import Chain
+from actuators.errors import CatalogError, closest
+from pipeline.api.machine import Machine
+from pipeline.api.result import Result, by_name
+from pipeline.api.tables import (
+    IDEAL,
+    metadata,
+    table_of_parameters,
+    tables_of_standing,
+    tables_of_walking,
+)
+from pipeline.errors import RobotFileError
+from pipeline.simulation import walk_stand
+from pipeline.simulation.settings import SAMPLES, Settings
+from reports.table import Table
+
+
+@dataclass(frozen=True, eq=False)
+class Stand(Result):
+    """The robot standing still.
+
+    Attributes:
+        result: Arrays: posture, demand, contacts, what holds, by alternative.
+    """
+
+    result: walk_stand.Standing
+
+    @property
+    def holding(self) -> Table:
+        """Torque, current, voltage and power of every joint and alternative."""
+        return self.table("standing")
+
+    @property
+    def energy(self) -> Table:
+        """Energy by leg and alternative [J]."""
+        return self.table("standing_energy")
+
+    @property
+    def contacts(self) -> Table:
+        """Feet and ground forces."""
+        return self.table("standing_contacts")
+
+
+@dataclass(frozen=True, eq=False)
+class Walk(Result):
+    """The robot over one gait cycle.
+
+    Attributes:
+        result: Arrays: motion, demand, margins, stages and supplies, by alternative.
+    """
+
+    result: walk_stand.Walking
+
+    @property
+    def demand(self) -> Table:
+        """Position, velocity, acceleration and torque of every joint over time."""
+        return self.table("walking_joint_demand")
+
+    @property
+    def energy(self) -> Table:
+        """Electrical energy of one cycle by alternative and leg [J]."""
+        return self.table("walking_energy")
+
+    @property
+    def stages(self) -> Table:
+        """E(+) and E(-) at every stage of every actuator [J]."""
+        return self.table("walking_stage_energy")
+
+
+def stand(machine: Machine, actuator: str | None = None) -> Stand:
+    """Stand still and hold, as the robot file says.
+
+    Args:
+        machine: From `load`, with a floating base.
+        actuator: Name of an alternative; all by default.
+
+    Raises:
+        TippingError: A foot would have to pull.
+        PipelineError: The robot stands on a fixed base.
+        ActuatorError: No such alternative.
+    """
+    given = _legged(machine, machine.settings(samples=SAMPLES, walks=False))
+    chains = _chains(given, actuator)
+    result = walk_stand.stand(given.machine, chains, adjust=given.adjust)
+    tables = [*tables_of_standing(given, result), table_of_parameters(given)]
+    return Stand(by_name(tables), "stand", metadata(given), result)
+
+
+def walk(
+    machine: Machine,
+    actuator: str | None = None,
+    *,
+    samples: int = SAMPLES,
+    quasi_static: bool = False,
+    regeneration: str = "none",
+) -> Walk:
+    """Walk one cycle of the robot file's gait.
+
+    Args:
+        machine: From `load`, with a floating base.
+        actuator: Name of an alternative, which the ideal one is put beside, since ratios refer to
+            it; all alternatives by default.
+        samples: Per segment of the gait.
+        quasi_static: Leave out the links' inertial terms.
+        regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
+
+    Raises:
+        TippingError: A foot would have to pull.
+        PipelineError: The robot stands on a fixed base, or an argument is out of range.
+        ActuatorError: No such alternative.
+    """
+    made = machine.settings(samples=samples, quasi_static=quasi_static, regeneration=regeneration)
+    given = _legged(machine, made)
+    chains = _chains(given, actuator)
+    result = walk_stand.walk(
+        given.machine,
+        chains,
+        samples=given.samples,
+        quasi_static=given.quasi_static,
+        regeneration=given.regeneration,
+        adjust=given.adjust,
+    )
+    tables = [*tables_of_walking(given, result), table_of_parameters(given)]
+    return Walk(by_name(tables), "walk", metadata(given), result)
+
+
+def _legged(machine: Machine, given: Settings) -> Settings:
+    if not given.robot.floating:
+        raise RobotFileError(
+            f"{machine.path}: a robot on a stand neither stands nor walks; "
+            "give one with a floating base"
+        )
+    return given
+
+
+def _chains(given: Settings, actuator: str | None) -> Mapping[str, Chain]:
+    chains = given.chains()
+    if actuator is None:
+        return chains
+    if actuator not in chains:
+        raise CatalogError(f"no alternative '{actuator}'; {closest(actuator, list(chains))}")
+    return {name: chain for name, chain in chains.items() if name in (IDEAL, actuator)}

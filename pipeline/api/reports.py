@@ -1,0 +1,127 @@
+"""Everything a run of stand, walk or reports computes, written to a folder."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+from pipeline.api.machine import Machine
+from pipeline.api.tables import (
+    findings,
+    inputs_of,
+    metadata,
+    table_of_parameters,
+    tables_of_standing,
+    tables_of_walking,
+)
+from pipeline.errors import RobotFileError
+from pipeline.simulation.settings import SAMPLES, Settings
+from pipeline.simulation.walk_stand import stand, walk
+from reports.folder.staging import staged
+from reports.table import Table
+from reports.writer import write_table
+
+logger = logging.getLogger("legwatt")
+
+
+def reports(
+    machine: Machine,
+    folder: str | Path,
+    *,
+    samples: int = SAMPLES,
+    quasi_static: bool = False,
+    regeneration: str = "none",
+    decimal: str = ".",
+) -> tuple[str, ...]:
+    """Stand, walk, hold it against the paper where it is the paper's robot; tables, figures, page.
+
+    Args:
+        machine: From `load`, with a floating base.
+        folder: For everything written; a run that it held is replaced.
+        samples: Per segment of the gait.
+        quasi_static: Leave out the links' inertial terms.
+        regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
+        decimal: ``","`` writes copies for a decimal-comma spreadsheet, too.
+
+    Returns:
+        What a reader should not overlook, a line each.
+
+    Raises:
+        TippingError: A foot would have to pull.
+        PipelineError: Unusable input.
+        ReportError: The folder cannot be written.
+    """
+    given = machine.settings(samples=samples, quasi_static=quasi_static, regeneration=regeneration)
+    return write(given, "reports", Path(folder), decimal)
+
+
+def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple[str, ...]:
+    """Compute what a verb asks for, then write it.
+
+    Args:
+        given: Robot and actuators.
+        verb: ``stand``, ``walk`` or ``reports``.
+        folder: For everything written.
+        decimal: Sign of decimals in copies of the tables.
+
+    Returns:
+        What was written and what a reader should not overlook, a line each.
+
+    Raises:
+        PipelineError: Unusable input.
+        ReportError: The folder cannot be written.
+    """
+    if not given.robot.floating:
+        raise RobotFileError(
+            f"{given.robot.spec.path}: a robot on a stand neither stands nor walks; "
+            "give one with a floating base"
+        )
+    said: list[str] = []
+    tables: list[Table] = []
+    standing = walking = None
+    if verb in ("stand", "reports"):
+        logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
+        standing = stand(given.machine, given.chains(), adjust=given.adjust)
+        tables += tables_of_standing(given, standing)
+    if verb in ("walk", "reports"):
+        logger.info("walking one cycle, %d samples per segment", given.samples)
+        walking = walk(
+            given.machine,
+            given.chains(),
+            samples=given.samples,
+            quasi_static=given.quasi_static,
+            regeneration=given.regeneration,
+            adjust=given.adjust,
+        )
+        tables += tables_of_walking(given, walking)
+    tables.append(table_of_parameters(given))
+    judgement = None
+    if verb == "reports":
+        from pipeline.api import judgement as judging
+        from pipeline.paper.judgement.basis import basis
+
+        by = basis(given)
+        if isinstance(by, str):
+            said.append(f"not held against the paper: {by}")
+        else:
+            logger.info("holding the run against the paper")
+            judgement, more = judging.judged(given, by)
+            tables += more
+            if by.word:
+                said.append(by.word)
+    with staged(folder, verb, inputs=inputs_of(given)) as out:
+        for table in tables:
+            write_table(table, out, meta=metadata(given), decimal=decimal)
+        files = len(tables)
+        if verb == "reports":
+            from pipeline.api.figures import write_figures
+
+            assert standing is not None
+            assert walking is not None
+            logger.info("drawing figures")
+            files += write_figures(given, standing, walking, out)
+            if judgement is not None:
+                files += judging.pages(given, judgement, tables, out)
+    said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
+    remarks = given.effects.remarks if given.effects else ()
+    return (*said, *given.remarks, *remarks, *(findings(walking, given) if walking else ()))

@@ -1,0 +1,14 @@
+"""An actuator of one's own: the catalogue's reversible one with a better Harmonic Drive."""
+
+# %%
+import pipeline as lw
+
+KEY = "harmonic_drive.viscous"  # [N*m*s/rad], as the catalogue writes it
+today = lw.load("urdf/hexapod.toml")
+better = lw.load("urdf/hexapod.toml", changes={KEY: 1.0})
+
+# %%
+for machine in (today, better):
+    energy = lw.walk(machine, "reversible").energy.frame()
+    robot = energy[(energy["leg"] == "robot") & (energy["alternative"] == "reversible")]
+    print(machine.changes or "catalogue", f"{robot['electrical_J'].item():.1f} J per cycle")

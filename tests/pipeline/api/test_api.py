@@ -1,0 +1,134 @@
+"""The Python API says what the command line writes."""
+
+from __future__ import annotations
+
+import doctest
+import runpy
+import subprocess
+import sys
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+import pipeline as lw
+from actuators.errors import CatalogError
+from pipeline.api.result import Result
+from pipeline.errors import PipelineError, RobotFileError
+from pipeline.logs.errors import GapError
+from reports.errors import TableError
+from tests.app.conftest import exit_code
+
+EXAMPLES = sorted((Path(__file__).parents[3] / "pipeline" / "examples").glob("*.py"))
+
+
+@pytest.fixture
+def machine(root: Path, monkeypatch: pytest.MonkeyPatch) -> lw.Machine:
+    monkeypatch.chdir(root)
+    return lw.load("urdf/hexapod.toml")
+
+
+def same(folder: Path, tables: Result, names: set[str]) -> None:
+    for name in names:
+        written = pd.read_csv(folder / f"{name}.csv")
+        frame = tables.table(name).frame()
+        assert list(frame.columns) == list(written.columns)
+        numbers = written.select_dtypes("number").columns
+        pd.testing.assert_frame_equal(
+            frame[numbers].astype(float), written[numbers].astype(float), rtol=1e-12, atol=1e-9
+        )
+
+
+def test_walk_and_stand_are_those_of_the_command_line(machine: lw.Machine, tmp_path: Path) -> None:
+    walk = lw.walk(machine, samples=101)
+    stand = lw.stand(machine)
+    assert exit_code(["walk", "--samples", "101", "--out", str(tmp_path / "walk")]) == 0
+    assert exit_code(["stand", "--out", str(tmp_path / "stand")]) == 0
+    same(tmp_path / "walk", walk, {"walking_joint_demand", "walking_energy", "robot_energy"})
+    same(tmp_path / "stand", stand, {"standing", "standing_energy", "standing_contacts"})
+
+
+def test_saved_files_are_those_of_the_command_line(machine: lw.Machine, tmp_path: Path) -> None:
+    lw.walk(machine, samples=101).save(tmp_path / "api")
+    assert exit_code(["walk", "--samples", "101", "--out", str(tmp_path / "cli")]) == 0
+    files = {p.name for p in (tmp_path / "cli").iterdir()}
+    assert {p.name for p in (tmp_path / "api").iterdir()} == files
+    for name in files:
+        assert (tmp_path / "api" / name).read_bytes() == (tmp_path / "cli" / name).read_bytes()
+
+
+def test_one_actuator_beside_the_ideal_one(machine: lw.Machine) -> None:
+    walk = lw.walk(machine, "reversible", samples=101)
+    assert set(walk.energy.frame()["alternative"]) == {"ideal", "reversible"}
+
+
+def test_changed_numbers_are_those_of_set(machine: lw.Machine, tmp_path: Path) -> None:
+    changed = lw.load("urdf/hexapod.toml", changes={"harmonic_drive.load": 0.1})
+    walk = lw.walk(changed, samples=101)
+    more = ["--set", "harmonic_drive.load=0.1", "--samples", "101", "--out", str(tmp_path)]
+    assert exit_code(["walk", *more]) == 0
+    same(tmp_path, walk, {"walking_energy"})
+
+
+def test_what_is_found_is_in_the_model_and_read_back(machine: lw.Machine, tmp_path: Path) -> None:
+    log = lw.read_log("pipeline/identification/demo/walk.parquet", machine)
+    assert "ok" in set(log.quality.frame()["verdict"])
+    found = lw.identify(log, machine, test="pipeline/identification/demo/walk_slow.parquet")
+    assert list(found.found.frame()["effect"]) == ["coulomb_friction"]
+    before, after = found.gap
+    assert after < 0.1 * before
+    assert not found.unexplained
+    file = found.model.save(tmp_path / "model.toml")
+    read = lw.load(model=file)
+    assert read.model is not None
+    assert found.model.model is not None
+    assert read.model.edits == found.model.model.edits
+    energies = [lw.walk(m, "rotor", samples=101).energy.frame() for m in (found.model, read)]
+    pd.testing.assert_frame_equal(*energies)
+    plain = lw.walk(machine, "rotor", samples=101).energy.frame()
+    assert energies[0]["electrical_J"].max() > plain["electrical_J"].max()
+    again = lw.validate("pipeline/identification/demo/walk_slow.parquet", read)
+    assert again.gap[1] < 0.1 * again.gap[0]
+
+
+def test_errors_are_one_line(machine: lw.Machine, tmp_path: Path) -> None:
+    trials = [
+        (lambda: lw.load(tmp_path / "no.toml"), PipelineError),
+        (lambda: lw.load(tmp_path / "no.urdf"), RobotFileError),
+        (lambda: lw.load(changes={"hip_spacin": 3}), PipelineError),
+        (lambda: lw.walk(machine, "reversibel"), CatalogError),
+        (lambda: lw.walk(machine, samples=3), PipelineError),
+        (lambda: lw.read_log(tmp_path / "no.csv", machine), GapError),
+        (lambda: lw.validate("pipeline/identification/demo/walk.parquet", machine), GapError),
+        (lambda: lw.stand(machine).table("standin"), TableError),
+        (lambda: machine.save(tmp_path / "model.toml"), PipelineError),
+        (lambda: lw.stand(lw.load("urdf/leg.toml")), PipelineError),
+    ]
+    for call, kind in trials:
+        with pytest.raises(kind) as error:
+            call()
+        assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
+def test_examples_run(
+    path: Path, root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(root)
+    runpy.run_path(str(path))
+    assert capsys.readouterr().out.count("\n") >= 2
+
+
+def test_the_example_of_the_package_is_true(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(root)
+    assert doctest.testmod(lw).failed == 0
+    assert doctest.testmod(lw).attempted >= 4
+
+
+def test_importing_the_package_is_light(root: Path) -> None:
+    code = "import sys, pipeline; print([m for m in ('pinocchio', 'pandas') if m in sys.modules])"
+    out = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True)
+    assert out.stdout.strip() == "[]"
+    assert set(lw.__all__) <= set(dir(lw))
+    with pytest.raises(AttributeError, match="wlak"):
+        lw.wlak  # type: ignore[attr-defined]
