@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli import figures
+from pipeline.api import figures
 from pipeline.cli.demo import DEMO
 from pipeline.cli.main import main
 from reports.errors import FigureError
