@@ -306,9 +306,9 @@ def test_a_continuous_joint_needs_no_limit_and_one_of_several_coordinates_is_non
 
 
 def spoilt(hexapod: Robot, change: str, size: float) -> Robot:
-    """The hexapod with one thing of `lm_joint_2` or its link another by a share or length."""
+    """The hexapod with one thing of `lm_joint_3` or its link another by a share or length."""
     model = hexapod.model.copy()
-    index = model.getJointId("lm_joint_2")
+    index = model.getJointId("lm_joint_3")
     body, place = model.inertias[index], model.jointPlacements[index]
     if change == "mass":
         model.inertias[index] = pin.Inertia(body.mass * (1 + size), body.lever, body.inertia)
