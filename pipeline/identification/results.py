@@ -1,6 +1,6 @@
 """Thresholds and results of naming, in one place.
 
-The thresholds were set on simulated logs with nothing hidden (see `README`): there they let pass
+The thresholds were set on simulated logs with nothing hidden (see `pipeline/blind`): there they let pass
 fewer than two in a hundred logs.
 """
 

@@ -28,7 +28,8 @@ def test_generated_tables_are_current(root: Path, page: str, out: Path) -> None:
 
 def test_every_block_between_markers_is_generated(root: Path) -> None:
     for page in pages():
-        for name in re.findall(r"<!-- begin: ([\w ]+) -->", (root / page).read_text(encoding="utf-8")):
+        text = (root / page).read_text(encoding="utf-8")
+        for name in re.findall(r"<!-- begin: ([\w ]+) -->", text):
             assert BLOCKS[name][0] == page.as_posix()
 
 
