@@ -15,7 +15,7 @@ quoted = '$(subst ','\'',$(1))'
 SHARE  ?= 0.15
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports gap blind calibrate test test-slow lint check bench mutants readme urdf lock clean
+.PHONY: help env reports gap blind calibrate test test-slow lint check bench mutants readme docs urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -51,8 +51,15 @@ bench: $(STAMP)  ## Print speed ratios measured in one run
 mutants: $(STAMP)  ## Put faults into the code and see whether tests notice (SHARE=, ARGS=; extra `mutants`)
 	$(PY) -m tests.mutants --share $(SHARE) $(ARGS)
 
-readme: $(STAMP)  ## Renew the README's tables and pictures from a run (BLIND=: those of a run of blind)
-	$(PY) -m tests.readme $(if $(BLIND),blind $(call quoted,$(BLIND)))
+readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run (BLIND=: those of a run of blind)
+	$(PY) -m tests.readme $(if $(BLIND),--blind $(call quoted,$(BLIND)))
+
+docs: $(VENV)/.docs  ## Build the pages and the API reference into a site in reports/out/docs (OUT=)
+	$(PY) reports/docs/build.py $(call quoted,$(OUT)/docs)
+
+$(VENV)/.docs: $(STAMP) reports/docs/requirements.lock
+	$(PY) -m pip install --quiet --require-hashes --no-deps -r reports/docs/requirements.lock
+	@touch $@
 
 # Exit 1 is a finding (something stays unexplained), not an error of make. LOG= is one file, whose
 # name may hold spaces, or several.
@@ -77,6 +84,12 @@ lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
 	  --no-emit-trusted-host --strip-extras --extra dev --extra mutants --allow-unsafe \
 	  -o requirements.lock pyproject.toml
+	$(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']\
+	['optional-dependencies']['docs'], sep='\n')" > reports/docs/requirements.in
+	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
+	  --no-emit-trusted-host --strip-extras --allow-unsafe -c requirements.lock \
+	  -o reports/docs/requirements.lock reports/docs/requirements.in
+	@rm reports/docs/requirements.in
 
 clean:  ## Remove what a run wrote
 	rm -rf reports/out .pytest_cache .mypy_cache .ruff_cache .hypothesis

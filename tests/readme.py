@@ -1,4 +1,4 @@
-"""The README's tables and pictures from a run: `make readme`. A test holds the tables current."""
+"""The pages' generated tables and pictures: `make readme`. A test holds the tables current."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import sys
 import tempfile
 import textwrap
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-README = ROOT / "README.md"
 PICTURES = ROOT / "reports" / "example"
 SHOWN = ("robot.png", "electrical_energy.png")
 LEG = "rm"
@@ -108,7 +107,7 @@ def parameters(out: Path) -> str:
     ).replace("| --- | ---: | ---: |", "| --- | ---: | --- |")
 
 
-#: Rates of the blind trials in the README's order and words.
+#: Rates of the blind trials in the page's order and words.
 RATES = {
     "right_and_written": "one effect the log can show: the first name, with its place, is it or "
     "one of its class, **and the model file holds it**",
@@ -146,6 +145,34 @@ def agreement(out: Path) -> str:
         raise ValueError(f"the calibration does not belong to the files: {by}")
     text = first_paragraph(judged(given, by)[0])
     return "\n".join(textwrap.wrap(text, 110, break_on_hyphens=False, break_long_words=False))
+
+
+def _written(unit: str) -> str:
+    """A unit as pages write it."""
+    return "that of the channel" if unit == "channel" else unit.replace("*", "·").replace("^2", "²")
+
+
+def effects(out: Path) -> str:
+    """Every effect with its parameters, from the catalogue."""
+    from pipeline.effects.base import Effect
+    from pipeline.effects.registry import EFFECTS
+
+    def name(effect: Effect) -> str:
+        special = ", ".join(f"`{word}`" for word in effect.contains)
+        return f"`{effect.name}`" + (f", contains {special}" if special else "")
+
+    def place(effect: Effect) -> str:
+        return effect.place_kind + (" (tolerance)" if effect.is_tolerance else "")
+
+    def parameters(effect: Effect) -> str:
+        units = {p.name: _written(p.unit) for p in effect.parameters}
+        return ", ".join(f"`{n}`" + (f" [{u}]" if u != "1" else "") for n, u in units.items())
+
+    text = table(
+        ("effect", "acts at", "parameters", "is shown by a motion that"),
+        [(name(e), place(e), parameters(e), e.excitation) for e in EFFECTS.values()],
+    )
+    return text.replace("---:", "---")
 
 
 def share(hits: str, trials: str) -> str:
@@ -206,70 +233,96 @@ def blind_effects(out: Path) -> str:
     return table((*header, "called unexplained", "wrong"), lines)
 
 
-BLOCKS = {
-    "standing": standing,
-    "walking": walking,
-    "parameters": parameters,
-    "agreement": agreement,
-    "blind": blind,
-    "blind effects": blind_effects,
+#: Block -> the page it stands on, and what makes it; some need a run, some the code alone.
+BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
+    "standing": ("README.md", standing),
+    "walking": ("README.md", walking),
+    "parameters": ("pipeline/paper/README.md", parameters),
+    "agreement": ("pipeline/paper/README.md", agreement),
+    "effects": ("pipeline/effects/README.md", effects),
+    "blind": ("pipeline/blind/README.md", blind),
+    "blind effects": ("pipeline/blind/README.md", blind_effects),
 }
-#: What a run of `make blind` leaves that the README shows.
+OF_BLIND = ("blind", "blind effects")
+WITHOUT_RUN = {"agreement", "effects", *OF_BLIND}
+PAGES = tuple(dict.fromkeys(page for page, _ in BLOCKS.values()))
+#: What a run of `make blind` leaves that its page shows.
 BLIND = ("blind_trials.csv", "blind_rates.csv", "blind_by_effect.csv", "blind_confusion.csv")
 BLIND_PICTURE = "blind_confusion.png"
 
 
-def renewed(text: str, out: Path, names: Iterable[str] = tuple(BLOCKS)) -> str:
-    """The README with blocks between their markers made anew from a run's files.
+def renewed(page: str, text: str, out: Path, names: Collection[str] = tuple(BLOCKS)) -> str:
+    """A page with its blocks between their markers made anew from a run's files.
 
     Args:
-        text: Of the README.
+        page: Relative to the root.
+        text: Of the page.
         out: Folder of the run.
-        names: Of the blocks.
+        names: Blocks to renew.
 
     Raises:
         ValueError: A block's markers are missing or doubled.
     """
-    for name in names:
-        make = BLOCKS[name]
+    for name, (own, make) in BLOCKS.items():
+        if own != page or name not in names:
+            continue
         begin, end = f"<!-- begin: {name} -->", f"<!-- end: {name} -->"
         pattern = re.compile(re.escape(begin) + r".*?" + re.escape(end), re.S)
         if len(pattern.findall(text)) != 1:
-            raise ValueError(f"README.md: '{begin}' and '{end}' must stand once")
+            raise ValueError(f"{page}: '{begin}' and '{end}' must stand once")
         block = f"{begin}\n{make(out)}\n{end}"
         text = pattern.sub(lambda _, block=block: block, text)
     return text
 
 
+def renew(out: Path, names: Collection[str]) -> None:
+    """Write the pages that have blocks of these names."""
+    for page in dict.fromkeys(BLOCKS[name][0] for name in names):
+        path = ROOT / page
+        text = path.read_text(encoding="utf-8")
+        path.write_text(renewed(page, text, out, names), encoding="utf-8")
+        print(f"renewed {page}")
+
+
 def store_blind(folder: Path) -> int:
-    """Take over the tables and the picture of a run of `make blind`, renew the README's."""
+    """Take over the tables and the picture of a run of `make blind`, renew their page.
+
+    Args:
+        folder: Of that run.
+    """
     for name in (*BLIND, BLIND_PICTURE):
         shutil.copyfile(folder / name, PICTURES / name)
-    text = README.read_text(encoding="utf-8")
-    README.write_text(renewed(text, folder, ("blind", "blind effects")), encoding="utf-8")
-    print(f"renewed {README.name} from {folder}")
+    renew(folder, OF_BLIND)
     return 0
 
 
-def main() -> int:
-    """Run, renew the tables and pictures; with `blind DIR` those of the blind trials."""
-    if sys.argv[1:2] == ["blind"]:
-        return store_blind(Path(sys.argv[2]))
+def main(words: Sequence[str]) -> int:
+    """Run, renew tables and pictures; only the named tables where names are given.
+
+    Args:
+        words: Names of blocks (all of them, and the pictures, by default), or `--blind DIR` to take
+            over the run of blind trials in DIR.
+    """
+    if words[:1] == ["--blind"]:
+        return store_blind(Path(words[1]))
     from pipeline.cli.main import main as command
 
+    if unknown := set(words) - set(BLOCKS):
+        print(f"no block {', '.join(sorted(unknown))}; known: {', '.join(BLOCKS)}", file=sys.stderr)
+        return 2
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder)
-        code = command(["reports", "--robot", str(ROOT / "urdf/hexapod.toml"), "--out", str(out)])
-        if code:
-            return code
-        text = README.read_text(encoding="utf-8")
-        README.write_text(renewed(text, out), encoding="utf-8")
-        PICTURES.mkdir(exist_ok=True)
-        for name in SHOWN:
-            shutil.copyfile(out / name, PICTURES / name)
-    print(f"renewed {README.name} and {len(SHOWN)} pictures")
+        if not words or set(words) - WITHOUT_RUN:
+            robot = str(ROOT / "urdf/hexapod.toml")
+            if code := command(["reports", "--robot", robot, "--out", str(out)]):
+                return code
+        renew(out, words or tuple(BLOCKS))
+        if not words:
+            PICTURES.mkdir(exist_ok=True)
+            for name in SHOWN:
+                shutil.copyfile(out / name, PICTURES / name)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(sys.argv[1:]))

@@ -1,7 +1,7 @@
 """Thresholds and results of naming, in one place.
 
-The thresholds were set on simulated logs with nothing hidden (see `README`): there they let pass
-fewer than two in a hundred logs.
+The thresholds were set on simulated logs with nothing hidden (see `pipeline/blind`): there they let
+pass fewer than two in a hundred logs.
 """
 
 from __future__ import annotations

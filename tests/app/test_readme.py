@@ -1,4 +1,4 @@
-"""What the README says is so: tables from a run, links, targets and options that exist."""
+"""What the pages' tables say is so: those from a run are current, the others are complete."""
 
 from __future__ import annotations
 
@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.main import parser
-from tests.readme import SHOWN, number, renewed
-
-LINK = re.compile(r"\]\(([^)#:]+)\)")
+from pipeline.logs.reading import mapping
+from pipeline.logs.reading.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
+from pipeline.robot import robot_file
+from pipeline.robot.robot_file import GAIT_SCHEMA
+from tests.pages import pages
+from tests.readme import BLOCKS, PAGES, SHOWN, number, renewed
 
 
 @pytest.fixture(scope="module")
@@ -18,14 +20,17 @@ def readme(root: Path) -> str:
     return (root / "README.md").read_text(encoding="utf-8")
 
 
-def test_tables_are_current(readme: str, out: Path) -> None:
-    assert renewed(readme, out) == readme, "run `make readme`"
+@pytest.mark.parametrize("page", PAGES)
+def test_generated_tables_are_current(root: Path, page: str, out: Path) -> None:
+    text = (root / page).read_text(encoding="utf-8")
+    assert renewed(page, text, out) == text, "run `make readme`"
 
 
-def test_links_lead_somewhere(root: Path, readme: str) -> None:
-    links = LINK.findall(readme)
-    assert len(links) > 8
-    assert not [link for link in links if not (root / link).exists()]
+def test_every_block_between_markers_is_generated(root: Path) -> None:
+    for page in pages():
+        text = (root / page).read_text(encoding="utf-8")
+        for name in re.findall(r"<!-- begin: ([\w ]+) -->", text):
+            assert BLOCKS[name][0] == page.as_posix()
 
 
 def test_pictures_are_small(root: Path, readme: str) -> None:
@@ -41,21 +46,30 @@ def test_named_targets_exist_and_are_in_the_help(root: Path, readme: str) -> Non
     assert phony
     assert helped == set(phony[1].split())
     named = set(re.findall(r"(?:`|^)make ([a-z-]+)", readme, flags=re.M))
-    assert {"reports", "test", "urdf", "bench"} <= named <= helped
+    assert {"reports", "gap", "test", "docs", "bench"} <= named <= helped
 
 
-def test_named_files_are_left_by_a_run(readme: str, out: Path) -> None:
-    section = readme.split("## What a run leaves")[1].split("**In a spreadsheet.**")[0]
+def test_named_files_are_left_by_a_run(root: Path, out: Path) -> None:
+    page = (root / "reports/tables/README.md").read_text(encoding="utf-8")
+    section = page.split("<!-- files: stand, walk -->")[1].split("\n\n")[0]
     named = set(re.findall(r"`(\w+\.csv)`", section))
     assert named == {path.name for path in out.glob("*.csv")}
 
 
-def test_named_options_exist(readme: str) -> None:
-    text = parser().format_help()
-    for action in parser()._subparsers._group_actions[0].choices.values():  # type: ignore[union-attr]
-        text += action.format_help()
-    for option in set(re.findall(r"(?<!-)--[a-z][a-z-]+", readme)):
-        assert option in text or option == "--help", option
+def test_every_column_of_the_log_format_is_described(root: Path) -> None:
+    page = (root / "pipeline/logs/README.md").read_text(encoding="utf-8")
+    table = page.split("## The log format")[1].split("\n## ")[0]
+    for column in (*JOINT_COLUMNS, *FOOT_COLUMNS, *BASE_COLUMNS):
+        assert re.search(rf"(__|`){column}`", table), column
+
+
+def test_every_key_of_robot_and_mapping_files_is_described(root: Path) -> None:
+    robot = (root / "urdf/README.md").read_text(encoding="utf-8")
+    for key in (*GAIT_SCHEMA, *robot_file._ROBOT_KEYS, *robot_file._LEG_KEYS):
+        assert f"`{key}`" in robot, key
+    logs = (root / "pipeline/logs/README.md").read_text(encoding="utf-8")
+    for key in (*mapping._TOP, *mapping._COLUMN):
+        assert re.search(rf"\b{key}\b", logs), key
 
 
 @pytest.mark.parametrize(
