@@ -138,7 +138,7 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     Raises:
         ParameterError: A file cannot be read, or a parameter is wrong.
         CatalogError: A component, law, argument or reference is unknown, a ratio does not come
-            out, or a parameter of a component in use is used by no alternative.
+            out, or an element leaves out a parameter that its law takes and no other uses.
         ActuatorError: A parameter is unphysical.
     """
     folder = Path(directory)
@@ -159,13 +159,17 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
             raise CatalogError(f"alternative '{alternative.name}': {error}") from None
     catalog = catalog.only(alternatives)
     used = {r for alternative in alternatives.values() for r in alternative.references}
-    motors = {alternative.motor for alternative in alternatives.values()}
-    for component, parameter in catalog.rows():
-        if component not in motors and f"{component}.{parameter.name}" not in used:
-            raise CatalogError(
-                f"{component}.toml: parameter '{parameter.name}' is used by no alternative: "
-                f"name it in {ALTERNATIVES_FILE} or remove it"
-            )
+    for element in (e for a in alternatives.values() for e in a.elements):
+        _, needed, possible = LAWS[element.law]
+        # Forgotten, where the law would take it; another part's, where it would not.
+        for component in {r.partition(".")[0] for r in element.arguments.values()}:
+            for name in sorted((needed | possible) - set(element.arguments)):
+                known = name in catalog.components[component].parameters
+                if known and f"{component}.{name}" not in used:
+                    raise CatalogError(
+                        f"{component}.toml: parameter '{name}' is used by no alternative: "
+                        f"name it in {ALTERNATIVES_FILE} or remove it"
+                    )
     return catalog
 
 
