@@ -1,7 +1,7 @@
 """From the catalogue's files to chains: components, alternatives, and edits of their parameters."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -104,6 +104,19 @@ class Catalog:
         """Return the chain of every alternative, in order."""
         return {name: self.chain(name) for name in self.alternatives}
 
+    def only(self, names: Iterable[str]) -> "Catalog":
+        """Return a catalogue of some alternatives, in the file's order, and of what they use.
+
+        Args:
+            names: Of alternatives; others than the catalogue's are passed over.
+        """
+        kept = set(names)
+        alternatives = {n: a for n, a in self.alternatives.items() if n in kept}
+        used = {a.motor for a in alternatives.values()}
+        used |= {r.partition(".")[0] for a in alternatives.values() for r in a.references}
+        components = {n: c for n, c in self.components.items() if n in used}
+        return Catalog(MappingProxyType(components), MappingProxyType(alternatives))
+
     def _split(self, reference: str) -> tuple[Component, str]:
         """Return the component and the parameter's name of a reference."""
         component, dot, name = reference.partition(".")
@@ -119,12 +132,13 @@ class Catalog:
 def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     """Load a catalogue: every component file of a directory and its `alternatives.toml`.
 
-    Every alternative is built once, so that a catalogue that loads is one that works.
+    Every alternative is built once, so that a catalogue that loads is one that works. A component
+    that no alternative names is read and left out: an alternative can be taken out by itself.
 
     Raises:
         ParameterError: A file cannot be read, or a parameter is wrong.
         CatalogError: A component, law, argument or reference is unknown, a ratio does not come
-            out, or a parameter is used by no alternative.
+            out, or an element leaves out a parameter that its law takes and no other uses.
         ActuatorError: A parameter is unphysical.
     """
     folder = Path(directory)
@@ -133,25 +147,29 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     components = {p.stem: load_component(p) for p in files}
     alternatives = {name: read_alternative(name, entry) for name, entry in contents.items()}
     catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
-    used: set[str] = set()
     for alternative in alternatives.values():
         _check_motor(alternative, catalog)
         for reference in alternative.references:
             _check_reference(alternative.name, reference, catalog)
-        used |= set(alternative.references)
-        used |= {f"{alternative.motor}.{p}" for p in components[alternative.motor].parameters}
         try:
             catalog.chain(alternative.name)
         except CatalogError:
             raise
         except ActuatorError as error:
             raise CatalogError(f"alternative '{alternative.name}': {error}") from None
-    for component, parameter in catalog.rows():
-        if f"{component}.{parameter.name}" not in used:
-            raise CatalogError(
-                f"{component}.toml: parameter '{parameter.name}' is used by no alternative: "
-                f"name it in {ALTERNATIVES_FILE} or remove it"
-            )
+    catalog = catalog.only(alternatives)
+    used = {r for alternative in alternatives.values() for r in alternative.references}
+    for element in (e for a in alternatives.values() for e in a.elements):
+        _, needed, possible = LAWS[element.law]
+        # Forgotten, where the law would take it; another part's, where it would not.
+        for component in {r.partition(".")[0] for r in element.arguments.values()}:
+            for name in sorted((needed | possible) - set(element.arguments)):
+                known = name in catalog.components[component].parameters
+                if known and f"{component}.{name}" not in used:
+                    raise CatalogError(
+                        f"{component}.toml: parameter '{name}' is used by no alternative: "
+                        f"name it in {ALTERNATIVES_FILE} or remove it"
+                    )
     return catalog
 
 

@@ -14,6 +14,7 @@ from actuators.energy.energy import stage_energies
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.robot.robot import Robot
+from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.figures.energy.electrical_energy import electrical_energy_figure
@@ -26,7 +27,7 @@ from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.robot_view import Leg, legs_of, robot_figure
 from reports.figures.robot.visuals import Primitive, joint_marks, primitives
 from reports.figures.several import Drawing, save_figures
-from reports.pages.names import leg_words, shown_leg
+from reports.pages.names import leg_words, short_titles, shown_leg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -95,11 +96,12 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
     )
     stages = {name: stage_energies(result) for name, result in walking.results.items()}
     limits = energy_limits(stages.values(), labels)
+    titles = short_titles(given.catalog)
     out, electrical = [], {}
     for name, result in walking.results.items():
         title = given.catalog.alternatives[name].title
         columns = [result.joint.joints.index(joint) for joint in labels]
-        electrical[title.split(": ")[-1]] = stages[name][-1].forward[columns]
+        electrical[titles[name]] = stages[name][-1].forward[columns]
         out += [
             Drawing(
                 f"motor_limits_{name}",
@@ -119,6 +121,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                     stage_energy_figure,
                     stages[name],
                     labels,
+                    places=given.catalog.alternatives[name].stage_names,
                     title=title,
                     subtitle=f"energy per cycle through each stage, {leg_words(leg)}; "
                     "one scale for all alternatives",
@@ -126,14 +129,20 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                 ),
             ),
         ]
+    subtitle = (
+        "returned energy is lost"
+        if given.regeneration.policy == "none"
+        else "what the motors draw; robot_energy.csv has what their return saves"
+    )
+    if IDEAL not in walking.results:
+        subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
     figure = partial(
         electrical_energy_figure,
         list(labels.values()),
         electrical,
+        reference=titles.get(IDEAL),
         title=f"Electrical energy per cycle, {leg_words(leg)}",
-        subtitle="returned energy is lost"
-        if given.regeneration.policy == "none"
-        else "what the motors draw; robot_energy.csv has what their return saves",
+        subtitle=subtitle,
     )
     return [*out, Drawing("electrical_energy", figure)]
 
@@ -230,11 +239,16 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
         How many figures.
     """
     every = []
-    for row in judgement.break_even:
-        curves = [c for c in judgement.per_minute if c.subject == row.subject]
-        share = curves[0].fraction
-        mark = None
-        if not np.isnan(row.fraction):
+    crossings = {row.subject: row for row in judgement.break_even}
+    for subject in SUBJECT_TITLES:
+        curves = [c for c in judgement.per_minute if c.subject == subject]
+        share, row = curves[0].fraction, crossings.get(subject)
+        mark, note = None, ""
+        if row is None:
+            note = "no break-even: that is between the reversible and the irreversible actuator"
+        elif np.isnan(row.fraction):
+            note = row.note.split(";")[0]
+        else:
             reference = next(c for c in curves if c.alternative == "reversible")
             energy = float(np.interp(row.fraction, share, reference.energy))
             known = (v if np.isfinite(v) else None for v in row.prior)
@@ -251,11 +265,11 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
                 )
                 for c in curves
             ],
-            title=f"Energy in one minute: {SUBJECT_TITLES[row.subject]}",
-            subtitle=row.note.split(";")[0] if mark is None else _bands(curves),
+            title=f"Energy in one minute: {SUBJECT_TITLES[subject]}",
+            subtitle=note or _bands(curves),
             break_even=mark,
         )
-        every.append(Drawing(f"energy_per_minute_{row.subject}", figure))
+        every.append(Drawing(f"energy_per_minute_{subject}", figure))
     return save_figures(every, out)
 
 

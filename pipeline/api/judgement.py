@@ -17,7 +17,7 @@ from reports.tables import judgement as tables
 def judged(given: Settings, by: Basis) -> tuple[Judged, list[Table]]:
     """Everything held against the paper."""
     judgement = judge(
-        given.robot, given.catalog, by.published, by.prior, by.results, samples=given.samples
+        given.robot, by.catalog, by.published, by.prior, by.results, samples=given.samples
     )
     out = [
         tables.reproduction(judgement.reproduction),

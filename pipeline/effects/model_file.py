@@ -305,10 +305,10 @@ def _edit(entry: object, where: str) -> Edit:
             raise ModelFileError(
                 f"{where}: {name} has no parameter '{one_line(key)}'; {closest(key, names)}"
             )
-    missing = [n for n in names if n not in table]
+    missing = [p.name for p in effect.parameters if p.name not in table and not p.optional]
     if missing:
         raise ModelFileError(f"{where}: {name} needs the parameter '{missing[0]}'")
-    parameters = tuple(_parameter(n, table[n], effect, where) for n in names)
+    parameters = tuple(_parameter(n, table[n], effect, where) for n in names if n in table)
     return Edit(name, tuple(place), parameters, str(basis), source)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
+from actuators.loading.build import Catalog
 from pipeline.robot.robot import Robot
 from pipeline.simulation.settings import Settings
 
@@ -28,12 +31,16 @@ def _is_two_letters(leg: str) -> bool:
     return len(leg) == 2 and leg[0] in _SIDES and leg[1] in _PLACES
 
 
+def short_titles(catalog: Catalog) -> dict[str, str]:
+    """Every alternative's title without its number; where two are alike, with the name."""
+    titles = {n: a.title.split(": ", 1)[-1] for n, a in catalog.alternatives.items()}
+    seen = Counter(titles.values())
+    return {n: title if seen[title] == 1 else f"{title} ({n})" for n, title in titles.items()}
+
+
 def names_text(given: Settings) -> str:
     """A paragraph for the first place where a reader meets the names."""
-    titles = [
-        f"`{name}` ({alternative.title.split(': ', 1)[-1]})"
-        for name, alternative in given.catalog.alternatives.items()
-    ]
+    titles = [f"`{name}` ({title})" for name, title in short_titles(given.catalog).items()]
     return (
         f"An *alternative* is one way to build the actuators of all joints: {', '.join(titles)}. "
         f"{legs_text(given.robot)} `robot` is all {len(given.robot.leg_names)} legs together."

@@ -13,10 +13,12 @@ from pipeline.simulation.settings import Settings
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
-from reports.pages.names import names_text
+from reports.pages.names import names_text, short_titles
 from reports.pages.summary_words import answer, percent, roles_text
 from reports.table import Table
 
+#: Actuators of so few stages that a picture of them is left to the folder.
+PLAIN = ("ideal", "rotor")
 TONES = {
     "reproduced": "good",
     "not reproduced": "bad",
@@ -46,7 +48,10 @@ def write_summary(given: Settings, judged: Judged, tables: Sequence[Table], out:
 
 def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: Path) -> Page:
     """The page; see `write_summary`."""
-    sections = [_energy(tables, out, names_text(given)), _reproduction(judged, tables)]
+    sections = [
+        _energy(tables, out, names_text(given), short_titles(given.catalog)),
+        _reproduction(judged, tables),
+    ]
     if judged.by.results is not None:
         sections.append(_reading(judged.by))
     sections += [
@@ -63,7 +68,9 @@ def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: P
     )
 
 
-def _energy(tables: Mapping[str, Table], out: Path, names: str) -> Section:
+def _energy(
+    tables: Mapping[str, Table], out: Path, names: str, titles: Mapping[str, str]
+) -> Section:
     walking = tables["walking_energy"]
     keep = [leg in ("rm", "robot") for leg in walking.columns["leg"]]
     return Section(
@@ -75,9 +82,10 @@ def _energy(tables: Mapping[str, Table], out: Path, names: str) -> Section:
                 walking, keep=keep, caption="Energy drawn from the supply in one walking cycle."
             ),
             table_block(tables["robot_energy"], caption="The whole robot, walking."),
-            FigureBlock(out / "stage_energy_reversible.svg", "Stages of the reversible actuator."),
-            FigureBlock(
-                out / "stage_energy_irreversible.svg", "Stages of the irreversible actuator."
+            *(
+                FigureBlock(out / f"stage_energy_{name}.svg", f"Stages of the {title}.")
+                for name, title in titles.items()
+                if name not in PLAIN
             ),
         ),
     )

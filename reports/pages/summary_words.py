@@ -26,7 +26,8 @@ def answer(judged: Judged, tables: Mapping[str, Table]) -> tuple[str, ...]:
     """The paragraphs a reader in a hurry reads."""
     if judged.by.results is None:
         return (_changed(judged), _energies(judged, tables), " ".join(_counted(judged)))
-    return (first_paragraph(judged), _energies(judged, tables), _ensemble(judged))
+    others = (_changed(judged),) if judged.by.word else ()
+    return (first_paragraph(judged), _energies(judged, tables), _ensemble(judged), *others)
 
 
 def first_paragraph(judged: Judged) -> str:
@@ -71,6 +72,12 @@ def _counted(judged: Judged) -> tuple[str, ...]:
     """How many printed numbers play which part; what is predicted, contradicted, missed."""
     count = headline(judged.judgement.reproduction)
     total = sum(of for _, of in count.values())
+    if judged.judgement.missing:
+        met = sum(reproduced for reproduced, _ in count.values())
+        return (
+            f"**Reproduced:** {met} of the {total} printed numbers that can be computed with these "
+            f"actuators; {len(judged.judgement.missing)} cannot and are left out.",
+        )
     met, of = count["prediction"]
     text = (
         f"**Predicted:** only {_word(of)} of the {total} printed numbers, both zeros: standing "
@@ -153,6 +160,7 @@ def _missed(judged: Judged) -> str:
 def _price(judged: Judged) -> str:
     """What the fit asks of single numbers."""
     p = judged.judgement.price
+    assert p is not None  # asked for with all the paper's actuators alone
     _, high = p.gear_interval
     return (
         '**The price of the fit:** "almost 15" needs a planetary gear with '
@@ -176,6 +184,11 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
         if leg == PUBLISHED_LEG
     }
     rows = _rows(judged)
+    if judged.judgement.missing:
+        listed = _listed(f"**{joules:.1f} J** with `{name}`" for name, joules in legs.items())
+        return (
+            "**What it costs:** walking one 3 s cycle, the middle right leg draws " + listed + "."
+        )
     power = {
         name: rows[f"{name}_leg_energy_3s"].computed / STANDING_SECONDS
         for name in ("reversible", "irreversible")
@@ -242,7 +255,7 @@ def _ensemble(judged: Judged) -> str:
 
 
 def _changed(judged: Judged) -> str:
-    return f"**Changed numbers:** {judged.by.word}."
+    return f"**Not the paper's:** {judged.by.word}."
 
 
 def roles_text() -> str:

@@ -128,10 +128,48 @@ def test_missing_component_and_missing_catalogue(copy, tmp_path):
         load_catalog(tmp_path / "nowhere")
 
 
-def test_unused_component(copy):
+def test_a_component_that_no_alternative_names_is_left_out(copy):
     shutil.copy(copy / "output_bearing.toml", copy / "spare.toml")
-    with pytest.raises(CatalogError, match=r"spare\.toml: parameter 'coulomb' is used by no"):
+    assert "spare" not in load_catalog(copy).components
+    assert load_catalog(copy).components.keys() == load_catalog().components.keys()
+
+
+def test_a_component_that_no_alternative_names_is_read_all_the_same(copy):
+    (copy / "spare.toml").write_text("title = 3\n")
+    with pytest.raises(ActuatorError, match=r"spare\.toml"):
         load_catalog(copy)
+
+
+def test_a_number_that_no_alternative_names_is_refused_in_a_component_that_is_in_use(copy):
+    path = copy / "alternatives.toml"
+    path.write_text(path.read_text().replace('viscous = "pinion.viscous"\n', ""))
+    with pytest.raises(CatalogError, match=r"pinion\.toml: parameter 'viscous' is used by no"):
+        load_catalog(copy)
+
+
+def test_an_alternative_can_be_taken_out_by_itself(copy):
+    path = copy / "alternatives.toml"
+    text = path.read_text()
+    for name in load_catalog().alternatives:
+        following = rf"^\[{name}\].*?(?=^\[[a-z]+\]$|\Z)"
+        changed, count = re.subn(following, "", text, flags=re.M | re.S)
+        assert count == 1
+        path.write_text(changed)
+        catalog = load_catalog(copy)
+        assert list(catalog.alternatives) == [n for n in load_catalog().alternatives if n != name]
+        assert catalog == load_catalog().only(catalog.alternatives)
+
+
+def test_some_alternatives_come_with_what_they_use():
+    only = load_catalog().only(["reversible", "no_such"])
+    assert list(only.alternatives) == ["reversible"]
+    assert list(only.components) == [
+        "harmonic_drive",
+        "motor_re40_24v",
+        "requirement",
+        "rotor_re40",
+        "timing_belt",
+    ]
 
 
 def test_a_stage_without_words_is_named_after_its_element(copy):

@@ -15,7 +15,7 @@ import pytest
 
 from pipeline.cli.main import parser
 from pipeline.cli.run import settings_of
-from pipeline.paper.judgement.basis import basis
+from pipeline.paper.judgement.basis import Basis, basis
 from tests.app.conftest import Command, exit_code, rows_of
 from tests.app.robots import changed, edited_robot, own_robot
 from tests.app.test_bad_input import refused
@@ -464,13 +464,19 @@ def test_a_robot_and_actuators_of_ones_own_are_reported(
     assert not (tmp_path / "out" / "reproduction.csv").exists()
 
 
-def test_the_projects_robot_with_other_actuators_is_not_held_against_the_paper(
+def test_the_projects_robot_is_held_against_the_paper_as_far_as_its_actuators_are_the_papers(
     root: Path, tmp_path: Path
 ) -> None:
     options = parser().parse_args(
         ["reports", "--actuators", str(without_ideal(root, tmp_path / "actuators"))]
     )
     options.robot = root / "urdf" / "hexapod.toml"
-    assert isinstance(basis(settings_of(options)), str)
+    by = basis(settings_of(options))
+    assert isinstance(by, Basis)
+    assert by.missing == ("ideal",)
+    assert by.results is None
     options.actuators = None
-    assert not isinstance(basis(settings_of(options)), str)
+    by = basis(settings_of(options))
+    assert isinstance(by, Basis)
+    assert by.missing == ()
+    assert by.results is not None

@@ -95,6 +95,7 @@ def test_stretches_come_from_the_demand(walk_demand: MotionDemand) -> None:
         joint_demand_figure("rm_joint_2", [])
 
 
+PLACES = {"out": "joint", "el": "supply"}
 STAGES = [
     StageEnergy("out", ("a", "b"), np.array([0.3, 2.6]), np.array([0.3, 2.6])),
     StageEnergy("el", ("a", "b"), np.array([1.5, 9.0]), np.array([0.0, 0.2])),
@@ -102,7 +103,7 @@ STAGES = [
 
 
 def test_stage_energy_bars_are_the_energies() -> None:
-    figure = stage_energy_figure(STAGES, JOINTS, title="Alternative")
+    figure = stage_energy_figure(STAGES, JOINTS, places=PLACES, title="Alternative")
     assert [axes.get_title(loc="center") for axes in figure.axes] == ["joint 1", "joint 2"]
     heights = [p.get_height() for p in figure.axes[1].patches]
     assert heights == [2.6, 9.0, -2.6, -0.2]
@@ -118,7 +119,9 @@ def test_stage_energies_of_all_alternatives_share_one_scale() -> None:
     limits = energy_limits([STAGES, smaller], JOINTS)
     assert limits == (9.0, 10.4)
     ranges = {
-        stage_energy_figure(stages, JOINTS, title="t", limits=limits).axes[0].get_ylim()
+        stage_energy_figure(stages, JOINTS, places=PLACES, title="t", limits=limits)
+        .axes[0]
+        .get_ylim()
         for stages in (STAGES, smaller)
     }
     ((low, high),) = ranges
@@ -128,21 +131,46 @@ def test_stage_energies_of_all_alternatives_share_one_scale() -> None:
 
 def test_stage_energy_of_zeros_and_of_unknown_joints() -> None:
     zero = StageEnergy("out", ("a",), np.zeros(1), np.zeros(1))
-    assert len(stage_energy_figure([zero], {"a": "joint"}, title="t").axes) == 1
+    assert len(stage_energy_figure([zero], {"a": "joint"}, places=PLACES, title="t").axes) == 1
     with pytest.raises(FigureError, match="no joint 'c'"):
-        stage_energy_figure(STAGES, {"c": "joint"}, title="t")
+        stage_energy_figure(STAGES, {"c": "joint"}, places=PLACES, title="t")
     with pytest.raises(FigureError, match="no stage"):
-        stage_energy_figure([], JOINTS, title="t")
+        stage_energy_figure([], JOINTS, places=PLACES, title="t")
+    with pytest.raises(FigureError, match="where stage 'el' is"):
+        stage_energy_figure(STAGES, JOINTS, places={"out": "joint"}, title="t")
+
+
+def test_words_too_long_for_a_bar_stand_once_in_the_key() -> None:
+    words = "between a long belt and the wave generator"
+    places = {"out": "joint", "e_l": words}
+    stages = [STAGES[0], replace(STAGES[1], stage="e_l")]
+    figure = stage_energy_figure(stages, JOINTS, places=places, title="t")
+    figure.canvas.draw()  # the name of a stage is no formula
+    assert sum(text.endswith(words) for text in texts(figure)) == 1
+    assert texts(figure).count("joint") == len(JOINTS)
 
 
 def test_electrical_energy_is_stacked_and_compared() -> None:
     energies = {"ideal": np.array([1.0, 4.0]), "real": np.array([20.0, 30.0])}
-    figure = electrical_energy_figure(["joint 1", "joint 2"], energies, title="t")
+    joints = ["joint 1", "joint 2"]
+    figure = electrical_energy_figure(joints, energies, reference="ideal", title="t")
     (axes,) = figure.axes
     assert [p.get_width() for p in axes.patches] == [1.0, 4.0, 20.0, 30.0]
     assert any("10 \N{MULTIPLICATION SIGN} ideal" in word for word in texts(figure))
     with pytest.raises(FigureError, match="needs 1 values"):
-        electrical_energy_figure(["joint 1"], energies, title="t")
+        electrical_energy_figure(["joint 1"], energies, reference="ideal", title="t")
+    with pytest.raises(FigureError, match="no alternative 'best'"):
+        electrical_energy_figure(joints, energies, reference="best", title="t")
+
+
+def test_a_ratio_is_to_the_reference_wherever_it_stands_and_none_is_without() -> None:
+    energies = {"real": np.array([20.0, 30.0]), "ideal": np.array([1.0, 4.0])}
+    joints = ["joint 1", "joint 2"]
+    figure = electrical_energy_figure(joints, energies, reference="ideal", title="t")
+    shown = [word for word in texts(figure) if "\N{MULTIPLICATION SIGN}" in word]
+    assert shown == ["50 J   10 \N{MULTIPLICATION SIGN} ideal"]
+    figure = electrical_energy_figure(joints, energies, reference=None, title="t")
+    assert not any("\N{MULTIPLICATION SIGN}" in word for word in texts(figure))
 
 
 MOTOR = DCMotor("m", 0.0302, 0.316, 1200.0, 24.0, 5.77, 75.0)
@@ -291,7 +319,7 @@ def test_same_figure_same_bytes_and_no_trace_of_the_machine(tmp_path: Path) -> N
 
 DRAWINGS = [
     Drawing("demand", lambda: joint_demand_figure("j", PARTS)),
-    Drawing("stages", lambda: stage_energy_figure(STAGES, JOINTS, title="t")),
+    Drawing("stages", lambda: stage_energy_figure(STAGES, JOINTS, places=PLACES, title="t")),
     Drawing("motors", lambda: motor_limits_figure(shaft(), MOTOR, JOINTS, SUPPORT, title="t")),
 ]
 

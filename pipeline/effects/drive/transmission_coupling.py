@@ -47,7 +47,7 @@ class TransmissionCoupling(Effect):
         """Couple them."""
         _refuse_circle(model, place)
         actuator = replace(model.actuator(place[0]), coupled_to=place[1], coupling=x["ratio"])
-        if shape:
+        if any(shape.values()):  # a written ratio alone comes with a shaft of nothing
             actuator = with_shaft(actuator, shape)
         return model.with_actuator(actuator)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import tomlkit
 
 from pipeline.effects.model_file import SCHEMA, Edit, EditParameter, ModelFile
+from pipeline.effects.registry import effect_named
 from pipeline.identification.results import Found
 
 
@@ -26,14 +27,21 @@ def edits_of(
         Edit(
             effect=one.effect,
             place=one.place,
-            parameters=tuple(
-                EditParameter(p.name, p.value, p.unit, (p.low, p.high)) for p in one.parameters
-            ),
+            parameters=_in_order(one),
             source=source,
             basis="doubtful" if one.doubtful else "identified",
         )
         for one in found
         if keep_doubtful or not one.doubtful
+    )
+
+
+def _in_order(found: Found) -> tuple[EditParameter, ...]:
+    """Parameters in the effect's order, in which a reader has them, too."""
+    names = [p.name for p in effect_named(found.effect).parameters]
+    return tuple(
+        EditParameter(p.name, p.value, p.unit, (p.low, p.high))
+        for p in sorted(found.parameters, key=lambda p: names.index(p.name))
     )
 
 

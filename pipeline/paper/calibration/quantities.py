@@ -11,6 +11,8 @@ from actuators.chain import HoldingResult
 from pipeline.paper.calibration.machine import PUBLISHED_LEG, ActuatorPart, RobotPart
 
 STANDING_SECONDS = 3.0  # section IV.B adds up over the duration of a walking cycle
+#: Between which the break-even is.
+PAIR = ("reversible", "irreversible")
 _ALTERNATIVES = ("ideal", "rotor", "reversible")
 #: id prefix to the property of a holding result, its dimension
 _STANDING = {
@@ -38,10 +40,12 @@ class Quantity:
     Attributes:
         dimension: Of its unit.
         compute: From both parts and the number of middle legs that stand, in SI units.
+        needs: Alternatives without which there is no such quantity.
     """
 
     dimension: str
     compute: Callable[[RobotPart, ActuatorPart, int], float]
+    needs: tuple[str, ...] = ()
 
 
 def break_even(
@@ -84,7 +88,7 @@ def _quantities() -> dict[str, Quantity]:
         "velocity", lambda r, a, n: r.robot.spec.parameters["walking_speed"]
     )
     table["transmission_ratio"] = Quantity(
-        "ratio", lambda r, a, n: float(np.asarray(a.chains["reversible"].ratio))
+        "ratio", lambda r, a, n: float(np.asarray(a.chains["reversible"].ratio)), ("reversible",)
     )
     table["standing_reaction_rm"] = Quantity("force", lambda r, a, n: r.reaction)
     for joint in (1, 2, 3):
@@ -96,15 +100,20 @@ def _quantities() -> dict[str, Quantity]:
         for what, (read, dimension) in _STANDING.items():
             for joint in (2, 3):
                 table[f"{alternative}_{what}_{joint}"] = Quantity(
-                    dimension, _standing_reader(alternative, read, joint)
+                    dimension, _standing_reader(alternative, read, joint), (alternative,)
                 )
     for alternative in (*_ALTERNATIVES, "irreversible"):
-        table[f"{alternative}_leg_energy_3s"] = Quantity("energy", _standing_energy(alternative))
+        table[f"{alternative}_leg_energy_3s"] = Quantity(
+            "energy", _standing_energy(alternative), (alternative,)
+        )
     for alternative in ("rotor", "reversible", "irreversible"):
-        table[f"walking_ratio_{alternative}"] = Quantity("ratio", _walking_ratio(alternative))
+        table[f"walking_ratio_{alternative}"] = Quantity(
+            "ratio", _walking_ratio(alternative), (alternative, "ideal")
+        )
     table["break_even_standing_fraction"] = Quantity(
         "ratio",
         lambda r, a, n: break_even(a.energy, float(a.holding["reversible"].power.sum()), n),
+        PAIR,
     )
     return table
 
@@ -129,11 +138,15 @@ DIMENSIONS = {name: quantity.dimension for name, quantity in QUANTITIES.items()}
 
 
 def computed(robot: RobotPart, actuators: ActuatorPart, standing_legs: int) -> dict[str, float]:
-    """Every published quantity in SI units.
+    """Every published quantity in SI units that these actuators have.
 
     Args:
         robot: The robot's part.
-        actuators: The actuators' part.
+        actuators: The actuators' part; the paper's alternatives or some of them.
         standing_legs: How many middle legs Fig. 21 counts as loaded, 1 or 2.
     """
-    return {name: q.compute(robot, actuators, standing_legs) for name, q in QUANTITIES.items()}
+    return {
+        name: q.compute(robot, actuators, standing_legs)
+        for name, q in QUANTITIES.items()
+        if all(alternative in actuators.chains for alternative in q.needs)
+    }

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from actuators.loading.build import Catalog
 from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior, load_prior
 from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
@@ -15,7 +16,8 @@ from pipeline.paper.published import Published, load_published
 from pipeline.simulation.settings import Settings
 
 #: A robot or an actuator built otherwise than the paper's has no such numbers to compare.
-_STRUCTURE = ("alternatives.", "legs", "gait.tripods", "standing.feet")
+_STRUCTURE = ("legs", "gait.tripods", "standing.feet")
+_ALTERNATIVE = "alternatives."
 _SHOWN = 3
 
 
@@ -29,21 +31,47 @@ class Basis:
         stored: The stored calibration.
         changed: Numbers of the run that differ from those the calibration was made with; its
             sets, intervals and verdicts then belong to other numbers and are left out.
+        catalog: The paper's own alternatives among the run's.
+        missing: Alternatives of the paper that the run does not have, or has built otherwise.
+        others: Alternatives of the run of which the paper says nothing.
     """
 
     published: Mapping[str, Published]
     prior: Prior
     stored: Mapping[str, Any]
     changed: tuple[str, ...]
+    catalog: Catalog
+    missing: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
 
     @property
     def results(self) -> Mapping[str, Any] | None:
         """The stored calibration where it belongs to the run's numbers, else None."""
-        return None if self.changed else self.stored
+        return None if self.changed or self.missing else self.stored
 
     @property
     def word(self) -> str:
-        """What to say of the numbers that differ; empty where none does."""
+        """What to say of the actuators and numbers that differ; empty where none does."""
+        return "; ".join(part for part in (self._alternatives, self._numbers) if part)
+
+    @property
+    def _alternatives(self) -> str:
+        parts = []
+        if self.missing:
+            parts.append(
+                f"the paper's {_quoted(self.missing)} {_is(self.missing)} not among the "
+                "alternatives as the paper builds them: what it prints of them or compares with "
+                "them is left out, and so is what rests on the calibration's sets"
+            )
+        if self.others:
+            parts.append(
+                f"the paper says nothing of {_quoted(self.others)}: left out of what is held "
+                "against it"
+            )
+        return "; ".join(parts)
+
+    @property
+    def _numbers(self) -> str:
         if not self.changed:
             return ""
         shown = ", ".join(self.changed[:_SHOWN])
@@ -75,8 +103,6 @@ def basis(given: Settings) -> Basis | str:
     results = load_results()
     if given.robot.spec.path.name != results.get("robot"):
         return f"{given.robot.spec.path.name} is not the paper's robot"
-    if given.actuators is not None:
-        return f"the actuators of {given.actuators} are not the paper's"
     if given.effects is not None:
         return "a model file changes the robot, and the paper knows nothing of its effects"
     if given.quasi_static:
@@ -84,9 +110,33 @@ def basis(given: Settings) -> Basis | str:
     if given.regeneration.policy != "none":
         return "in the paper energy that flows back is lost, in this run it is used again"
     published, prior = load_published(IDS, DIMENSIONS), load_prior()
+    stored = results.get("numbers", {})
     now = fingerprint(given.robot.spec, given.catalog, published, prior)
-    changed = differences(results.get("numbers", {}), now)
+    differ = set(differences(stored, now))
+    every = dict.fromkeys((*_alternatives_of(stored), *given.catalog.alternatives))
+    own = [name for name in every if f"{_ALTERNATIVE}{name}" not in differ]
+    if not own:
+        return "no actuator alternative is built as one of the paper's"
+    catalog = given.catalog.only(own)
+    now = fingerprint(given.robot.spec, catalog, published, prior)
+    # A number of which nothing is left is not one that differs.
+    changed = [name for name in differences(stored, now) if name in now]
     built = [name for name in changed if name.startswith(_STRUCTURE)]
     if built:
         return f"{built[0]} differs from the paper's"
-    return Basis(published, prior, results, tuple(changed))
+    missing = tuple(name for name in _alternatives_of(stored) if name not in own)
+    others = tuple(name for name in given.catalog.alternatives if name not in own)
+    return Basis(published, prior, results, tuple(changed), catalog, missing, others)
+
+
+def _alternatives_of(numbers: Mapping[str, Any]) -> list[str]:
+    """The alternatives of a fingerprint."""
+    return [n.removeprefix(_ALTERNATIVE) for n in numbers if n.startswith(_ALTERNATIVE)]
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return ", ".join(f"'{name}'" for name in names)
+
+
+def _is(names: Sequence[str]) -> str:
+    return "is" if len(names) == 1 else "are"

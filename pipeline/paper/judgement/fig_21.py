@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.paper.calibration.problem import EVEN
+from pipeline.paper.calibration.quantities import PAIR
 from pipeline.paper.calibration.whole_robot import Totals
 from pipeline.paper.judgement.evidence import BAND, NONE, Evidence, Interval, Point, quantiles
 from pipeline.paper.judgement.reproduction import PREDICTED_BY
@@ -80,12 +81,14 @@ def crossing(whole: Mapping[str, Mapping[str, float]], cycle: str, stand: str) -
 
 
 def break_evens(whole: Totals, known: Evidence | None) -> tuple[BreakEven, ...]:
-    """The crossing for every subject.
+    """The crossing for every subject; none without both actuators that may cross.
 
     Args:
         whole: Ours.
         known: The calibration's sets; None where they belong to other numbers.
     """
+    if any(name not in whole for name in PAIR):
+        return ()
     return tuple(_break_even(subject, whole, known) for subject in SUBJECTS)
 
 

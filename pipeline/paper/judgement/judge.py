@@ -10,7 +10,7 @@ from actuators.loading.build import Catalog
 from pipeline.paper.calibration.machine import actuator_part, part_of
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.calibration.problem import EXTRA
-from pipeline.paper.calibration.quantities import computed, walking_extra
+from pipeline.paper.calibration.quantities import PAIR, computed, walking_extra
 from pipeline.paper.calibration.whole_robot import totals
 from pipeline.paper.constants.rotor_friction import Frictions, friction_ranges
 from pipeline.paper.judgement.conclusions import Conclusion, conclusions
@@ -18,7 +18,7 @@ from pipeline.paper.judgement.contradictions import Contradiction, contradiction
 from pipeline.paper.judgement.evidence import Evidence, evidence
 from pipeline.paper.judgement.fig_21 import BreakEven, EnergyPerMinute, break_evens, per_minute
 from pipeline.paper.judgement.leave_one_out import Prediction, leave_one_out
-from pipeline.paper.judgement.price import Price, price
+from pipeline.paper.judgement.price import PRICED, Price, price
 from pipeline.paper.judgement.reproduction import ReproducedRow, reproduction
 from pipeline.paper.published import Published
 from pipeline.robot.robot import Robot
@@ -36,7 +36,8 @@ class Judgement:
         predictions: Each target as the rest predicts it; empty without the calibration's sets.
         ranges: Rotor frictions by which entries they leave unmet.
         contradiction: Of Table V with itself.
-        price: What the fit asks of single numbers.
+        price: What the fit asks of single numbers; None without the actuator it was asked of.
+        missing: Ids of printed values for which the catalogue has no actuator.
     """
 
     reproduction: tuple[ReproducedRow, ...]
@@ -46,7 +47,8 @@ class Judgement:
     predictions: tuple[Prediction, ...]
     ranges: tuple[Frictions, ...]
     contradiction: Contradiction
-    price: Price
+    price: Price | None
+    missing: tuple[str, ...] = ()
 
 
 def judge(
@@ -63,7 +65,7 @@ def judge(
 
     Args:
         robot: With a floating base.
-        catalog: Actuators.
+        catalog: Actuators: the paper's, or some of them; what the others print is left out.
         published: The printed values.
         prior: What was known before.
         results: The stored calibration, if it was made with these very numbers; else None, and
@@ -74,7 +76,9 @@ def judge(
     part = part_of(robot.spec, samples)
     actuators = actuator_part(part, catalog)
     ours = computed(part, actuators, standing_legs)
-    ours[EXTRA] = walking_extra(actuators.energy)
+    if all(name in catalog.alternatives for name in PAIR):
+        ours[EXTRA] = walking_extra(actuators.energy)
+    asked = all(name in catalog.alternatives for name in PRICED)
     whole = totals(robot, catalog, samples)
     known: Evidence | None = None if results is None else evidence(results)
     ranges = friction_ranges(published) if results is None else tuple(stored_ranges(results))
@@ -87,5 +91,6 @@ def judge(
         () if known is None else tuple(leave_one_out(published, known)),
         ranges,
         against,
-        price(actuators, catalog, prior, results),
+        price(actuators, catalog, prior, results) if asked else None,
+        tuple(name for name in published if name not in ours),
     )

@@ -21,6 +21,8 @@ ROTOR_VISCOUS = "rotor_re40.viscous"
 GEAR_FRICTION = "planetary.coulomb"
 GEAR_ELEMENT = "planetary_friction"
 ALTERNATIVE = "irreversible"
+#: Actuators of whose numbers it speaks.
+PRICED = ("rotor", ALTERNATIVE)
 #: A no-load current above the data sheet's by more than this is called out.
 NOTABLE = 1.3
 

@@ -62,17 +62,19 @@ def reproduction(
     unmet: Sequence[str],
     known: Evidence | None,
 ) -> tuple[ReproducedRow, ...]:
-    """A row for every printed value.
+    """A row for every printed value that was computed.
 
     Args:
         published: All of them.
-        ours: Computed, SI.
+        ours: Computed, SI; without those for which the catalogue has no actuator.
         unmet: Ids that stay unmet at the rotor friction that leaves the fewest.
         known: The calibration's sets; None where they belong to other numbers.
     """
     fixed = fixed_before(published) | {f"{a}_leg_energy_3s" for a in ("ideal", "rotor")}
     rows = []
     for name, row in published.items():
+        if name not in ours:
+            continue
         value = from_si(ours[name], row.unit)
         verdict = REPRODUCED
         if not row.reproduced(value):

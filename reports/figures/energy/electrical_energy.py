@@ -23,6 +23,7 @@ def electrical_energy_figure(
     joints: Sequence[str],
     alternatives: Mapping[str, Array],
     *,
+    reference: str | None,
     title: str,
     subtitle: str = "",
 ) -> Figure:
@@ -30,23 +31,25 @@ def electrical_energy_figure(
 
     Args:
         joints: Labels of the parts, J of them.
-        alternatives: Name to energy per joint, shape (J,) [J]. The ratio at the end of a bar is to
-            the first.
+        alternatives: Name to energy per joint, shape (J,) [J].
+        reference: The alternative to which the ratio at the end of a bar is; None for no ratio.
         title: First line.
         subtitle: Second line.
 
     Raises:
-        FigureError: Shapes that do not fit, or nothing to draw.
+        FigureError: Shapes that do not fit, nothing to draw, or no such reference.
     """
     if not alternatives or any(a.shape != (len(joints),) for a in alternatives.values()):
         raise FigureError(f"'{title}': every alternative needs {len(joints)} values")
-    totals = [float(a.sum()) for a in alternatives.values()]
-    first = next(iter(alternatives))
-    widest = max(*totals, 1e-9)
+    if reference is not None and reference not in alternatives:
+        raise FigureError(f"'{title}': no alternative '{reference}' to compare with")
+    totals = {name: float(a.sum()) for name, a in alternatives.items()}
+    base = totals[reference] if reference is not None else 0.0
+    widest = max(*totals.values(), 1e-9)
     figure = new_figure(0.62 * len(alternatives) + 1.55)
     headline(figure, title, subtitle)
     axes = figure.subplots()
-    for row, parts in enumerate(alternatives.values()):
+    for row, (name, parts) in enumerate(alternatives.items()):
         left = 0.0
         for j, value in enumerate(parts):
             color = CYCLE[j % len(CYCLE)]
@@ -57,8 +60,8 @@ def electrical_energy_figure(
                 )
             left += value
         ratio = ""
-        if row and totals[0] > 0:
-            ratio = f"   {number(totals[row] / totals[0])} \N{MULTIPLICATION SIGN} {first}"
+        if name != reference and base > 0:
+            ratio = f"   {number(totals[name] / base)} \N{MULTIPLICATION SIGN} {reference}"
         axes.text(left + 0.008 * widest, row, f"{number(left)} J{ratio}", va="center")
     _name_joints(axes, joints)
     axes.set_yticks(range(len(alternatives)), list(alternatives))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -29,17 +31,6 @@ if TYPE_CHECKING:
     from actuators.energy.energy import StageEnergy
 
 Array = NDArray[np.float64]
-#: Where the stages of the paper's alternatives lie, in a word that fits under a bar.
-STAGE_PLACES = {
-    "out": "joint",
-    "2": "hypoid",
-    "ph": "pinion",
-    "mp": "planetary",
-    "wg": "wave generator",
-    "mt": "rotor",
-    "m": "motor",
-    "el": "supply",
-}
 
 
 @styled
@@ -47,39 +38,44 @@ def stage_energy_figure(
     stages: Sequence[StageEnergy],
     joints: Mapping[str, str],
     *,
+    places: Mapping[str, str],
     title: str,
     subtitle: str = "",
     limits: tuple[float, float] | None = None,
-    places: Mapping[str, str] = STAGE_PLACES,
 ) -> Figure:
     """One panel per joint, one pair of bars per stage: E(+) upwards, E(-) downwards.
 
     Args:
         stages: From the joint to the supply, energy in one cycle.
         joints: Those to draw, name to label of the panel.
+        places: Stage to the words that say where it is, as `Alternative.stage_names` has them.
         title: Names the alternative.
         subtitle: Second line.
         limits: Largest E(+) and E(-) to scale for [J], to give several figures the same scale.
-        places: Stage to a word that says where it is, for the second line under a bar.
 
     Raises:
-        FigureError: Nothing to draw, or a joint that is not among the stages' joints.
+        FigureError: Nothing to draw, a joint that is not among the stages' joints, or a stage
+            without words.
     """
     if not stages or not joints:
         raise FigureError(f"'{title}': no stage or no joint to draw")
+    for stage in stages:
+        if stage.stage not in places:
+            raise FigureError(f"'{title}': no words say where stage '{stage.stage}' is")
     forward, reverse = _energies(stages, joints)
     top, bottom = limits or energy_limits([stages], joints)
-    figure = new_figure(4.5)
+    names = {s.stage: (_symbol(s.stage), places[s.stage]) for s in stages}
+    long = [f"{symbol}  {words}" for symbol, words in names.values() if " " in words]
+    figure = new_figure(4.5 + 0.2 * math.ceil(len(long) / 2))
     headline(figure, title, subtitle)
     panels = figure.subplots(1, len(joints), sharey=True, squeeze=False)[0]
     for j, (axes, joint) in enumerate(zip(panels, joints.values(), strict=True)):
         _bars(axes, forward[:, j], reverse[:, j])
         axes.set_title(joint, loc="center", fontweight="bold")
-        symbols = [rf"$E_{{\mathrm{{{s.stage}}}}}$" for s in stages]
-        axes.set_xticks(np.arange(len(stages)), symbols)
-        for x, stage in enumerate(stages):
+        axes.set_xticks(np.arange(len(stages)), [symbol for symbol, _ in names.values()])
+        for x, (_, words) in enumerate(names.values()):
             axes.annotate(
-                "\n".join(places.get(stage.stage, "").split()),
+                "" if " " in words else words,
                 (x, 0),
                 xycoords=axes.get_xaxis_transform(),
                 xytext=(0, -18),
@@ -93,7 +89,7 @@ def stage_energy_figure(
     panels[0].set_ylim(-bottom - room, top + room)
     panels[0].set_ylabel("energy per cycle [J]")
     panels[0].yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
-    _key(figure)
+    _key(figure, long)
     return figure
 
 
@@ -152,12 +148,26 @@ def _joules(value: float) -> str:
     return "0" if value < 5e-4 else number(value, 3 if value >= 1 else 2)
 
 
-def _key(figure: Figure) -> None:
-    """What the two colours mean, below the panels, where no line crosses it."""
+def _symbol(stage: str) -> str:
+    """A stage's energy as a formula; what TeX would read otherwise stands for itself."""
+    plain = re.sub(r"([_#%&${}])", r"\\\1", stage)
+    return rf"$E_{{\mathrm{{{plain}}}}}$"
+
+
+def _key(figure: Figure, long: Sequence[str]) -> None:
+    """What colours and symbols mean, below the panels, where no line crosses it.
+
+    Args:
+        figure: To draw in.
+        long: Symbols with the words that are too long to stand under a bar.
+    """
     from matplotlib.patches import Patch
 
-    handles = [
+    words = [Patch(alpha=0.0, label=text) for text in long]
+    handles = [  # by column, of which the first has the odd one
         Patch(color=FORWARD, label="E(+): from supply to joint"),
+        *words[::2],
         Patch(color=REVERSE, label="E(\N{MINUS SIGN}): from joint to supply"),
+        *words[1::2],
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=2)

@@ -1,0 +1,74 @@
+"""The list of alternatives is data: added to, cut down or renamed, every verb runs on it."""
+
+from __future__ import annotations
+
+import csv
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from actuators.loading.build import CATALOG
+from pipeline.cli.main import main
+
+PAPERS = ("ideal", "rotor", "reversible", "irreversible")
+
+
+def _parts() -> tuple[str, dict[str, str]]:
+    text = (CATALOG / "alternatives.toml").read_text(encoding="utf-8")
+    head, *parts = re.split(r"(?m)^(?=\[[a-z]+\]$)", text)
+    return head, dict(zip(PAPERS, parts, strict=True))
+
+
+def _renamed(part: str, old: str, new: str) -> str:
+    return part.replace(f"[{old}]", f"[{new}]").replace(f"[[{old}.", f"[[{new}.")
+
+
+def _catalogue(kind: str, folder: Path) -> tuple[str, ...]:
+    """Write a catalogue; returns its alternatives."""
+    head, four = _parts()
+    parts = {
+        "fifth": {**four, "belt": _renamed(four["reversible"], "reversible", "belt")},
+        "no_ideal": {n: p for n, p in four.items() if n != "ideal"},
+        "only_reversible": {"reversible": four["reversible"]},
+        "renamed": {f"my_{n}": _renamed(p, n, f"my_{n}") for n, p in four.items()},
+    }[kind]
+    shutil.copytree(CATALOG, folder)
+    (folder / "alternatives.toml").write_text(head + "".join(parts.values()), encoding="utf-8")
+    return tuple(parts)
+
+
+def _column(file: Path, name: str) -> list[str]:
+    with file.open(encoding="utf-8", newline="") as stream:
+        return [row[name] for row in csv.DictReader(stream)]
+
+
+@pytest.mark.parametrize("kind", ["fifth", "no_ideal", "only_reversible", "renamed"])
+def test_every_verb_runs_on_any_list_of_alternatives(
+    root: Path, tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = _catalogue(kind, tmp_path / "actuators")
+    robot = str(root / "urdf" / "hexapod.toml")
+    for verb, table in (("stand", "standing"), ("walk", "walking"), ("reports", "walking")):
+        out = tmp_path / verb
+        options = [verb, "--robot", robot, "--actuators", str(tmp_path / "actuators")]
+        assert main([*options, "--samples", "51", "--out", str(out)]) == 0
+        told = dict.fromkeys(_column(out / f"{table}_energy.csv", "alternative"))
+        assert tuple(told) == names
+    ratios = _column(tmp_path / "walk" / "walking_energy.csv", "ratio_to_ideal")
+    assert all(ratios) if "ideal" in names else not any(ratios)
+    said = capsys.readouterr().out
+    reports = tmp_path / "reports"
+    assert all((reports / f"stage_energy_{name}.svg").exists() for name in names)
+    if kind == "renamed":
+        assert "not held against the paper: no actuator alternative is built as" in said
+        return
+    printed = _column(reports / "reproduction.csv", "id")
+    assert "reversible_leg_energy_3s" in printed
+    assert ("walking_ratio_reversible" in printed) == ("ideal" in names)
+    assert "irreversible_leg_energy_3s" in printed or "irreversible" not in names
+    assert ("belt" in said) == (kind == "fifth")
+    assert ("'ideal'" in said) == ("ideal" not in names)
+    assert (reports / "index.html").exists()
+    assert (reports / "readings.csv").exists() == (kind == "fifth")
