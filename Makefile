@@ -48,8 +48,12 @@ check: $(STAMP)  ## Check the robot model for physical sense (ROBOT=)
 bench: $(STAMP)  ## Print speed ratios measured in one run
 	$(PY) -m tests.bench
 
-mutants: $(STAMP)  ## Put faults into the code and see whether tests notice (SHARE=, ARGS=; extra `mutants`)
+mutants: $(VENV)/.mutants  ## Put faults into the code and see whether tests notice (SHARE=, ARGS=)
 	$(PY) -m tests.mutants --share $(SHARE) $(ARGS)
+
+$(VENV)/.mutants: $(STAMP) tests/mutants.lock
+	$(PY) -m pip install --quiet --require-hashes --no-deps -r tests/mutants.lock
+	@touch $@
 
 readme: $(STAMP)  ## Renew the tables and pictures of the pages from a run (BLIND=: those of a run of blind)
 	$(PY) -m tests.readme $(if $(BLIND),--blind $(call quoted,$(BLIND)))
@@ -80,16 +84,21 @@ calibrate: $(STAMP)  ## Fit the unpublished numbers to the paper anew (about 15 
 urdf: $(STAMP)  ## Build the URDFs from their TOML
 	$(PY) -m pipeline urdf
 
+# One extra's packages, with the versions that all others have.
+define lock_extra
+	$(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']\
+	['optional-dependencies']['$(1)'], sep='\n')" > $(2).in
+	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
+	  --no-emit-trusted-host --strip-extras --allow-unsafe -c requirements.lock -o $(2) $(2).in
+	@rm $(2).in
+endef
+
 lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
-	  --no-emit-trusted-host --strip-extras --extra dev --extra mutants --allow-unsafe \
+	  --no-emit-trusted-host --strip-extras --extra dev --allow-unsafe \
 	  -o requirements.lock pyproject.toml
-	$(PYTHON) -c "import tomllib; print(*tomllib.load(open('pyproject.toml', 'rb'))['project']\
-	['optional-dependencies']['docs'], sep='\n')" > reports/docs/requirements.in
-	pip-compile --quiet --generate-hashes --no-emit-index-url --no-emit-find-links \
-	  --no-emit-trusted-host --strip-extras --allow-unsafe -c requirements.lock \
-	  -o reports/docs/requirements.lock reports/docs/requirements.in
-	@rm reports/docs/requirements.in
+	$(call lock_extra,docs,reports/docs/requirements.lock)
+	$(call lock_extra,mutants,tests/mutants.lock)
 
 clean:  ## Remove what a run wrote
 	rm -rf reports/out .pytest_cache .mypy_cache .ruff_cache .hypothesis
