@@ -91,11 +91,11 @@ def _counted(judged: Judged) -> tuple[str, ...]:
     ]
     if shares and judged.by.results is not None:
         text += (
-            f" (in {_listed(percent(s) for s in shares)} of the "
-            f"{len(judged.by.results['ensemble'])} sets of numbers that fit)"
+            f" (in {_listed(percent(s) for s in shares)} of "
+            f"{len(judged.by.results['ensemble'])} sets of numbers that fit, see below)"
         )
     text += (
-        f". {count['input'][1]} were put in, {count['target'][1]} "
+        f". Of the rest {count['input'][1]} were put in, {count['target'][1]} "
         f"{'fitted' if judged.by.results is not None else 'are what was fitted'}, "
         f"{count['consequence'][1]} follow from those by Ohm's law and the like, "
         f"{count['symmetry'][1]} is zero by symmetry."
@@ -116,9 +116,9 @@ def _against(judged: Judged) -> str:
         if row.published.role == "contradicted" and row.verdict != REPRODUCED
     ]
     text = (
-        f"**Contradicted:** the other {_word(of)} cannot be met together. Two motor torques of "
+        f"**Contradicted by the paper itself:** the other {_word(of)}. Two motor torques of "
         f"Table V ask for a rotor friction of {first:.3f} and of {second:.3f} mN·m, and an energy "
-        f"was computed from a rounded power; {_word(met) if met else 'none'} "
+        f"was computed from a rounded power: {_word(met) if met else 'none'} of them "
         f"{'is' if met < 2 else 'are'} met"
     )
     if unmet:
@@ -137,8 +137,8 @@ def _beside(row: ReproducedRow) -> str:
     digits = max(0, -math.floor(math.log10(half))) - 1 if half > 0 else 3
     joint = f" of joint {row.published.joint}" if row.published.joint else ""
     return (
-        f"{row.published.quantity}{joint}, {ours:.{digits}f} instead of {published:.{digits}f} "
-        f"{unit}"
+        f"{row.published.quantity}{joint}, {ours:.{digits}f} where {published:.{digits}f} {unit} "
+        "is printed"
     )
 
 
@@ -195,17 +195,20 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
     }
     text = (
         f"**What it costs:** walking one 3 s cycle, the middle right leg draws "
-        f"**{legs['ideal']:.1f} J** with ideal drives, {legs['rotor']:.1f} J once the rotor has "
+        f"**{legs['ideal']:.2f} J** with ideal drives, {legs['rotor']:.1f} J once the rotor has "
         f"inertia and friction, **{legs['reversible']:.1f} J** with belt and Harmonic Drive "
         f"(reversible) and **{legs['irreversible']:.1f} J** with planetary and hypoid gears "
-        "(irreversible). Standing still, the loaded leg draws "
+        "(irreversible). Standing still, a loaded leg draws "
         f"{power['reversible']:.2f} W with reversible and {power['irreversible']:.2g} W with "
         "irreversible gears"
     )
     even = rows[EVEN]
     if math.isnan(even.computed):
         return text + "; there is no share of standing above which the irreversible ones pay."
-    text += f", which pay only above {percent(even.computed, 1)} of the time standing."
+    text += (
+        "; of the two middle legs, which the paper adds up, one is loaded, so that irreversible "
+        f"gears pay only above {percent(even.computed, 1)} of the time standing."
+    )
     if judged.by.results is None:
         return text
     row = next(c for c in judged.judgement.conclusions if c.sentence.name == EVEN)
@@ -215,9 +218,9 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
         f"{_span(rows['walking_ratio_irreversible'].prior)} times the ideal drive's energy; in "
         f"{percent(1 - more.prior_share)} of their draws walking takes less with irreversible than "
         "with reversible gears, and where it takes more, the irreversible ones pay above "
-        f"{_percent(row.prior)} of the time standing. Fitted to everything but the irreversible "
-        f"gears' own two figures, they take {_span(rows['walking_ratio_irreversible'].left_out)} "
-        "times the ideal drive's energy."
+        f"{_percent(row.prior)} of the time standing. With everything fitted but their own two "
+        "figures (almost 15 and the share of standing), irreversible gears take "
+        f"{_span(rows['walking_ratio_irreversible'].left_out)} times the ideal drive's energy."
     )
 
 
@@ -245,12 +248,12 @@ def _ensemble(judged: Judged) -> str:
         f"and {count['target'][1]} figures cannot determine {len(results['nearest']['z'])} "
         "numbers. The values here are the set nearest to data sheets and literature that fits. "
         f"Beside it stand {len(results['ensemble'])} sets of numbers that fit as well, from "
-        f"{results['draws']} draws of prior knowledge, each moved as little as needed: every one "
-        "gives every printed number at printed precision, but for "
-        f"{_listed(_named(_rows(judged)[name]) for name in unmet)}, and was not asked for the "
-        "predictions. That they can is no wonder: the motor's torque constant, resistance and "
-        "rotor friction have no prior, all are drawn from the sliver in which Tables IV to VI "
-        "come out and which no data sheet resolves."
+        f"{results['draws']} draws of prior knowledge, each moved as little as needed (the others "
+        "did not get there): every one gives every number that was put in, fitted or follows at "
+        f"printed precision, but for {_listed(_named(_rows(judged)[name]) for name in unmet)}; the "
+        "predictions were not asked for. That is by construction: the motor's torque constant, "
+        "resistance and rotor friction have no prior but are drawn from the narrow range in which "
+        "Tables IV to VI come out, finer than any data sheet resolves."
     )
 
 
