@@ -1,0 +1,1 @@
+"""Identification of machines with a fixed base from joint torques, by regression."""
