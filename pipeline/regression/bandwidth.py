@@ -59,7 +59,7 @@ def rich_residual(wide: Rows, model: pin.Model) -> Array:
     """Torque less bodies near the URDF and friction of any shape, joints weighted by residual."""
     design, bodies = Design.of(model, wide), Bodies.of(model)
     columns = design.columns(design.load(bodies.nominal), ())
-    n, joints = wide.tau.shape
+    joints = wide.tau.shape[1]
     names = [*general_terms(), "rotor"]
     nb = bodies.nominal.size
     level = wide.tau.std(axis=0) + 1e-12

@@ -21,6 +21,7 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
+import scipy.linalg
 from numpy.typing import NDArray
 
 from pipeline.regression.errors import RegressionError
@@ -33,6 +34,11 @@ PARAMETERS: Final = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "
 UNITS: Final = ("kg", *("kg*m",) * 3, *("kg*m^2",) * 6)
 #: A body is nowhere thinner than this share of its reach (point masses and rods of a URDF).
 THINNEST: Final = 0.05
+#: Newton steps at one strength of the barrier at most.
+NEWTON_STEPS: Final = 60
+#: Uncertainty at which the path of the barrier begins, and its growth from step to step.
+FIRST: Final = 0.003
+PATH: Final = 2.0
 
 
 def _basis() -> Array:
@@ -115,7 +121,7 @@ class Bodies:
         free = tens[:, 0] > 0
         centre = tens.copy()
         metric = np.zeros((nominal.size, nominal.size))
-        for k in np.flatnonzero(free):
+        for k in map(int, np.flatnonzero(free)):
             centre[k] = _thick(tens[k], _reach(model, k + 1, tens[k]))
             inverse = np.linalg.inv(pseudo_inertia(centre[k]))
             g = np.einsum("ij,kjl->kil", inverse, _E)
@@ -180,19 +186,35 @@ def _thick(ten: Array, reach: float) -> Array:
     return out
 
 
-def consistent(gram: Array, moment: Array, bodies: Bodies, sigma: float, start: Array) -> Array:
-    """Least squares under the divergence over sigma^2: Newton's method on a convex function.
+def consistent(
+    gram: Array, moment: Array, bodies: Bodies, sigma: float, start: Array | None = None
+) -> Array:
+    """Least squares under the divergence over sigma^2, a convex problem.
+
+    The divergence is a barrier that is weak where little is known; Newton's method follows its path
+    from a strong one, as interior-point methods do.
 
     Args:
         gram: Of all parameters, the bodies' first, (P, P).
         moment: (P,).
         bodies: Where they come from.
         sigma: Uncertainty of the URDF.
-        start: A feasible first guess, (P,).
+        start: A solution nearby, (P,); without it the path begins at the URDF.
 
     Returns:
         The parameters (P,), every body of which is one.
     """
+    if start is not None:
+        return _newton(gram, moment, bodies, sigma, start)
+    x = np.zeros(len(moment))
+    x[: bodies.nominal.size] = bodies.centre
+    steps = max(1, int(np.ceil(np.log(sigma / FIRST) / np.log(PATH)))) if sigma > FIRST else 0
+    for k in range(steps):
+        x = _newton(gram, moment, bodies, FIRST * (sigma / FIRST) ** (k / steps), x)
+    return _newton(gram, moment, bodies, sigma, x)
+
+
+def _newton(gram: Array, moment: Array, bodies: Bodies, sigma: float, start: Array) -> Array:
     n = bodies.nominal.size
     x = start.copy()
 
@@ -201,7 +223,7 @@ def consistent(gram: Array, moment: Array, bodies: Bodies, sigma: float, start: 
         return float(0.5 * x @ gram @ x - moment @ x + d / sigma**2)
 
     f = value(x)
-    for _ in range(60):
+    for _ in range(NEWTON_STEPS):
         _, g, h = bodies.divergence(x[:n])
         gradient = gram @ x - moment
         hessian = gram.copy()
@@ -211,11 +233,15 @@ def consistent(gram: Array, moment: Array, bodies: Bodies, sigma: float, start: 
         hessian[still, still] = 1.0
         gradient[still] = 0.0
         scale = 1.0 / np.sqrt(np.diag(hessian))
-        step = -scale * np.linalg.lstsq(
-            hessian * np.outer(scale, scale), scale * gradient, rcond=1e-13
-        )[0]
+        scaled = hessian * np.outer(scale, scale)
+        scaled[np.diag_indices_from(scaled)] += 1e-13
+        try:
+            factor = scipy.linalg.cho_factor(scaled, check_finite=False)
+            step = -scale * scipy.linalg.cho_solve(factor, scale * gradient, check_finite=False)
+        except np.linalg.LinAlgError:
+            step = -scale * np.linalg.lstsq(scaled, scale * gradient, rcond=1e-13)[0]
         decrement = float(-gradient @ step)
-        if decrement < 1e-9 * max(1.0, abs(f)):
+        if decrement < 1e-6:
             break
         t = 1.0
         while t > 1e-10:

@@ -85,6 +85,8 @@ class Coupling:
 def every_pair(joints: int) -> list[Coupling]:
     """Couplings of joints in a chain whose motors may sit before the axes they pass."""
     return [
-        Coupling(j, i, r) for j in range(joints) for i in range(max(0, j - PASSED), j)
+        Coupling(j, i, r)
+        for j in range(joints)
+        for i in range(max(0, j - PASSED), j)
         for r in RATIOS
     ]

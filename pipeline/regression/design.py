@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -85,10 +86,12 @@ def even_blocks(
             continue
         k = max(1, int((b - a) / length))
         edges = np.linspace(a, b, k + 1).round().astype(int)
-        out += [(int(x), int(y)) for x, y in zip(edges[:-1], edges[1:], strict=True)]
+        out += [(int(x), int(y)) for x, y in pairwise(edges)]
     return out
 
 
 def folds_of(blocks: int, folds: int = 6) -> list[NDArray[np.intp]]:
     """Contiguous groups of blocks: validation is another part of the motion."""
-    return [np.asarray(x, dtype=np.intp) for x in np.array_split(np.arange(blocks), folds) if x.size]
+    return [
+        np.asarray(x, dtype=np.intp) for x in np.array_split(np.arange(blocks), folds) if x.size
+    ]

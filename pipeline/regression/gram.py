@@ -1,4 +1,4 @@
-"""Normal equations per block of the log: drawing blocks anew or leaving some out only adds them up."""
+"""Normal equations per block: to draw blocks anew or leave some out is to add them up."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.regression.noise import Colour, Span
+from pipeline.regression.noise import Colour, Span, weights
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]
@@ -108,8 +108,3 @@ def system(
             power[b] += g[-1, -1]
             rows[b] += len(z)
     return System(keys, gram, moment, power, rows, where)
-
-
-def weights(doubt: Array, friction: float, level: float) -> Array:
-    """Weight of rows whose friction is unsure by `doubt` times its square, (N,)."""
-    return 1.0 / np.sqrt(1.0 + doubt * (friction / max(level, 1e-12)) ** 2)

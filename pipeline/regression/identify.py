@@ -233,8 +233,13 @@ class _Identification:
             columns = self.design.columns(self.load, self.couplings, rest)
             fit = self._fit(self._system(columns), columns, self.sigma)
             found = find_coupling(
-                fit, self.folds, self.weight, [general(j) for j in range(self.model.nv)],
-                self.couplings, rest, self.options.error_rate,
+                fit,
+                self.folds,
+                self.weight,
+                [general(j) for j in range(self.model.nv)],
+                self.couplings,
+                rest,
+                self.options.error_rate,
             )
             if found is None:
                 break
@@ -333,8 +338,16 @@ class _Identification:
         for closes, key in least.values():
             value, e = float(x[fit.system.where[key]]), float(error[fit.system.where[key]])
             term = Term(
-                self._place(key), kind(key[1]), key[1], value, value - t * e, value + t * e,
-                unit(key[1]), 0.0, closes, Level.SUSPECTED,
+                self._place(key),
+                kind(key[1]),
+                key[1],
+                value,
+                value - t * e,
+                value + t * e,
+                unit(key[1]),
+                0.0,
+                closes,
+                Level.SUSPECTED,
             )
             out.append((key, term))
         return out
@@ -397,8 +410,7 @@ class _Identification:
             x, replicas = self._final(fit, keys)
             where = fit.system.where
             wrong = [
-                k for k in keys
-                if not self._curve(k) and k[1] not in SIGNED and x[where[k]] <= 0
+                k for k in keys if not self._curve(k) and k[1] not in SIGNED and x[where[k]] <= 0
             ]
             if not wrong:
                 return keys, x, replicas
@@ -412,7 +424,9 @@ class _Identification:
         return self.choices[int(place)].law is UNNAMED
 
     def _leave_one_out(self) -> list[Array]:
-        return [np.where(np.arange(len(self.blocks)) == b, 0.0, 1.0) for b in range(len(self.blocks))]
+        return [
+            np.where(np.arange(len(self.blocks)) == b, 0.0, 1.0) for b in range(len(self.blocks))
+        ]
 
     def _quantile(self, coverage: float) -> float:
         return float(scipy.stats.t.ppf(0.5 + 0.5 * coverage, len(self.blocks) - 1))
@@ -432,15 +446,10 @@ class _Identification:
             gram[:nb, :nb] -= fit.prior_gram[:nb, :nb]
             moment[:nb] -= fit.prior_moment[:nb]
             free = np.isin(used, at)
-            if start is None:
-                first = np.zeros(len(used))
-                first[:nb] = self.bodies.centre
-            else:
-                first = start[used]
             gram[~free], gram[:, ~free], moment[~free] = 0.0, 0.0, 0.0
-            first[~free] = 0.0
-            first[:nb][~self.bodies.columns] = 0.0
-            x[used] = consistent(gram, moment, self.bodies, self.sigma, first) + fit.known[used]
+            first = None if start is None else np.where(free, start[used], 0.0)
+            y = consistent(gram, moment, self.bodies, self.sigma, first)
+            x[used] = np.where(free, y, 0.0) + fit.known[used]
             return x
 
         x = solved(self.weight, None)
@@ -496,8 +505,16 @@ class _Identification:
             level = Level.CONFIRMED if stands else Level.APPROXIMATE
             terms.append(
                 Term(
-                    self._place(key), kind(term), term, float(x[k]), float(x[k] - t * error[k]),
-                    float(x[k] + t * error[k]), unit(term), share, closes, level,
+                    self._place(key),
+                    kind(term),
+                    term,
+                    float(x[k]),
+                    float(x[k] - t * error[k]),
+                    float(x[k] + t * error[k]),
+                    unit(term),
+                    share,
+                    closes,
+                    level,
                 )
             )
         frictions = []
@@ -548,11 +565,18 @@ class _Identification:
         error = _jackknife(replicas[:, :nb] @ found.combine.T)
         free = np.flatnonzero(self.bodies.columns)
         spread = np.linalg.inv(self.bodies.metric[np.ix_(free, free)]) * self.sigma**2
-        stated = np.sqrt(np.einsum("ki,ij,kj->k", found.combine[:, free], spread,
-                                   found.combine[:, free]))
+        stated = np.sqrt(
+            np.einsum("ki,ij,kj->k", found.combine[:, free], spread, found.combine[:, free])
+        )
         table = tuple(
             BaseParameter(
-                name, float(u), float(v), float(v - t * e), float(v + t * e), one, float((v - u) / s)
+                name,
+                float(u),
+                float(v),
+                float(v - t * e),
+                float(v + t * e),
+                one,
+                float((v - u) / s),
             )
             for name, one, u, v, e, s in zip(
                 found.names, found.units, urdf, value, error, stated, strict=True

@@ -86,3 +86,8 @@ def colour(residual: Array, spans: Sequence[Span], longest: int = LONGEST) -> Co
     # Long-run variance over variance: how many rows count as one.
     correlation = float(np.clip(best[2] / gain**2 / cov[0], 1.0, n / 4)) if gain > 0 else n / 4
     return Colour(best[1], float(np.sqrt(best[2])), level, correlation)
+
+
+def weights(doubt: Array, friction: float, level: float) -> Array:
+    """Weight of rows whose friction is unsure by `doubt` times its square, (N,)."""
+    return 1.0 / np.sqrt(1.0 + doubt * (friction / max(level, 1e-12)) ** 2)

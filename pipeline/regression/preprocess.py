@@ -116,7 +116,9 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
     start, n = [], 0
     for q, tau, v, t in grids:
         qs = low_pass(q, full, cutoff)
-        vs = low_pass(v, full, cutoff) if v is not None and logged else np.gradient(qs, step, axis=0)
+        vs = (
+            low_pass(v, full, cutoff) if v is not None and logged else np.gradient(qs, step, axis=0)
+        )
         a = np.gradient(vs, step, axis=0)
         part = tuple(x[::every] for x in (t, qs, vs, a, low_pass(tau, full, cutoff)))
         start.append(n)
@@ -144,9 +146,9 @@ def spectra(parts: Sequence[Array], rate: float) -> tuple[Array, Array]:
     """One-sided spectral density averaged over recordings by length: (F,) and (F, J)."""
     longest = min(len(p) for p in parts)
     size = int(max(16, min(longest, sum(len(p) for p in parts) // AVERAGES)))
-    total, weight = 0.0, 0
+    total, weight = np.zeros((size // 2 + 1, parts[0].shape[1])), 0
     for p in parts:
-        f, s = scipy.signal.welch(p, rate, nperseg=size, axis=0, detrend="linear")
+        f, s = scipy.signal.welch(p, rate, nperseg=size, axis=0, detrend="constant")
         total, weight = total + s * len(p), weight + len(p)
     return f, np.asarray(total / weight)
 
@@ -156,8 +158,9 @@ def _noise(parts: Sequence[Array], rate: float, derivative: int) -> Array:
     f, s = spectra(parts, rate)
     upper = (f > 0.3 * rate) & (f < 0.48 * rate)
     level = np.median(s[upper], axis=0) / 0.7 if upper.any() else s[-1]
-    rounding = np.array([_resolution(np.concatenate([p[:, j] for p in parts]))
-                         for j in range(s.shape[1])])
+    rounding = np.array(
+        [_resolution(np.concatenate([p[:, j] for p in parts])) for j in range(s.shape[1])]
+    )
     return np.maximum(level, rounding**2 / 12 / (rate / 2))
 
 

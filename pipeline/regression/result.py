@@ -169,11 +169,11 @@ class Result:
                     out[:, j] += size * column
         for c in self.couplings:
             rise = self.friction[c.motor].shape.rise
-            for name, columns in c.columns(v, a, self.sigma_v, spread, rise).items():
+            for name, actions in c.columns(v, a, self.sigma_v, spread, rise).items():
                 size = self.sizes.get(("shared", name))
                 if size is not None:
-                    for j, column in columns.items():
-                        out[:, j] += size * column
+                    for i, action in actions.items():
+                        out[:, i] += size * action
         return out
 
     def at(self, place: str) -> Sequence[Term]:

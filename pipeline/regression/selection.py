@@ -56,9 +56,7 @@ def general(joint: int) -> Choice:
     return Choice(UNNAMED, BESIDE, 0.0)
 
 
-def choose_law(
-    fit: Fit, folds: Folds, weight: Array, joint: int, common: Sequence[Key]
-) -> Choice:
+def choose_law(fit: Fit, folds: Folds, weight: Array, joint: int, common: Sequence[Key]) -> Choice:
     """Law of one joint beside everything else.
 
     Args:

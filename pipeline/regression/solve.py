@@ -93,7 +93,9 @@ class Fit:
         g = self.system.gram[block][np.ix_(at, at)]
         return 0.5 * float(x @ g @ x - 2 * x @ self.moment[block][at] + self.power[block])
 
-    def losses(self, folds: Sequence[Array], weight: Array, at: NDArray[np.intp]) -> Array:
+    def losses(
+        self, folds: Sequence[NDArray[np.intp]], weight: Array, at: NDArray[np.intp]
+    ) -> Array:
         """Predictive loss of every block, fitted on the blocks of other folds, (B,)."""
         out = np.zeros(len(weight))
         for fold in folds:
@@ -128,7 +130,7 @@ class Eliminated:
     def __init__(
         self,
         fit: Fit,
-        folds: Sequence[Array],
+        folds: Sequence[NDArray[np.intp]],
         weight: Array,
         common: NDArray[np.intp],
         own: NDArray[np.intp],

@@ -1,0 +1,52 @@
+"""Noise: order, level, whiteness; rows near reversal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.signal
+
+from pipeline.regression.friction import sense
+from pipeline.regression.noise import colour, weights
+
+
+def coloured(n: int = 20000) -> np.ndarray:
+    white = np.random.default_rng(0).standard_normal(n)
+    return scipy.signal.lfilter([1.0], [1.0, -0.8], white)
+
+
+def test_coloured_noise_is_whitened_to_unit_variance() -> None:
+    x = coloured()
+    c = colour(x, [(0, len(x))])
+    z = c.whiten(x)
+    assert z.std() == pytest.approx(1.0, abs=0.05)
+    assert abs(np.corrcoef(z[1:], z[:-1])[0, 1]) < 0.1
+
+
+def test_correlation_counts_rows_that_say_the_same() -> None:
+    # (1 + a) / (1 - a) for a first-order process.
+    x = coloured(200000)
+    assert colour(x, [(0, len(x))]).correlation == pytest.approx(9.0, rel=0.25)
+
+
+def test_white_noise_needs_no_filter() -> None:
+    x = np.random.default_rng(2).standard_normal(5000)
+    assert colour(x, [(0, 2500), (2500, 5000)]).memory == 0
+
+
+def test_rows_whose_sign_is_in_doubt_weigh_less_and_none_is_lost() -> None:
+    v = np.array([0.0, 0.01, 1.0])
+    felt = sense(v, np.zeros(3), 0.01, 0.0)
+    w = weights(felt.doubt, friction=1.0, level=0.1)
+    assert 0 < w[0] < w[1] < w[2] == pytest.approx(1.0)
+
+
+def test_filtered_sign_is_that_of_a_low_passed_step() -> None:
+    from pipeline.regression.preprocess import SPREAD, low_pass
+
+    rate, cutoff = 1000.0, 10.0
+    t = np.arange(-1, 1, 1 / rate)
+    v = 2.0 * t
+    expected = low_pass(np.sign(v), rate, cutoff)
+    found = sense(v, np.full_like(v, 2.0), 1e-9, SPREAD / cutoff).sign
+    assert np.abs(found - expected)[200:-200].max() < 0.12
