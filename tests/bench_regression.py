@@ -180,9 +180,9 @@ def trial(seed: int) -> dict[str, float]:
     cut = int(0.6 * len(t))
     train = prepare([Run(t[:cut], seen[:cut], tau[:cut])], nominal)
     result = identify(train, nominal, options=Options(draws=20, seed=seed))
-    test = rows([Run(t[cut:], seen[cut:], tau[cut:])], cutoff=train.cutoff)
-    clean_test = rows([Run(t[cut:], seen[cut:], clean[cut:])], cutoff=train.cutoff)
-    predicted = result.predict(test.q, test.v, test.a, train.cutoff)
+    test = rows([Run(t[cut:], seen[cut:], tau[cut:])], cutoff=train.cutoff, rate=rate)
+    clean_test = rows([Run(t[cut:], seen[cut:], clean[cut:])], cutoff=train.cutoff, rate=rate)
+    predicted = result.predict(test.q, test.v, test.a, rate, train.cutoff)
     error = float(np.sqrt(((test.tau - predicted) ** 2).mean()))
     beyond = float(np.sqrt(((clean_test.tau - predicted) ** 2).mean()))
     out = {

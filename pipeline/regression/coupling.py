@@ -50,14 +50,14 @@ class Coupling:
         return [self.name(t) for t in TERMS]
 
     def columns(
-        self, v: Array, a: Array, sigma_v: Array, spread: float, rise: float = 0.0
+        self, v: Array, a: Array, sigma_v: Array, rise: float = 0.0
     ) -> dict[str, dict[int, Array]]:
         """Torque per size of every term on both joints, (N,) each."""
         speed = v[:, self.motor] + self.ratio * v[:, self.other]
         change = a[:, self.motor] + self.ratio * a[:, self.other]
         noise = float(np.hypot(sigma_v[self.motor], self.ratio * sigma_v[self.other]))
         values = {
-            "coulomb": sense(speed, change, noise, spread, rise).sign,
+            "coulomb": sense(speed, noise, rise).sign,
             "viscous": speed,
             "inertia": change,
         }
@@ -66,10 +66,10 @@ class Coupling:
         }
 
     def halves(
-        self, v: Array, a: Array, sigma_v: Array, spread: float, rise: float = 0.0
+        self, v: Array, a: Array, sigma_v: Array, rise: float = 0.0
     ) -> dict[str, dict[int, Array]]:
         """The same columns with the action on either joint apart: what no coupling would be."""
-        whole = self.columns(v, a, sigma_v, spread, rise)
+        whole = self.columns(v, a, sigma_v, rise)
         out = {}
         for name, parts in whole.items():
             out[f"{name}|motor"] = {self.motor: parts[self.motor]}

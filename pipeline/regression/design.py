@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.regression.bodies import regressor
 from pipeline.regression.coupling import Coupling
-from pipeline.regression.friction import Shape
+from pipeline.regression.friction import SMOOTH, Shape
 from pipeline.regression.gram import Columns
 from pipeline.regression.noise import Span
 from pipeline.regression.preprocess import Rows
@@ -22,10 +22,18 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Design:
-    """Rows with the regressor of their bodies and the shape of every joint's friction."""
+    """Rows with the regressor of their bodies and the shape of every joint's friction.
+
+    Attributes:
+        rows: The rows.
+        bodies: Torque per body parameter of the rows, (N, J, P).
+        fine: The same before rows are thinned, (M, J, P).
+        shapes: Of every joint.
+    """
 
     rows: Rows
     bodies: Array
+    fine: Array
     shapes: tuple[Shape, ...]
 
     @classmethod
@@ -34,7 +42,8 @@ class Design:
         shapes = tuple(
             Shape.of(rows.v[:, j], float(rows.sigma_v[j])) for j in range(rows.v.shape[1])
         )
-        return cls(rows, regressor(model, rows.q, rows.v, rows.a), shapes)
+        fine = regressor(model, *rows.fine)
+        return cls(rows, rows.thin(fine), fine, shapes)
 
     @property
     def joints(self) -> int:
@@ -42,8 +51,8 @@ class Design:
         return len(self.shapes)
 
     def load(self, bodies: Array) -> Array:
-        """Torque of bodies with these parameters, (N, J) [N*m]."""
-        out: Array = self.bodies @ bodies
+        """Torque of bodies with these parameters before rows are thinned, (M, J) [N*m]."""
+        out: Array = self.fine @ bodies
         return out
 
     def columns(
@@ -51,19 +60,31 @@ class Design:
     ) -> Columns:
         """All columns, with couplings as asked, and some with their two actions apart."""
         r = self.rows
+        _, v, a = r.fine
         local, doubt = [], []
         for j, shape in enumerate(self.shapes):
-            terms, unsure = shape.columns(r.v[:, j], r.a[:, j], load[:, j], r.spread)
-            local.append(terms)
-            doubt.append(unsure)
+            terms, unsure = shape.columns(v[:, j], a[:, j], load[:, j])
+            local.append(self._rows(terms))
+            doubt.append(r.thin(unsure))
         shared: dict[str, dict[int, Array]] = {}
         for c in couplings:
-            rise = self.shapes[c.motor].rise
-            shared.update(c.columns(r.v, r.a, r.sigma_v, r.spread, rise))
+            whole = c.columns(v, a, r.sigma_v, self.shapes[c.motor].rise)
+            shared.update({n: self._actions(n, parts) for n, parts in whole.items()})
         for c in halves:
-            rise = self.shapes[c.motor].rise
-            shared.update(c.halves(r.v, r.a, r.sigma_v, r.spread, rise))
+            apart = c.halves(v, a, r.sigma_v, self.shapes[c.motor].rise)
+            shared.update({n: self._actions(n, parts) for n, parts in apart.items()})
         return Columns(self.bodies, local, shared, np.column_stack(doubt))
+
+    def _rows(self, terms: dict[str, Array]) -> dict[str, Array]:
+        """Filter what jumps or bends, thin the rest."""
+        sharp = [n for n in terms if n not in SMOOTH]
+        filtered = self.rows.filtered(np.column_stack([terms[n] for n in sharp]))
+        out = {n: filtered[:, k] for k, n in enumerate(sharp)}
+        return {n: out[n] if n in out else self.rows.thin(x) for n, x in terms.items()}
+
+    def _actions(self, name: str, parts: dict[int, Array]) -> dict[int, Array]:
+        sharp = name.split(":")[-1].split("|")[0] not in SMOOTH
+        return {j: (self.rows.filtered if sharp else self.rows.thin)(x) for j, x in parts.items()}
 
 
 def even_blocks(

@@ -1,9 +1,8 @@
 """Friction of one joint: named laws as nested sets of columns, and a general member above them.
 
 Every law is linear in its sizes once its shape is fixed; shapes (a Stribeck speed, a speed of
-saturation) come as a few fixed steps. Motion reverses within one low-pass's memory, so what is
-compared with a filtered torque is the filtered sign: the mean of sgn(v + a t) over the memory,
-erf(v / (sqrt(2) |a| spread)), widened by the noise of the velocity.
+saturation) come as a few fixed steps. Motion reverses within one low-pass's memory, so columns that
+jump or bend there are computed before rows are thinned and go through the filter of the torque.
 """
 
 from __future__ import annotations
@@ -26,15 +25,15 @@ TRANSITIONS: Final = (0.0, 0.003, 0.01, 0.03, 0.1)
 #: Shares of motor torque tried for the convention "per motor torque".
 MOTOR_SHARES: Final = (0.1, 0.25)
 #: Inner knots of the general member, as quantiles of the speed.
-KNOTS: Final = (0.1, 0.25, 0.5, 0.75)
+KNOTS: Final = (0.1, 0.25, 0.4, 0.55, 0.7, 0.85)
 
 
 @dataclass(frozen=True)
 class Sense:
-    """Sign of the velocity as a filtered torque shows it.
+    """Sign of a velocity that is known with noise.
 
     Attributes:
-        sign: Filtered sign, -1 to 1, (N,).
+        sign: Its mean, -1 to 1, (N,).
         doubt: Variance of the sign from the noise of the velocity, 0 to 1, (N,).
     """
 
@@ -42,19 +41,17 @@ class Sense:
     doubt: Array
 
 
-def sense(v: Array, a: Array, sigma_v: float, spread: float, rise: float = 0.0) -> Sense:
+def sense(v: Array, sigma_v: float, rise: float = 0.0) -> Sense:
     """Sign of one joint's velocity.
 
     Args:
         v: (N,) [rad/s].
-        a: (N,) [rad/s^2].
         sigma_v: Noise of the velocity [rad/s].
-        spread: Standard deviation of the low-pass in time [s].
         rise: Speed over which friction rises after a reversal [rad/s].
     """
     tiny = 1e-12 + 1e-9 * float(np.abs(v).max(initial=0.0))
     noise = max(sigma_v, tiny)
-    width = np.sqrt(noise**2 + (a * spread) ** 2 + rise**2)
+    width = np.hypot(noise, rise)
     sign = scipy.special.erf(v / (np.sqrt(2) * width))
     doubt = 1.0 - scipy.special.erf(v / (np.sqrt(2) * noise)) ** 2
     return Sense(np.asarray(sign), np.asarray(doubt))
@@ -85,6 +82,8 @@ class Law:
 
 #: Terms that may have either sign; every other one takes energy out or is none.
 SIGNED: Final = frozenset({"offset", "even"})
+#: Terms that are as smooth as the motion: it went through the filter already.
+SMOOTH: Final = frozenset({"offset", "rotor", "viscous", "quadratic", "inertia"})
 #: Terms beside friction, decided on their own.
 BESIDE: Final = ("offset", "rotor")
 
@@ -148,18 +147,15 @@ class Shape:
         knots = np.maximum.accumulate(knots + 1e-9 * top * np.arange(knots.size))
         return cls(top, knots, sigma_v)
 
-    def columns(
-        self, v: Array, a: Array, load: Array, spread: float
-    ) -> tuple[dict[str, Array], Array]:
+    def columns(self, v: Array, a: Array, load: Array) -> tuple[dict[str, Array], Array]:
         """Columns of every term, (N,) each, and the doubt about the sign, (N,).
 
         Args:
             v: (N,) [rad/s].
             a: (N,) [rad/s^2].
             load: Torque of the rigid bodies, (N,) [N*m].
-            spread: Standard deviation of the low-pass in time [s].
         """
-        felt = sense(v, a, self.sigma_v, spread, self.rise)
+        felt = sense(v, self.sigma_v, self.rise)
         s, speed, heavy = felt.sign, np.abs(v), np.abs(load)
         power = np.sign(load) * s
         out = {
@@ -174,7 +170,7 @@ class Shape:
             "driven": heavy * s * (0.5 - 0.5 * power),
         }
         for k, share in enumerate(TRANSITIONS):
-            rising = sense(v, a, self.sigma_v, spread, share * self.speed).sign
+            rising = sense(v, self.sigma_v, share * self.speed).sign
             out[f"rising@{k}"] = rising
             out[f"rising_load@{k}"] = heavy * rising
         for k, share in enumerate(STRIBECK_SPEEDS):

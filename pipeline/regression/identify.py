@@ -72,7 +72,7 @@ class Options:
     draws: int = 50
     uncertainties: tuple[float, ...] = (0.0, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
     closes: float = 0.01
-    bends: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1)
+    bends: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
     seed: int = 0
 
 
@@ -176,7 +176,7 @@ class _Identification:
                     out[:, j] -= size * x
             else:
                 out[:, int(place)] -= size * columns.local[int(place)][term]
-        return out - self.load
+        return out - self.rows.thin(self.load)
 
     # -- stages --------------------------------------------------------------------------------
 

@@ -23,8 +23,6 @@ Array = NDArray[np.float64]
 SHRINK: Final = 0.01
 #: Rows kept per second and hertz of the cut-off: what lies above half of it is filtered away.
 ROWS_PER_HERTZ: Final = 2.5
-#: Spread in time of the low-pass taken as a Gaussian of the same half-amplitude frequency [1].
-SPREAD: Final = float(np.sqrt(2 * np.log(2)) / (2 * np.pi))
 #: Samples of a spectrum, so many averages at least.
 AVERAGES: Final = 8
 
@@ -43,6 +41,11 @@ class Rows:
         rate: Rows per second [Hz].
         cutoff: Of the low-pass; amplitude is halved there [Hz].
         sigma_v: Standard deviation of a velocity's noise, (J,) [rad/s].
+        fine: Position, velocity and acceleration before thinning, (M, J) each: friction jumps
+            where a velocity changes sign, and is filtered as the torque was.
+        fine_start: Index of the first fine row of every run.
+        fine_rate: Fine rows per second [Hz].
+        every: Fine rows per row.
     """
 
     time: Array
@@ -54,11 +57,25 @@ class Rows:
     rate: float
     cutoff: float
     sigma_v: Array
+    fine: tuple[Array, Array, Array]
+    fine_start: tuple[int, ...]
+    fine_rate: float
+    every: int
 
-    @property
-    def spread(self) -> float:
-        """Standard deviation in time of what the low-pass makes of an instant [s]."""
-        return SPREAD / self.cutoff
+    def thin(self, x: Array) -> Array:
+        """Rows of fine values, (M, ...) to (N, ...), without a filter."""
+        ends = [*self.fine_start[1:], len(x)]
+        parts = [x[a:b][:: self.every] for a, b in zip(self.fine_start, ends, strict=True)]
+        return np.concatenate(parts)
+
+    def filtered(self, x: Array) -> Array:
+        """Rows of fine values through the low-pass that the torque went through."""
+        ends = [*self.fine_start[1:], len(x)]
+        parts = [
+            low_pass(x[a:b], self.fine_rate, self.cutoff)[:: self.every]
+            for a, b in zip(self.fine_start, ends, strict=True)
+        ]
+        return np.concatenate(parts)
 
 
 @dataclass(frozen=True)
@@ -113,7 +130,8 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
     rate = min(rate or ROWS_PER_HERTZ * cutoff, full)
     every = max(1, round(full / rate))
     parts: list[tuple[Array, ...]] = []
-    start, n = [], 0
+    whole: list[tuple[Array, Array, Array]] = []
+    start, n, fine_start, m = [], 0, [], 0
     for q, tau, v, t in grids:
         qs = low_pass(q, full, cutoff)
         vs = (
@@ -121,6 +139,9 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
         )
         a = np.gradient(vs, step, axis=0)
         part = tuple(x[::every] for x in (t, qs, vs, a, low_pass(tau, full, cutoff)))
+        whole.append((qs, vs, a))
+        fine_start.append(m)
+        m += len(t)
         start.append(n)
         n += len(part[0])
         parts.append(part)
@@ -129,7 +150,22 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
         sigma_v = np.sqrt(noise_v * cutoff)
     else:
         sigma_v = np.sqrt(noise * (2 * np.pi) ** 2 * cutoff**3 / 3)
-    return Rows(time, q, v, a, tau, tuple(start), full / every, cutoff, sigma_v)
+    fine = tuple(np.concatenate(x) for x in zip(*whole, strict=True))
+    return Rows(
+        time,
+        q,
+        v,
+        a,
+        tau,
+        tuple(start),
+        full / every,
+        cutoff,
+        sigma_v,
+        (fine[0], fine[1], fine[2]),
+        tuple(fine_start),
+        full,
+        every,
+    )
 
 
 def _uniform(run: Run, step: float) -> tuple[Array, Array, Array | None, Array]:

@@ -11,9 +11,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pipeline.regression.coupling import Coupling
-from pipeline.regression.friction import Shape
+from pipeline.regression.friction import SMOOTH, Shape
 from pipeline.regression.noise import Colour
-from pipeline.regression.preprocess import SPREAD
+from pipeline.regression.preprocess import low_pass
 
 Array = NDArray[np.float64]
 
@@ -82,7 +82,7 @@ class Friction:
         """Friction torque at speeds (N,) [rad/s] under loads [N*m], (N,) [N*m]."""
         v = np.asarray(v, dtype=np.float64)
         load = np.broadcast_to(np.asarray(load, dtype=np.float64), v.shape)
-        columns, _ = self.shape.columns(v, np.zeros_like(v), load, 0.0)
+        columns, _ = self.shape.columns(v, np.zeros_like(v), load)
         return sum((x * columns[t] for t, x in self.terms.items()), np.zeros_like(v))
 
 
@@ -145,35 +145,49 @@ class Result:
     blocks: int
     sigma_v: Array
 
-    def predict(self, q: Array, v: Array, a: Array, cutoff: float | None = None) -> Array:
+    def predict(
+        self,
+        q: Array,
+        v: Array,
+        a: Array,
+        rate: float | None = None,
+        cutoff: float | None = None,
+    ) -> Array:
         """Torque of the model, (N, J) [N*m].
 
         Args:
             q: (N, J) [rad].
             v: (N, J) [rad/s].
             a: (N, J) [rad/s^2].
-            cutoff: Of the low-pass that the motion and what is compared went through [Hz]; jumps
-                of friction are rounded by it. Without it friction jumps.
+            rate: Rows per second, of one run without gaps [Hz].
+            cutoff: Of the low-pass that the motion, and the torque it is compared with, went
+                through [Hz]: where friction jumps it goes through the same. Without rate and
+                cut-off friction jumps.
         """
-        spread = SPREAD / cutoff if cutoff else 0.0
+
+        def filtered(term: str, x: Array) -> Array:
+            if rate is None or cutoff is None or term in SMOOTH:
+                return x
+            return low_pass(x, rate, cutoff)
+
         data = self.model.createData()
         load = np.array(
             [pin.rnea(self.model, data, *row) for row in zip(q, v, a, strict=True)]
         ).reshape(q.shape)
         out = load.copy()
         for j, friction in enumerate(self.friction):
-            columns, _ = friction.shape.columns(v[:, j], a[:, j], load[:, j], spread)
+            columns, _ = friction.shape.columns(v[:, j], a[:, j], load[:, j])
             for name, column in columns.items():
                 size = self.sizes.get((str(j), name))
                 if size is not None:
-                    out[:, j] += size * column
+                    out[:, j] += size * filtered(name, column)
         for c in self.couplings:
             rise = self.friction[c.motor].shape.rise
-            for name, actions in c.columns(v, a, self.sigma_v, spread, rise).items():
+            for name, actions in c.columns(v, a, self.sigma_v, rise).items():
                 size = self.sizes.get(("shared", name))
                 if size is not None:
                     for i, action in actions.items():
-                        out[:, i] += size * action
+                        out[:, i] += size * filtered(name.split(":")[-1], action)
         return out
 
     def at(self, place: str) -> Sequence[Term]:

@@ -226,6 +226,10 @@ def find_coupling(
         both = np.zeros((len(own), len(TERMS)))
         for t in range(len(TERMS)):
             both[first + 2 * t : first + 2 * t + 2, t] = 1.0
+        # What would give energy counts for nothing.
+        both = both[:, eliminated.mixed_sizes(both) > 0]
+        if not both.shape[1] or min(eliminated.mixed_sizes(both)) < 0:
+            continue
         coupled = eliminated.mixed(both)
         mean, error = compare(without, coupled, weight)
         if mean <= limit * error or (best is not None and mean <= best[0]):
@@ -233,9 +237,6 @@ def find_coupling(
         halves = range(first, first + 2 * len(TERMS))
         apart = eliminated.losses(halves)
         sides = [compare(eliminated.losses(halves[side::2]), apart, weight) for side in (0, 1)]
-        sizes = eliminated.mixed_sizes(both)
-        if min(sizes) < 0:
-            continue
         enough = mean >= SAME * compare(without, apart, weight)[0]
         if enough and all(gain > side_limit * doubt for gain, doubt in sides):
             best = (mean, c)

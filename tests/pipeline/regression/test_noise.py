@@ -8,6 +8,7 @@ import scipy.signal
 
 from pipeline.regression.friction import sense
 from pipeline.regression.noise import colour, weights
+from tests.pipeline.regression.arms import arm
 
 
 def coloured(n: int = 20000) -> np.ndarray:
@@ -36,17 +37,21 @@ def test_white_noise_needs_no_filter() -> None:
 
 def test_rows_whose_sign_is_in_doubt_weigh_less_and_none_is_lost() -> None:
     v = np.array([0.0, 0.01, 1.0])
-    felt = sense(v, np.zeros(3), 0.01, 0.0)
+    felt = sense(v, 0.01)
     w = weights(felt.doubt, friction=1.0, level=0.1)
     assert 0 < w[0] < w[1] < w[2] == pytest.approx(1.0)
 
 
-def test_filtered_sign_is_that_of_a_low_passed_step() -> None:
-    from pipeline.regression.preprocess import SPREAD, low_pass
+def test_columns_that_jump_go_through_the_filter_of_the_torque() -> None:
+    from pipeline.regression.design import Design
+    from pipeline.regression.preprocess import Run, low_pass, rows
 
-    rate, cutoff = 1000.0, 10.0
-    t = np.arange(-1, 1, 1 / rate)
-    v = 2.0 * t
-    expected = low_pass(np.sign(v), rate, cutoff)
-    found = sense(v, np.full_like(v, 2.0), 1e-9, SPREAD / cutoff).sign
-    assert np.abs(found - expected)[200:-200].max() < 0.12
+    t = np.arange(0, 20, 0.005)
+    q = np.sin(2 * np.pi * 0.4 * t)[:, None]
+    v = 0.8 * np.pi * np.cos(2 * np.pi * 0.4 * t)[:, None]
+    r = rows([Run(t, q, np.sign(v))], cutoff=8.0)
+    design = Design.of(arm(1), r)
+    column = design.columns(np.zeros_like(r.fine[1]), ()).local[0]["coulomb"]
+    inner = slice(20, -20)
+    np.testing.assert_allclose(column[inner], r.tau[inner, 0], atol=0.08)
+    np.testing.assert_allclose(r.tau[:, 0], low_pass(np.sign(v), 200.0, 8.0)[:: r.every, 0])
