@@ -54,12 +54,12 @@ class Options:
     """Error rates and sizes of the search.
 
     Attributes:
-        error_rate: Chance of one wrong coupling, and of one confirmed size whose interval should
-            have held zero, per log.
+        error_rate: Chance of one wrong coupling, of a refit of true bodies, and of one confirmed
+            size whose interval should have held zero, per log.
         coverage: Of the intervals.
         sure: Share of draws from which a name is confirmed: so often it should be right.
         draws: Of the log's blocks.
-        uncertainties: Of the URDF that validation chooses from; 0 is no refit.
+        uncertainties: Of the URDF that validation chooses from, beside no refit.
         closes: Share of what stays unexplained below which a size closes next to nothing.
         bends: Of the general member: how far it may depart from Coulomb, viscous and
             load-dependent friction, as a share of the joint's torque; validation chooses.
@@ -70,7 +70,7 @@ class Options:
     coverage: float = 0.95
     sure: float = 0.95
     draws: int = 50
-    uncertainties: tuple[float, ...] = (0.0, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+    uncertainties: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
     closes: float = 0.01
     bends: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
     seed: int = 0
@@ -188,20 +188,10 @@ class _Identification:
         self._rich(colours=True)
         self._block(max(c.correlation for c in self.noise))
         self._rich(colours=True)
-        self._refit_or_not()
+        self._strengths()
         self._rise()
         self._rich(colours=True)
-        for _ in range(2):  # the URDF's uncertainty once more, now beside the laws
-            columns = self._columns(self.couplings)
-            normal = self._system(columns)
-            fit = self._fit(normal, columns, self.sigma)
-            rich = [general(j) for j in range(self.model.nv)]
-            chosen = choose_laws(fit, self.folds, self.weight, rich, self.couplings, passes=3)
-            self.choices = upgrade(fit, self.folds, self.weight, chosen, self.couplings)
-            before = self.sigma
-            self._strength(normal, columns, self._keys())
-            if self.sigma == before:
-                break
+        self._laws()
         return self._finish()
 
     def _rich(self, colours: bool) -> None:
@@ -246,8 +236,8 @@ class _Identification:
             self.couplings.append(found)
             self._rich(colours=True)
 
-    def _refit_or_not(self) -> None:
-        """Uncertainty of the URDF: the best on validation blocks, if it wins against no refit."""
+    def _strengths(self) -> None:
+        """How far the general member bends and the URDF may be off, by validation blocks."""
         columns = self._columns(self.couplings)
         s = self._system(columns)
         keys = self._keys([general(j) for j in range(self.model.nv)])
@@ -260,15 +250,75 @@ class _Identification:
         self._strength(s, columns, keys)
 
     def _strength(self, s: System, columns: Columns, keys: Sequence[Key]) -> None:
-        """Uncertainty of the URDF beside some columns."""
+        """Uncertainty of the URDF that predicts best beside some columns."""
         losses = []
         for sigma in self.options.uncertainties:
             fit = self._fit(s, columns, sigma)
-            losses.append(fit.losses(self.folds, self.weight, fit.columns(keys)))
-        best = int(np.argmin([x.sum() for x in losses]))
-        mean, error = compare(losses[0], losses[best], self.weight)
-        # Index 0 is no refit: a refit has to win by a standard error, its strength only to be best.
-        self.sigma = self.options.uncertainties[0 if mean <= error else best]
+            losses.append(float(fit.losses(self.folds, self.weight, fit.columns(keys)).sum()))
+        self.sigma = self.options.uncertainties[int(np.argmin(losses))]
+
+    def _laws(self) -> None:
+        """Laws beside the URDF's bodies and beside fitted ones; a refit has to win beyond chance.
+
+        Rotor inertia and a link's inertia, or a load and friction, stand in for each other: either
+        way needs laws of its own before the two can be compared. A refit must carry over: from one
+        half of the log to the other as well, and in torque itself, not only in what whitening sees.
+        """
+        columns = self._columns(self.couplings)
+        normal = self._system(columns)
+        # The same rows with every joint's noise taken as white: what is promised is an error of
+        # torque, and whitening hardly looks at its slow part.
+        white = [Colour(np.zeros(0), c.level, c.level, 1.0) for c in self.noise]
+        plain = system(columns, self.rows.tau, self.blocks, white)
+        kept, kept_loss = self._chosen(self._fit(normal, columns, 0.0))
+        refit, loss = self._chosen(self._fit(normal, columns, self.sigma))
+        before = self.sigma
+        self._strength(normal, columns, self._keys(refit))
+        if self.sigma != before:
+            refit, loss = self._chosen(self._fit(normal, columns, self.sigma))
+        wins = self._beyond_chance(kept_loss, loss)
+        for folds in (self.folds, folds_of(len(self.blocks), 2)):
+            wins = wins and self._beyond_chance(
+                self._plain_losses(normal, plain, columns, 0.0, kept, folds),
+                self._plain_losses(normal, plain, columns, self.sigma, refit, folds),
+            )
+        if wins:
+            self.choices = refit
+        else:
+            self.choices, self.sigma = kept, 0.0
+
+    def _beyond_chance(self, first: Array, second: Array) -> bool:
+        gain, error = compare(first, second, self.weight)
+        chance = scipy.stats.t.ppf(1 - self.options.error_rate, len(self.blocks) - 1)
+        return gain > float(chance) * error
+
+    def _plain_losses(
+        self,
+        normal: System,
+        plain: System,
+        columns: Columns,
+        sigma: float,
+        found: list[Choice],
+        folds: Sequence[NDArray[np.intp]],
+    ) -> Array:
+        """Loss of every block in torque itself, fitted with whitening on the other folds."""
+        fit, bare = self._fit(normal, columns, sigma), self._fit(plain, columns, sigma)
+        at = fit.columns(self._keys(found))
+        out = np.zeros(len(self.blocks))
+        for fold in folds:
+            train = self.weight.copy()
+            train[fold] = 0.0
+            x = fit.solve(train, at)
+            out[fold] = [bare.loss(int(b), at, x) for b in fold]
+        return out
+
+    def _chosen(self, fit: Fit) -> tuple[list[Choice], Array]:
+        """Laws of all joints and the predictive loss of every block with them."""
+        rich = [general(j) for j in range(self.model.nv)]
+        found = choose_laws(fit, self.folds, self.weight, rich, self.couplings, passes=3)
+        found = upgrade(fit, self.folds, self.weight, found, self.couplings)
+        at = fit.columns(self._keys(found))
+        return found, fit.losses(self.folds, self.weight, at)
 
     def _rise(self) -> None:
         """Speed over which friction rises after a reversal, per joint: what predicts best."""
