@@ -48,7 +48,7 @@ class Reporting(Standing):
         for key, (closes, gain) in self._closing(fit, keys).items():
             place, term = key
             k = fit.system.where[key]
-            share, short = 1.0, 0.0
+            share, short = self.coupled.get(term, 0.0), 0.0
             if place != "shared":
                 share = shares[int(place)].get(kind(term), 0.0)
                 short = self.choices[int(place)].short

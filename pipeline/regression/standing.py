@@ -139,6 +139,19 @@ class Standing(Choosing):
             out.append((key, term))
         return out
 
+    def _drawn_couplings(self, fit: Fit, weight: Array) -> None:
+        """Count a coupling's terms where this draw predicts worse without them by an error."""
+        keys = self._keys()
+        if not self.couplings:
+            return
+        have = fit.losses(self.folds, weight, fit.columns(keys))
+        for c in self.couplings:
+            for name in c.names:
+                rest = [k for k in keys if k != ("shared", name)]
+                without = fit.losses(self.folds, weight, fit.columns(rest))
+                mean, error = compare(without, have, weight)
+                self.coupled[name] = self.coupled.get(name, 0.0) + float(mean > error)
+
     def _shares(self, fit: Fit) -> tuple[list[dict[str, float]], list[float]]:
         """How often every kind and every law is chosen when blocks are drawn anew."""
         rng = np.random.default_rng(self.options.seed)
@@ -154,5 +167,7 @@ class Standing(Choosing):
                 laws[j] += c.law.name == self.choices[j].law.name
                 for k in {kind(t) for t in c.terms}:
                     kinds[j][k] = kinds[j].get(k, 0.0) + 1.0
+            self._drawn_couplings(fit, weight)
         done = max(done, 1)
+        self.coupled = {name: x / done for name, x in self.coupled.items()}
         return [{k: x / done for k, x in d.items()} for d in kinds], [x / done for x in laws]

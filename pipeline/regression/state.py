@@ -45,6 +45,7 @@ class State:
         self.design = Design.of(model, rows)
         self.names = tuple(model.names[1:])
         self.couplings: list[Coupling] = []
+        self.coupled: dict[str, float] = {}
         self.noise = [Colour(np.zeros(0), s, s, 1.0) for s in rows.tau.std(axis=0) + 1e-12]
         self.load = self.design.load(self.bodies.nominal)
         self.friction: Array | None = None
