@@ -18,10 +18,10 @@ import scipy.linalg
 import scipy.signal
 from numpy.typing import NDArray
 
-from pipeline.regression.bandwidth import prepare
-from pipeline.regression.bodies import parameters, pseudo_inertia, regressor, with_parameters
 from pipeline.regression.identify import Options, identify
+from pipeline.regression.laws.bodies import parameters, pseudo_inertia, regressor, with_parameters
 from pipeline.regression.preprocess import Run, rows
+from pipeline.regression.statistics.bandwidth import prepare
 
 Array = NDArray[np.float64]
 ARMS = {"ur5": 6, "panda": 7, "z1": 6, "kinova": 6, "xarm7": 7, "double_pendulum": 2}

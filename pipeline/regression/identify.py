@@ -12,11 +12,11 @@ from collections.abc import Sequence
 
 import pinocchio as pin
 
-from pipeline.regression.noise import Span
 from pipeline.regression.options import Options
 from pipeline.regression.preprocess import Rows
 from pipeline.regression.reporting import Reporting
 from pipeline.regression.result import Result, Term
+from pipeline.regression.statistics.noise import Span
 
 __all__ = ["Options", "identify"]
 

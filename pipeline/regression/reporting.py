@@ -7,23 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.regression.base_parameters import base_set
-from pipeline.regression.bodies import with_parameters
-from pipeline.regression.friction import (
+from pipeline.regression.laws.base_parameters import base_set
+from pipeline.regression.laws.bodies import with_parameters
+from pipeline.regression.laws.friction import (
     BESIDE,
     SIGNED,
     kind,
     name_of,
     unit,
 )
-from pipeline.regression.gram import Key
-from pipeline.regression.jackknife import standard_error
 from pipeline.regression.result import BaseParameter, Friction, Level, Result, Term
-from pipeline.regression.selection import (
+from pipeline.regression.statistics.gram import Key
+from pipeline.regression.statistics.jackknife import standard_error
+from pipeline.regression.statistics.selection import (
     UNNAMED,
 )
-from pipeline.regression.solve import Fit
-from pipeline.regression.standing import Standing
+from pipeline.regression.statistics.solve import Fit
+from pipeline.regression.statistics.standing import Standing
 
 Array = NDArray[np.float64]
 

@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pipeline.regression.coupling import Coupling
-from pipeline.regression.friction import SMOOTH, Shape
-from pipeline.regression.noise import Colour
+from pipeline.regression.laws.coupling import Coupling
+from pipeline.regression.laws.friction import SMOOTH, Shape
 from pipeline.regression.preprocess import low_pass
+from pipeline.regression.statistics.noise import Colour
 
 Array = NDArray[np.float64]
 

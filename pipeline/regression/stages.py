@@ -7,22 +7,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.regression.coupling import every_pair
-from pipeline.regression.friction import (
+from pipeline.regression.laws.coupling import every_pair
+from pipeline.regression.laws.friction import (
     BESIDE,
     TRANSITIONS,
     Law,
     general_terms,
 )
-from pipeline.regression.gram import Columns, Key, System
-from pipeline.regression.noise import Colour, colour
-from pipeline.regression.selection import (
+from pipeline.regression.state import State
+from pipeline.regression.statistics.gram import Columns, Key, System
+from pipeline.regression.statistics.noise import Colour, colour
+from pipeline.regression.statistics.selection import (
     Choice,
     find_coupling,
     general,
 )
-from pipeline.regression.solve import Eliminated
-from pipeline.regression.state import State
+from pipeline.regression.statistics.solve import Eliminated
 
 
 class Stages(State):

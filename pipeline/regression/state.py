@@ -9,23 +9,23 @@ import pinocchio as pin
 import scipy.stats
 from numpy.typing import NDArray
 
-from pipeline.regression.bodies import Bodies
-from pipeline.regression.coupling import Coupling
-from pipeline.regression.design import Design, even_blocks, folds_of
 from pipeline.regression.errors import RegressionError
-from pipeline.regression.friction import (
+from pipeline.regression.laws.bodies import Bodies
+from pipeline.regression.laws.coupling import Coupling
+from pipeline.regression.laws.design import Design, even_blocks, folds_of
+from pipeline.regression.laws.friction import (
     bends,
 )
-from pipeline.regression.gram import Columns, Key, System, system
-from pipeline.regression.noise import Colour, Span
 from pipeline.regression.options import Options
 from pipeline.regression.preprocess import Rows
-from pipeline.regression.selection import (
+from pipeline.regression.statistics.gram import Columns, Key, System, system
+from pipeline.regression.statistics.noise import Colour, Span
+from pipeline.regression.statistics.selection import (
     UNNAMED,
     Choice,
     general,
 )
-from pipeline.regression.solve import Fit, Prior
+from pipeline.regression.statistics.solve import Fit, Prior
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pipeline.regression.bodies import parameters, with_parameters
+from pipeline.regression.laws.bodies import parameters, with_parameters
 from pipeline.regression.preprocess import Run
 
 Array = NDArray[np.float64]

@@ -6,8 +6,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.regression.base_parameters import base_set
-from pipeline.regression.bodies import (
+from pipeline.regression.errors import RegressionError
+from pipeline.regression.laws.base_parameters import base_set
+from pipeline.regression.laws.bodies import (
     Bodies,
     consistent,
     parameters,
@@ -15,7 +16,6 @@ from pipeline.regression.bodies import (
     regressor,
     with_parameters,
 )
-from pipeline.regression.errors import RegressionError
 from tests.pipeline.regression.arms import arm, heavier
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.regression.bandwidth import prepare
 from pipeline.regression.errors import RegressionError
-from pipeline.regression.friction import LAWS, kind
 from pipeline.regression.identify import Options, identify
+from pipeline.regression.laws.friction import LAWS, kind
 from pipeline.regression.preprocess import Run, low_pass, rows
 from pipeline.regression.result import Level, Result
+from pipeline.regression.statistics.bandwidth import prepare
 from tests.pipeline.regression.arms import arm, heavier, log
 
 FEW = Options(draws=10)

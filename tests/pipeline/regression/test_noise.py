@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from pipeline.regression.friction import sense
-from pipeline.regression.noise import colour, weights
+from pipeline.regression.laws.friction import sense
+from pipeline.regression.statistics.noise import colour, weights
 from tests.pipeline.regression.arms import arm
 
 
@@ -43,7 +43,7 @@ def test_rows_whose_sign_is_in_doubt_weigh_less_and_none_is_lost() -> None:
 
 
 def test_columns_that_jump_go_through_the_filter_of_the_torque() -> None:
-    from pipeline.regression.design import Design
+    from pipeline.regression.laws.design import Design
     from pipeline.regression.preprocess import Run, low_pass, rows
 
     t = np.arange(0, 20, 0.005)

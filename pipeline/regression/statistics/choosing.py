@@ -8,17 +8,17 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
-from pipeline.regression.design import folds_of
-from pipeline.regression.gram import Columns, System, system
-from pipeline.regression.noise import Colour
-from pipeline.regression.selection import (
+from pipeline.regression.laws.design import folds_of
+from pipeline.regression.stages import Stages
+from pipeline.regression.statistics.gram import Columns, System, system
+from pipeline.regression.statistics.noise import Colour
+from pipeline.regression.statistics.selection import (
     Choice,
     choose_laws,
     general,
     upgrade,
 )
-from pipeline.regression.solve import Fit, compare
-from pipeline.regression.stages import Stages
+from pipeline.regression.statistics.solve import Fit, compare
 
 Array = NDArray[np.float64]
 

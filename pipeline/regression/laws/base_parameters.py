@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from pipeline.regression.bodies import PARAMETERS, UNITS, Bodies
+from pipeline.regression.laws.bodies import PARAMETERS, UNITS, Bodies
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.regression.noise import Colour, Span, weights
+from pipeline.regression.statistics.noise import Colour, Span, weights
 
 Array = NDArray[np.float64]
 Key = tuple[str, str]

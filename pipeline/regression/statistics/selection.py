@@ -9,10 +9,10 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
-from pipeline.regression.coupling import TERMS, Coupling
-from pipeline.regression.friction import BESIDE, LAWS, SIGNED, Law, general_terms
-from pipeline.regression.gram import Key
-from pipeline.regression.solve import Eliminated, Fit, compare
+from pipeline.regression.laws.coupling import TERMS, Coupling
+from pipeline.regression.laws.friction import BESIDE, LAWS, SIGNED, Law, general_terms
+from pipeline.regression.statistics.gram import Key
+from pipeline.regression.statistics.solve import Eliminated, Fit, compare
 
 Array = NDArray[np.float64]
 Folds = Sequence[NDArray[np.intp]]

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.regression.friction import sense
+from pipeline.regression.laws.friction import sense
 
 Array = NDArray[np.float64]
 

@@ -7,20 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.regression.bodies import consistent
-from pipeline.regression.choosing import Choosing
-from pipeline.regression.friction import (
+from pipeline.regression.laws.bodies import consistent
+from pipeline.regression.laws.friction import (
     SIGNED,
     kind,
     unit,
 )
-from pipeline.regression.gram import Key
-from pipeline.regression.jackknife import standard_error
 from pipeline.regression.result import Level, Term
-from pipeline.regression.selection import (
+from pipeline.regression.statistics.choosing import Choosing
+from pipeline.regression.statistics.gram import Key
+from pipeline.regression.statistics.jackknife import standard_error
+from pipeline.regression.statistics.selection import (
     choose_laws,
 )
-from pipeline.regression.solve import Fit, compare
+from pipeline.regression.statistics.solve import Fit, compare
 
 Array = NDArray[np.float64]
 

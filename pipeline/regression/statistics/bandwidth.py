@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pipeline.regression.bodies import Bodies
-from pipeline.regression.design import Design
-from pipeline.regression.friction import general_terms
+from pipeline.regression.laws.bodies import Bodies
+from pipeline.regression.laws.design import Design
+from pipeline.regression.laws.friction import general_terms
 from pipeline.regression.preprocess import Rows, Run, rows, spectra
 
 Array = NDArray[np.float64]

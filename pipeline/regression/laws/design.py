@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pipeline.regression.bodies import regressor
-from pipeline.regression.coupling import Coupling
-from pipeline.regression.friction import SMOOTH, Shape
-from pipeline.regression.gram import Columns
-from pipeline.regression.noise import Span
+from pipeline.regression.laws.bodies import regressor
+from pipeline.regression.laws.coupling import Coupling
+from pipeline.regression.laws.friction import SMOOTH, Shape
 from pipeline.regression.preprocess import Rows
+from pipeline.regression.statistics.gram import Columns
+from pipeline.regression.statistics.noise import Span
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from pipeline.regression.bodies import Bodies
-from pipeline.regression.gram import Key, System
+from pipeline.regression.laws.bodies import Bodies
+from pipeline.regression.statistics.gram import Key, System
 
 Array = NDArray[np.float64]
 
