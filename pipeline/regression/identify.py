@@ -1,0 +1,76 @@
+"""Rigid bodies, friction of every joint and couplings of a machine with a fixed base, together.
+
+The order of a good engineer: the richest model first, whose residual is the noise; couplings and
+the refit of bodies beside friction of any shape; then for every joint the simplest law that
+predicts blocks it did not see as well as any; what does not stand is dropped and the rest fitted
+anew; sizes with intervals from leaving out blocks; shares from drawing blocks anew.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pinocchio as pin
+
+from pipeline.regression.options import Options
+from pipeline.regression.preprocess import Rows
+from pipeline.regression.reporting import Reporting
+from pipeline.regression.result import Result, Term
+from pipeline.regression.statistics.noise import Span
+
+__all__ = ["Options", "identify"]
+
+
+def identify(
+    rows: Rows,
+    model: pin.Model,
+    *,
+    blocks: Sequence[Span] | None = None,
+    options: Options | None = None,
+) -> Result:
+    """Identify a machine from its training rows.
+
+    Args:
+        rows: Training rows; nothing else is looked at.
+        model: By the URDF; its joints in the order of the rows' columns.
+        blocks: Stretches that are drawn and left out together, such as whole cycles; found from the
+            correlation of the noise by default.
+        options: Error rates.
+
+    Raises:
+        RegressionError: Joints do not match, or there are too few blocks.
+    """
+    return _Identification(rows, model, blocks, options or Options()).run()
+
+
+class _Identification(Reporting):
+    """One identification."""
+
+    def run(self) -> Result:
+        """All stages in order."""
+        self._rich(colours=False)
+        self._rich(colours=True)
+        self._couple()
+        self._rich(colours=True)
+        self._block(max(c.correlation for c in self.noise))
+        self._rich(colours=True)
+        self._strengths()
+        self._rise()
+        self._rich(colours=True)
+        self._laws()
+        return self._finish()
+
+    def _finish(self) -> Result:
+        suspected: list[Term] = []
+        for last in (False, True):  # the load is of the bodies as they come out
+            columns = self._columns(self.couplings)
+            fit = self._fit(self._system(columns), columns, self.sigma)
+            keys, x, replicas = self._stand(fit, self._keys())
+            if last:
+                while small := self._small(fit, keys, x, replicas):
+                    suspected += [t for _, t in small]
+                    gone = [k for k, _ in small]
+                    keys, x, replicas = self._stand(fit, [k for k in keys if k not in gone])
+            self.load = self.design.load(x[: fit.n_bodies])
+        shares, laws = self._shares(fit)
+        return self._result(fit, keys, x, replicas, shares, laws, suspected)

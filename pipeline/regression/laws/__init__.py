@@ -1,0 +1,1 @@
+"""What torque may depend on: bodies, friction, couplings, as columns."""

@@ -1,0 +1,118 @@
+"""From rows to columns: what torque is linear in, given the load on every joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pipeline.regression.laws.bodies import regressor
+from pipeline.regression.laws.coupling import Coupling
+from pipeline.regression.laws.friction import SMOOTH, Shape
+from pipeline.regression.preprocess import Rows
+from pipeline.regression.statistics.gram import Columns
+from pipeline.regression.statistics.noise import Span
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Design:
+    """Rows with the regressor of their bodies and the shape of every joint's friction.
+
+    Attributes:
+        rows: The rows.
+        bodies: Torque per body parameter of the rows, (N, J, P).
+        fine: The same before rows are thinned, (M, J, P).
+        shapes: Of every joint.
+    """
+
+    rows: Rows
+    bodies: Array
+    fine: Array
+    shapes: tuple[Shape, ...]
+
+    @classmethod
+    def of(cls, model: pin.Model, rows: Rows) -> Design:
+        """Compute the regressor once; nothing later changes it."""
+        shapes = tuple(
+            Shape.of(rows.v[:, j], float(rows.sigma_v[j])) for j in range(rows.v.shape[1])
+        )
+        fine = regressor(model, *rows.fine)
+        return cls(rows, rows.thin(fine), fine, shapes)
+
+    @property
+    def joints(self) -> int:
+        """Number of joints."""
+        return len(self.shapes)
+
+    def load(self, bodies: Array) -> Array:
+        """Torque of bodies with these parameters before rows are thinned, (M, J) [N*m]."""
+        out: Array = self.fine @ bodies
+        return out
+
+    def columns(
+        self, load: Array, couplings: Sequence[Coupling], halves: Sequence[Coupling] = ()
+    ) -> Columns:
+        """All columns, with couplings as asked, and some with their two actions apart."""
+        r = self.rows
+        _, v, a = r.fine
+        local, doubt = [], []
+        for j, shape in enumerate(self.shapes):
+            terms, unsure = shape.columns(v[:, j], a[:, j], load[:, j])
+            local.append(self._rows(terms))
+            doubt.append(r.thin(unsure))
+        shared: dict[str, dict[int, Array]] = {}
+        for c in couplings:
+            whole = c.columns(v, a, r.sigma_v, self.shapes[c.motor].rise)
+            shared.update({n: self._actions(n, parts) for n, parts in whole.items()})
+        for c in halves:
+            apart = c.halves(v, a, r.sigma_v, self.shapes[c.motor].rise)
+            shared.update({n: self._actions(n, parts) for n, parts in apart.items()})
+        return Columns(self.bodies, local, shared, np.column_stack(doubt))
+
+    def _rows(self, terms: dict[str, Array]) -> dict[str, Array]:
+        """Filter what jumps or bends, thin the rest."""
+        sharp = [n for n in terms if n not in SMOOTH]
+        filtered = self.rows.filtered(np.column_stack([terms[n] for n in sharp]))
+        out = {n: filtered[:, k] for k, n in enumerate(sharp)}
+        return {n: out[n] if n in out else self.rows.thin(x) for n, x in terms.items()}
+
+    def _actions(self, name: str, parts: dict[int, Array]) -> dict[int, Array]:
+        sharp = name.split(":")[-1].split("|")[0] not in SMOOTH
+        return {j: (self.rows.filtered if sharp else self.rows.thin)(x) for j, x in parts.items()}
+
+
+def even_blocks(
+    n: int, start: Sequence[int], correlation: float, most: int = 36, least: int = 20
+) -> list[Span]:
+    """Stretches of equal length that do not cross a gap and are longer than the correlation.
+
+    Args:
+        n: Rows.
+        start: First row of every run.
+        correlation: Rows over which noise stays correlated.
+        most: Largest number of blocks.
+        least: Number below which intervals and shares say little: blocks are not made longer.
+    """
+    ends = [*start[1:], n]
+    length = max(n / most, min(2 * correlation, n / least), 12.0)
+    out: list[Span] = []
+    for a, b in zip(start, ends, strict=True):
+        if b - a < 8:
+            continue
+        k = max(1, int((b - a) / length))
+        edges = np.linspace(a, b, k + 1).round().astype(int)
+        out += [(int(x), int(y)) for x, y in pairwise(edges)]
+    return out
+
+
+def folds_of(blocks: int, folds: int = 6) -> list[NDArray[np.intp]]:
+    """Contiguous groups of blocks: validation is another part of the motion."""
+    return [
+        np.asarray(x, dtype=np.intp) for x in np.array_split(np.arange(blocks), folds) if x.size
+    ]

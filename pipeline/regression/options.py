@@ -1,0 +1,32 @@
+"""Error rates and sizes of the search."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Options:
+    """Error rates and sizes of the search.
+
+    Attributes:
+        error_rate: Chance of one wrong coupling, of a refit of true bodies, and of one confirmed
+            size whose interval should have held zero, per log.
+        coverage: Of the intervals.
+        sure: Share of draws from which a name is confirmed: so often it should be right.
+        draws: Of the log's blocks.
+        uncertainties: Of the URDF that validation chooses from, beside no refit.
+        closes: Share of what stays unexplained below which a size closes next to nothing.
+        bends: Of the general member: how far it may depart from Coulomb, viscous and
+            load-dependent friction, as a share of the joint's torque; validation chooses.
+        seed: Of the draws.
+    """
+
+    error_rate: float = 0.05
+    coverage: float = 0.95
+    sure: float = 0.95
+    draws: int = 50
+    uncertainties: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
+    closes: float = 0.01
+    bends: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+    seed: int = 0

@@ -1,0 +1,143 @@
+"""From sizes and shares to findings with levels and the table of base parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.regression.laws.base_parameters import base_set
+from pipeline.regression.laws.bodies import with_parameters
+from pipeline.regression.laws.friction import (
+    BESIDE,
+    SIGNED,
+    kind,
+    name_of,
+    unit,
+)
+from pipeline.regression.result import BaseParameter, Friction, Level, Result, Term
+from pipeline.regression.statistics.gram import Key
+from pipeline.regression.statistics.jackknife import standard_error
+from pipeline.regression.statistics.selection import (
+    UNNAMED,
+)
+from pipeline.regression.statistics.solve import Fit
+from pipeline.regression.statistics.standing import Standing
+
+Array = NDArray[np.float64]
+
+
+class Reporting(Standing):
+    """Findings."""
+
+    def _result(
+        self,
+        fit: Fit,
+        keys: Sequence[Key],
+        x: Array,
+        replicas: Array,
+        shares: Sequence[dict[str, float]],
+        laws: Sequence[float],
+        suspected: Sequence[Term],
+    ) -> Result:
+        o, t = self.options, self._quantile(self.options.coverage)
+        error = standard_error(replicas)
+        strict = self._quantile(1 - o.error_rate / max(len(keys), 1))
+        terms = []
+        for key, (closes, gain) in self._closing(fit, keys).items():
+            place, term = key
+            k = fit.system.where[key]
+            share, short = self.coupled.get(term, 0.0), 0.0
+            if place != "shared":
+                share = shares[int(place)].get(kind(term), 0.0)
+                short = self.choices[int(place)].short
+            stands = (
+                abs(x[k]) > strict * error[k]
+                and share >= o.sure
+                and short <= 1.0
+                and gain > 1.0
+                and closes > o.closes
+                and (x[k] > 0 or term in SIGNED)
+            )
+            level = Level.CONFIRMED if stands else Level.APPROXIMATE
+            terms.append(
+                Term(
+                    self._place(key),
+                    kind(term),
+                    term,
+                    float(x[k]),
+                    float(x[k] - t * error[k]),
+                    float(x[k] + t * error[k]),
+                    unit(term),
+                    share,
+                    closes,
+                    level,
+                )
+            )
+        frictions = []
+        for j, choice in enumerate(self.choices):
+            have = tuple(key[1] for key in keys if key[0] == str(j) and key[1] not in BESIDE)
+            mine = [u for u in terms if u.place == self.names[j] and u.term not in BESIDE]
+            unnamed = choice.law is UNNAMED
+            sure = laws[j] >= o.sure and not unnamed
+            sure = sure and all(u.level is Level.CONFIRMED for u in mine)
+            frictions.append(
+                Friction(
+                    self.names[j],
+                    UNNAMED.name if unnamed else name_of(have),
+                    {u: float(x[fit.system.where[(str(j), u)]]) for u in have},
+                    self.design.shapes[j],
+                    laws[j],
+                    Level.CONFIRMED if sure else Level.APPROXIMATE,
+                    choice.short,
+                )
+            )
+        base, condition, lost = self._base(x, replicas, t)
+        nb = fit.n_bodies
+        return Result(
+            with_parameters(self.model, x[:nb]) if self.sigma > 0 else self.model.copy(),
+            self.sigma > 0,
+            self.sigma,
+            base,
+            condition,
+            lost,
+            (*terms, *suspected),
+            tuple(frictions),
+            tuple(self.couplings),
+            {key: float(x[fit.system.where[key]]) for key in keys},
+            tuple(self.noise),
+            self.rows.cutoff,
+            len(self.blocks),
+            self.rows.sigma_v,
+        )
+
+    def _base(
+        self, x: Array, replicas: Array, t: float
+    ) -> tuple[tuple[BaseParameter, ...], float, tuple[str, ...]]:
+        if self.sigma == 0:
+            return (), float("nan"), ()
+        found = base_set(self.design.bodies, self.bodies, self.names)
+        nb = self.bodies.nominal.size
+        value, urdf = found.combine @ x[:nb], found.combine @ self.bodies.nominal
+        error = standard_error(replicas[:, :nb] @ found.combine.T)
+        free = np.flatnonzero(self.bodies.columns)
+        spread = np.linalg.inv(self.bodies.metric[np.ix_(free, free)]) * self.sigma**2
+        stated = np.sqrt(
+            np.einsum("ki,ij,kj->k", found.combine[:, free], spread, found.combine[:, free])
+        )
+        table = tuple(
+            BaseParameter(
+                name,
+                float(u),
+                float(v),
+                float(v - t * e),
+                float(v + t * e),
+                one,
+                float((v - u) / s),
+            )
+            for name, one, u, v, e, s in zip(
+                found.names, found.units, urdf, value, error, stated, strict=True
+            )
+        )
+        return table, found.condition, found.lost

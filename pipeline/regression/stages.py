@@ -1,0 +1,128 @@
+"""The richest model: its noise, its couplings, how far it bends, where friction rises."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.regression.laws.coupling import every_pair
+from pipeline.regression.laws.friction import (
+    BESIDE,
+    TRANSITIONS,
+    Law,
+    general_terms,
+)
+from pipeline.regression.state import State
+from pipeline.regression.statistics.gram import Columns, Key, System
+from pipeline.regression.statistics.noise import Colour, colour
+from pipeline.regression.statistics.selection import (
+    Choice,
+    find_coupling,
+    general,
+)
+from pipeline.regression.statistics.solve import Eliminated
+
+
+class Stages(State):
+    """Stages that need no law."""
+
+    def _rich(self, colours: bool) -> None:
+        """Fit everything; its residual is the noise, its bodies give the load."""
+        columns = self._columns(self.couplings)
+        fit = self._fit(self._system(columns), columns, self.sigma)
+        keys = self._keys([general(j) for j in range(self.model.nv)])
+        at = fit.columns(keys)
+        x = fit.known.copy()
+        x[at] = fit.solve(self.weight, at)
+        self.load = self.design.load(x[: fit.n_bodies])
+        residual = self._residual(columns, keys, x[fit.system.index(keys)])
+        size = np.empty(self.model.nv)
+        for j in range(self.model.nv):
+            parts = [
+                x[fit.system.where[(str(j), t)]] * columns.local[j][t] for t in general_terms()
+            ]
+            size[j] = float(np.sqrt((np.sum(parts, axis=0) ** 2).mean()))
+        self.friction = size
+        if colours:
+            self.noise = [colour(residual[:, j], self.blocks) for j in range(self.model.nv)]
+        else:
+            self.noise = [Colour(np.zeros(0), s, s, 1.0) for s in residual.std(axis=0) + 1e-12]
+
+    def _couple(self) -> None:
+        pairs = every_pair(self.model.nv)
+        while pairs:
+            rest = [c for c in pairs if c not in self.couplings]
+            columns = self.design.columns(self.load, self.couplings, rest)
+            fit = self._fit(self._system(columns), columns, self.sigma)
+            found = find_coupling(
+                fit,
+                self.folds,
+                self.weight,
+                [general(j) for j in range(self.model.nv)],
+                self.couplings,
+                rest,
+                self.options.error_rate,
+            )
+            if found is None:
+                break
+            self.couplings.append(found)
+            self._rich(colours=True)
+
+    def _strengths(self) -> None:
+        """How far the general member bends and the URDF may be off, by validation blocks."""
+        columns = self._columns(self.couplings)
+        s = self._system(columns)
+        keys = self._keys([general(j) for j in range(self.model.nv)])
+        total = []
+        for bend in self.options.bends:
+            self.bend = bend
+            fit = self._fit(s, columns, self.sigma)
+            total.append(fit.losses(self.folds, self.weight, fit.columns(keys)).sum())
+        self.bend = self.options.bends[int(np.argmin(total))]
+        self._strength(s, columns, keys)
+
+    def _strength(self, s: System, columns: Columns, keys: Sequence[Key]) -> None:
+        """Uncertainty of the URDF that predicts best beside some columns."""
+        losses = []
+        for sigma in self.options.uncertainties:
+            fit = self._fit(s, columns, sigma)
+            losses.append(float(fit.losses(self.folds, self.weight, fit.columns(keys)).sum()))
+        self.sigma = self.options.uncertainties[int(np.argmin(losses))]
+
+    def _rise(self) -> None:
+        """Speed over which friction rises after a reversal, per joint: what predicts best."""
+        columns = self._columns(self.couplings)
+        fit = self._fit(self._system(columns), columns, self.sigma)
+        rich = [general(j).keys(j) for j in range(self.model.nv)]
+        shared: list[Key] = [("shared", n) for c in self.couplings for n in c.names]
+        coupled = {c.motor for c in self.couplings}
+        shapes = list(self.design.shapes)
+        for j in range(self.model.nv):
+            if j in coupled:
+                losses = [self._with_rise(j, share) for share in TRANSITIONS]
+            else:
+                common = [k for i, ks in enumerate(rich) if i != j for k in ks] + shared
+                names = ["viscous", *BESIDE]
+                for k in range(len(TRANSITIONS)):
+                    names += [f"rising@{k}", f"rising_load@{k}"]
+                own = fit.system.index([(str(j), t) for t in names])
+                e = Eliminated(fit, self.folds, self.weight, fit.columns(common), own)
+                losses = [
+                    float(e.losses([0, 1, 2, 3 + 2 * k, 4 + 2 * k]).sum())
+                    for k in range(len(TRANSITIONS))
+                ]
+            share = TRANSITIONS[int(np.argmin(losses))]
+            shapes[j] = replace(shapes[j], rise=share * shapes[j].speed)
+        self.design = replace(self.design, shapes=tuple(shapes))
+
+    def _with_rise(self, joint: int, share: float) -> float:
+        """Predictive loss with the friction of one joint and of its coupled motor rising so."""
+        shapes = list(self.design.shapes)
+        shapes[joint] = replace(shapes[joint], rise=share * shapes[joint].speed)
+        columns = replace(self.design, shapes=tuple(shapes)).columns(self.load, self.couplings)
+        fit = self._fit(self._system(columns), columns, self.sigma)
+        simple = Choice(Law("", ("coulomb", "viscous", "load")), BESIDE, 0.0)
+        choices = [simple if j == joint else general(j) for j in range(self.model.nv)]
+        return float(fit.losses(self.folds, self.weight, fit.columns(self._keys(choices))).sum())

@@ -1,0 +1,1 @@
+"""Weights, sums over blocks, choices and intervals."""

@@ -1,0 +1,243 @@
+"""Which law: the simplest within one standard error of the best on blocks that did not fit it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.stats
+from numpy.typing import NDArray
+
+from pipeline.regression.laws.coupling import TERMS, Coupling
+from pipeline.regression.laws.friction import BESIDE, LAWS, SIGNED, Law, general_terms
+from pipeline.regression.statistics.gram import Key
+from pipeline.regression.statistics.solve import Eliminated, Fit, compare
+
+Array = NDArray[np.float64]
+Folds = Sequence[NDArray[np.intp]]
+
+#: Share of what two separate actions would gain that one and the same must reach.
+SAME = 0.9
+#: What a joint is told when no law of the catalogue comes near the general member.
+UNNAMED = Law("a law that is not in the catalogue", general_terms())
+#: The richest law whose every size has a name: what the general member departs from.
+LOADED = next(law for law in LAWS if law.terms == ("coulomb", "viscous", "load"))
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Law of one joint.
+
+    Attributes:
+        law: The simplest within one standard error, or `UNNAMED`.
+        beside: Terms beside friction.
+        short: How much better the general member predicts, in standard errors of the difference.
+        best: The named law that predicts best, whatever its size; none where none is allowed.
+    """
+
+    law: Law
+    beside: tuple[str, ...]
+    short: float
+    best: Law | None = None
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """All terms of the joint."""
+        return (*self.law.terms, *self.beside)
+
+    def keys(self, joint: int) -> list[Key]:
+        """Columns of the joint."""
+        return [(str(joint), t) for t in self.terms]
+
+
+def general(joint: int) -> Choice:
+    """Everything at once: what other joints are allowed while one is looked at."""
+    return Choice(UNNAMED, BESIDE, 0.0)
+
+
+def choose_law(fit: Fit, folds: Folds, weight: Array, joint: int, common: Sequence[Key]) -> Choice:
+    """Law of one joint beside everything else.
+
+    Args:
+        fit: Regressions.
+        folds: Blocks left out together.
+        weight: How often every block was drawn, (B,).
+        joint: Which.
+        common: Columns of the other joints and of couplings.
+    """
+    names = [t for law in LAWS for t in law.terms]
+    names = list(dict.fromkeys([*names, *UNNAMED.terms, *BESIDE]))
+    at = {name: k for k, name in enumerate(names)}
+    own = fit.system.index([(str(joint), t) for t in names])
+    eliminated = Eliminated(fit, folds, weight, fit.columns(common), own)
+
+    def use(terms: Sequence[str]) -> list[int]:
+        return [at[t] for t in terms]
+
+    beside = _beside(eliminated, at, weight)
+    top = eliminated.losses(use((*UNNAMED.terms, *beside)))
+    found: list[tuple[Law, Array]] = []
+    for law in LAWS:
+        sizes = eliminated.sizes(use((*law.terms, *beside)))
+        if any(x < 0 and t not in SIGNED for t, x in zip(law.terms, sizes, strict=False)):
+            continue
+        found.append((law, eliminated.losses(use((*law.terms, *beside)))))
+    candidates = [*found, (UNNAMED, top)]
+    best = min(candidates, key=lambda c: float(weight @ c[1]))
+    near = []
+    for law, loss in found:
+        mean, error = compare(loss, best[1], weight)
+        if mean <= error:
+            near.append((law.shapes, float(weight @ loss), law, loss))
+    first = min(found, key=lambda c: float(weight @ c[1]))[0] if found else None
+    if not near:
+        return Choice(UNNAMED, beside, np.inf, first)
+    _, _, law, loss = min(near, key=lambda x: x[:2])
+    mean, error = compare(loss, top, weight)
+    return Choice(law, beside, mean / max(error, 1e-300), first)
+
+
+def _beside(eliminated: Eliminated, at: Mapping[str, int], weight: Array) -> tuple[str, ...]:
+    """Offset and rotor inertia, each kept where validation blocks want it by a standard error."""
+    rich = [at[t] for t in UNNAMED.terms]
+    kept = list(BESIDE)
+    for term in reversed(BESIDE):
+        rest = [t for t in kept if t != term]
+        with_it = [*rich, *(at[t] for t in kept)]
+        size = eliminated.sizes(with_it)[len(rich) + kept.index(term)]
+        mean, error = compare(
+            eliminated.losses([*rich, *(at[t] for t in rest)]), eliminated.losses(with_it), weight
+        )
+        if mean <= error or (size < 0 and term not in SIGNED):
+            kept = rest
+    return tuple(kept)
+
+
+def choose_laws(
+    fit: Fit,
+    folds: Folds,
+    weight: Array,
+    start: Sequence[Choice],
+    couplings: Sequence[Coupling],
+    passes: int,
+) -> list[Choice]:
+    """Laws of all joints in turn, each beside what the others have, until nothing changes."""
+    shared: list[Key] = [("shared", n) for c in couplings for n in c.names]
+    now = list(start)
+    for _ in range(passes):
+        before = list(now)
+        for j in range(len(now)):
+            others = [k for i, c in enumerate(now) if i != j for k in c.keys(i)]
+            now[j] = choose_law(fit, folds, weight, j, [*others, *shared])
+        if [c.terms for c in now] == [c.terms for c in before]:
+            break
+    return now
+
+
+def upgrade(
+    fit: Fit,
+    folds: Folds,
+    weight: Array,
+    choices: Sequence[Choice],
+    couplings: Sequence[Coupling],
+) -> list[Choice]:
+    """Forward and swap steps until the whole model is within one standard error of the best.
+
+    A joint's law may stop one standard error short of its best; many joints' shortcomings add up.
+    A step gives one joint a richer law, or gives or takes its offset or rotor inertia.
+    """
+    shared: list[Key] = [("shared", n) for c in couplings for n in c.names]
+
+    def losses(now: Sequence[Choice]) -> Array:
+        keys = [k for j, c in enumerate(now) for k in c.keys(j)]
+        return fit.losses(folds, weight, fit.columns([*keys, *shared]))
+
+    uniform = [
+        losses([replace(c, law=UNNAMED, beside=beside) for c in choices])
+        for beside in ((), ("rotor",), BESIDE)
+    ]
+    now = list(choices)
+    loss = losses(now)
+    best = min([*uniform, loss], key=lambda x: float(weight @ x))
+    while True:
+        mean, error = compare(loss, best, weight)
+        if mean <= error:
+            return now
+        trials = []
+        for j, c in enumerate(now):
+            for step in _steps(c):
+                trial = [*now[:j], step, *now[j + 1 :]]
+                trials.append((losses(trial), trial))
+        new, trial = min(trials, key=lambda x: float(weight @ x[0]))
+        if weight @ new >= weight @ loss:
+            return now
+        loss, now = new, trial
+
+
+def _steps(c: Choice) -> list[Choice]:
+    """What a joint may become in one step."""
+    out = []
+    for law in (c.best, LOADED, UNNAMED):
+        if law is not None and law is not c.law and law.shapes > c.law.shapes:
+            out.append(replace(c, law=law, short=np.inf if law is UNNAMED else 0.0))
+    for term in BESIDE:
+        if term in c.beside:
+            out.append(replace(c, beside=tuple(t for t in c.beside if t != term)))
+        else:
+            out.append(replace(c, beside=tuple(t for t in BESIDE if t in (*c.beside, term))))
+    return out
+
+
+def find_coupling(
+    fit: Fit,
+    folds: Folds,
+    weight: Array,
+    joints: Sequence[Choice],
+    have: Sequence[Coupling],
+    candidates: Sequence[Coupling],
+    error_rate: float,
+) -> Coupling | None:
+    """The coupling that predicts best, if chance would not.
+
+    A motor that turns with another joint acts on both with one and the same torque. What helps on
+    one of the two only, or by another size there, is something else at that joint.
+
+    Args:
+        fit: Regressions whose system has the halves of all candidates.
+        folds: Blocks left out together.
+        weight: How often every block was drawn, (B,).
+        joints: What every joint has.
+        have: Couplings found before.
+        candidates: Couplings looked at.
+        error_rate: Chance that one of all candidates passes where none is there.
+    """
+    common: list[Key] = [k for j, c in enumerate(joints) for k in c.keys(j)]
+    common += [("shared", n) for c in have for n in c.names]
+    own = fit.system.index([("shared", n) for c in candidates for n in c.half_names])
+    eliminated = Eliminated(fit, folds, weight, fit.columns(common), own)
+    without = eliminated.losses([])
+    blocks = int((weight > 0).sum())
+    limit = float(scipy.stats.t.ppf(1 - error_rate / max(len(candidates), 1), max(blocks - 1, 1)))
+    side_limit = float(scipy.stats.t.ppf(1 - error_rate, max(blocks - 1, 1)))
+    best: tuple[float, Coupling] | None = None
+    for k, c in enumerate(candidates):
+        first = 2 * len(TERMS) * k
+        both = np.zeros((len(own), len(TERMS)))
+        for t in range(len(TERMS)):
+            both[first + 2 * t : first + 2 * t + 2, t] = 1.0
+        # What would give energy counts for nothing.
+        both = both[:, eliminated.mixed_sizes(both) > 0]
+        if not both.shape[1] or min(eliminated.mixed_sizes(both)) < 0:
+            continue
+        coupled = eliminated.mixed(both)
+        mean, error = compare(without, coupled, weight)
+        if mean <= limit * error or (best is not None and mean <= best[0]):
+            continue
+        halves = range(first, first + 2 * len(TERMS))
+        apart = eliminated.losses(halves)
+        sides = [compare(eliminated.losses(halves[side::2]), apart, weight) for side in (0, 1)]
+        enough = mean >= SAME * compare(without, apart, weight)[0]
+        if enough and all(gain > side_limit * doubt for gain, doubt in sides):
+            best = (mean, c)
+    return None if best is None else best[1]
