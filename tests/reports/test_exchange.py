@@ -230,6 +230,15 @@ def test_a_stop_while_files_are_gathered_leaves_everything_as_it_was(
     assert files(used, hidden=True) == before
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """A process started in the background ignores SIGINT; here it is to be heard."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_waits_for_the_end_of_an_exchange(used: Path) -> None:
     for number in range(2, 12):
         interrupt = failing_at(number, lambda: signal.raise_signal(signal.SIGINT), decided=True)
