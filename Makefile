@@ -99,6 +99,7 @@ lock:  ## Resolve the dependencies anew into requirements.lock (needs pip-tools)
 	  -o requirements.lock pyproject.toml
 	$(call lock_extra,docs,reports/docs/requirements.lock)
 	$(call lock_extra,mutants,tests/mutants.lock)
+	$(call lock_extra,view,reports/view.lock)
 
 clean:  ## Remove what a run wrote
 	rm -rf reports/out .pytest_cache .mypy_cache .ruff_cache .hypothesis
