@@ -13,6 +13,7 @@ from pipeline.motion.gait import tripod_gait
 from pipeline.motion.motion import Motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
+from tests.command_line import Command, exit_code, stand_and_walk
 
 # No clock in a test: a loaded machine is no failure.
 settings.register_profile("legwatt", deadline=None)
@@ -40,3 +41,26 @@ def walk(hexapod: Robot) -> Motion:
 @pytest.fixture(scope="session")
 def walk_demand(hexapod: Robot, walk: Motion) -> MotionDemand:
     return motion_demand(hexapod, walk)
+
+
+@pytest.fixture(scope="session")
+def command(root: Path) -> Command:
+    def run(verb: str, out: Path, *more: str, robot: str | Path = "hexapod.toml") -> int:
+        return exit_code([verb, "--robot", str(root / "urdf" / robot), "--out", str(out), *more])
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def out(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Path:
+    """The tables of standing and walking with every option at its default."""
+    return stand_and_walk(tmp_path_factory.mktemp("out"), command)
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Folder of the measured logs of real machines."""
+    root = os.environ.get("LEGWATT_SHARED")
+    if not root or not (Path(root) / "data").is_dir():
+        pytest.skip("LEGWATT_SHARED does not name the folder of the measured logs")
+    return Path(root) / "data"

@@ -20,6 +20,7 @@ ORDER = (
         "blind",
         "paper",
         "identification",
+        "regression",
         "simulation",
         "effects",
         "machine",
@@ -133,3 +134,14 @@ def test_no_folder_is_a_flat_pile() -> None:
     files = Counter(path.parent for path in FILES if path.name != "__init__.py")
     piles = {str(f.relative_to(ROOT)): n for f, n in files.items() if n > FILES_IN_FOLDER}
     assert not piles
+
+
+def test_tests_mirror_the_rooms() -> None:
+    """Whoever knows where the code is knows where its tests are; no folder of them is a pile."""
+    tests = ROOT / "tests"
+    shared = {"data_files", "__pycache__"}
+    names = {path.name for path in (tests / "pipeline").iterdir() if path.is_dir()} - shared
+    assert names <= {room for room in ORDER if (ROOT / "pipeline" / room).is_dir()}
+    assert not list((tests / "pipeline").glob("test_*.py"))
+    files = Counter(path.parent for path in tests.rglob("test_*.py"))
+    assert {str(f.relative_to(ROOT)) for f, n in files.items() if n > FILES_IN_FOLDER} == set()

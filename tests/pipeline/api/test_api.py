@@ -17,7 +17,7 @@ from pipeline.api.result import Result
 from pipeline.errors import PipelineError, RobotFileError
 from pipeline.logs.errors import GapError
 from reports.errors import TableError
-from tests.app.conftest import exit_code
+from tests.command_line import exit_code
 
 EXAMPLES = sorted((Path(__file__).parents[3] / "pipeline" / "examples").glob("*.py"))
 

@@ -1,0 +1,70 @@
+"""Two logs of one machine: what the first lacks goes into the model, the second has a payload."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from pipeline.identification.results import Estimate, Found
+from pipeline.identification.workflow.model_writer import edits_of
+from tests.command_line import exit_code, rows_of
+
+SEED = 5  # of the machine: its tolerances, its motion and what is hidden
+
+
+def _twin(out: Path, *hidden: str) -> dict[str, dict[str, float]]:
+    sealed = out.with_suffix(".json")
+    arguments = ["twin", "--seed", str(SEED), "--hide", *hidden]
+    assert exit_code([*arguments, "--out", str(out), "--sealed", str(sealed)]) == 0
+    truth = json.loads(sealed.read_text(encoding="utf-8"))
+    return {
+        item["effect"]: {name: p["value"] for name, p in item["parameters"].items()}
+        for item in truth["hidden"]
+    }
+
+
+def _gap(step: str, folder: Path, out: Path, *more: str) -> list[dict[str, str]]:
+    files = [str(folder / "log.csv"), "--robot", str(folder / "urdf" / "leg.toml")]
+    files += ["--actuators", str(folder / "actuators"), "--out", str(out)]
+    assert exit_code(["gap", step, *files, *more]) == 0
+    return rows_of(out / "found.csv") if (out / "found.csv").exists() else []
+
+
+def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) -> None:
+    bare, loaded = tmp_path / "bare", tmp_path / "loaded"
+    _twin(bare, "coulomb_friction")
+    truth = _twin(loaded, "coulomb_friction", "link_mass")
+    _gap("add", bare, tmp_path / "first")
+    model = tmp_path / "first" / "model.toml"
+    (found,) = _gap("name", loaded, tmp_path / "second", "--model", str(model))
+    assert (found["effect"], found["joint"]) == ("link_mass", "rm_joint_3")
+    mass = truth["link_mass"]["mass"]
+    assert float(found["ci_low"]) <= mass <= float(found["ci_high"])
+    assert float(found["value"]) == pytest.approx(mass, rel=0.15)
+
+    # Without the first log's model the friction is found again beside the payload.
+    both = {row["effect"] for row in _gap("name", loaded, tmp_path / "alone")}
+    assert both >= {"coulomb_friction", "link_mass"}
+
+
+def test_a_doubted_name_reaches_the_model_file_only_when_asked() -> None:
+    def found(doubt: str) -> Found:
+        torque = Estimate("torque", 1.0, 0.9, 1.1, "N*m")
+        return Found(
+            order=1,
+            effect="coulomb_friction",
+            place=("j",),
+            parameters=(torque,),
+            rivals=(),
+            valid_before=1.0,
+            valid_after=0.5,
+            unit="A",
+            noise_floor=0.1,
+            excitation="",
+            doubtful=doubt,
+        )
+
+    both = [found(""), found("its law is not that of the machine")]
+    assert [edit.basis for edit in edits_of(both, "log")] == ["identified"]
+    kept = edits_of(both, "log", keep_doubtful=True)
+    assert [edit.basis for edit in kept] == ["identified", "doubtful"]

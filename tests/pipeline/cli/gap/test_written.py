@@ -1,0 +1,118 @@
+"""What is quoted is the gap of the model file as written, on rows that had no say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from pipeline.effects.model_file import Edit, ModelFile, edits_in
+from pipeline.effects.registry import effect_named
+from pipeline.identification.compare.stages import overall
+from pipeline.identification.results import Estimate, Found
+from pipeline.identification.selection.identify import estimated_alone, identify
+from pipeline.identification.workflow.model_writer import edits_of, model_text
+from pipeline.identification.workflow.written import Weighed, weigh_found
+from reports.pages.gap_words import shrink_words
+from tests.pipeline.identification import bench_leg as leg
+
+JOINT = "rm_joint_1"
+FRICTION = 0.5  # [N*m]
+VISCOUS = {"coefficient": 0.8}  # [N*m*s/rad]
+
+
+def found(effect: str, parameter: str, value: float, unit: str, doubt: str = "") -> Found:
+    return Found(
+        order=1,
+        effect=effect,
+        place=(JOINT,),
+        parameters=(Estimate(parameter, value, value, value, unit),),
+        rivals=(),
+        valid_before=1.0,
+        valid_after=0.1,
+        unit="A",
+        noise_floor=0.004,
+        excitation="",
+        doubtful=doubt,
+    )
+
+
+@pytest.fixture(scope="module")
+def where() -> Any:
+    truth = effect_named("coulomb_friction").apply(leg.leg_model(), (JOINT,), {"torque": FRICTION})
+    log = leg.measured(truth, leg.leg_motion())
+    return SimpleNamespace(measurements=(log,), intake=SimpleNamespace(long=None))
+
+
+def weighed(where: Any, *names: Found, keep: bool = False) -> Weighed:
+    def written(among: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
+        edits = edits_of(among, "log", keep_doubtful=keep)
+        robot = ModelFile(leg.ROOT / "urdf" / "leg.toml", "0" * 64, "rotor")
+        text = model_text(robot.with_edits(edits), leg.ROOT)
+        return tuple(among), text, edits_in(text)
+
+    return weigh_found(leg.leg_model(), where, names, written)
+
+
+RIGHT = found("coulomb_friction", "torque", FRICTION, "N*m")
+DOUBTED = found("coulomb_friction", "torque", FRICTION, "N*m", "its law is not the machine's")
+
+
+def test_a_written_effect_explains_the_log(where: Any) -> None:
+    result = weighed(where, RIGHT)
+    assert not result.unexplained
+    assert result.found[0].written
+    assert result.found[0].gap_after < 1.2 * result.found[0].noise_floor
+    assert 'effect = "coulomb_friction"' in result.text
+
+
+def test_a_doubted_name_is_left_out_and_so_is_what_it_would_close(where: Any) -> None:
+    result = weighed(where, DOUBTED)
+    assert result.unexplained
+    (one,) = result.found
+    assert not one.written
+    # Listed with what it would close beside the file ...
+    assert one.gap_after < 0.2 * one.gap_before
+    # ... which is not in the number that is quoted.
+    tolerances, last = result.stages[1], result.stages[-1]
+    assert last is tolerances
+    whole = (overall(result.stages[0].gap), overall(tolerances.gap), overall(last.gap))
+    words = shrink_words(result.found, [JOINT], whole, "A", 0.004)
+    assert "no name is sure enough to be written" in words
+    assert "coulomb_friction" not in words
+
+
+def test_a_doubted_name_that_is_written_all_the_same_counts(where: Any) -> None:
+    result = weighed(where, DOUBTED, keep=True)
+    assert not result.unexplained
+    assert result.found[0].written
+    assert 'basis = "doubtful"' in result.text
+
+
+def test_a_wrong_value_in_the_file_is_not_called_explained(where: Any) -> None:
+    # What naming thought of it does not matter: the file is simulated.
+    assert weighed(where, found("coulomb_friction", "torque", 0.2, "N*m")).unexplained
+
+
+def test_a_name_with_which_the_simulation_is_worse_is_doubted(where: Any) -> None:
+    result = weighed(where, found("viscous_friction", "coefficient", 9.0, "N*m*s/rad"))
+    (one,) = result.found
+    assert "validation" in one.doubtful
+    assert not one.written
+    assert "viscous_friction" not in result.text
+
+
+def test_what_is_written_is_estimated_without_what_is_left_out() -> None:
+    truth = leg.leg_model()
+    for effect, values in (("coulomb_friction", {"torque": 0.5}), ("viscous_friction", VISCOUS)):
+        truth = effect_named(effect).apply(truth, (JOINT,), values)
+    both = leg.measured(truth, leg.leg_motion())
+    named = identify(leg.leg_model(), [both])
+    assert {f.effect for f in named.naming.found} == {"coulomb_friction", "viscous_friction"}
+    (dry,) = [f for f in named.naming.found if f.effect == "coulomb_friction"]
+    (alone,) = estimated_alone(named, [dry])
+    # Without the viscous part dry friction has to carry it.
+    assert alone.values["torque"] > dry.parameters[0].high
+    assert estimated_alone(named, named.naming.found) == named.naming.found

@@ -1,0 +1,48 @@
+"""What a walk needs is told before it is computed, and the rule is not far from what it takes."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import GaitError
+from pipeline.simulation import memory
+from tests.command_line import Command
+
+
+def test_the_rule_is_above_what_a_walk_takes_and_of_its_size(
+    tmp_path: Path, command: Command
+) -> None:
+    samples = 3000
+    tracemalloc.start()
+    try:
+        assert command("walk", tmp_path, "--samples", str(samples)) == 0
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    need = memory.needed(samples, 18, 4)
+    assert 0.3 * need < peak < need
+
+
+def test_the_most_that_fits_is_taken_and_one_more_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(memory, "free", lambda: 10**9)
+    with pytest.raises(GaitError, match=r"1 GB are free; at most (\d+) samples fit") as caught:
+        memory.refuse_beyond_memory(10**8, 18, 4)
+    most = int(str(caught.value).split("at most ")[1].split()[0])
+    memory.refuse_beyond_memory(most, 18, 4)
+    with pytest.raises(GaitError):
+        memory.refuse_beyond_memory(most + 1, 18, 4)
+
+
+def test_a_container_counts_where_it_is_smaller(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    limit, used = tmp_path / "max", tmp_path / "current"
+    limit.write_text("1000000\n", encoding="utf-8")
+    used.write_text("400000\n", encoding="utf-8")
+    monkeypatch.setattr(memory, "_CGROUPS", ((str(limit), str(used)),))
+    assert memory.free() == 600_000
+    limit.write_text("max\n", encoding="utf-8")
+    assert memory.free() > 10**6

@@ -1,0 +1,113 @@
+"""`make reports` from the outside: every table, every figure as PNG and SVG, twice the same."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from tests.command_line import Command
+from tests.pipeline.cli.test_tables import TABLES
+from tests.reports.browser import layout, needs_chromium, needs_poppler, printed
+
+FIGURES = (
+    *(f"joint_demand_rm_joint_{k}" for k in (1, 2, 3)),  # Fig. 2 to 4
+    *(f"stage_energy_{a}" for a in ("ideal", "rotor", "reversible", "irreversible")),  # 14 to 20
+    "electrical_energy",
+    "robot",
+    "gait",
+)
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory: pytest.TempPathFactory, command: Command) -> Path:
+    folder = tmp_path_factory.mktemp("reports")
+    assert command("reports", folder) == 0
+    return folder
+
+
+def test_every_table_of_the_list(reports: Path, out: Path) -> None:
+    """The same bytes as `stand` and `walk` leave."""
+    for name in TABLES:
+        for ending in (".csv", ".meta.json"):
+            assert (reports / f"{name}{ending}").read_bytes() == (
+                out / f"{name}{ending}"
+            ).read_bytes()
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_figure(reports: Path, name: str) -> None:
+    png = (reports / f"{name}.png").read_bytes()
+    assert png.startswith(b"\x89PNG\r\n\x1a\n")
+    width, height = (int.from_bytes(png[at : at + 4], "big") for at in (16, 20))
+    assert 600 <= width <= 3000
+    assert 300 <= height <= 3000
+    root = ET.parse(reports / f"{name}.svg").getroot()
+    assert root.tag.endswith("svg")
+
+
+def test_every_csv_has_a_sidecar_and_nothing_else_is_left(reports: Path) -> None:
+    for path in reports.iterdir():
+        assert path.suffix in (".csv", ".json", ".png", ".svg", ".html", ".md")
+        if path.suffix == ".csv":
+            assert path.with_suffix(".meta.json").exists()
+        if path.suffix == ".png":
+            assert path.with_suffix(".svg").exists()
+
+
+def test_headings_are_words_with_units(reports: Path) -> None:
+    """No identifier, no "[see unit]", N·m and no other way; each says on pointing what it means."""
+    page = (reports / "index.html").read_text(encoding="utf-8")
+    headings = re.findall(r'<th scope="col"([^>]*)>(.*?)</th>', page)
+    assert len(headings) > 30
+    for _, words in headings:
+        assert "_" not in words.replace("E_el/E_m", "")
+        assert "see " not in words
+        assert "*" not in words
+    assert sum("title=" in attributes for attributes, _ in headings) > 30
+    text = re.sub(r"<style>.*?</style>|<[^>]*>", " ", page, flags=re.DOTALL)
+    assert "N·m" in text
+    assert not re.search(r"N\*m|\d%|\de[-\N{MINUS SIGN}+]\d|(?<![\w.)\]-])-\d", text)
+
+
+@needs_chromium
+@pytest.mark.parametrize("width", [1280, 800, 400])
+def test_nothing_of_the_page_is_cut(reports: Path, tmp_path: Path, width: int) -> None:
+    """A table that is wider than the window scrolls in a frame that is not."""
+    seen = layout(reports / "index.html", width, tmp_path)
+    assert seen.page <= seen.window
+    assert seen.beyond == []
+    assert len(seen.tables) >= 6
+    assert len(seen.pictures) >= 10
+    for table in seen.tables:
+        assert table["table"] <= table["frame"] or table["scrolls"] == "auto"
+
+
+@needs_chromium
+@needs_poppler
+def test_print_cuts_no_table(reports: Path, tmp_path: Path) -> None:
+    words = printed(reports / "index.html", tmp_path)
+    assert all(word.right <= 1.0 and word.bottom <= 1.0 for word in words)
+    verdicts = re.findall(
+        r'<span class="tone[^>]*>(.*?)</span>', (reports / "index.html").read_text()
+    )
+    last = [verdict.split()[-1] for verdict in verdicts]
+    assert len(last) > 40
+    for word in set(last):
+        assert sum(w.text.rstrip(".,;:") == word for w in words) >= last.count(word)
+
+
+@pytest.mark.slow
+def test_two_processes_leave_the_same_bytes(root: Path, tmp_path: Path) -> None:
+    """Figures included. (Within one process matplotlib numbers clip paths on and on.)"""
+    for name in ("first", "second"):
+        command = [sys.executable, "-m", "pipeline", "reports", "--out", str(tmp_path / name)]
+        subprocess.run(command, cwd=root, check=True, capture_output=True, timeout=300)
+    first, second = tmp_path / "first", tmp_path / "second"
+    assert {p.name for p in first.iterdir()} == {p.name for p in second.iterdir()}
+    for path in first.iterdir():
+        assert path.read_bytes() == (second / path.name).read_bytes(), path.name

@@ -1,0 +1,132 @@
+"""Rows with the drive off: what flows there is known, and tells the motor from its friction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from actuators.loading.build import load_catalog
+from pipeline.effects.registry import effect_named
+from pipeline.identification.compare.intake import prepare_logs
+from pipeline.identification.compare.observe import observe
+from pipeline.identification.results import Naming
+from pipeline.identification.selection.identify import identify
+from pipeline.identification.workflow.constants import voltage_per_speed, voltage_remarks
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.prepared.parts import split
+from pipeline.logs.reading.expected import expected_of_model
+from pipeline.logs.reading.log import Log
+from pipeline.machine.machine import MachineModel, machine_of_urdf
+from pipeline.simulation.forward import ForwardSimulator, ServoInput
+
+Array = NDArray[np.float64]
+FILES = Path(__file__).parents[1] / "data_files"
+JOINT = "pendulum_joint"
+VISCOUS, SHARE = 0.03, 0.25
+
+
+def stated() -> MachineModel:
+    chain = load_catalog(FILES / "xl330_actuators").chain("servo")
+    return machine_of_urdf(FILES / "xl330.urdf", chain=chain)
+
+
+def truth() -> MachineModel:
+    """A motor of another constant than the file's, with friction."""
+    model = stated()
+    actuator = model.actuator(JOINT)
+    assert actuator.motor is not None
+    model = model.with_actuator(
+        replace(actuator, motor=replace(actuator.motor, torque_constant=0.34, resistance=4.4))
+    )
+    model = effect_named("load_dependent_friction").apply(model, (JOINT,), {"share": SHARE})
+    return effect_named("viscous_friction").apply(model, (JOINT,), {"coefficient": VISCOUS})
+
+
+def log(seed: int, bridge: str | None, seconds: float = 8.0) -> Log:
+    """Driven by sines, and every second second without a drive."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(seconds * 200)) / 200
+    w = rng.uniform(1.5, 6.0, 3)
+    goal = sum(s * np.sin(f * time + p) for s, f, p in zip((0.9, 0.6, 0.4), w, w, strict=True))
+    off = ((time % 4.0) > 2.2)[:, None]
+    servo = ServoInput(
+        name=f"made_{seed}",
+        time=time,
+        goal=np.asarray(goal)[:, None],
+        supply=np.full(time.size, 7.3),
+        gain=1.5,
+        off=off,
+        open_bridge=bridge != "shorted",
+        position=np.zeros(1),
+        velocity=np.zeros(1),
+    )
+    run = ForwardSimulator(truth()).run(servo)
+    voltage = np.where(off, np.nan, run.voltage + rng.normal(0.0, 0.01, run.voltage.shape))
+    return Log(
+        name=servo.name,
+        time=time,
+        joints=(JOINT,),
+        position=run.position + rng.normal(0.0, 2e-5, run.position.shape),
+        position_source="joint",
+        voltage=voltage,
+        valid=~off,
+        torque_off=off,
+        torque_off_bridge=bridge,
+    )
+
+
+@cache
+def measurements(bridge: str | None) -> tuple[Measurement, ...]:
+    model = stated()
+    logs = [log(seed, bridge) for seed in (1, 2, 3)]
+    expected = expected_of_model(model.rigid, model.name, joints=model.joints)
+    intake = prepare_logs(logs, expected, cutoff=12.0)
+    parts = split(intake.prepared[:2], holdout=intake.prepared[2:])
+    return observe(model, intake.prepared, parts)
+
+
+@cache
+def named(bridge: str) -> Naming:
+    return identify(stated(), measurements(bridge)).naming
+
+
+def test_only_rows_whose_filter_sees_no_drive_count() -> None:
+    told, untold = measurements("open")[0], measurements(None)[0]
+    assert told.open_winding is not None
+    assert untold.open_winding is None
+    more = told.mask & ~untold.mask
+    assert more.sum() > 0.1 * told.mask.sum()
+    assert not told.effort[more].any()
+    assert told.open_winding[more].all()
+    assert (told.mask & ~more == untold.mask).all()
+    # Reaches of the filter around every switching count neither as driven nor as free.
+    switch = np.flatnonzero(np.diff(told.open_winding[:, 0].astype(int)))
+    near = int(0.05 / (told.time[1] - told.time[0]))
+    assert not any(told.mask[k - near : k + near].any() for k in switch)
+
+
+@pytest.mark.parametrize("bridge", ["open", "shorted"])
+def test_free_rows_tell_the_torque_constant_from_viscous_friction(bridge: str) -> None:
+    naming = named(bridge)
+    found = {f.effect: f.values for f in naming.found}
+    assert found["load_dependent_friction"]["share"] == pytest.approx(SHARE, abs=0.03)
+    assert found["viscous_friction"]["coefficient"] == pytest.approx(VISCOUS, rel=0.15)
+    constant = 0.39 * (1 + naming.tolerances["torque_constant", JOINT][0])
+    assert constant == pytest.approx(0.34, rel=0.03)
+
+
+def test_the_sum_that_voltage_shows_is_told() -> None:
+    seen, naming = measurements("open"), named("open")
+    total, *_ = voltage_per_speed(stated().actuator(JOINT), naming)
+    assert total == pytest.approx(0.34 + 4.4 * VISCOUS / 0.34, rel=0.02)
+    (sentence,) = voltage_remarks(stated().actuators, naming, seen)
+    assert f"{total:.3g} V*s/rad" in sentence
+    assert "drive off" in sentence
+    assert (
+        voltage_remarks(stated().actuators, naming, [replace(seen[0], channels=("current",))]) == ()
+    )

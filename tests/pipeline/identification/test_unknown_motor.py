@@ -1,0 +1,77 @@
+"""A motor whose constants are stated with a wide interval, and one whose housing is measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.effects.registry import effect_named
+from pipeline.identification.regression.tolerances import nuisances
+from pipeline.identification.selection.identify import identify
+from pipeline.logs.errors import ModelError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Simulator
+from tests.pipeline.identification import bench_leg as leg
+
+J2 = "rm_joint_2"
+
+
+def with_motor(model: MachineModel, **changes: float) -> MachineModel:
+    actuator = model.actuator(J2)
+    assert actuator.motor is not None
+    return model.with_actuator(replace(actuator, motor=replace(actuator.motor, **changes)))
+
+
+@pytest.fixture(scope="module")
+def motion() -> Measurement:
+    return leg.leg_motion()
+
+
+def test_the_files_interval_is_the_tolerance(motion: Measurement) -> None:
+    model = with_motor(leg.leg_model(), torque_constant_spread=0.2, resistance_spread=0.3)
+    sigma = {(n.kind, n.place): n.sigma for n in nuisances(model, [motion])}
+    assert sigma["torque_constant", J2] == 0.2
+    assert sigma["resistance", J2] == 0.3
+    # No specimen is better than a data sheet's two per cent.
+    assert sigma["torque_constant", "rm_joint_1"] == 0.02
+    assert effect_named("torque_constant_error").tolerance(model, (J2,)) == {"more": 0.2}
+
+
+def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant(
+    motion: Measurement,
+) -> None:
+    stated = leg.leg_model()
+    assert stated.actuator(J2).motor is not None
+    constant = float(np.asarray(stated.actuator(J2).motor.torque_constant))  # type: ignore[union-attr]
+    truth = with_motor(stated, torque_constant=0.8 * constant)
+    share = {"share": 0.12}
+    truth = effect_named("load_dependent_friction").apply(truth, (J2,), share)
+    log = leg.measured(truth, motion)
+    open_ = identify(with_motor(stated, torque_constant_spread=0.15), [log]).naming
+    assert [(f.effect, f.place) for f in open_.found] == [("load_dependent_friction", (J2,))]
+    assert open_.found[0].values["share"] == pytest.approx(0.12, abs=0.01)
+    value, sigma = open_.tolerances["torque_constant", J2]
+    assert value == pytest.approx(-0.2, abs=0.01)
+    assert sigma == 0.15
+    # Where the file leaves two per cent, the same log says that the constant is wrong.
+    sure = identify(stated, [log]).naming
+    assert ("torque_constant_error", (J2,)) in {(f.effect, f.place) for f in sure.found}
+
+
+def test_heating_is_named_from_the_housings_sensor(motion: Measurement) -> None:
+    nominal = leg.leg_model()
+    sensor = np.full(motion.q.shape, 25.0)
+    sensor[:, 1] += np.linspace(0.0, 12.0, len(motion))
+    warm = replace(motion, temperature=sensor)
+    values = {"rise": 0.0, "thermal_resistance": 0.0, "time_constant": 4.0, "sensor_gain": 4.0}
+    truth = effect_named("winding_heating").apply(nominal, (J2,), values)
+    (found,) = identify(nominal, [leg.measured(truth, warm)]).naming.found
+    assert (found.effect, found.place) == ("winding_heating", (J2,))
+    gain = next(p for p in found.parameters if p.name == "sensor_gain")
+    assert gain.low <= 4.0 <= gain.high
+    assert gain.high - gain.low < 1.5
+    with pytest.raises(ModelError, match="no temperature"):
+        Simulator(motion).predict(truth)

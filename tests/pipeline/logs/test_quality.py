@@ -1,0 +1,263 @@
+"""The judgement on a log: each defect is put in and must be found, and only it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from actuators.units import to_si
+from pipeline.identification.compare.model_check import compare_with_prediction
+from pipeline.logs.errors import GapError
+from pipeline.logs.quality.finding import Quality
+from pipeline.logs.quality.glitches import glitches
+from pipeline.logs.quality.quality import judge
+from pipeline.logs.quality.sampling import held, quantum
+from pipeline.logs.quality.skew import skew
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import Log
+from tests.pipeline.logs.made import made_log, motion
+
+Array = NDArray[np.float64]
+
+
+def good(n: int = 4000, seed: int = 3) -> tuple[Array, Array, Array]:
+    """Position, velocity and torque with a little noise."""
+    _, q, v, a = motion(n)
+    rng = np.random.default_rng(seed)
+    return (
+        q + rng.normal(0, 1e-5, q.shape),
+        v + rng.normal(0, 1e-3, q.shape),
+        0.1 * a + 5 * np.sin(q) + rng.normal(0, 0.05, q.shape),
+    )
+
+
+def checks(quality: Quality, verdict: str) -> set[tuple[str, str]]:
+    return {(f.column, f.check) for f in quality.findings if f.verdict == verdict}
+
+
+def refused(log: Log, expected: Expected) -> str:
+    with pytest.raises(GapError) as error:
+        judge(log, expected).refuse()
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_a_good_log_has_nothing_against_it(two_joints: Expected) -> None:
+    q, v, e = good()
+    quality = judge(made_log(q, e, velocity=v), two_joints)
+    quality.refuse()
+    assert {f.verdict for f in quality.findings} == {"ok"}
+    assert quality.position_ok.all()
+    assert quality.effort_ok.all()
+
+
+def test_ten_rows_are_refused(two_joints: Expected) -> None:
+    q, _, e = good()
+    assert "10 rows" in refused(made_log(q[:10], e[:10]), two_joints)
+
+
+def test_all_nan_is_refused_and_the_column_named(two_joints: Expected) -> None:
+    q, _, e = good()
+    e[:, 1] = np.nan
+    assert "b__torque_Nm" in refused(made_log(q, e), two_joints)
+    q[:] = np.nan
+    assert "a__position_rad" in refused(made_log(q, e), two_joints)
+
+
+def test_constant_channels_are_refused_unless_locked(two_joints: Expected) -> None:
+    q, _, e = good()
+    dead_effort = e.copy()
+    dead_effort[:, 0] = 1.5
+    message = refused(made_log(q, dead_effort), two_joints)
+    assert "a__torque_Nm" in message
+    assert "locked" in message
+    dead_position = q.copy()
+    dead_position[:, 1] = 0.3
+    assert "b__position_rad" in refused(made_log(dead_position, e), two_joints)
+    quality = judge(made_log(dead_position, e, locked=("b",)), two_joints)
+    quality.refuse()
+    assert not quality.effort_ok[:, 1].any()
+    assert quality.effort_ok[:, 0].all()
+
+
+def test_a_log_in_which_nothing_moves_is_refused(two_joints: Expected) -> None:
+    q, _, e = good()
+    assert "no joint moves" in refused(made_log(0 * q, 0 * e), two_joints)
+
+
+@pytest.mark.parametrize("joint", [0, 1])
+def test_degrees_for_radians_name_the_column(two_joints: Expected, joint: int) -> None:
+    q, _, e = good()
+    q[:, joint] = np.degrees(q[:, joint])
+    message = refused(made_log(q, e), two_joints)
+    assert f"{'ab'[joint]}__position_rad" in message
+    assert "degrees" in message
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(180 / np.pi, "deg/s"), (30 / np.pi, "rpm")])
+def test_wrong_velocity_units(two_joints: Expected, factor: float, unit: str) -> None:
+    q, v, e = good()
+    v[:, 1] *= factor
+    message = refused(made_log(q, e, velocity=v), two_joints)
+    assert "b__velocity_rad_s" in message
+    assert unit in message
+
+
+def test_flipped_velocity(two_joints: Expected) -> None:
+    q, v, e = good()
+    assert "flip" in refused(made_log(q, e, velocity=-v), two_joints)
+
+
+def test_milliamperes_and_millinewtonmetres(two_joints: Expected) -> None:
+    q, _, e = good()
+    assert "mN*m" in refused(made_log(q, 1e3 * e), two_joints)
+    log = made_log(q, None, current=1e3 * e)
+    with pytest.raises(GapError, match=r"a__current_A.*mA"):
+        judge(log, two_joints, largest={"current": np.array([60.0, 60.0])}).refuse()
+
+
+@pytest.mark.parametrize(
+    ("factor", "name", "unit"),
+    [(1e3, "milliseconds", "ms"), (1e6, "microseconds", "us"), (1e9, "nanoseconds", "ns")],
+)
+def test_time_in_another_unit_is_told_by_its_name(
+    two_joints: Expected, factor: float, name: str, unit: str
+) -> None:
+    q, _, e = good()
+    message = refused(made_log(q, e, rate=500 / factor), two_joints)
+    assert f'time_s looks like {name}, write [time] unit = "{unit}" in a mapping file' in message
+    assert to_si(factor, unit) == pytest.approx(1.0)
+
+
+def test_positions_of_another_robot(two_joints: Expected) -> None:
+    q, _, e = good()
+    assert "another robot" in refused(made_log(q + 300.0, e), two_joints)
+
+
+@pytest.mark.parametrize("factor", [2, 5])
+def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int) -> None:
+    q, _, e = good()
+    index = np.arange(len(q)) // factor * factor
+    quality = judge(made_log(q[index], e), two_joints)
+    assert ("a__position_rad", "held") in checks(quality, "masked")
+    share = next(f.value for f in quality.findings if f.check == "held")
+    assert share == pytest.approx(1 - 1 / factor, abs=0.02)
+    assert not quality.position_ok.all()
+    assert ("a__torque_Nm", "held") not in checks(quality, "masked")
+    both = judge(made_log(q[index], e[index]), two_joints)
+    assert ("", "repeated_rows") in checks(both, "warning")
+
+
+def test_quantisation_is_not_mistaken_for_holding(two_joints: Expected) -> None:
+    q, _, e = good()
+    step = 2 * np.pi / 4096
+    quality = judge(made_log(np.round(q / step) * step, e), two_joints)
+    assert not checks(quality, "masked")
+    found = [f.value for f in quality.findings if f.check == "quantum"]
+    assert found == pytest.approx([step, step], rel=1e-3)
+
+
+def test_quantum_of_a_slow_and_a_continuous_channel() -> None:
+    t = np.arange(3000) / 500
+    step, _ = quantum(np.round(0.05 * np.sin(t) / 0.002) * 0.002)
+    assert step == pytest.approx(0.002, rel=1e-6)
+    assert quantum(np.sin(t))[0] == 0.0
+    # A slow quantised channel repeats, and that is no holding.
+    assert held(np.round(0.05 * np.sin(t) / 0.002) * 0.002, 0.002)[0] == 0.0
+
+
+def test_saturation_is_masked(two_joints: Expected) -> None:
+    q, _, e = good()
+    clipped = np.clip(e, -4.0, 4.0)
+    quality = judge(made_log(q, clipped), two_joints)
+    assert ("a__torque_Nm", "saturated") in checks(quality, "masked")
+    assert not quality.effort_ok[np.abs(clipped) == 4.0].any()
+    assert quality.effort_ok[np.abs(clipped) < 4.0].all()
+
+
+def test_gaps_and_jitter_are_told(two_joints: Expected) -> None:
+    q, _, e = good()
+    time = np.arange(len(q)) / 500
+    time[2000:] += 0.1
+    assert ("time_s", "gaps") in checks(judge(made_log(q, e, time=time), two_joints), "masked")
+    time = time + np.random.default_rng(0).uniform(0, 5e-4, time.size)
+    assert ("time_s", "jitter") in checks(judge(made_log(q, e, time=time), two_joints), "warning")
+
+
+def test_skew_between_channels_is_measured(two_joints: Expected) -> None:
+    q, v, e = good()
+    late = np.roll(v, 3, axis=0)
+    late[:3] = v[0]
+    quality = judge(made_log(q, e, velocity=late), two_joints)
+    found = [f.value for f in quality.findings if f.check == "skew"]
+    assert found == pytest.approx([3 / 500, 3 / 500], abs=2e-4)
+    assert ("a__velocity_rad_s", "skew") in checks(quality, "warning")
+
+
+@pytest.mark.parametrize("lag", [0.0, 0.4e-3, -1.3e-3, 7.7e-3])
+def test_skew_of_a_fraction_of_a_row(lag: float) -> None:
+    t = np.arange(5000) / 500
+
+    def y(t: Array) -> Array:
+        return np.sin(2 * np.pi * 0.7 * t) + 0.3 * np.sin(2 * np.pi * 3.1 * t)
+
+    seen = skew(2.5 * y(t - lag), y(t), 1 / 500, longest=0.1)
+    assert seen is not None
+    assert seen.lag == pytest.approx(lag, abs=2e-5)
+    assert seen.factor == pytest.approx(2.5, rel=1e-2)
+
+
+def test_comparison_with_a_first_simulation(two_joints: Expected) -> None:
+    q, _, e = good()
+    log = made_log(q, e)
+    mask = np.ones(e.shape, dtype=np.bool_)
+
+    def against(measured: Array) -> list[str]:
+        found = compare_with_prediction(
+            log, measured, e, mask, 0.002, "torque", ratio=two_joints.ratio
+        )
+        return [f.detail for f in found if f.verdict == "refused"]
+
+    rng = np.random.default_rng(1)
+    friction = 20 * np.sign(np.gradient(q, axis=0)) + rng.normal(0, 1, e.shape)
+    assert against(e + friction) == []
+    assert "mN*m" in against(1e3 * e)[0]
+    assert "motor side" in against(e / 100)[0]
+    assert "runs against" in against(-e)[0]
+
+
+def test_a_wrist_that_carries_only_friction_is_no_unit_error(two_joints: Expected) -> None:
+    q, _, e = good()
+    tiny = e * np.array([1.0, 1e-3])
+    friction = np.sign(np.gradient(q, axis=0)) * np.array([0.0, 5.0])
+    mask = np.ones(e.shape, dtype=np.bool_)
+    found = compare_with_prediction(made_log(q, e), tiny + friction, tiny, mask, 0.002, "torque")
+    assert "refused" not in {f.verdict for f in found}
+
+
+@pytest.mark.parametrize(("at", "length"), [(0, 1), (1, 1), (3999, 1), (700, 1), (700, 4)])
+def test_samples_that_jump_away_and_back_are_left_out(
+    two_joints: Expected, at: int, length: int
+) -> None:
+    q, _, e = good()
+    rows = slice(at, at + length)
+    q[rows, 0] = 500.0
+    quality = judge(made_log(q, e), two_joints)
+    assert checks(quality, "warning") == {("a__position_rad", "glitches")}
+    bad = np.zeros(len(q), dtype=np.bool_)
+    bad[rows] = True
+    assert np.array_equal(~quality.position_ok[:, 0], bad)
+    assert quality.position_ok[:, 1].all()
+
+
+def test_steps_ramps_and_noise_are_no_glitches() -> None:
+    rng = np.random.default_rng(2)
+    t = np.arange(4000) / 500
+    step = np.where(t > 3.0, 1.0, 0.0)
+    ramp = np.clip(20.0 * (t - 3.0), 0.0, 0.5)
+    jerk = np.clip((t - 3.0) * 500 / 6.0, 0.0, 1.0)  # six rows
+    stairs = np.round(np.sin(t) / 0.01) * 0.01
+    friction = np.sign(np.sin(5 * t)) + 0.05 * rng.standard_normal(t.size)
+    for x in (step, ramp, jerk, stairs, friction, rng.standard_normal(t.size), 0.0 * t):
+        assert not glitches(x).any()

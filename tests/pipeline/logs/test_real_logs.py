@@ -1,0 +1,78 @@
+"""The measured logs of real machines, read and judged with mapping files only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.identification.compare.intake import take_in
+from pipeline.logs.prepared.parts import PROVE, split
+from pipeline.logs.reading.expected import Expected, expected_of_model
+from pipeline.logs.reading.mapping import load_mapping
+from pipeline.robot.robot import parse_urdf
+
+FILES = Path(__file__).parents[1] / "data_files"
+
+
+def expected(urdf: Path) -> Expected:
+    return expected_of_model(
+        parse_urdf(urdf.read_text(encoding="utf-8"), urdf.name, floating=False), urdf.stem
+    )
+
+
+def test_tx40_is_accepted_as_it_is(shared_data: Path) -> None:
+    folder = shared_data / "tx40"
+    intake = take_in([folder / "tx40_log.csv"], expected(folder / "tx40.urdf"), cutoff=100.0)
+    (ready,) = intake.prepared
+    assert ready.channel == "torque"
+    assert ready.rate == pytest.approx(2500.0)
+    assert {f.verdict for f in intake.findings} == {"ok"}
+    still = [f.value for f in intake.findings if f.check == "standstill_share"]
+    assert np.all(np.array(still) > 0.2)  # at rest at both ends
+    parts = split(intake.prepared, prove_last=0.4)
+    assert np.flatnonzero(parts.rows(0, PROVE))[[0, -1]].tolist() == [13_500, 22_499]
+    # The motion stays within the velocities the maker states.
+    limit = expected(folder / "tx40.urdf").velocity_limit
+    assert (np.abs(ready.v).max(axis=0) <= 1.03 * limit).all()
+
+
+def test_tx40_asks_for_about_the_bandwidth_its_users_take(shared_data: Path) -> None:
+    folder = shared_data / "tx40"
+    intake = take_in([folder / "tx40_log.csv"], expected(folder / "tx40.urdf"))
+    assert 50.0 < intake.settings.cutoff < 250.0
+
+
+def test_xl330_with_its_mapping(shared_data: Path) -> None:
+    logs = sorted((shared_data / "xl330").glob("*.csv"))
+    mapping = load_mapping(FILES / "xl330.toml")
+    intake = take_in(logs, expected(FILES / "xl330.urdf"), mapping)
+    assert {p.channel for p in intake.prepared} == {"voltage"}
+    assert {p.log.condition["gain"] for p in intake.prepared} == {100.0, 200.0, 800.0}
+    for ready in intake.prepared:
+        log = ready.log
+        # The stated gain is that of the voltage column.
+        assert log.gain is not None
+        assert log.supply is not None
+        assert log.goal_position is not None
+        assert log.voltage is not None
+        duty = np.clip(log.gain * (log.goal_position - log.position), -1.0, 1.0)
+        assert np.nanmax(np.abs(log.supply[:, None] * duty - log.voltage)) < 2e-3
+        if "lift_and_drop" in log.name:
+            assert log.torque_off is not None
+            assert log.torque_off_bridge == "open"
+            assert np.array_equal(np.isnan(log.voltage), log.torque_off)
+            assert not ready.mask[log.torque_off].any()
+            assert ready.motion_ok[60:-60].all()
+    assert "gain = 200" in split(intake.prepared).rule
+
+
+def test_xl330_velocity_is_found_late_and_position_quantised(shared_data: Path) -> None:
+    logs = [shared_data / "xl330" / "xl330_kp200_sin_sin.csv"]
+    mapping = load_mapping(FILES / "xl330.toml")
+    intake = take_in(logs, expected(FILES / "xl330.urdf"), mapping)
+    found = {(f.column, f.check): f.value for f in intake.findings}
+    assert found["pendulum_joint__velocity_rad_s", "skew"] == pytest.approx(0.020, abs=0.002)
+    quantum = found["pendulum_joint__position_rad", "quantum"]
+    assert quantum == pytest.approx(2 * np.pi / 4096, rel=0.01)

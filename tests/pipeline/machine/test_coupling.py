@@ -1,0 +1,101 @@
+"""A motor that also turns with another joint: its speed follows both, its torque acts on both.
+
+With motor angles theta = C q the power that the motors give is the power that the joints take,
+for any motion: tau^T dq = tau_m^T C dq, so tau = C^T tau_m. Both are held here without the code's
+own formulas: speeds from the definition of the ratio, torques from the balance of power.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuators.chain import Chain
+from actuators.elements.motor import DCMotor
+from actuators.elements.ratio import Ratio
+from actuators.shaft import ShaftSeries
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.edited_chain import edited_chain
+from pipeline.machine.machine import JointModel, MachineModel
+from pipeline.simulation.predict import Simulator
+from tests.pipeline.identification import bench_leg as leg
+
+RATIO, CONSTANT, TURNS = 50.0, 0.04, 0.3
+#: theta = C q at the joint side: joint 3's motor turns with joint 2, too.
+C = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, TURNS, 1.0]])
+LOSSLESS = Chain(
+    "lossless",
+    (Ratio("gear", ratio=RATIO),),
+    DCMotor("motor", torque_constant=CONSTANT, resistance=0.5),
+    {"m": "gear"},
+)
+
+
+def actuators() -> tuple[JointModel, ...]:
+    names = leg.leg_model().joints
+    plain = tuple(
+        JointModel(name, elements=LOSSLESS.elements, motor=LOSSLESS.motor) for name in names
+    )
+    return (*plain[:2], replace(plain[2], coupled_to=names[1], coupling=TURNS))
+
+
+@pytest.fixture(scope="module")
+def motion() -> Measurement:
+    return leg.leg_motion(duration=4.0)
+
+
+@pytest.fixture(scope="module")
+def machine() -> MachineModel:
+    return replace(leg.leg_model(), actuators=actuators())
+
+
+def test_in_prediction_the_motors_give_what_the_joints_take(
+    motion: Measurement, machine: MachineModel
+) -> None:
+    prediction = Simulator(motion).predict(machine)
+    taken = np.sum(prediction.torque * motion.v, axis=1)
+    given = np.sum(prediction.motor_torque * (motion.v @ C.T), axis=1)
+    np.testing.assert_allclose(given, taken, atol=1e-9 * np.abs(taken).max())
+    np.testing.assert_allclose(prediction.motor_torque @ C, prediction.torque, atol=1e-9)
+
+
+def test_in_prediction_the_voltage_tells_the_speed_of_both_joints(
+    motion: Measurement, machine: MachineModel
+) -> None:
+    effort = Simulator(motion).predict(machine).effort  # its measured current is zero: no R I
+    np.testing.assert_allclose(
+        effort[..., 1], CONSTANT * RATIO * motion.v @ C.T, atol=1e-9, err_msg="voltage"
+    )
+    current = Simulator(motion).predict(machine).motor_torque / (RATIO * CONSTANT)
+    np.testing.assert_allclose(effort[..., 0], current, atol=1e-9, err_msg="current")
+
+
+def test_a_sensor_at_the_joint_sees_what_the_joint_needs(
+    motion: Measurement, machine: MachineModel
+) -> None:
+    """Without motors in the model the log's torque is what both motors bring to a joint."""
+    bare = tuple(replace(a, motor=None, elements=()) for a in machine.actuators)
+    seen = replace(motion, channels=("torque",), effort=motion.effort[..., :1])
+    prediction = Simulator(seen).predict(replace(machine, actuators=bare))
+    np.testing.assert_allclose(prediction.effort[..., 0], prediction.torque, atol=1e-9)
+
+
+def test_walking_with_a_coupling_keeps_the_balance_of_power(motion: Measurement) -> None:
+    torque = np.random.default_rng(0).normal(size=motion.q.shape) * 20.0
+    joint = ShaftSeries.at_joint(motion.joints, motion.time, motion.q, motion.v, motion.a, torque)
+    result = edited_chain(LOSSLESS, actuators()).moving(joint)
+    for name in ("position", "velocity", "acceleration"):
+        np.testing.assert_allclose(
+            getattr(result.motor, name), RATIO * getattr(joint, name) @ C.T, atol=1e-9
+        )
+    np.testing.assert_allclose(RATIO * result.motor.torque @ C, torque, atol=1e-9)
+    given, taken = result.motor.power.sum(axis=1), joint.power.sum(axis=1)
+    np.testing.assert_allclose(given, taken, atol=1e-9 * np.abs(taken).max())
+
+
+def test_standing_with_a_coupling_the_motors_balance_every_joint() -> None:
+    torque = np.array([3.0, -7.0, 5.0])
+    held = edited_chain(LOSSLESS, actuators()).holding(torque)
+    np.testing.assert_allclose(RATIO * held.motor_torque @ C, torque, atol=1e-12)

@@ -1,0 +1,216 @@
+"""Forward simulation against another integrator, in closed form, and by its energies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from actuators.elements.friction import Friction
+from actuators.elements.heating import COPPER, Heating
+from actuators.elements.inertia import Inertia
+from actuators.elements.motor import DCMotor
+from actuators.elements.quadrant import QuadrantFriction
+from actuators.elements.ratio import Ratio
+from actuators.elements.stribeck import Stribeck
+from pipeline.logs.errors import LogContentError, ModelError
+from pipeline.logs.reading.log import Log
+from pipeline.machine.machine import JointModel, MachineModel, machine_of_urdf
+from pipeline.simulation.forward import ForwardSimulator, ServoInput, servo_input
+
+Array = NDArray[np.float64]
+URDF = Path(__file__).parents[1] / "data_files" / "xl330.urdf"
+JOINT = "pendulum_joint"
+MASS, LEVER, GRAVITY = 0.49, 0.1, 9.81
+LINK = MASS * LEVER**2 + 1e-6  # [kg*m^2]
+ROTOR, RATIO = 2e-6, 30.0
+INERTIA = LINK + ROTOR * RATIO**2
+CONSTANT, RESISTANCE = 0.013, 4.0
+SUPPLY, GAIN = 7.0, 0.6
+
+
+def machine(*friction: Friction | Stribeck | QuadrantFriction, **changes: object) -> MachineModel:
+    """The pendulum behind a gear of 30, friction at the joint."""
+    elements = (
+        *friction,
+        Ratio(name="gear", ratio=RATIO),
+        Inertia(name="rotor", inertia=ROTOR),
+    )
+    motor = DCMotor("winding", CONSTANT, RESISTANCE)
+    model = machine_of_urdf(URDF)
+    return model.with_actuator(JointModel(JOINT, elements, motor, **changes))  # type: ignore[arg-type]
+
+
+def driven(
+    goal: Callable[[Array], Array], q: float = 0.0, v: float = 0.0, seconds: float = 3.0
+) -> ServoInput:
+    time = np.arange(round(seconds * 200) + 1) / 200
+    return ServoInput(
+        name="drive",
+        time=time,
+        goal=goal(time)[:, None],
+        supply=np.full(time.size, SUPPLY),
+        gain=GAIN,
+        off=np.zeros((time.size, 1), dtype=np.bool_),
+        open_bridge=True,
+        position=np.array([q]),
+        velocity=np.array([v]),
+    )
+
+
+def free(q: float, seconds: float = 3.0) -> ServoInput:
+    drive = driven(np.zeros_like, q, seconds=seconds)
+    return replace(drive, off=np.ones_like(drive.off))
+
+
+def test_another_integrator_gives_the_same_motion() -> None:
+    viscous = 0.02
+
+    def goal(t: Array) -> Array:
+        return np.asarray(0.8 * np.sin(2.0 * t) + 0.3 * np.sin(5.1 * t))
+
+    servo = driven(goal, q=0.3, v=-1.0)
+
+    def rate(t: float, x: Array) -> list[float]:
+        asked = float(np.interp(t, servo.time, servo.goal[:, 0]))
+        voltage = SUPPLY * np.clip(GAIN * (asked - x[0]), -1.0, 1.0)
+        current = (voltage - CONSTANT * RATIO * x[1]) / RESISTANCE
+        torque = RATIO * CONSTANT * current - viscous * x[1]
+        return [x[1], (torque - MASS * GRAVITY * LEVER * np.sin(x[0])) / INERTIA]
+
+    other = solve_ivp(rate, (0, 3), [0.3, -1.0], t_eval=servo.time, rtol=1e-9, max_step=2e-3)
+    own = ForwardSimulator(machine(Friction("f", viscous=viscous))).run(servo)
+    assert np.abs(own.position[:, 0] - other.y[0]).max() < 2e-5
+    assert np.abs(own.velocity[:, 0] - other.y[1]).max() < 2e-4
+
+
+def test_load_friction_forward_is_its_inverse() -> None:
+    """Along a driven motion the chain, asked backward, needs the motor's torque."""
+    model = machine(
+        Friction("load", load=0.35, coulomb=0.01),
+        Stribeck("s", excess=0.02, speed=0.3),
+    )
+    servo = driven(lambda t: np.asarray(1.2 * np.sin(3.0 * t)))
+    run = ForwardSimulator(model).run(servo)
+    a = np.gradient(run.velocity[:, 0], run.time)
+    load = LINK * a + MASS * GRAVITY * LEVER * np.sin(run.position[:, 0])
+    v = run.velocity[:, 0]
+    loss = 0.01 + 0.35 * np.abs(load) + 0.02 * np.exp(-((v / 0.3) ** 2))
+    needed = (load + np.sign(v) * loss) / RATIO + ROTOR * RATIO * a
+    given = CONSTANT * run.current[:, 0]
+    # Away from standstill, reversals and changes of the load's sign, where a is not what it seems.
+    smooth = np.ones(v.size, dtype=np.bool_)
+    for event in (v, load):
+        for k in np.flatnonzero(np.diff(np.sign(event)) + (v[1:] == 0.0)):
+            smooth[max(0, k - 2) : k + 4] = False
+    smooth[:2] = smooth[-2:] = False
+    assert smooth.mean() > 0.7
+    assert np.abs(needed - given)[smooth].max() < 0.01 * np.abs(given).max()
+
+
+def test_a_free_swing_loses_what_friction_takes() -> None:
+    coulomb = 0.05
+    run = ForwardSimulator(machine(Friction("c", coulomb=coulomb))).run(free(1.0, 6.0))
+    q, v = run.position[:, 0], run.velocity[:, 0]
+    energy = 0.5 * INERTIA * v**2 - MASS * GRAVITY * LEVER * np.cos(q)
+    travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q)))])
+    assert np.abs(energy[0] - energy - coulomb * travel).max() < 0.01 * (energy[0] - energy[-1])
+    # It comes to rest where gravity no longer overcomes friction, and stays.
+    assert not v[-100:].any()
+    assert np.ptp(q[-100:]) == 0.0
+    assert MASS * GRAVITY * LEVER * abs(np.sin(q[-1])) <= coulomb
+    assert np.isnan(run.voltage).all()
+    assert not run.current.any()
+
+
+@pytest.mark.parametrize(("torque", "moves"), [(0.95, False), (1.05, True)])
+def test_a_held_joint_breaks_away_at_its_friction(torque: float, moves: bool) -> None:
+    share, coulomb, q = 0.3, 0.05, 0.6
+    weight = MASS * GRAVITY * LEVER * np.sin(q)
+    least = weight * (1 + share) + coulomb  # to lift it [N*m]
+    voltage = torque * least / RATIO / CONSTANT * RESISTANCE
+    servo = driven(lambda t: np.full_like(t, q + voltage / SUPPLY / GAIN), q=q, seconds=0.5)
+    run = ForwardSimulator(machine(Friction("f", coulomb=coulomb, load=share))).run(servo)
+    assert (run.position[-1, 0] > q + 1e-4) == moves
+    if not moves:
+        assert np.ptp(run.position) == 0.0
+
+
+def test_a_self_locking_gear_is_not_driven_back() -> None:
+    lock = QuadrantFriction("q", when_driving=0.4, when_driven=0.99)
+    held = ForwardSimulator(machine(lock, Friction("c", coulomb=0.01))).run(free(1.0, 1.0))
+    assert np.ptp(held.position) == 0.0
+
+
+def test_energy_is_conserved_without_losses() -> None:
+    run = ForwardSimulator(machine()).run(free(1.2, 10.0))
+    q, v = run.position[:, 0], run.velocity[:, 0]
+    energy = 0.5 * INERTIA * v**2 - MASS * GRAVITY * LEVER * np.cos(q)
+    assert np.ptp(energy) < 2e-4 * MASS * GRAVITY * LEVER
+
+
+def test_a_shorted_winding_brakes() -> None:
+    swing = free(1.0)
+    short = ForwardSimulator(machine()).run(replace(swing, open_bridge=False))
+    free_ = ForwardSimulator(machine()).run(swing)
+    assert np.abs(short.position[-200:]).max() < 0.5 * np.abs(free_.position[-200:]).max()
+    assert np.allclose(short.current, -CONSTANT * RATIO * short.velocity / RESISTANCE)
+
+
+def test_a_sensor_that_reads_high_and_a_warm_motor() -> None:
+    servo = driven(lambda t: np.full_like(t, 0.5), seconds=4.0)
+    stiff = Friction("v", viscous=0.05)
+    plain = ForwardSimulator(machine(stiff)).run(servo)
+    off = ForwardSimulator(machine(stiff, encoder_offset=0.1)).run(servo)
+    # The servo brings its sensor, not the joint, to the goal: the weight differs.
+    q = off.position[-1, 0] - 0.1
+    weight = MASS * GRAVITY * LEVER * np.sin(q) / RATIO
+    assert off.current[-1, 0] * CONSTANT == pytest.approx(weight, rel=1e-3)
+    warm = replace(servo, temperature=np.full((servo.time.size, 1), 45.0))
+    hot = ForwardSimulator(machine(stiff, heating=Heating(sensor_gain=3.0))).run(warm)
+    assert abs(0.5 - hot.position[-1, 0]) > 1.1 * abs(0.5 - plain.position[-1, 0])
+
+
+def test_a_held_motor_warms_until_its_loss_leaves_it() -> None:
+    node = Heating(thermal_resistance=12.0, time_constant=0.4)
+    servo = driven(lambda t: np.full_like(t, 1.0), seconds=4.0)
+    run = ForwardSimulator(machine(Friction("c", coulomb=5.0), heating=node)).run(servo)
+    voltage = SUPPLY * GAIN
+    # dT = R_th U^2 / (R0 (1 + COPPER dT)), solved for dT; magnets lose torque, not resistance.
+    loss = node.thermal_resistance * voltage**2 / RESISTANCE
+    rise = (np.sqrt(1.0 + 4.0 * COPPER * loss) - 1.0) / (2.0 * COPPER)
+    warm = RESISTANCE * (1.0 + COPPER * rise)
+    assert not run.velocity.any()
+    assert run.current[0, 0] == pytest.approx(voltage / RESISTANCE)
+    assert run.current[-1, 0] == pytest.approx(voltage / warm, rel=1e-3)
+
+
+def test_what_cannot_be_simulated_is_refused() -> None:
+    with pytest.raises(ModelError, match="no motor"):
+        ForwardSimulator(machine_of_urdf(URDF))
+    with pytest.raises(ModelError, match="loose"):
+        ForwardSimulator(machine(backlash=0.01))
+    n = 20
+    log = Log(
+        name="bare",
+        time=np.arange(n) / 100,
+        joints=(JOINT,),
+        position=np.zeros((n, 1)),
+        position_source="joint",
+        voltage=np.zeros((n, 1)),
+    )
+    with pytest.raises(LogContentError, match="goal positions and a supply voltage and the contr"):
+        servo_input(log)
+    told = log.with_changes(
+        goal_position=np.zeros((n, 1)),
+        supply=np.full(n, 5.0),
+        gain=1.0,
+        torque_off=np.ones((n, 1), dtype=np.bool_),
+    )
+    with pytest.raises(LogContentError, match="torque_off_bridge"):
+        servo_input(told)

@@ -1,0 +1,39 @@
+"""The law of play by itself: which flank carries, and how far motor and joint lie apart."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.effects.registry import effect_named
+from pipeline.simulation.predict import Simulator
+from tests.pipeline.identification import bench_leg as leg
+
+J3 = ("rm_joint_3",)
+VALUES = {"width": 0.01, "stiffness": 1e3, "crossing": 0.2}
+
+
+def lead(torque: np.ndarray) -> np.ndarray:
+    """How far the motor leads at torques that are held, before the log's filter."""
+    model = effect_named("backlash").apply(leg.leg_model(), J3, VALUES)
+    simulator = Simulator(leg.leg_motion())
+    constant = [np.full(len(simulator.measurement), t) for t in torque]
+    middle = len(simulator.measurement) // 2
+    return np.array([simulator._wind(model.actuator(J3[0]), t)[middle] for t in constant])
+
+
+def test_play_is_odd_nothing_without_load_and_ends_at_its_flanks() -> None:
+    torque = np.array([-5.0, -0.05, 0.0, 0.05, 5.0])
+    lag = lead(torque)
+    assert lag == pytest.approx(-lag[::-1], abs=1e-12)
+    assert lag[2] == pytest.approx(0.0, abs=1e-12)
+    # On a flank: half the width and what the flank gives.
+    assert lag[-1] == pytest.approx(0.5 * VALUES["width"] + 5.0 / VALUES["stiffness"], rel=1e-6)
+    # Between the flanks the slope is that of width / (2 crossing) beside the stiffness.
+    slope = 0.5 * VALUES["width"] / VALUES["crossing"] + 1.0 / VALUES["stiffness"]
+    assert lag[3] == pytest.approx(0.05 * slope, rel=0.03)
+
+
+def test_its_parameters_come_back() -> None:
+    effect = effect_named("backlash")
+    assert effect.physical(*effect.internal(VALUES)) == pytest.approx(VALUES)
