@@ -178,8 +178,8 @@ def segment_demand(
     if robot.floating:
         contacts, from_ground = _ground(robot, segment, generalised)
         for i, leg in enumerate(segment.stance):
-            columns = robot.leg_columns[robot.leg_names.index(leg)]
-            torque[:, columns] -= from_ground[:, i]
+            columns = robot.layout.of(robot.leg_names.index(leg))
+            torque[:, columns] -= from_ground[:, i, : columns.size]
     demand = JointDemand(
         joints=robot.joints,
         time=segment.time,

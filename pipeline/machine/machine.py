@@ -22,7 +22,8 @@ from actuators.elements.position_torque import PositionTorque
 from actuators.errors import closest
 from pipeline.logs.errors import ModelError
 from pipeline.robot.check import refuse_urdf
-from pipeline.robot.kinematics import LegChains
+from pipeline.robot.leg_chains import LegChains
+from pipeline.robot.leg_columns import LegColumns
 from pipeline.robot.robot import Robot, parse_urdf
 from pipeline.robot.urdf_source import read_urdf
 
@@ -142,6 +143,7 @@ class MachineModel:
         rigid: Pinocchio model as the robot file states it; armature zero.
         joints: In the order of every column.
         legs: Geometry of the legs; None for a robot without.
+        layout: The legs' joints among `joints`; None for a robot without legs.
         left: Which legs are on the left side.
         floating: Whether the base floats.
         bodies: Changes of bodies, ground and contact.
@@ -153,6 +155,7 @@ class MachineModel:
     rigid: pin.Model
     joints: tuple[str, ...]
     legs: LegChains | None
+    layout: LegColumns | None
     left: tuple[bool, ...]
     floating: bool
     bodies: Bodies = field(default_factory=Bodies)
@@ -227,6 +230,7 @@ def machine_of_robot(robot: Robot, chain: Chain | None) -> MachineModel:
         rigid=robot.model,
         joints=robot.joints,
         legs=robot.chains,
+        layout=robot.layout,
         left=tuple(leg.side == "left" for leg in robot.spec.legs),
         floating=robot.floating,
         actuators=_actuators(robot.joints, chain),
@@ -260,6 +264,7 @@ def machine_of_urdf(
         rigid=model,
         joints=names,
         legs=None,
+        layout=None,
         left=(),
         floating=False,
         actuators=_actuators(names, chain),

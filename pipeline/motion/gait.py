@@ -92,14 +92,13 @@ def tripod_gait(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
         base[:, 0] = speed * time
         base_velocity = np.zeros((samples, 3))
         base_velocity[:, 0] = speed
-        flat = (samples, len(robot.joints))
         segments.append(
             Segment(
                 name="support of " + ", ".join(stance),
                 time=time,
-                configuration=robot.configuration(q.reshape(flat), base),
-                velocity=robot.tangent(q_dot.reshape(flat), base_velocity),
-                acceleration=robot.tangent(q_ddot.reshape(flat)),
+                configuration=robot.configuration(robot.joint_positions(q), base),
+                velocity=robot.tangent(robot.joint_rates(q_dot), base_velocity),
+                acceleration=robot.tangent(robot.joint_rates(q_ddot)),
                 stance=stance,
             )
         )
@@ -138,7 +137,7 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     return Segment(
         name="standing on " + ", ".join(stance),
         time=time,
-        configuration=robot.configuration(q.reshape(1, -1), np.zeros((1, 3))),
+        configuration=robot.configuration(robot.joint_positions(q), np.zeros((1, 3))),
         velocity=still,
         acceleration=still,
         stance=stance,
@@ -146,9 +145,8 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
 
 
 def _within_limits(robot: Robot, q: Array, time: Array) -> None:
-    flat = q.reshape(q.shape[0], -1)
-    lower = robot.model.lowerPositionLimit[robot.position_index]
-    upper = robot.model.upperPositionLimit[robot.position_index]
+    flat = robot.joint_positions(q)
+    lower, upper = robot.limits
     beyond = np.maximum(flat - upper, lower - flat)
     if beyond.max() > 1e-9:
         sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)

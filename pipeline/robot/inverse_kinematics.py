@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import OutOfReachError
-from pipeline.robot.kinematics import LegChains, foot_jacobian_rates, foot_jacobians
+from pipeline.robot.kinematics import foot_jacobian_rates, foot_jacobians
+from pipeline.robot.leg_chains import LegChains
 
 Array = NDArray[np.float64]
 _ITERATIONS = 60
@@ -26,12 +27,12 @@ def approach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Arr
     Args:
         chains: The legs.
         target: Foot positions in the base frame [m], shape (N, L, 3).
-        start: Posture that names the branch (knee up or down) [rad], shape (L, 3) or (N, L, 3).
+        start: Posture that names the branch (knee up or down) [rad, m], shape (L, K) or (N, L, K).
 
     Returns:
-        Joint positions [rad], shape (N, L, 3), and what is left to the targets [m], shape (N, L).
+        Joint positions [rad, m], shape (N, L, K), and what is left to the targets [m], (N, L).
     """
-    q = np.broadcast_to(start, target.shape).copy()
+    q = np.broadcast_to(start, (*target.shape[:2], chains.depth)).copy()
     damping = 1e-2  # [m], relaxed as the iteration comes close
     for _ in range(_ITERATIONS):
         foot, jacobian = foot_jacobians(chains, q)
@@ -54,11 +55,11 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
     Args:
         chains: The legs.
         target: Foot positions in the base frame [m], shape (N, L, 3).
-        start: Posture that names the branch (knee up or down) [rad], shape (L, 3).
+        start: Posture that names the branch (knee up or down) [rad, m], shape (L, K).
         time: For messages [s], shape (N,).
 
     Returns:
-        Joint positions [rad], shape (N, L, 3).
+        Joint positions [rad, m], shape (N, L, K).
 
     Raises:
         OutOfReachError: A target is not reached; names leg, instant and how far it is off.

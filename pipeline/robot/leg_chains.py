@@ -1,4 +1,9 @@
-"""Constant geometry of legs: serial chains of three revolute joints from the base to a foot."""
+"""Constant geometry of legs: serial chains of joints of one coordinate from the base to a foot.
+
+Legs may differ in their number of joints. Shorter ones are filled up at their outer end with
+joints of zero axis, which neither turn nor slide, so that all legs stay one batched array;
+`LegChains.counts` says how many are real.
+"""
 
 from __future__ import annotations
 
@@ -14,18 +19,21 @@ from actuators.errors import closest
 from pipeline.errors import UrdfError
 
 Array = NDArray[np.float64]
-JOINTS_PER_LEG = 3
+#: Of a leg; fewer follow no path, more are no leg.
+FEWEST_JOINTS, MOST_JOINTS = 1, 7
 
 
 @dataclass(frozen=True)
 class LegChains:
-    """Constant geometry of L legs with three joints each, read from a Pinocchio model.
+    """Constant geometry of L legs with up to K joints each, read from a Pinocchio model.
 
     Attributes:
         names: Leg names.
-        rotation: Placement of each joint in its parent, shape (3 joints, L, 3, 3).
-        offset: Origin of each joint in its parent [m], shape (3 joints, L, 3).
-        axis: Unit axis of each joint in its own frame, shape (3 joints, L, 3).
+        rotation: Placement of each joint in its parent, shape (K joints, L, 3, 3).
+        offset: Origin of each joint in its parent [m], shape (K joints, L, 3).
+        axis: Unit axis of each joint in its own frame, shape (K joints, L, 3); zero where a leg
+            has no such joint.
+        slides: Whether a joint is prismatic, shape (K joints, L).
         foot: Foot point in the frame of the last joint [m], shape (L, 3).
     """
 
@@ -33,17 +41,39 @@ class LegChains:
     rotation: Array
     offset: Array
     axis: Array
+    slides: NDArray[np.bool_]
     foot: Array
+
+    @property
+    def depth(self) -> int:
+        """K, the largest number of joints of any leg."""
+        return int(self.axis.shape[0])
+
+    @cached_property
+    def real(self) -> NDArray[np.bool_]:
+        """Which joints exist, shape (L, K); the others fill up shorter legs."""
+        return np.asarray(self.axis.any(axis=-1).T, dtype=np.bool_)
+
+    @cached_property
+    def counts(self) -> NDArray[np.intp]:
+        """Joints of each leg, shape (L,)."""
+        return np.asarray(self.real.sum(axis=1), dtype=np.intp)
+
+    @cached_property
+    def turning_only(self) -> bool:
+        """Whether every leg has K joints and none of them slides: angles need no mask."""
+        return bool(self.real.all() and not self.slides.any())
 
     @cached_property
     def along(self) -> tuple[tuple[int, Array] | None, ...]:
         """Where a joint's axis is a coordinate axis in every leg: which one, and its sign (L, 1).
 
-        None where it is not. A rotation about a coordinate axis turns two components only.
+        None where it is not. A rotation about a coordinate axis turns two components only. The
+        sign is zero where a leg has no such joint.
         """
         found: list[tuple[int, Array] | None] = []
         for axis in self.axis:
-            coordinate = int(np.argmax(np.abs(axis[0])))
+            coordinate = int(np.argmax(np.abs(axis).max(axis=0)))
             rest = np.delete(axis, coordinate, axis=1)
             found.append(None if rest.any() else (coordinate, np.sign(axis[:, coordinate, None])))
         return tuple(found)
@@ -56,11 +86,21 @@ class LegChains:
         )
 
     @cached_property
+    def reach(self) -> Array:
+        """Length of each leg stretched out, from its first joint [m], shape (L,)."""
+        links = np.linalg.norm(self.offset[1:], axis=-1).sum(axis=0)
+        reach: Array = links + np.linalg.norm(self.foot, axis=-1)
+        return reach
+
+    @cached_property
     def _parts(self) -> dict[tuple[int, ...], LegChains]:
         return {}
 
     def of(self, legs: Sequence[int]) -> LegChains:
-        """Some of the legs, by index; made once for each choice."""
+        """Some of the legs, by index; made once for each choice.
+
+        The depth stays, so that joints keep their columns.
+        """
         key = tuple(legs)
         if key not in self._parts:
             own = list(key)
@@ -69,6 +109,7 @@ class LegChains:
                 self.rotation[:, own],
                 self.offset[:, own],
                 self.axis[:, own],
+                self.slides[:, own],
                 self.foot[own],
             )
         return self._parts[key]
@@ -81,63 +122,78 @@ def leg_chains(
 
     Args:
         model: Pinocchio model.
-        legs: For each leg its name, its three joint names from the base outward and the foot frame.
+        legs: For each leg its name, its joint names from the base outward and the foot frame.
         base_joint: Index of the joint that carries the base (0 for a fixed base).
 
     Raises:
-        UrdfError: A joint or frame is missing, not revolute, or not the child of the one before.
+        UrdfError: A joint or frame is missing, of several coordinates, or not the child of the one
+            before.
     """
-    n_legs = len(legs)
-    rotation = np.empty((JOINTS_PER_LEG, n_legs, 3, 3))
-    offset = np.empty((JOINTS_PER_LEG, n_legs, 3))
-    axis = np.empty((JOINTS_PER_LEG, n_legs, 3))
+    n_legs, depth = len(legs), max((len(joints) for _, joints, _ in legs), default=0)
+    rotation = np.tile(np.eye(3), (depth, n_legs, 1, 1))
+    offset = np.zeros((depth, n_legs, 3))
+    axis = np.zeros((depth, n_legs, 3))
+    slides = np.zeros((depth, n_legs), dtype=np.bool_)
     foot = np.empty((n_legs, 3))
     for i, (leg, joints, frame_name) in enumerate(legs):
-        if len(joints) != JOINTS_PER_LEG:
-            raise UrdfError(f"leg '{leg}' names {len(joints)} joints; a leg has {JOINTS_PER_LEG}")
+        if not FEWEST_JOINTS <= len(joints) <= MOST_JOINTS:
+            raise UrdfError(
+                f"leg '{leg}' names {len(joints)} joints; a leg has {FEWEST_JOINTS} to "
+                f"{MOST_JOINTS}"
+            )
         parent = base_joint
         for j, joint in enumerate(joints):
-            if not model.existJointName(joint):
-                raise UrdfError(
-                    f"leg '{leg}': joint '{joint}' is not in the URDF; "
-                    f"{closest(joint, list(model.names)[1:])}"
-                )
-            index = model.getJointId(joint)
-            if model.parents[index] != parent:
-                raise UrdfError(
-                    f"leg '{leg}': joint '{joint}' hangs on '{model.names[model.parents[index]]}', "
-                    f"not on '{model.names[parent]}'; list the joints from the base outward"
-                )
-            if model.joints[index].nq != 1 or model.joints[index].nv != 1:
-                found = "continuous" if model.joints[index].nv == 1 else "of several coordinates"
-                raise UrdfError(
-                    f"leg '{leg}': joint '{joint}' is {found}; a leg's are of type revolute, "
-                    "with limits"
-                )
-            placement = model.jointPlacements[index]
+            parent = _next_joint(model, leg, joint, parent)
+            placement = model.jointPlacements[parent]
             rotation[j, i] = placement.rotation
             offset[j, i] = placement.translation
-            axis[j, i] = _axis(model, index, leg, joint)
-            parent = index
-        if not model.existFrame(frame_name):
-            known = [frame.name for frame in model.frames]
-            raise UrdfError(
-                f"leg '{leg}': foot '{frame_name}' is not a frame of the URDF; "
-                f"{closest(frame_name, known)}"
-            )
-        frame = model.frames[model.getFrameId(frame_name)]
-        if frame.parentJoint != parent:
-            raise UrdfError(f"leg '{leg}': foot '{frame_name}' is not carried by '{joints[-1]}'")
-        foot[i] = frame.placement.translation
-    return LegChains(tuple(leg for leg, _, _ in legs), rotation, offset, axis, foot)
+            axis[j, i], slides[j, i] = _axis(model, parent, leg, joint)
+        foot[i] = _foot(model, leg, frame_name, joints[-1], parent)
+    return LegChains(tuple(leg for leg, _, _ in legs), rotation, offset, axis, slides, foot)
 
 
-def _axis(model: pin.Model, index: int, leg: str, joint: str) -> Array:
-    # The motion subspace of a revolute joint is (0, axis): ask Pinocchio rather than parse names.
+def _next_joint(model: pin.Model, leg: str, joint: str, parent: int) -> int:
+    if not model.existJointName(joint):
+        raise UrdfError(
+            f"leg '{leg}': joint '{joint}' is not in the URDF; "
+            f"{closest(joint, list(model.names)[1:])}"
+        )
+    index = int(model.getJointId(joint))
+    if model.parents[index] != parent:
+        raise UrdfError(
+            f"leg '{leg}': joint '{joint}' hangs on '{model.names[model.parents[index]]}', "
+            f"not on '{model.names[parent]}'; list the joints from the base outward"
+        )
+    return index
+
+
+def _foot(model: pin.Model, leg: str, name: str, last: str, joint: int) -> Array:
+    if not model.existFrame(name):
+        known = [frame.name for frame in model.frames]
+        raise UrdfError(
+            f"leg '{leg}': foot '{name}' is not a frame of the URDF; {closest(name, known)}"
+        )
+    frame = model.frames[model.getFrameId(name)]
+    if frame.parentJoint != joint:
+        raise UrdfError(f"leg '{leg}': foot '{name}' is not carried by '{last}'")
+    place: Array = np.asarray(frame.placement.translation)
+    return place
+
+
+def _axis(model: pin.Model, index: int, leg: str, joint: str) -> tuple[Array, bool]:
+    """Unit axis of a joint in its own frame, and whether it slides along it."""
+    if model.joints[index].nq != 1 or model.joints[index].nv != 1:
+        raise UrdfError(
+            f"leg '{leg}': joint '{joint}' is of several coordinates; a leg's joints are of type "
+            "revolute, continuous or prismatic"
+        )
+    # The motion subspace is (0, axis) or (axis, 0): ask Pinocchio rather than parse names.
     data = model.joints[index].createData()
     q = pin.neutral(model)
     model.joints[index].calc(data, q[model.joints[index].idx_q :][:1])
     subspace = np.asarray(data.S).reshape(6)
-    if np.any(np.abs(subspace[:3]) > 0) or abs(np.linalg.norm(subspace[3:]) - 1) > 1e-9:
-        raise UrdfError(f"leg '{leg}': joint '{joint}' slides; a leg's are of type revolute")
-    return subspace[3:]
+    slides = bool(np.any(np.abs(subspace[:3]) > 0))
+    axis, other = (subspace[:3], subspace[3:]) if slides else (subspace[3:], subspace[:3])
+    if other.any() or abs(np.linalg.norm(axis) - 1) > 1e-9:
+        raise UrdfError(f"leg '{leg}': joint '{joint}' neither turns nor slides along one axis")
+    return axis, slides

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
+import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from actuators.errors import closest, one_line
 from pipeline.errors import UrdfError
 from pipeline.robot.leg_chains import LegChains, leg_chains
+from pipeline.robot.leg_columns import LegColumns, leg_columns
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.urdf_builder import build_urdf
 from pipeline.robot.urdf_source import read_elements, read_urdf
@@ -47,7 +49,7 @@ class Robot:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Actuated joints in the robot file's order; the order of every column."""
+        """Actuated joints in the robot file's order, the legs' first; the order of every column."""
         return self.spec.joints
 
     @property
@@ -77,9 +79,40 @@ class Robot:
         return np.array([self._joint(name).idx_v for name in self.joints], dtype=np.intp)
 
     @cached_property
+    def layout(self) -> LegColumns:
+        """The legs' joints among `joints`."""
+        return leg_columns(self.joints, [leg.joints for leg in self.spec.legs])
+
+    @property
     def leg_columns(self) -> NDArray[np.intp]:
-        """Columns of each leg's joints among `joints`, shape (L, 3)."""
-        return np.arange(len(self.joints), dtype=np.intp).reshape(len(self.leg_names), -1)
+        """Columns of each leg's joints among `joints`, shape (L, K); see `LegColumns.columns`."""
+        return self.layout.columns
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Lower and upper position limits of `joints`, each (J,) [rad, m]; infinite without."""
+        at = self.position_index
+        return self.model.lowerPositionLimit[at], self.model.upperPositionLimit[at]
+
+    @cached_property
+    def held(self) -> Array:
+        """Where joints outside the legs are held, zero in the legs, shape (J,) [rad, m]."""
+        pose = dict(self.spec.held)
+        return np.array([pose.get(name, 0.0) for name in self.joints])
+
+    @cached_property
+    def sliding(self) -> NDArray[np.bool_]:
+        """Which of `joints` are prismatic, shape (J,): metres and newtons, not radians."""
+        kinds = [self._joint(name).shortname() for name in self.joints]
+        return np.array(["JointModelP" in kind for kind in kinds])
+
+    @cached_property
+    def start_posture(self) -> Array:
+        """Postures that name each leg's branch, shape (L, K) [rad, m]; zero beyond its joints."""
+        out = np.zeros(self.leg_columns.shape)
+        for row, leg in zip(out, self.spec.legs, strict=True):
+            row[: len(leg.joints)] = leg.start_posture
+        return out
 
     def _joint(self, name: str) -> pin.JointModel:
         if not self.model.existJointName(name):
@@ -90,9 +123,16 @@ class Robot:
         return self.model.joints[self.model.getJointId(name)]
 
     def leg_positions(self, configuration: Array) -> Array:
-        """Joint positions by leg: (N, nq) to (N, L, 3) [rad]."""
-        q = configuration[:, self.position_index]
-        return q.reshape(q.shape[0], len(self.leg_names), -1)
+        """Joint positions by leg: (N, nq) to (N, L, K) [rad, m]."""
+        return self.layout.by_leg(configuration[:, self.position_index])
+
+    def joint_positions(self, legs: Array) -> Array:
+        """All joints' positions, those outside the legs held: (N, L, K) to (N, J) [rad, m]."""
+        return self.layout.by_joint(legs, self.held)
+
+    def joint_rates(self, legs: Array) -> Array:
+        """All joints' velocities or accelerations, none outside the legs: (N, L, K) to (N, J)."""
+        return self.layout.by_joint(legs)
 
     def base_rotation(self, configuration: Array) -> Array | None:
         """Rotation from base to world, shape (N, 3, 3), or None where it is the identity."""
@@ -168,23 +208,34 @@ def load_robot(spec: RobotSpec) -> Robot:
             raise UrdfError(f"{error}; {spec.path} names it as robot.urdf") from None
         read_elements(text, str(spec.urdf))
     where = str(spec.path if spec.build else spec.urdf)
-    model = parse_urdf(text, where, floating=spec.floating)
+    model = model_of_angles(text, where, floating=spec.floating)
     model.gravity.linear = np.array([0.0, 0.0, -spec.parameters["gravity"]])
     robot = Robot(spec, text, model)
     _refuse_other_base(robot)
     # Resolve every name now, so that a wrong one is an error on loading and not in the middle.
-    _ = robot.position_index, robot.velocity_index
     try:
         _ = robot.chains
     except UrdfError as error:
         raise UrdfError(f"{spec.path}: {error}") from None
-    actuated = set(robot.joints)
-    for name in list(model.names)[2 if spec.floating else 1 :]:
-        if name not in actuated:
-            raise UrdfError(
-                f"{spec.path}: joint '{name}' of the URDF belongs to no leg; list it or fix it"
-            )
+    _ = robot.position_index, robot.velocity_index
+    _refuse_left_over(robot)
     return robot
+
+
+def _refuse_left_over(robot: Robot) -> None:
+    """Every joint of the URDF is a leg's, or held.
+
+    Raises:
+        UrdfError: Some are neither.
+    """
+    known = set(robot.joints)
+    moving = list(robot.model.names)[2 if robot.floating else 1 :]
+    left = [name for name in moving if name not in known]
+    if left:
+        raise UrdfError(
+            f"{robot.spec.path}: of the URDF's joints {', '.join(map(repr, left))} belong to no "
+            f"leg; list them in a leg, hold them ([held] {left[0]} = 0.0), or make them fixed"
+        )
 
 
 def _refuse_other_base(robot: Robot) -> None:
@@ -223,6 +274,34 @@ def _parser_heard() -> Iterator[list[str]]:
             for line in sink.read().decode("utf-8", "replace").splitlines():
                 if line.startswith("Error:"):
                     said.append(" ".join(line.removeprefix("Error:").split()))
+
+
+def model_of_angles(text: str, where: str, *, floating: bool) -> pin.Model:
+    """A model whose joints all have one number: a continuous joint is an angle without limits.
+
+    Pinocchio writes a continuous joint as cosine and sine; the physics is the same.
+
+    Raises:
+        UrdfError: As for `parse_urdf`.
+    """
+    root = ET.fromstring(text)
+    endless = [joint for joint in root.findall("joint") if joint.get("type") == "continuous"]
+    if not endless:
+        return parse_urdf(text, where, floating=floating)
+    for joint in endless:
+        joint.set("type", "revolute")
+        limit = joint.find("limit")
+        if limit is None:
+            limit = ET.SubElement(joint, "limit", {"effort": "0", "velocity": "0"})
+        limit.set("lower", "-1")
+        limit.set("upper", "1")
+    model = parse_urdf(ET.tostring(root, encoding="unicode"), where, floating=floating)
+    lower, upper = model.lowerPositionLimit.copy(), model.upperPositionLimit.copy()
+    for joint in endless:
+        at = model.joints[model.getJointId(joint.get("name", ""))].idx_q
+        lower[at], upper[at] = -np.inf, np.inf
+    model.lowerPositionLimit, model.upperPositionLimit = lower, upper
+    return model
 
 
 def parse_urdf(text: str, where: str, *, floating: bool) -> pin.Model:

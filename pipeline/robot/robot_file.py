@@ -13,6 +13,7 @@ from actuators.parameters import REQUIRED_KEYS, ParameterSet, parameters_from_ta
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import si_unit
 from pipeline.errors import RobotFileError
+from pipeline.robot.published import urdf_path
 
 #: Numbers every walking robot needs, with their dimension.
 #: Of the project, from the folder it is run in.
@@ -65,12 +66,13 @@ LARGEST_GRAVITY = 30.0
 _ANY_LENGTH = ("coxa_length", "joint_2_lateral", "trunk_com_left")
 STATIONS = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 
-_TOP_KEYS = {"extends", "robot", "parameters", "legs", "gait", "standing"}
+_TOP_KEYS = {"extends", "robot", "parameters", "legs", "held", "gait", "standing", "assumed"}
 _ROBOT_KEYS = {"name", "urdf", "base_link", "base", "build", "zero_pose", "note"}
 _LEG_KEYS = {"joints", "foot", "side", "station", "neutral_foot", "start_posture"}
 _GAIT_KEYS = {"transfer_path", "tripods"}
 _STANDING_KEYS = {"feet"}
 _MOST_EXTENDED = 20
+_COUNTS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven"}
 
 
 @dataclass(frozen=True)
@@ -84,7 +86,8 @@ class LegSpec:
         side: ``"left"`` or ``"right"``.
         station: ``"front"``, ``"middle"`` or ``"rear"``; empty for a URDF of the user's own.
         neutral_foot: Foot at mid-stroke in the base frame [m].
-        start_posture: Joint positions that name the knee's branch [rad]; zero where none is stated.
+        start_posture: Joint positions that name the knee's branch [rad, m], one for each joint;
+            zero where none is stated.
         start_stated: Whether the robot file states them.
     """
 
@@ -94,7 +97,7 @@ class LegSpec:
     side: str
     station: str
     neutral_foot: tuple[float, float, float]
-    start_posture: tuple[float, float, float]
+    start_posture: tuple[float, ...]
     start_stated: bool = False
 
 
@@ -116,6 +119,8 @@ class RobotSpec:
         transfer_path: Name of the foot's path through the air.
         tripods: The two sets of legs that support in turn.
         standing_feet: Legs that stand in the standing mode.
+        held: Joints outside the legs and where they are held [rad, m].
+        assumed: Keys of the file that are guesses, each with its reason.
     """
 
     path: Path
@@ -131,11 +136,14 @@ class RobotSpec:
     transfer_path: str
     tripods: tuple[tuple[str, ...], ...]
     standing_feet: tuple[str, ...]
+    held: tuple[tuple[str, float], ...] = ()
+    assumed: tuple[tuple[str, str], ...] = ()
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """All leg joints, leg by leg."""
-        return tuple(joint for leg in self.legs for joint in leg.joints)
+        """All actuated joints: the legs' leg by leg, then those that are held."""
+        legs = (joint for leg in self.legs for joint in leg.joints)
+        return (*legs, *(joint for joint, _ in self.held))
 
     def with_parameters(self, values: Mapping[str, float]) -> RobotSpec:
         """The same robot with some parameters at other values.
@@ -220,6 +228,7 @@ def load_robot_file(path: Path) -> RobotSpec:
     check_parameters(parameters, build, where)
     legs = _legs(table["legs"], parameters, build, where)
     names = [leg.name for leg in legs]
+    held = _held(table.get("held", {}), legs, where)
     gait = table["gait"]
     _known_keys(gait, _GAIT_KEYS, where, "key of [gait]")
     standing = table.get("standing", {})
@@ -232,7 +241,7 @@ def load_robot_file(path: Path) -> RobotSpec:
         path=path,
         sources=sources,
         name=_text(robot, "name", where),
-        urdf=path.parent / _text(robot, "urdf", where),
+        urdf=urdf_path(_text(robot, "urdf", where), path),
         base_link=_text(robot, "base_link", where),
         floating=base == "floating",
         build=build,
@@ -242,6 +251,8 @@ def load_robot_file(path: Path) -> RobotSpec:
         transfer_path=_text(gait, "transfer_path", where),
         tripods=tripods,
         standing_feet=_leg_list(standing.get("feet", names), names, f"{where}: standing.feet"),
+        held=held,
+        assumed=_assumed(table.get("assumed", {}), where),
     )
 
 
@@ -298,7 +309,7 @@ def _refuse_missing(table: Mapping[str, Any], where: str) -> None:
     for name, entry in under("parameters").items():
         if isinstance(entry, dict):
             missing += [f"parameters.{name}.{key}" for key in REQUIRED_KEYS if key not in entry]
-    tables = ("robot", "legs", "gait", "parameters", "standing")
+    tables = ("robot", "legs", "held", "gait", "parameters", "standing", "assumed")
     wrong = [k for k in tables if not isinstance(table.get(k, {}), dict)]
     if wrong:
         raise RobotFileError(f"{where}: {wrong[0]} must be a table, [{wrong[0]}]")
@@ -361,14 +372,15 @@ def _legs(
                 )
             neutral = built_neutral_foot(parameters, side, station)
         else:
-            neutral = _triple(entry, "neutral_foot", None, place)
+            x, y, z = _numbers(entry, "neutral_foot", 3, None, place)
+            neutral = (x, y, z)
         for k, at in enumerate(neutral):
             if abs(at) > LARGEST_LENGTH:
                 raise RobotFileError(
                     f"{place}: neutral_foot has {at:g} at place {k + 1}; it is written in metres, "
                     "are these millimetres?"
                 )
-        start = _triple(entry, "start_posture", (0.0, 0.0, 0.0), place)
+        start = _numbers(entry, "start_posture", len(joints), (0.0,) * len(joints), place)
         for k, angle in enumerate(start):
             if abs(angle) > 2 * math.pi:
                 raise RobotFileError(
@@ -408,22 +420,55 @@ def _refuse_name(name: str, place: str) -> None:
         raise RobotFileError(f"{place}: a name {what}; names become columns and file names")
 
 
-def _triple(
-    entry: Mapping[str, Any], key: str, default: tuple[float, float, float] | None, where: str
-) -> tuple[float, float, float]:
+def _numbers(
+    entry: Mapping[str, Any], key: str, count: int, default: tuple[float, ...] | None, where: str
+) -> tuple[float, ...]:
     value = entry.get(key, default)
-    numbers = isinstance(value, (list, tuple)) and all(
-        isinstance(x, (int, float)) and not isinstance(x, bool) for x in value
-    )
-    if not numbers or len(value) != 3:
-        raise RobotFileError(f"{where}: {key} must be three numbers")
+    some = "a number" if count == 1 else f"{_COUNTS.get(count, count)} numbers"
+    if not isinstance(value, (list, tuple)) or not all(_is_number(x) for x in value):
+        raise RobotFileError(f"{where}: {key} must be {some}")
+    if len(value) != count:
+        raise RobotFileError(f"{where}: {key} must be {some}, not {len(value)}")
+    return tuple(_finite(x, f"{where}: {key}") for x in value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _finite(value: Any, where: str) -> float:
     try:
-        x, y, z = (float(component) for component in value)
+        number = float(value)
     except OverflowError:
-        x = y = z = math.inf
-    if not all(math.isfinite(component) for component in (x, y, z)):
-        raise RobotFileError(f"{where}: {key} must be three finite numbers")
-    return (x, y, z)
+        number = math.inf
+    if not math.isfinite(number):
+        raise RobotFileError(f"{where} must be finite")
+    return number
+
+
+def _held(
+    table: Mapping[str, Any], legs: tuple[LegSpec, ...], where: str
+) -> tuple[tuple[str, float], ...]:
+    """Joints outside the legs and where they are held [rad, m]."""
+    of_leg = {joint: leg.name for leg in legs for joint in leg.joints}
+    out = []
+    for joint, value in table.items():
+        place = f"{where}: held.{one_line(joint)}"
+        _refuse_name(joint, place)
+        if joint in of_leg:
+            raise RobotFileError(f"{place}: the joint belongs to leg '{of_leg[joint]}'; take one")
+        if not _is_number(value):
+            raise RobotFileError(f"{place}: expected the position it is held at [rad, m]")
+        out.append((joint, _finite(value, place)))
+    return tuple(out)
+
+
+def _assumed(table: Mapping[str, Any], where: str) -> tuple[tuple[str, str], ...]:
+    """Guesses and their reasons."""
+    for key, reason in table.items():
+        if not isinstance(reason, str) or not reason.strip():
+            raise RobotFileError(f"{where}: assumed.{one_line(key)}: expected the reason, a text")
+    return tuple((key, reason) for key, reason in table.items())
 
 
 def check_parameters(parameters: ParameterSet, build: str | None, where: str) -> None:

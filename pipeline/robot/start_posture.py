@@ -18,7 +18,8 @@ from pipeline.robot.inverse_kinematics import ACCEPTED, approach, beyond_reach
 from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
-_STARTS = 5  # per joint, inside its limits
+_STARTS = 5  # per joint of a leg of three, inside its limits
+_TRIES = _STARTS**3
 _OTHER = 0.02  # [rad] two postures closer than this are one
 _NEAR = 1e-4  # [m]
 _SHOWN = 2  # postures offered per leg
@@ -26,7 +27,7 @@ _UNLIMITED = 2 * np.pi  # [rad] a range beyond this is searched over one turn
 
 
 def neutral_postures(robot: Robot) -> Array:
-    """Joint positions with every foot at mid-stroke [rad], shape (L, 3), each on its branch.
+    """Joint positions with every foot at mid-stroke [rad, m], shape (L, K), each on its branch.
 
     Raises:
         OutOfReachError: No posture of a leg reaches its neutral foot.
@@ -35,8 +36,7 @@ def neutral_postures(robot: Robot) -> Array:
     """
     spec = robot.spec
     target = np.array([leg.neutral_foot for leg in spec.legs])[None]
-    start = np.array([leg.start_posture for leg in spec.legs])
-    q, miss = approach(robot.chains, target, start)
+    q, miss = approach(robot.chains, target, robot.start_posture)
     lower, upper = _limits(robot)
     inside = ((q[0] >= lower - ACCEPTED) & (q[0] <= upper + ACCEPTED)).all(axis=1)
     lost = np.flatnonzero((miss[0] > ACCEPTED) | ~inside)
@@ -46,9 +46,8 @@ def neutral_postures(robot: Robot) -> Array:
 
 
 def _limits(robot: Robot) -> tuple[Array, Array]:
-    shape = (len(robot.leg_names), -1)
-    lower = robot.model.lowerPositionLimit[robot.position_index].reshape(shape)
-    upper = robot.model.upperPositionLimit[robot.position_index].reshape(shape)
+    """By leg, shape (L, K)."""
+    lower, upper = (robot.layout.by_leg(limit[None])[0] for limit in robot.limits)
     return lower, upper
 
 
@@ -60,10 +59,11 @@ def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array)
         found, least = _branches(robot, int(i), target[i])
         if not found:
             return beyond_reach(leg.name, target[i], min(least, float(miss[i])), 0.0)
-        good = [q for q in found if ((q >= lower[i]) & (q <= upper[i])).all()]
+        low, high = lower[i, : len(leg.joints)], upper[i, : len(leg.joints)]
+        good = [q for q in found if ((q >= low) & (q <= high)).all()]
         if not good:
-            best = min(found, key=lambda q: float(_beyond(q, lower[i], upper[i]).max()))
-            worst = int(_beyond(best, lower[i], upper[i]).argmax())
+            best = min(found, key=lambda q: float(_beyond(q, low, high).max()))
+            worst = int(_beyond(best, low, high).argmax())
             return GaitError(
                 f"leg '{leg.name}': to stand on its neutral foot joint '{leg.joints[worst]}' would "
                 f"have to reach {np.degrees(best[worst]):.1f} deg, its limits are "
@@ -86,6 +86,21 @@ def _beyond(q: Array, lower: Array, upper: Array) -> Array:
     return out
 
 
+def _spread(joints: int) -> Array:
+    """Points that fill the unit cube evenly, shape (_TRIES, joints)."""
+    if joints <= 3:
+        shares = (np.arange(_STARTS) + 0.5) / _STARTS
+        return np.array(list(itertools.product(shares, repeat=3)))[:, :joints]
+    # More joints ask for points that do not stand in rows: Kronecker's sequence of the root of
+    # x^(joints + 1) = x + 1.
+    root = 2.0
+    for _ in range(30):
+        root = (1 + root) ** (1 / (joints + 1))
+    steps = root ** -np.arange(1, joints + 1)
+    points: Array = (0.5 + np.arange(1, _TRIES + 1)[:, None] * steps) % 1.0
+    return points
+
+
 def _written(q: Array) -> str:
     return "[" + ", ".join(f"{float(x):.2f}" for x in q) + "]"
 
@@ -94,15 +109,15 @@ def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float
     """Postures of one leg that reach a point, those nearest to the middle of the limits first.
 
     Returns:
-        Each of shape (3,) [rad], and the least distance that was left [m].
+        Each with as many coordinates as the leg has joints [rad, m], and the least distance that
+        was left [m].
     """
+    count = len(robot.spec.legs[leg].joints)
     lower, upper = (limit[leg] for limit in _limits(robot))
     wide = ~np.isfinite(upper - lower) | (upper - lower > _UNLIMITED) | (upper <= lower)
     low, high = np.where(wide, -np.pi, lower), np.where(wide, np.pi, upper)
-    shares = (np.arange(_STARTS) + 0.5) / _STARTS
-    starts = np.array(
-        [low + (high - low) * np.array(s) for s in itertools.product(shares, repeat=3)]
-    )
+    starts = np.zeros((_TRIES, low.size))
+    starts[:, :count] = (low + (high - low) * _spread(low.size))[:, :count]
     chains = robot.chains.of([leg])
     points = np.broadcast_to(target, (len(starts), 1, 3))
     # A start that never arrives keeps the damping of all up; those that come close go on alone.
@@ -113,8 +128,9 @@ def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float
         if miss[0, 0] > ACCEPTED:
             continue
         # Whole turns lead to the same posture; take the one inside the limits.
-        own = q[0, 0] - 2 * np.pi * np.round((q[0, 0] - (low + high) / 2) / (2 * np.pi))
+        turns = np.where(chains.slides[:, 0], 0.0, (q[0, 0] - (low + high) / 2) / (2 * np.pi))
+        own = (q[0, 0] - 2 * np.pi * np.round(turns))[:count]
         if all(np.abs(own - other).max() > _OTHER for other in found):
             found.append(own)
-    middle = (low + high) / 2
+    middle = ((low + high) / 2)[:count]
     return sorted(found, key=lambda q: float(np.abs(q - middle).sum())), float(left.min())

@@ -111,7 +111,7 @@ class Effects:
                     force[:, robot.leg_names.index(name), 1] = sign * squeeze / len(standing)
             q = robot.leg_positions(segment.configuration)
             part = foot_force_torques(robot.chains, q, force)
-            torque[:, robot.leg_columns.ravel()] -= part.reshape(part.shape[0], -1)
+            torque -= robot.layout.by_joint(part)
         return replace(demand, torque=torque)
 
     @property

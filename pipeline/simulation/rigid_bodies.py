@@ -18,7 +18,6 @@ from pipeline.dynamics.contact_forces import least_tangential_forces
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import Bodies, MachineModel
 from pipeline.robot.kinematics import (
-    LegChains,
     foot_force_torques,
     foot_jacobian_rates,
     foot_jacobians,
@@ -96,7 +95,7 @@ class RigidBodies:
         if self._base is None:
             # What the base did is told by the measured motion, whatever an effect makes of it.
             m = self.measurement
-            velocity, acceleration = _base_motion(machine.legs, m, (m.q, m.v, m.a))
+            velocity, acceleration = _base_motion(machine, m, (m.q, m.v, m.a))
             if legs_are_separate(machine, m):
                 acceleration = _measured_acceleration(machine, m, velocity)
             else:
@@ -169,19 +168,16 @@ def _base_rotation(m: Measurement, n: int) -> Array | None:
     )
 
 
-def _legs(q: Array) -> Array:
-    return q.reshape(q.shape[0], -1, 3)
-
-
 def _base_motion(
-    legs: LegChains | None, m: Measurement, motion: tuple[Array, Array, Array]
+    machine: MachineModel, m: Measurement, motion: tuple[Array, Array, Array]
 ) -> tuple[Array, Array]:
     """Linear velocity and acceleration of the base in its own frame, each (N, 3)."""
     n = motion[0].shape[0]
     velocity, acceleration = np.zeros((n, 3)), np.zeros((n, 3))
-    if legs is None or m.standing is None:
+    legs, layout = machine.legs, machine.layout
+    if legs is None or layout is None or m.standing is None:
         return velocity, acceleration
-    q, v, a = (_legs(x) for x in motion)
+    q, v, a = (layout.by_leg(x) for x in motion)
     for start in range(0, n, _BLOCK):
         s = slice(start, start + _BLOCK)
         jacobian = foot_jacobians(legs, q[s])[1]
@@ -202,6 +198,7 @@ def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Arra
     walks is none, is taken off.
     """
     assert machine.legs is not None
+    assert machine.layout is not None
     assert m.foot_force is not None
     model = machine.rigid
     n = m.q.shape[0]
@@ -233,7 +230,7 @@ def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Arra
         unit[:, k] = 1.0
         inertia[:, :, k] = base_wrench(floating, unit, still)
     inertia[:, 3:, :3] = inertia[:, :3, 3:].transpose(0, 2, 1)
-    feet = foot_positions(machine.legs, _legs(m.q))
+    feet = foot_positions(machine.legs, machine.layout.by_leg(m.q))
     rotation = _base_rotation(m, n)
     force = m.foot_force if rotation is None else np.einsum("nji,nfj->nfi", rotation, m.foot_force)
     given = np.hstack([force.sum(axis=1), np.cross(feet, force).sum(axis=1)])
@@ -246,14 +243,15 @@ def _ground_torque(
 ) -> Array:
     """What the ground's forces put into the joints, shape (N, J) [N*m]."""
     assert machine.legs is not None
+    assert machine.layout is not None
     n = q.shape[0]
-    legs = _legs(q)
+    legs = machine.layout.by_leg(q)
     out = np.empty((n, len(machine.joints)))
     for start in range(0, n, _BLOCK):
         s = slice(start, min(start + _BLOCK, n))
         turn = None if rotation is None else rotation[s]
         force = _foot_forces(machine, m, s, foot_positions(machine.legs, legs[s]), wrench[s], turn)
-        out[s] = foot_force_torques(machine.legs, legs[s], force).reshape(s.stop - s.start, -1)
+        out[s] = machine.layout.by_joint(foot_force_torques(machine.legs, legs[s], force))
     return out
 
 

@@ -130,9 +130,9 @@ def step_table(robot: Robot, samples: int = 751) -> Array:
     foot = np.repeat(neutral[None], 2 * samples, axis=0)
     foot[..., 0] += stroke * along[:, None]
     foot[..., 2] += lift * up[:, None]
-    start = np.array([leg.start_posture for leg in spec.legs])
+    start = robot.start_posture
     q = solve_positions(robot.chains, foot, start, np.arange(2.0 * samples))
-    return np.delete(q.reshape(2 * samples, -1), samples, axis=0)
+    return np.delete(robot.joint_positions(q), samples, axis=0)
 
 
 def at_phase(table: Array, phase: Array) -> Array:

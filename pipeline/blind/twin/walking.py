@@ -151,4 +151,4 @@ def squeeze_torque(
         for i in same:
             push[:, i, 1] = side * force / len(same)
     torque = -foot_force_torques(robot.chains, q, push)
-    return torque.reshape(q.shape[0], -1)
+    return robot.layout.by_joint(torque)

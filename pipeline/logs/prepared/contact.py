@@ -114,7 +114,7 @@ def lowest_feet(robot: Robot, position: Array, roll: Array | None, pitch: Array 
         pitch: Likewise.
     """
     n = position.shape[0]
-    shaped = position.reshape(n, len(robot.leg_names), -1)
+    shaped = robot.layout.by_leg(position)
     feet = np.concatenate(
         [foot_positions(robot.chains, shaped[i : i + 4096]) for i in range(0, n, 4096)]
     )

@@ -129,8 +129,8 @@ class TransmissionCoupling(Effect):
 
     def draw(self, rng: np.random.Generator, ref: Reference, torque: float) -> Hidden:
         """Motor of joint 2 or 3 with joint 1 or 2 of its leg."""
-        legs = ref.robot.leg_columns
-        leg = legs[rng.integers(legs.shape[0])]
+        layout = ref.robot.layout
+        leg = layout.of(int(rng.integers(layout.columns.shape[0])))
         k = int(rng.integers(1, leg.size))
         j, other = int(leg[k]), int(leg[k - 1])
         trial = 0.1

@@ -1,0 +1,88 @@
+"""Robots that the package ``example-robot-data`` ships, by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from actuators.errors import closest, one_line
+from pipeline.errors import UrdfError
+
+#: How a robot file writes such a URDF: ``example-robot-data:solo12``.
+SCHEME: Final = "example-robot-data:"
+
+
+@dataclass(frozen=True)
+class PublishedRobot:
+    """One robot of the package.
+
+    Attributes:
+        name: By which the package calls it.
+        urdf: Its file.
+        srdf: Poses with names; None where the package has none.
+        pose: Name of its reference pose; empty where it names none.
+    """
+
+    name: str
+    urdf: Path
+    srdf: Path | None
+    pose: str
+
+
+@cache
+def _loaders() -> dict[str, Any]:
+    from example_robot_data.robots_loader import ROBOTS
+
+    return dict(ROBOTS)
+
+
+def published_names() -> list[str]:
+    """Every name that the package knows."""
+    return sorted(_loaders())
+
+
+def published_robot(name: str) -> PublishedRobot:
+    """Look a robot of the package up.
+
+    Raises:
+        UrdfError: No robot has that name, or it is not described by a URDF.
+    """
+    from example_robot_data.robots_loader import getModelPath
+
+    loaders = _loaders()
+    if name not in loaders:
+        raise UrdfError(
+            f"'{one_line(name)}' is no robot of example-robot-data; "
+            f"{closest(name, published_names())}"
+        )
+    loader = loaders[name]
+    if not loader.urdf_filename:
+        raise UrdfError(
+            f"{name}: example-robot-data describes it in {loader.sdf_filename or 'no file'}, not "
+            "in a URDF; its closed chains have none"
+        )
+    folder = Path(getModelPath(loader.path)) / loader.path
+    urdf = folder / loader.urdf_subpath / loader.urdf_filename
+    srdf = folder / loader.srdf_subpath / loader.srdf_filename
+    has_srdf = bool(loader.srdf_filename) and srdf.is_file()
+    return PublishedRobot(name, urdf, srdf if has_srdf else None, loader.ref_posture or "")
+
+
+def urdf_path(text: str, robot_file: Path) -> Path:
+    """Where the URDF that a robot file names lies.
+
+    Args:
+        text: ``robot.urdf``: a path beside the robot file, or ``example-robot-data:NAME``.
+        robot_file: The file that names it.
+
+    Raises:
+        UrdfError: The package has no such robot.
+    """
+    if not text.startswith(SCHEME):
+        return robot_file.parent / text
+    try:
+        return published_robot(text.removeprefix(SCHEME)).urdf
+    except UrdfError as error:
+        raise UrdfError(f"{robot_file}: robot.urdf: {error}") from None

@@ -1,0 +1,139 @@
+"""Legs of two to seven joints that turn or slide, and joints that belong to no leg."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pipeline.dynamics.joint_demand import segment_demand
+from pipeline.errors import RobotFileError, UrdfError
+from pipeline.motion.gait import standing_posture
+from pipeline.motion.motion import Segment
+from pipeline.robot.kinematics import (
+    foot_force_torques,
+    foot_jacobian_rates,
+    foot_jacobians,
+    foot_positions,
+)
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+from tests.pipeline.robot.walkers import MIXED, robot_text, urdf_text, walker
+
+N = 12
+
+
+@pytest.fixture(scope="module")
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> Robot:
+    return walker(tmp_path_factory.mktemp("mixed"), MIXED, arm=True)
+
+
+def random_legs(robot: Robot, seed: int) -> np.ndarray:
+    values = np.random.default_rng(seed).uniform(-1, 1, (N, *robot.leg_columns.shape))
+    return np.where(robot.layout.real, values, 0.0)
+
+
+def test_feet_and_jacobians_agree_with_pinocchio(mixed: Robot) -> None:
+    q = random_legs(mixed, 1)
+    feet, jacobian = foot_jacobians(mixed.chains, q)
+    np.testing.assert_allclose(foot_positions(mixed.chains, q), feet, atol=1e-14)
+    model, data = mixed.model, mixed.model.createData()
+    rows = mixed.configuration(mixed.joint_positions(q), np.zeros((N, 3)))
+    for n, row in enumerate(rows):
+        pin.computeJointJacobians(model, data, row)
+        pin.updateFramePlacements(model, data)
+        for i, leg in enumerate(mixed.spec.legs):
+            frame = model.getFrameId(leg.foot)
+            np.testing.assert_allclose(feet[n, i], data.oMf[frame].translation, atol=1e-13)
+            full = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+            columns = mixed.velocity_index[mixed.layout.of(i)]
+            np.testing.assert_allclose(
+                jacobian[n, i, :, : columns.size], full[:, columns], atol=1e-13
+            )
+            assert not jacobian[n, i, :, columns.size :].any()
+
+
+def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(mixed: Robot) -> None:
+    q, rate = random_legs(mixed, 2), random_legs(mixed, 3)
+    force = np.random.default_rng(4).normal(size=(N, len(MIXED), 3))
+    _, jacobian = foot_jacobians(mixed.chains, q)
+    np.testing.assert_allclose(
+        foot_force_torques(mixed.chains, q, force),
+        np.einsum("nlij,nli->nlj", jacobian, force),
+        atol=1e-13,
+    )
+    h = 1e-6
+    ahead, behind = (foot_jacobians(mixed.chains, q + s * h * rate)[1] for s in (1, -1))
+    expected = np.einsum("nlij,nlj->nli", (ahead - behind) / (2 * h), rate)
+    np.testing.assert_allclose(foot_jacobian_rates(mixed.chains, q, rate), expected, atol=1e-8)
+
+
+def test_what_fills_up_a_short_leg_is_not_heeded(mixed: Robot) -> None:
+    q = random_legs(mixed, 5)
+    other = np.where(mixed.layout.real, q, 7.0)
+    np.testing.assert_array_equal(
+        foot_positions(mixed.chains, other), foot_positions(mixed.chains, q)
+    )
+    there_and_back = mixed.layout.by_leg(mixed.joint_positions(other))
+    np.testing.assert_array_equal(there_and_back, q)
+
+
+def test_joints_outside_the_legs_are_held_and_their_torque_is_told(mixed: Robot) -> None:
+    assert mixed.joints[-1] == "arm"
+    q = random_legs(mixed, 6)[:1]
+    configuration = mixed.configuration(mixed.joint_positions(q), np.zeros((1, 3)))
+    still = mixed.tangent(mixed.joint_rates(np.zeros_like(q)))
+    segment = Segment("still", np.zeros(1), configuration, still, still, mixed.leg_names)
+    demand, _ = segment_demand(mixed, segment)
+    assert demand.position[0, -1] == 0.4
+    # 0.7 kg at (0.01, -0.05) m of the joint's x and z, turned by 0.4 rad about y.
+    ahead = 0.01 * np.cos(0.4) - 0.05 * np.sin(0.4)
+    assert demand.torque[0, -1] == pytest.approx(-0.7 * 9.81 * ahead, rel=1e-12)
+
+
+def test_an_endless_joint_is_an_angle_without_limits(mixed: Robot) -> None:
+    lower, upper = mixed.limits
+    endless = [mixed.joints.index("leg2_0"), mixed.joints.index("leg3_3")]
+    assert np.isinf(lower[endless]).all()
+    assert np.isinf(upper[endless]).all()
+    assert np.isfinite(np.delete(upper, endless)).all()
+    assert mixed.model.nq == mixed.model.nv + 1
+    sliding = [mixed.joints[k] for k in np.flatnonzero(mixed.sliding)]
+    assert sliding == ["leg2_2", "leg3_5"]
+
+
+@pytest.mark.parametrize("name", ["solo12", "anymal_c"])
+def test_published_quadrupeds_stand_and_carry_their_weight(root: Path, name: str) -> None:
+    robot = load_robot(load_robot_file(root / "urdf" / f"{name}.toml"))
+    _, contacts = segment_demand(robot, standing_posture(robot))
+    assert contacts is not None
+    weight = 9.81 * robot.mass
+    assert contacts.force_world[0, :, 2].sum() == pytest.approx(weight, rel=1e-12)
+    assert (contacts.force_world[0, :, 2] > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("arm = 0.4", "", "of the URDF's joints 'arm' belong to no leg; .*hold them"),
+        ("arm = 0.4", "arn = 0.4", "joint 'arn' is not in the URDF; did you mean 'arm'"),
+        ("arm = 0.4", "arm = true", "held.arm: expected the position"),
+        ("arm = 0.4", "arm = 0.4\nleg0_1 = 0", "held.leg0_1: the joint belongs to leg 'leg0'"),
+        (
+            '"walker.urdf"',
+            '"example-robot-data:solo21"',
+            "robot.urdf: 'solo21' is no robot of .*so",
+        ),
+        ('"walker.urdf"', '"example-robot-data:cassie"', "describes it in cassie.*not in a URDF"),
+    ],
+)
+def test_what_cannot_be_loaded(tmp_path: Path, old: str, new: str, message: str) -> None:
+    (tmp_path / "walker.urdf").write_text(urdf_text(MIXED, arm=True), encoding="utf-8")
+    text = robot_text(MIXED, arm=True)
+    assert old in text
+    path = tmp_path / "walker.toml"
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises((UrdfError, RobotFileError), match=message):
+        load_robot(load_robot_file(path))
