@@ -232,9 +232,11 @@ def _refuse_left_over(robot: Robot) -> None:
     moving = list(robot.model.names)[2 if robot.floating else 1 :]
     left = [name for name in moving if name not in known]
     if left:
+        many, them = ("s", "them") if len(left) > 1 else ("", "it")
         raise UrdfError(
-            f"{robot.spec.path}: of the URDF's joints {', '.join(map(repr, left))} belong to no "
-            f"leg; list them in a leg, hold them ([held] {left[0]} = 0.0), or make them fixed"
+            f"{robot.spec.path}: joint{many} {', '.join(map(repr, left))} of the URDF "
+            f"belong{'' if many else 's'} to no leg; list {them} in a leg, hold {them} "
+            f"([held] {left[0]} = 0.0), or make {them} fixed"
         )
 
 

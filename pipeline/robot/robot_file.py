@@ -72,7 +72,7 @@ _LEG_KEYS = {"joints", "foot", "side", "station", "neutral_foot", "start_posture
 _GAIT_KEYS = {"transfer_path", "tripods"}
 _STANDING_KEYS = {"feet"}
 _MOST_EXTENDED = 20
-_COUNTS = {2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven"}
+_COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven"}
 
 
 @dataclass(frozen=True)
@@ -424,25 +424,25 @@ def _numbers(
     entry: Mapping[str, Any], key: str, count: int, default: tuple[float, ...] | None, where: str
 ) -> tuple[float, ...]:
     value = entry.get(key, default)
-    some = "a number" if count == 1 else f"{_COUNTS.get(count, count)} numbers"
+    some = _COUNTS.get(count, str(count))
     if not isinstance(value, (list, tuple)) or not all(_is_number(x) for x in value):
-        raise RobotFileError(f"{where}: {key} must be {some}")
+        raise RobotFileError(f"{where}: {key} must be {some} numbers")
     if len(value) != count:
-        raise RobotFileError(f"{where}: {key} must be {some}, not {len(value)}")
-    return tuple(_finite(x, f"{where}: {key}") for x in value)
+        raise RobotFileError(f"{where}: {key} must be {some} numbers, not {len(value)}")
+    return tuple(_finite(x, f"{where}: {key} must be {some} finite numbers") for x in value)
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
-def _finite(value: Any, where: str) -> float:
+def _finite(value: Any, else_said: str) -> float:
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise RobotFileError(f"{where} must be finite")
+        raise RobotFileError(else_said)
     return number
 
 
@@ -459,7 +459,7 @@ def _held(
             raise RobotFileError(f"{place}: the joint belongs to leg '{of_leg[joint]}'; take one")
         if not _is_number(value):
             raise RobotFileError(f"{place}: expected the position it is held at [rad, m]")
-        out.append((joint, _finite(value, place)))
+        out.append((joint, _finite(value, f"{place}: expected a finite number")))
     return tuple(out)
 
 

@@ -148,12 +148,6 @@ URDFS = {
         r"<link name='lost'>: hangs on no joint, and neither does 'base_link'",
     ),
     "unknown type": (r'type="revolute"', 'type="revolut"', r"'revolut'; did you mean 'revolute'"),
-    "prismatic": (r'type="revolute"', 'type="prismatic"', r"own.toml: leg 'lf': joint .* slides"),
-    "continuous": (
-        r'type="revolute"',
-        'type="continuous"',
-        r"own.toml: leg 'lf': joint 'lf_joint_1' is continuous; a leg's are of type revolute",
-    ),
     "no axis": (r'<axis xyz="[^"]*"', '<axis xyz="0 0 0"', r"line 20: .*'0 0 0' has no direction"),
     "half an axis": (
         r'<axis xyz="[^"]*"',

@@ -117,7 +117,7 @@ def test_published_quadrupeds_stand_and_carry_their_weight(root: Path, name: str
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("arm = 0.4", "", "of the URDF's joints 'arm' belong to no leg; .*hold them"),
+        ("arm = 0.4", "", "joint 'arm' of the URDF belongs to no leg; .*hold it"),
         ("arm = 0.4", "arn = 0.4", "joint 'arn' is not in the URDF; did you mean 'arm'"),
         ("arm = 0.4", "arm = true", "held.arm: expected the position"),
         ("arm = 0.4", "arm = 0.4\nleg0_1 = 0", "held.leg0_1: the joint belongs to leg 'leg0'"),

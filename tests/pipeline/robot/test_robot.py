@@ -245,6 +245,6 @@ def test_axes_are_those_of_the_urdf() -> None:
 
 def test_a_joint_of_no_leg_is_refused(hexapod: Robot) -> None:
     with pytest.raises(
-        UrdfError, match=r"'rr_joint_1', .* belong to no leg; .*\[held\] rr_joint_1"
+        UrdfError, match=r"'rr_joint_3' of the URDF belong to no leg; .*\[held\] rr_joint_1"
     ):
         load_robot(replace(hexapod.spec, build=None, legs=hexapod.spec.legs[:5]))
