@@ -175,7 +175,11 @@ def _foot(model: pin.Model, leg: str, name: str, last: str, joint: int) -> Array
         )
     frame = model.frames[model.getFrameId(name)]
     if frame.parentJoint != joint:
-        raise UrdfError(f"leg '{leg}': foot '{name}' is not carried by '{last}'")
+        carrier = model.names[frame.parentJoint]
+        raise UrdfError(
+            f"leg '{leg}': foot '{name}' is not carried by '{last}', the last of its joints, but "
+            f"by '{carrier}'; list the joints up to there"
+        )
     place: Array = np.asarray(frame.placement.translation)
     return place
 

@@ -62,7 +62,11 @@ OWN_FILES = {
         '"rm_joint_2", "rm_joint_1"',
         r"'rm_joint_2' hangs on 'rm_joint_1'.*base outward",
     ),
-    "two joints": (r', "rm_joint_3"', "", r"'rm' names 2 joints; a leg has 3"),
+    "two joints": (
+        r', "rm_joint_3"',
+        "",
+        r"foot 'rm_foot_link' is not carried by 'rm_joint_2'.* list",
+    ),
     "unknown foot": (r'"rm_foot_link"', '"rm_fot_link"', r"did you mean 'rm_foot_link'"),
     "no place for a foot": (r"^neutral_foot = .*?$", "", r"missing: legs.\w\w.neutral_foot; see"),
     "a leg left out": (r"^\[legs\.rm\].*?(?=^\[)", "", r"leg 'rm' is not known"),
