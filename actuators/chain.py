@@ -1,6 +1,6 @@
 """A chain of elements from the joint to the supply, and its answers in motion and at rest."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -49,6 +49,7 @@ class ChainResult:
         current: (N, J) [A].
         voltage: (N, J) [V].
         electrical_power: From the supply to the motor (N, J) [W].
+        motors: One per joint.
     """
 
     chain: str
@@ -58,6 +59,7 @@ class ChainResult:
     current: FloatArray
     voltage: FloatArray
     electrical_power: FloatArray
+    motors: tuple[DCMotor, ...]
 
     @property
     def joint(self) -> ShaftSeries:
@@ -179,9 +181,7 @@ class Chain:
         shafts = {JOINT_STAGE: joint}
         losses: dict[str, FloatArray] = {}
         stored: dict[str, FloatArray] = {}
-        side = joint
-        for element in self.elements:
-            motor_side = element.moving(side)
+        for element, side, motor_side in steps(self.elements, joint):
             loss = element.loss(side, motor_side)
             rate = element.stored(side, motor_side)
             if loss is not None:
@@ -190,12 +190,11 @@ class Chain:
                 stored[element.name] = rate
             if standing:
                 low, high = element.holding(low, high)
-            side = motor_side
             if element.name in stage_after:
-                shown = side
+                shown = motor_side
                 if standing:
                     held = least_magnitude(low, high)
-                    shown = side.with_torque(np.where(at_rest, held, side.torque))
+                    shown = shown.with_torque(np.where(at_rest, held, shown.torque))
                 shafts[stage_after[element.name]] = shown
         last = tuple(shafts.values())[-1]
         current = self.motor.current(last.torque)
@@ -209,6 +208,7 @@ class Chain:
             current=current,
             voltage=voltage,
             electrical_power=voltage * current,
+            motors=(self.motor,) * len(joint.joints),
         )
 
     def holding(self, torque: FloatArray) -> HoldingResult:
@@ -220,9 +220,8 @@ class Chain:
         Args:
             torque: (..., J) [N*m].
         """
-        low = high = np.asarray(torque, dtype=float)
-        for element in self.elements:
-            low, high = element.holding(low, high)
+        load = np.asarray(torque, dtype=float)
+        low, high = held(self.elements, load, load)
         motor_torque = least_magnitude(low, high)
         current = self.motor.current(motor_torque)
         voltage = self.motor.voltage(current, np.zeros_like(current))
@@ -248,6 +247,45 @@ class Chain:
         if name not in names:
             raise ChainError(f"{self.name}: no element '{name}': {closest(name, names)}")
         return names.index(name)
+
+
+def steps(
+    elements: Iterable[Element], joint: ShaftSeries
+) -> Iterator[tuple[Element, ShaftSeries, ShaftSeries]]:
+    """Yield every element of a row with its joint side and what its motor side needs.
+
+    Args:
+        elements: From the joint to the motor.
+        joint: Series at the joints.
+    """
+    side = joint
+    for element in elements:
+        motor_side = element.moving(side)
+        yield element, side, motor_side
+        side = motor_side
+
+
+def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
+    """Return what a row of elements needs at its motor side in motion; see `steps`."""
+    side = joint
+    for _, _, side in steps(elements, joint):  # noqa: B007
+        pass
+    return side
+
+
+def held(
+    elements: Iterable[Element], low: FloatArray, high: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return which torques at the motor side of a row of elements hold at standstill.
+
+    Args:
+        elements: From the joint to the motor.
+        low: Least torques at the joint side (...) [N*m].
+        high: Greatest ones (...) [N*m].
+    """
+    for element in elements:
+        low, high = element.holding(low, high)
+    return low, high
 
 
 def least_magnitude(low: FloatArray, high: FloatArray) -> FloatArray:

@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
 
 from actuators.arrays import FloatArray, Scalars
 from actuators.shaft import ShaftSeries
@@ -16,15 +15,15 @@ class Element(ABC):
     Subclasses are frozen dataclasses; a parameter is one number for all joints or one per joint
     (J,). A law that an alternative does not have is simply not in its list.
 
+    Every element is local: a sample of a joint depends on no other sample and no other joint. What
+    is not (a warming winding, wind-up, a coupled wrist) stands beside the row of elements, in
+    `pipeline.machine`.
+
     Attributes:
         name: Unique in its chain; names the row of its loss.
-        local_in_time: Whether a sample depends on no other sample (heating and backlash do).
-        local_in_joint: Whether a joint depends on no other joint (a coupled wrist does).
     """
 
     name: str
-    local_in_time: ClassVar[bool] = True
-    local_in_joint: ClassVar[bool] = True
 
     @abstractmethod
     def moving(self, joint_side: ShaftSeries) -> ShaftSeries:

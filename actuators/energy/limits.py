@@ -6,7 +6,6 @@ import numpy as np
 
 from actuators.arrays import FloatArray
 from actuators.chain import ChainResult
-from actuators.elements.motor import DCMotor
 from actuators.energy.energy import duration
 
 
@@ -35,12 +34,11 @@ class LimitRow:
     breach: bool
 
 
-def limit_rows(result: ChainResult, motor: DCMotor) -> tuple[LimitRow, ...]:
+def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:
     """Return a row for every joint and limit, breached or not.
 
     Args:
-        result: What the chain needs for the motion.
-        motor: The motor whose limits hold.
+        result: What the chain needs for the motion; its motors' limits hold.
 
     Raises:
         EnergyError: The series spans no time.
@@ -48,13 +46,13 @@ def limit_rows(result: ChainResult, motor: DCMotor) -> tuple[LimitRow, ...]:
     time = result.joint.time
     span = duration(time)
     rows = []
-    instantaneous = (
-        ("speed", "rad/s", motor.max_speed, result.motor.velocity),
-        ("voltage", "V", motor.supply_voltage, result.voltage),
-        ("current", "A", motor.peak_current, result.current),
-    )
     rms = rms_over_time(time, result.current)
-    for j, joint in enumerate(result.joint.joints):
+    for j, (joint, motor) in enumerate(zip(result.joint.joints, result.motors, strict=True)):
+        instantaneous = (
+            ("speed", "rad/s", motor.max_speed, result.motor.velocity),
+            ("voltage", "V", motor.supply_voltage, result.voltage),
+            ("current", "A", motor.peak_current, result.current),
+        )
         for quantity, unit, limit, values in instantaneous:
             magnitude = np.abs(values[:, j])
             at = int(np.argmax(magnitude))

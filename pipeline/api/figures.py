@@ -90,10 +90,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
         for part in walking.demand.contacts
         if part is not None and leg in part.stance
     ]
-    motors = {name: given.catalog.chain(name).motor for name in walking.results}
-    scale = common_scale(
-        [(result.motor, motors[name]) for name, result in walking.results.items()], labels
-    )
+    scale = common_scale([(r.motor, r.motors) for r in walking.results.values()], labels)
     stages = {name: stage_energies(result) for name, result in walking.results.items()}
     limits = energy_limits(stages.values(), labels)
     titles = short_titles(given.catalog)
@@ -108,7 +105,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                 partial(
                     motor_limits_figure,
                     result.motor,
-                    motors[name],
+                    result.motors,
                     labels,
                     support,
                     title=f"{title}: its motors, {leg_words(leg)}",

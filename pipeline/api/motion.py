@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from actuators.chain import Chain
 from actuators.errors import CatalogError, closest
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result, by_name
@@ -17,6 +16,7 @@ from pipeline.api.tables import (
     tables_of_walking,
 )
 from pipeline.errors import RobotFileError
+from pipeline.machine.drivetrains import Actuators
 from pipeline.simulation import walk_stand
 from pipeline.simulation.settings import SAMPLES, Settings
 from reports.table import Table
@@ -140,7 +140,7 @@ def _legged(machine: Machine, given: Settings) -> Settings:
     return given
 
 
-def _chains(given: Settings, actuator: str | None) -> Mapping[str, Chain]:
+def _chains(given: Settings, actuator: str | None) -> Mapping[str, Actuators]:
     chains = given.chains()
     if actuator is None:
         return chains

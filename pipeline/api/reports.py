@@ -124,4 +124,4 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
                 files += judging.pages(given, judgement, tables, out)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
     remarks = given.effects.remarks if given.effects else ()
-    return (*said, *given.remarks, *remarks, *(findings(walking, given) if walking else ()))
+    return (*said, *given.remarks, *remarks, *(findings(walking) if walking else ()))

@@ -58,7 +58,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
             given.machine.mass * p["gravity"],  # the mass that the forces rest on
             p["walking_speed"],
         ),
-        walking_tables.motor_limits(walking.results, chains),
+        walking_tables.motor_limits(walking.results),
     ]
     if not given.quasi_static:
         static = walk(
@@ -114,13 +114,13 @@ def metadata(given: Settings) -> dict[str, Any]:
     }
 
 
-def findings(walking: Walking, given: Settings) -> list[str]:
+def findings(walking: Walking) -> list[str]:
     """Lines for the terminal: what a reader should not overlook."""
     from actuators.energy.limits import limit_rows
 
     lines = []
-    for name, chain in given.chains().items():
-        breaches = [row for row in limit_rows(walking.results[name], chain.motor) if row.breach]
+    for name, result in walking.results.items():
+        breaches = [row for row in limit_rows(result) if row.breach]
         if breaches:
             worst = max(breaches, key=lambda row: row.peak / row.limit)
             lines.append(

@@ -168,7 +168,7 @@ def base_model(file: ModelFile) -> MachineModel:
     """
     chain = load_catalog().chain(file.alternative) if file.alternative else None
     if file.robot.suffix == ".urdf":
-        return machine_of_urdf(file.robot, chain=chain)
+        return machine_of_urdf(file.robot, actuators=chain)
     return machine_of_robot(load_robot(load_robot_file(file.robot)), chain)
 
 

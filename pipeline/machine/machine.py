@@ -8,26 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-from actuators.chain import Chain
-from actuators.elements.element import Element
-from actuators.elements.heating import Heating
-from actuators.elements.motor import DCMotor
-from actuators.elements.position_torque import PositionTorque
 from actuators.errors import closest
 from pipeline.logs.errors import ModelError
+from pipeline.machine.drivetrains import Actuators, Drivetrains, drivetrains_of
+from pipeline.machine.joint import JointModel, joints_of
 from pipeline.robot.check import refuse_urdf
 from pipeline.robot.leg_chains import LegChains
 from pipeline.robot.leg_columns import LegColumns
 from pipeline.robot.robot import Robot, parse_urdf
 from pipeline.robot.urdf_source import read_urdf
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 BASE = "base"
 
@@ -75,66 +70,6 @@ class Bodies:
 
 
 @dataclass(frozen=True, eq=False)
-class JointModel:
-    """One joint's actuator and sensors.
-
-    Attributes:
-        name: Of the joint.
-        elements: From the joint to the motor; those that effects add stand first.
-        motor: The converter; None where the log's torque is the actuator's, as of a bare URDF.
-        position_torques: Torques that depend on the joint's position alone.
-        compliance: Of the transmission [rad/(N*m)].
-        backlash: Whole width [rad].
-        crossing: Torque over which the joint passes from one flank to the other [N*m].
-        coupled_to: Joint with which this one's motor also turns; empty without.
-        coupling: Turns of the motor, at the joint side, per turn of that other joint [1].
-        heating: Thermal node of the motor; None for a motor that stays cold.
-        encoder_offset: The position sensor reads high by this [rad].
-        effort_offset: The effort sensor reads high by this, in the unit of its channel.
-        delay: The effort channels lag behind the position by this [s].
-        gains: Channel to how many times what it should its column reads; once where absent.
-    """
-
-    name: str
-    elements: tuple[Element, ...] = ()
-    motor: DCMotor | None = None
-    position_torques: tuple[PositionTorque, ...] = ()
-    compliance: float = 0.0
-    backlash: float = 0.0
-    crossing: float = 0.0
-    coupled_to: str = ""
-    coupling: float = 0.0
-    heating: Heating | None = None
-    encoder_offset: float = 0.0
-    effort_offset: float = 0.0
-    delay: float = 0.0
-    gains: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def ratio(self) -> float:
-        """Motor speed over joint speed."""
-        total = 1.0
-        for element in self.elements:
-            total *= float(np.asarray(element.gearing))
-        return total
-
-    @property
-    def wound(self) -> bool:
-        """Whether motor and joint turn apart from one another."""
-        return self.compliance != 0.0 or self.backlash != 0.0
-
-    def with_element(self, element: Element, *, at_motor: bool = False) -> JointModel:
-        """The same with an element more, at the joint's or the motor's shaft; names made unique."""
-        taken = {e.name for e in self.elements}
-        name, k = element.name, 2
-        while name in taken:
-            name, k = f"{element.name}_{k}", k + 1
-        named = replace(element, name=name)
-        elements = (*self.elements, named) if at_motor else (named, *self.elements)
-        return replace(self, elements=elements)
-
-
-@dataclass(frozen=True, eq=False)
 class MachineModel:
     """Robot, actuators and sensors.
 
@@ -161,6 +96,11 @@ class MachineModel:
     bodies: Bodies = field(default_factory=Bodies)
     actuators: tuple[JointModel, ...] = ()
     links: Mapping[str, str] = field(default_factory=dict)
+
+    @cached_property
+    def drivetrains(self) -> Drivetrains:
+        """All actuators, to be asked together."""
+        return Drivetrains(self.name, self.actuators)
 
     def index(self, joint: str) -> int:
         """Column of a joint.
@@ -218,12 +158,12 @@ def link_name(model: pin.Model, joint: int) -> str:
     return str(model.names[joint])
 
 
-def machine_of_robot(robot: Robot, chain: Chain | None) -> MachineModel:
-    """A machine whose joints all have the same actuator.
+def machine_of_robot(robot: Robot, actuators: Actuators | None) -> MachineModel:
+    """A machine of a robot file.
 
     Args:
         robot: From a robot file.
-        chain: Actuator; None where the log's torque is the actuator's at the joint side.
+        actuators: Of all joints; None where the log's torque is the actuator's at the joint side.
     """
     return MachineModel(
         name=robot.spec.name,
@@ -233,19 +173,19 @@ def machine_of_robot(robot: Robot, chain: Chain | None) -> MachineModel:
         layout=robot.layout,
         left=tuple(leg.side == "left" for leg in robot.spec.legs),
         floating=robot.floating,
-        actuators=_actuators(robot.joints, chain),
+        actuators=_joints(robot.joints, actuators),
     )
 
 
 def machine_of_urdf(
-    path: Path, joints: Sequence[str] | None = None, chain: Chain | None = None
+    path: Path, joints: Sequence[str] | None = None, actuators: Actuators | None = None
 ) -> MachineModel:
     """A machine of a bare URDF: fixed base, no legs.
 
     Args:
         path: The URDF.
         joints: Columns; all joints of one degree of freedom by default.
-        chain: As for `machine_of_robot`.
+        actuators: As for `machine_of_robot`.
 
     Raises:
         ModelError: It moves in joints that are not columns.
@@ -267,11 +207,11 @@ def machine_of_urdf(
         layout=None,
         left=(),
         floating=False,
-        actuators=_actuators(names, chain),
+        actuators=_joints(names, actuators),
     )
 
 
-def _actuators(joints: Sequence[str], chain: Chain | None) -> tuple[JointModel, ...]:
-    if chain is None:
-        return tuple(JointModel(name) for name in joints)
-    return tuple(JointModel(name, elements=chain.elements, motor=chain.motor) for name in joints)
+def _joints(names: Sequence[str], actuators: Actuators | None) -> tuple[JointModel, ...]:
+    if actuators is None:
+        return joints_of(None, tuple(names))
+    return drivetrains_of(actuators, names).joints

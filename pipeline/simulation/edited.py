@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.chain import Chain
 from pipeline.dynamics.joint_demand import JointDemand
-from pipeline.machine.edited_chain import edited_chain
-from pipeline.machine.machine import JointModel, MachineModel, machine_of_robot
+from pipeline.machine.drivetrains import Actuators, Drivetrains
+from pipeline.machine.joint import JointModel
+from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.motion import Segment
 from pipeline.robot.kinematics import foot_force_torques
 from pipeline.robot.robot import Robot
@@ -74,18 +74,25 @@ class Effects:
         """
         return alternative in (IDEAL, self.found_with) or not self.of_drivetrain
 
-    def chain(self, chain: Chain) -> Chain:
-        """The chain of one alternative with the effects in it that count there."""
-        if chain.name == IDEAL:
-            return chain
-        edited = self.apply(machine_of_robot(self.robot, chain)).actuators
-        if not self.counts_in(chain.name):
+    def chain(self, actuators: Actuators) -> Actuators:
+        """One alternative with the effects in it that count there; itself where none does."""
+        if actuators.name == IDEAL:
+            return actuators
+        bare = machine_of_robot(self.robot, actuators)
+        edited = self.apply(bare).actuators
+        if not self.counts_in(actuators.name):
             edited = tuple(
-                replace(a, elements=chain.elements, coupled_to="", coupling=0.0) for a in edited
+                replace(new, elements=old.elements, coupled_to="", coupling=0.0)
+                for old, new in zip(bare.actuators, edited, strict=True)
             )
-        return edited_chain(chain, edited)
+        if all(
+            _drivetrain(old) == _drivetrain(new) and old.motor is new.motor
+            for old, new in zip(bare.actuators, edited, strict=True)
+        ):
+            return actuators
+        return Drivetrains(actuators.name, edited)
 
-    def chains(self, chains: Mapping[str, Chain]) -> dict[str, Chain]:
+    def chains(self, chains: Mapping[str, Actuators]) -> dict[str, Actuators]:
         """Every alternative with the effects in it."""
         return {name: self.chain(chain) for name, chain in chains.items()}
 
@@ -98,8 +105,7 @@ class Effects:
         """
         torque = np.array(demand.torque)
         for k, actuator in enumerate(self._machine.actuators):
-            for law in actuator.position_torques:
-                torque[:, k] += law.torque(demand.position[:, k])
+            torque[:, k] = actuator.beside(demand.position[:, k], torque[:, k])
         squeeze = self._machine.bodies.squeeze
         if squeeze and segment.stance:
             robot = self.robot
@@ -141,7 +147,7 @@ def _drivetrain(actuator: JointModel) -> tuple[object, ...]:
 
 def effects(
     robot: Robot,
-    chain: Chain,
+    actuators: Actuators,
     apply: Callable[[MachineModel], MachineModel],
     names: tuple[str, ...],
     file: str,
@@ -153,7 +159,7 @@ def effects(
 
     Args:
         robot: As its file states it.
-        chain: Of the alternative they were found against, or of any with a motor.
+        actuators: Of the alternative they were found against, or of any with a motor.
         apply: Puts the effects into a machine.
         names: Of the effects in order.
         file: The model file's name.
@@ -164,9 +170,9 @@ def effects(
     Raises:
         GapError: An effect does not fit the robot.
     """
-    bare = machine_of_robot(robot, chain)
+    bare = machine_of_robot(robot, actuators)
     machine = apply(bare)
     model = changed_model(robot.model, machine.bodies)
     edited = robot if model is robot.model else replace(robot, model=model)
-    own = chain.name if found_with is None else found_with
+    own = actuators.name if found_with is None else found_with
     return Effects(edited, file, names, own, apply, bare, machine, warnings)

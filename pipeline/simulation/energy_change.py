@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from actuators.chain import Chain
+from pipeline.machine.drivetrains import Actuators
 from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import Effects
 from pipeline.simulation.walk_stand import Adjust, stand, walk
@@ -52,7 +52,7 @@ class EnergyChange:
 
 
 def energy_change(
-    robot: Robot, chains: Mapping[str, Chain], effects: Effects, known: Effects | None = None
+    robot: Robot, chains: Mapping[str, Actuators], effects: Effects, known: Effects | None = None
 ) -> EnergyChange:
     """Walk and stand with and without effects.
 
@@ -74,7 +74,7 @@ def energy_change(
     return EnergyChange(before, after, break_even(before, period), break_even(after, period))
 
 
-def _costs(robot: Robot, chains: Mapping[str, Chain], adjust: Adjust | None) -> dict[str, Cost]:
+def _costs(robot: Robot, chains: Mapping[str, Actuators], adjust: Adjust | None) -> dict[str, Cost]:
     walking = walk(robot, chains, samples=SAMPLES, adjust=adjust)
     standing = stand(robot, chains, adjust=adjust)
     legs = [leg for leg in robot.spec.legs if leg.station == "middle"] or robot.spec.legs

@@ -23,12 +23,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from actuators.elements.heating import warm_resistance, warm_torque_constant
-from actuators.elements.motor import DCMotor
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
-from pipeline.machine.machine import JointModel, MachineModel
+from pipeline.machine.joint import JointModel
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
 
 Array = NDArray[np.float64]
@@ -166,7 +165,8 @@ class ForwardSimulator:
         if model.floating:
             raise ModelError(f"{model.name}: a forward simulation stands on a fixed base only")
         self.model = model
-        self._motors = [_motor(a) for a in model.actuators]
+        for actuator in model.actuators:
+            _refuse(actuator)
         self._rigid = changed_model(model.rigid, model.bodies)
         self._data = self._rigid.createData()
         self._columns = np.array(
@@ -215,12 +215,12 @@ class ForwardSimulator:
     def _warm(self, servo: ServoInput, row: int, own: Array) -> tuple[Array, Array]:
         """Torque constants and resistances of the warm motors, each (J,)."""
         constant, resistance = np.empty(own.size), np.empty(own.size)
-        for k, (a, motor) in enumerate(zip(self._actuators, self._motors, strict=True)):
-            rise = np.array([own[k]])
+        for k, a in enumerate(self._actuators):
+            rise = np.array(own[k])
             if a.heating is not None and servo.temperature is not None:
-                rise = rise + a.heating.sensed(servo.temperature[row : row + 1, k])
-            constant[k] = warm_torque_constant(float(np.asarray(motor.torque_constant)), rise)[0]
-            resistance[k] = warm_resistance(float(np.asarray(motor.resistance)), rise)[0]
+                rise = rise + a.heating.sensed(servo.temperature[row, k])
+            warm = a.warm(rise)
+            constant[k], resistance[k] = warm.torque_constant, warm.resistance
         return constant, resistance
 
     def _warmed(self, own: Array, current: Array, width: float) -> Array:
@@ -278,8 +278,7 @@ class ForwardSimulator:
         bias = pin.rnea(self._rigid, self._data, full, self._spread(v), np.zeros(self._rigid.nv))
         load = np.asarray(bias)[self._columns]
         for k, actuator in enumerate(self._actuators):
-            for law in actuator.position_torques:
-                load[k] += float(law.torque(q[k : k + 1])[0])
+            load[k] = actuator.beside(q[k], load[k])
         mass = np.asarray(pin.crba(self._rigid, self._data, full))
         mass = (np.triu(mass) + np.triu(mass, 1).T)[np.ix_(self._columns, self._columns)]
         _, current = self._electrical(servo, now, q, v)
@@ -301,9 +300,8 @@ class ForwardSimulator:
 
     def _breaking_away(self, joint: int, needed: float, torque: float) -> float:
         """Sense in which a motor's torque starts a joint that is held; 0 where it does not."""
-        low, high = np.array([needed]), np.array([needed])
-        for element in self._actuators[joint].elements:
-            low, high = element.holding(low, high)
+        load = np.array([needed])
+        low, high = self._actuators[joint].holding(load, load)
         return float(torque > high[0]) - float(torque < low[0])
 
     def _solved(
@@ -344,9 +342,7 @@ class ForwardSimulator:
             torque=np.array([[load], [load + step], [load]]),
             direction=np.full((3, 1), direction),
         )
-        for element in self._actuators[joint].elements:
-            side = element.moving(side)
-        needed = side.torque[:, 0]
+        needed = self._actuators[joint].at_motor(side).torque[:, 0]
         return float(needed[0]), float(needed[1] - needed[0]) / step, float(needed[2] - needed[0])
 
     def _spread(self, values: Array) -> Array:
@@ -355,12 +351,15 @@ class ForwardSimulator:
         return out
 
 
-def _motor(actuator: JointModel) -> DCMotor:
-    """The motor of a joint that can be simulated forward."""
+def _refuse(actuator: JointModel) -> None:
+    """Refuse a joint that cannot be simulated forward.
+
+    Raises:
+        ModelError: It has no motor, or a transmission that is not rigid and its own.
+    """
     if actuator.motor is None:
         raise ModelError(f"joint '{actuator.name}': no motor; name the actuator with --alternative")
     if actuator.coupled_to or actuator.backlash:
         raise ModelError(
             f"joint '{actuator.name}': a coupled or loose transmission cannot be simulated forward"
         )
-    return actuator.motor

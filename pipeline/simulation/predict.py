@@ -6,20 +6,20 @@ that share a part of their model share its computation: a change at one joint co
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
+from actuators.elements.motor import DCMotor
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import ModelError
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.machine.machine import JointModel, MachineModel
+from pipeline.machine.joint import JointModel
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import RigidBodies
 
 Array = NDArray[np.float64]
-_LEAST_CROSSING = 1e-9  # [N*m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,72 +150,39 @@ class Simulator:
         wind = np.zeros_like(q)
         for k, a in enumerate(model.actuators):
             if a.wound:
-                wind[:, k] = self._wind(a, self._with_position_torque(a, q[:, k], torque[:, k]))
+                wind[:, k] = m.lowpass(a.wind(_load(model, k, q, torque)))
         rate = m.derivative(wind)
         bend = m.derivative(rate)
         q = q - wind
         return q, self._bodies.torque(model, (q, m.v - rate, m.a - bend))
 
-    def _with_position_torque(self, a: JointModel, q: Array, torque: Array) -> Array:
-        for law in a.position_torques:
-            torque = torque + law.torque(q)
-        return torque
-
-    def _wind(self, a: JointModel, torque: Array) -> Array:
-        """Motor angle less joint angle at the joint side, (N,) [rad], at the log's bandwidth."""
-        wind = a.compliance * torque
-        if a.backlash:
-            wind = wind + 0.5 * a.backlash * np.tanh(torque / max(a.crossing, _LEAST_CROSSING))
-        return self.measurement.lowpass(wind)
-
-    def _load(self, model: MachineModel, k: int, q: Array, torque: Array) -> Array:
-        """What one motor's transmission has to supply, at the joint side, (N,) [N*m].
-
-        With motor angles theta = C q the joints' torques are C^T times the motors': a motor that
-        also turns with another joint carries a part of that joint's torque.
-        """
-        a = model.actuators[k]
-        load = self._with_position_torque(a, q[:, k], torque[:, k])
-        for i, other in enumerate(model.actuators):
-            if other.coupled_to == a.name:
-                load = load - other.coupling * self._load(model, i, q, torque)
-        return load
-
     def _joint(
         self, model: MachineModel, k: int, q: Array, torque: Array, motor: Array
     ) -> tuple[Array, Array]:
         """Motor torque at the joint side (N,) and effort channels (N, C) of one joint."""
-        m, a = self.measurement, model.actuators[k]
-        load = self._load(model, k, q, torque)
-        carried = np.zeros_like(load)
-        for i, other in enumerate(model.actuators):
-            if other.coupled_to == a.name:
-                carried = carried + other.coupling * motor[:, i]
-        position, velocity, acceleration = m.q[:, k], m.v[:, k], m.a[:, k]
+        m, a, drives = self.measurement, model.actuators[k], model.drivetrains
+        load = _load(model, k, q, torque)
+        position, velocity, acceleration = (drives.turned(k, x) for x in (m.q, m.v, m.a))
         if a.wound and not m.at_motor:
-            wind = self._wind(a, load)
+            wind = m.lowpass(a.wind(load))
             rate = m.derivative(wind)
             position, velocity = position + wind, velocity + rate
             acceleration = acceleration + m.derivative(rate)
-        if a.coupled_to:
-            i = model.index(a.coupled_to)
-            position = position + a.coupling * m.q[:, i]
-            velocity = velocity + a.coupling * m.v[:, i]
-            acceleration = acceleration + a.coupling * m.a[:, i]
-        side = ShaftSeries(
-            joints=(a.name,),
-            time=m.time,
-            position=position[:, None],
-            velocity=velocity[:, None],
-            acceleration=acceleration[:, None],
-            torque=load[:, None],
-            direction=np.tanh(velocity / m.rest_speed[k])[:, None],
+        shaft = a.at_motor(
+            ShaftSeries(
+                joints=(a.name,),
+                time=m.time,
+                position=position[:, None],
+                velocity=velocity[:, None],
+                acceleration=acceleration[:, None],
+                torque=load[:, None],
+                direction=np.tanh(velocity / m.rest_speed[k])[:, None],
+            )
         )
-        for element in a.elements:
-            side = element.moving(side)
-        shaft_torque, speed = side.torque[:, 0], side.velocity[:, 0]
+        shaft_torque, speed = shaft.torque[:, 0], shaft.velocity[:, 0]
         at_joint = shaft_torque * a.ratio
-        return at_joint, self._channels(a, k, at_joint + carried, shaft_torque, speed)
+        brought = at_joint + drives.carried(k, motor)
+        return at_joint, self._channels(a, k, brought, shaft_torque, speed)
 
     def _channels(
         self, a: JointModel, k: int, brought: Array, torque: Array, speed: Array
@@ -240,14 +207,9 @@ class Simulator:
                 for c in range(out.shape[1]):
                     out[piece, c] = _delayed(t, out[piece, c], a.delay)
         if "voltage" in m.channels and "current" in m.channels and a.motor is not None:
-            c = m.channels.index("voltage")
-            cold = float(np.asarray(a.motor.resistance))
-            resistance: Array | float = cold
             current = self._drawn(a, k)
-            if a.heating is not None:
-                rise = self._rise(a.heating, k, cold * current**2)
-                resistance = warm_resistance(cold, rise)
-            out[:, c] += resistance * current
+            resistance = self._working(a, k, current).resistance
+            out[:, m.channels.index("voltage")] += resistance * current
         for c, channel in enumerate(m.channels):
             if channel in a.gains:
                 out[:, c] *= a.gains[channel]
@@ -260,33 +222,28 @@ class Simulator:
         seen = m.effort[:, k, m.channels.index("current")] - a.effort_offset
         return np.asarray(seen / a.gains.get("current", 1.0))
 
-    def _rise(self, heating: Heating, k: int, loss: Array) -> Array:
-        """How much warmer than its data sheet one motor is, (N,) [K]."""
+    def _working(self, a: JointModel, k: int, current: Array) -> DCMotor:
+        """One motor as warm as a current (N,) [A] makes it."""
+        assert a.motor is not None
+        if a.heating is None:
+            return a.motor
         m = self.measurement
-        rise = heating.temperature_rise(m.time, loss)
-        if not heating.sensor_gain:
-            return rise
-        if m.temperature is None:
-            raise ModelError(
-                f"log '{m.name}' has no temperature of joint '{m.joints[k]}', from which the "
-                "model's winding_heating takes the winding's"
-            )
-        return rise + heating.sensed(m.temperature[:, k])
+        rise = a.heating.temperature_rise(m.time, a.motor.copper_loss(current))
+        if a.heating.sensor_gain:
+            if m.temperature is None:
+                raise ModelError(
+                    f"log '{m.name}' has no temperature of joint '{m.joints[k]}', from which the "
+                    "model's winding_heating takes the winding's"
+                )
+            rise = rise + a.heating.sensed(m.temperature[:, k])
+        return a.warm(rise)
 
     def _electrical(self, out: Array, a: JointModel, k: int, torque: Array, speed: Array) -> None:
         """Current, voltage, power of one motor; with measured current voltage is k speed alone."""
         assert a.motor is not None
         m = self.measurement
-        k0, r0 = float(np.asarray(a.motor.torque_constant)), float(np.asarray(a.motor.resistance))
-        constant: Array | float = k0
-        resistance: Array | float = r0
-        if a.heating is not None:
-            measured = "current" in m.channels
-            drawn = self._drawn(a, k) if measured else torque / k0
-            rise = self._rise(a.heating, k, r0 * drawn**2)
-            resistance = warm_resistance(r0, rise)
-            constant = warm_torque_constant(k0, rise)
-        motor = replace(a.motor, torque_constant=constant, resistance=resistance)
+        measured = a.heating is not None and "current" in m.channels
+        motor = self._working(a, k, self._drawn(a, k) if measured else a.motor.current(torque))
         current = motor.current(torque)
         driven = speed if m.open_winding is None else np.where(m.open_winding[:, k], 0.0, speed)
         voltage = motor.voltage(current, driven)
@@ -294,7 +251,7 @@ class Simulator:
             if channel == "current":
                 out[:, c] = current
             elif channel == "voltage" and "current" in m.channels:
-                out[:, c] = constant * speed
+                out[:, c] = motor.torque_constant * speed
             elif channel == "voltage":
                 out[:, c] = voltage
             elif channel == "power":
@@ -303,6 +260,12 @@ class Simulator:
                 raise ModelError(
                     f"channel '{channel}' is not known; torque, current, voltage, power"
                 )
+
+
+def _load(model: MachineModel, k: int, q: Array, torque: Array) -> Array:
+    """What one motor's transmission has to supply, at the joint side, (N,) [N*m]."""
+    joints = model.actuators
+    return model.drivetrains.load(k, lambda i: joints[i].beside(q[:, i], torque[:, i]))
 
 
 def _winding(a: JointModel) -> tuple[float, float, float]:

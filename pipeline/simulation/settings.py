@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from actuators.chain import Chain
 from actuators.errors import ActuatorError, CatalogError, closest, one_line
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.parameters import ParameterSet
 from actuators.units import to_si
 from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
+from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.transfer_path import transfer_path
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
@@ -58,8 +58,8 @@ class Settings:
     effects: Effects | None = None
     model: Path | None = None
 
-    def chains(self) -> dict[str, Chain]:
-        """Every alternative's chain, with the model file's effects in it."""
+    def chains(self) -> Mapping[str, Actuators]:
+        """Every alternative, with the model file's effects in it."""
         chains = self.catalog.chains()
         return chains if self.effects is None else self.effects.chains(chains)
 

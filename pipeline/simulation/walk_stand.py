@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.chain import Chain, ChainResult, HoldingResult
+from actuators.chain import ChainResult, HoldingResult
 from actuators.energy.regeneration import Supply, supply
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand, motion_demand, segment_demand
 from pipeline.dynamics.stability import stability_margins
+from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.gait import standing_posture, tripod_gait
 from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.robot import Robot
@@ -89,7 +90,7 @@ def joint_series(demand: MotionDemand) -> ShaftSeries:
 
 def stand(
     robot: Robot,
-    chains: Mapping[str, Chain],
+    chains: Mapping[str, Actuators],
     feet: tuple[str, ...] | None = None,
     adjust: Adjust | None = None,
 ) -> Standing:
@@ -117,7 +118,7 @@ def stand(
 
 def walk(
     robot: Robot,
-    chains: Mapping[str, Chain],
+    chains: Mapping[str, Actuators],
     *,
     samples: int,
     quasi_static: bool = False,

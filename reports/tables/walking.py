@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.chain import Chain, ChainResult
+from actuators.chain import ChainResult
 from actuators.energy.energy import loss_energies, stage_energies
 from actuators.energy.limits import limit_rows
 from actuators.energy.regeneration import BUS, Supply
@@ -290,7 +290,7 @@ def _support_energy(
     return total
 
 
-def motor_limits(results: Mapping[str, ChainResult], chains: Mapping[str, Chain]) -> Table:
+def motor_limits(results: Mapping[str, ChainResult]) -> Table:
     """Peaks over the cycle against the motor's data sheet."""
     rows = [
         {
@@ -305,7 +305,7 @@ def motor_limits(results: Mapping[str, ChainResult], chains: Mapping[str, Chain]
             "breach": row.breach,
         }
         for name, result in results.items()
-        for row in limit_rows(result, chains[name].motor)
+        for row in limit_rows(result)
     ]
     return table_from_rows(
         "motor_limits",

@@ -177,7 +177,7 @@ def test_limits_of_a_fast_and_a_slow_joint():
     zero = np.zeros_like(ramp)
     s = split(series(t, zero, ramp, zero, zero, joints=("fast", "slow")))
     chain = CHAINS["ideal"]
-    rows = {(r.joint, r.quantity): r for r in limit_rows(chain.moving(s), chain.motor)}
+    rows = {(r.joint, r.quantity): r for r in limit_rows(chain.moving(s))}
     assert len(rows) == 8
     speed = rows["fast", "speed"]
     assert speed.breach
@@ -203,7 +203,7 @@ def test_a_peak_at_its_limit_is_no_breach():
     two = np.ones((2, 1))
     s = series([0.0, 4.0], 0 * two, 2.0 * two, 0 * two, 1000.0 * two)  # 800 rad/s, 2.5 N*m
     result = replace(chain, motor=motor).moving(s)
-    rows = {r.quantity: r for r in limit_rows(result, motor)}
+    rows = {r.quantity: r for r in limit_rows(result)}
     assert rows["speed"].peak == rows["speed"].limit == 800.0
     assert rows["current"].peak == rows["current"].limit
     for quantity in ("speed", "current"):
@@ -211,9 +211,11 @@ def test_a_peak_at_its_limit_is_no_breach():
         assert rows[quantity].share_over == 0.0
     assert not rows["voltage"].breach  # no limit
     exact = replace(motor, continuous_current=rows["rms_current"].peak)
-    assert not {r.quantity: r for r in limit_rows(result, exact)}["rms_current"].breach
+    assert not {r.quantity: r for r in limit_rows(replace(result, motors=(exact,)))}[
+        "rms_current"
+    ].breach
     lower = replace(motor, continuous_current=0.99 * rows["rms_current"].peak)
-    over = {r.quantity: r for r in limit_rows(result, lower)}["rms_current"]
+    over = {r.quantity: r for r in limit_rows(replace(result, motors=(lower,)))}["rms_current"]
     assert (over.breach, over.share_over, over.peak_time) == (True, 1.0, 0.0)
 
 

@@ -67,9 +67,9 @@ def test_limit_rows_breach_exactly_where_the_motion_leaves_the_region() -> None:
         current = RE40.current(torque)
         voltage = RE40.voltage(current, speed)
         result = ChainResult(
-            "c", {"out": shaft, "m": shaft}, {}, {}, current, voltage, current * voltage
+            "c", {"out": shaft, "m": shaft}, {}, {}, current, voltage, current * voltage, (RE40,)
         )
-        breach = any(r.breach for r in limit_rows(result, RE40) if r.quantity != "rms_current")
+        breach = any(r.breach for r in limit_rows(result) if r.quantity != "rms_current")
         corners = operating_region(RE40, reach=(2e3, 5.0))
         points = np.column_stack([speed[:, 0], torque[:, 0]])
         assert breach == (not inside(corners, points).all())

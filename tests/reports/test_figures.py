@@ -174,6 +174,7 @@ def test_a_ratio_is_to_the_reference_wherever_it_stands_and_none_is_without() ->
 
 
 MOTOR = DCMotor("m", 0.0302, 0.316, 1200.0, 24.0, 5.77, 75.0)
+MOTORS = [MOTOR, MOTOR]
 SUPPORT = [(0.0, 1.0)]
 
 
@@ -191,7 +192,7 @@ def colored(axes, color: str) -> list[np.ndarray]:
 
 
 def test_motor_path_is_closed_and_its_phases_are_told_apart() -> None:
-    figure = motor_limits_figure(shaft(), MOTOR, JOINTS, SUPPORT, title="t")
+    figure = motor_limits_figure(shaft(), MOTORS, JOINTS, SUPPORT, title="t")
     panel = figure.axes[1]
     ((support,), (transfer,)) = colored(panel, BLUE), colored(panel, VERMILION)
     rpm = 60 / (2 * np.pi)
@@ -204,7 +205,7 @@ def test_motor_path_is_closed_and_its_phases_are_told_apart() -> None:
 
 
 def test_arrows_on_the_motor_path_follow_time() -> None:
-    panel = motor_limits_figure(shaft(4.0), MOTOR, JOINTS, SUPPORT, title="t").axes[1]
+    panel = motor_limits_figure(shaft(4.0), MOTORS, JOINTS, SUPPORT, title="t").axes[1]
     arrows = [text for text in panel.texts if getattr(text, "arrow_patch", None)]
     assert len(arrows) == 2
     for arrow in arrows:
@@ -212,7 +213,7 @@ def test_arrows_on_the_motor_path_follow_time() -> None:
 
 
 def test_motor_limits_states_every_limit_and_the_rms() -> None:
-    figure = motor_limits_figure(shaft(), MOTOR, JOINTS, SUPPORT, title="t")
+    figure = motor_limits_figure(shaft(), MOTORS, JOINTS, SUPPORT, title="t")
     assert len(figure.axes) == 3
     words = texts(figure)
     for expected in (
@@ -224,16 +225,16 @@ def test_motor_limits_states_every_limit_and_the_rms() -> None:
     ):
         assert expected in words
     with pytest.raises(FigureError, match="no joint 'z'"):
-        motor_limits_figure(shaft(), MOTOR, {"z": "joint"}, SUPPORT, title="t")
+        motor_limits_figure(shaft(), MOTORS, {"z": "joint"}, SUPPORT, title="t")
     with pytest.raises(FigureError, match="no joint to draw"):
-        motor_limits_figure(shaft(), MOTOR, {}, SUPPORT, title="t")
+        motor_limits_figure(shaft(), MOTORS, {}, SUPPORT, title="t")
 
 
 def test_motor_limits_of_all_alternatives_share_one_scale() -> None:
     every = [shaft(), shaft(8.0)]
-    scale = common_scale([(series, MOTOR) for series in every], JOINTS)
+    scale = common_scale([(series, MOTORS) for series in every], JOINTS)
     figures = [
-        motor_limits_figure(series, MOTOR, JOINTS, SUPPORT, title="t", scale=scale)
+        motor_limits_figure(series, MOTORS, JOINTS, SUPPORT, title="t", scale=scale)
         for series in every
     ]
     for k in range(3):
@@ -248,14 +249,14 @@ def test_motor_limits_of_all_alternatives_share_one_scale() -> None:
 
 
 def test_motor_without_limits() -> None:
-    figure = motor_limits_figure(shaft(), DCMotor("m", 0.03, 0.3), JOINTS, SUPPORT, title="t")
+    figure = motor_limits_figure(shaft(), [DCMotor("m", 0.03, 0.3)] * 2, JOINTS, SUPPORT, title="t")
     words = texts(figure)
     assert not any(word.startswith(("supply", "peak", "permitted", "continuous")) for word in words)
     assert "rms 50 mN·m" in words
 
 
 def test_strong_motors_are_drawn_in_newton_metres() -> None:
-    figure = motor_limits_figure(shaft(400.0), DCMotor("m", 0.03, 0.3), JOINTS, [], title="t")
+    figure = motor_limits_figure(shaft(400.0), [DCMotor("m", 0.03, 0.3)] * 2, JOINTS, [], title="t")
     assert figure.axes[0].get_ylabel() == "motor torque [N·m]"
     assert "rms 20 N·m" in texts(figure)
 
@@ -320,7 +321,7 @@ def test_same_figure_same_bytes_and_no_trace_of_the_machine(tmp_path: Path) -> N
 DRAWINGS = [
     Drawing("demand", lambda: joint_demand_figure("j", PARTS)),
     Drawing("stages", lambda: stage_energy_figure(STAGES, JOINTS, places=PLACES, title="t")),
-    Drawing("motors", lambda: motor_limits_figure(shaft(), MOTOR, JOINTS, SUPPORT, title="t")),
+    Drawing("motors", lambda: motor_limits_figure(shaft(), MOTORS, JOINTS, SUPPORT, title="t")),
 ]
 
 

@@ -10,7 +10,8 @@ from actuators.elements.inertia import Inertia
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.machine.machine import JointModel, MachineModel
+from pipeline.machine.joint import JointModel
+from pipeline.machine.machine import MachineModel
 
 _FULL = 1.0  # a joint carried along by a bevel or a cable turns one to one
 

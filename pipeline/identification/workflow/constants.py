@@ -17,7 +17,7 @@ import numpy as np
 from actuators.elements.friction import Friction
 from pipeline.identification.results import Naming
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.machine.machine import JointModel
+from pipeline.machine.joint import JointModel
 
 
 def voltage_remarks(

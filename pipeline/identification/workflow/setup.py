@@ -96,7 +96,7 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
     robot = _robot(path, options.base)
     if robot is None:
         chain = catalog.chain(alternative) if alternative else None
-        bare = machine_of_urdf(path, chain=chain)
+        bare = machine_of_urdf(path, actuators=chain)
         ratio = _ratio(chain, len(bare.joints))
         expected = expected_of_model(bare.rigid, bare.name, joints=bare.joints, ratio=ratio)
         sources: tuple[Path, ...] = (path,)

@@ -258,7 +258,7 @@ def _computed_outcome(part: RobotPart, chain: Chain) -> Outcome:
         for leg in MIDDLE_LEGS
     }
     excess: dict[str, float] = {}
-    for row in limit_rows(walking, chain.motor):
+    for row in limit_rows(walking):
         excess[row.quantity] = max(excess.get(row.quantity, -1.0), row.peak / row.limit - 1)
     return Outcome(
         chain,

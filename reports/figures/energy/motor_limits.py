@@ -59,32 +59,39 @@ class MotorScale:
     torque: float
 
 
-def common_scale(every: Iterable[tuple[ShaftSeries, DCMotor]], joints: Iterable[str]) -> MotorScale:
+def common_scale(
+    every: Iterable[tuple[ShaftSeries, Sequence[DCMotor]]], joints: Iterable[str]
+) -> MotorScale:
     """The scale on which the paths of several alternatives can be compared.
 
     It holds every path, the edge of the region at no torque, and the continuous torque.
+
+    Args:
+        every: Series at the motors' shafts and the motor of each of its joints.
+        joints: Those to draw.
 
     Raises:
         FigureError: A joint that a series lacks.
     """
     shown = list(joints)
     speed, torque = [1e-9], [1e-9]
-    for series, motor in every:
+    for series, motors in every:
         columns = _columns(series, shown)
-        constants = [_constants(motor, column)[0] for column in columns]
         speed.append(1.12 * float(np.abs(series.velocity[:, columns]).max()))
         torque.append(1.12 * float(np.abs(series.torque[:, columns]).max()))
-        edges = [motor.max_speed, motor.supply_voltage / min(constants)]
-        speed += [1.12 * edge for edge in edges if np.isfinite(edge)]
-        continuous = motor.continuous_current * max(constants)
-        torque += [1.25 * continuous] if np.isfinite(continuous) else []
+        for column in columns:
+            motor, constant = motors[column], _constants(motors[column], column)[0]
+            edges = [motor.max_speed, motor.supply_voltage / constant]
+            speed += [1.12 * edge for edge in edges if np.isfinite(edge)]
+            continuous = motor.continuous_current * constant
+            torque += [1.25 * continuous] if np.isfinite(continuous) else []
     return MotorScale(max(speed), max(torque))
 
 
 @styled
 def motor_limits_figure(
     series: ShaftSeries,
-    motor: DCMotor,
+    motors: Sequence[DCMotor],
     joints: Mapping[str, str],
     support: Sequence[tuple[float, float]],
     *,
@@ -99,7 +106,7 @@ def motor_limits_figure(
 
     Args:
         series: At the motor's shaft, over one cycle.
-        motor: Whose limits are drawn.
+        motors: Whose limits are drawn, one per joint of the series.
         joints: Those to draw, name to label of the panel.
         support: Start and end of every stretch of time in which the joints' leg stands [s].
         title: First line.
@@ -112,17 +119,18 @@ def motor_limits_figure(
     if not joints:
         raise FigureError(f"'{title}': no joint to draw")
     columns = _columns(series, list(joints))
-    scale = scale or common_scale([(series, motor)], joints)
+    scale = scale or common_scale([(series, motors)], joints)
     rms = rms_over_time(series.time, series.torque[:, columns])
     unit, factor = ("N·m", 1.0) if scale.torque >= _STRONG else ("mN·m", 1e3)
     figure = new_figure(4.6)
     headline(figure, title, subtitle)
     whole, *panels = figure.subplots(1, 1 + len(joints), width_ratios=[0.8] + [1.0] * len(joints))
-    _whole(whole, motor, columns[0], scale, factor)
+    _whole(whole, motors[columns[0]], columns[0], scale, factor)
+    alike = all(motors[column] is motors[columns[0]] for column in columns)
     whole.set_ylabel(f"motor torque [{unit}]")
     whole.set_title("whole region\n", loc="center", fontweight="bold")
     for column, value, axes, label in zip(columns, rms, panels, joints.values(), strict=True):
-        limits = (scale.speed * _RPM, scale.torque * factor)
+        motor, limits = motors[column], (scale.speed * _RPM, scale.torque * factor)
         key = _region(axes, motor, column, limits, factor)
         key = _path(axes, series, column, support, limits, factor) + key
         allowed = motor.continuous_current * _constants(motor, column)[0]
@@ -142,6 +150,9 @@ def motor_limits_figure(
             axes.tick_params(labelleft=False)
     for axes in (whole, *panels):
         axes.set_xlabel("motor speed [1000 rpm]")
+    if not alike:  # each panel has limits of its own: the key tells what they are, not how large
+        for handle in key:
+            handle.set_label(str(handle.get_label()).partition(":")[0])
     figure.legend(handles=key, loc="outside lower center", ncols=4, fontsize=8, handlelength=2.2)
     return figure
 

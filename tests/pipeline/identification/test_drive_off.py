@@ -32,7 +32,7 @@ VISCOUS, SHARE = 0.03, 0.25
 
 def stated() -> MachineModel:
     chain = load_catalog(FILES / "xl330_actuators").chain("servo")
-    return machine_of_urdf(FILES / "xl330.urdf", chain=chain)
+    return machine_of_urdf(FILES / "xl330.urdf", actuators=chain)
 
 
 def truth() -> MachineModel:

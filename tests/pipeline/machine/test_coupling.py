@@ -13,12 +13,15 @@ import numpy as np
 import pytest
 
 from actuators.chain import Chain
+from actuators.elements.friction import Friction
+from actuators.elements.inertia import Inertia
 from actuators.elements.motor import DCMotor
 from actuators.elements.ratio import Ratio
 from actuators.shaft import ShaftSeries
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.machine.edited_chain import edited_chain
-from pipeline.machine.machine import JointModel, MachineModel
+from pipeline.machine.drivetrains import Drivetrains
+from pipeline.machine.joint import JointModel
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
 
@@ -85,7 +88,7 @@ def test_a_sensor_at_the_joint_sees_what_the_joint_needs(
 def test_walking_with_a_coupling_keeps_the_balance_of_power(motion: Measurement) -> None:
     torque = np.random.default_rng(0).normal(size=motion.q.shape) * 20.0
     joint = ShaftSeries.at_joint(motion.joints, motion.time, motion.q, motion.v, motion.a, torque)
-    result = edited_chain(LOSSLESS, actuators()).moving(joint)
+    result = Drivetrains("coupled", actuators()).moving(joint)
     for name in ("position", "velocity", "acceleration"):
         np.testing.assert_allclose(
             getattr(result.motor, name), RATIO * getattr(joint, name) @ C.T, atol=1e-9
@@ -97,5 +100,53 @@ def test_walking_with_a_coupling_keeps_the_balance_of_power(motion: Measurement)
 
 def test_standing_with_a_coupling_the_motors_balance_every_joint() -> None:
     torque = np.array([3.0, -7.0, 5.0])
-    held = edited_chain(LOSSLESS, actuators()).holding(torque)
+    held = Drivetrains("coupled", actuators()).holding(torque)
     np.testing.assert_allclose(RATIO * held.motor_torque @ C, torque, atol=1e-12)
+
+
+def lossy() -> tuple[JointModel, ...]:
+    """Friction of every kind at the joint side, between frame and motor, and a rotor."""
+    rubbing = Friction("friction", coulomb=2.0, load=0.1, viscous=1.5)
+    rotor = Inertia("rotor", inertia=2e-4)
+    return tuple(replace(a, elements=(rubbing, *a.elements, rotor)) for a in actuators())
+
+
+def test_walking_with_a_coupling_and_losses_every_watt_is_accounted_for(
+    motion: Measurement,
+) -> None:
+    torque = np.random.default_rng(1).normal(size=motion.q.shape) * 20.0
+    joint = ShaftSeries.at_joint(motion.joints, motion.time, motion.q, motion.v, motion.a, torque)
+    result = Drivetrains("lossy", lossy()).moving(joint)
+    lost = sum(x.sum(axis=1) for x in (*result.losses.values(), *result.stored.values()))
+    taken = joint.power.sum(axis=1)
+    drawn = result.electrical_power.sum(axis=1)
+    np.testing.assert_allclose(drawn, taken + lost, atol=1e-9 * np.abs(drawn).max())
+
+
+def test_walking_and_prediction_ask_the_same_of_coupled_motors(
+    motion: Measurement, machine: MachineModel
+) -> None:
+    model = replace(machine, actuators=lossy())
+    predicted = Simulator(motion).predict(model)
+    walked = model.drivetrains.moving(
+        ShaftSeries.at_joint(
+            motion.joints, motion.time, motion.q, motion.v, motion.a, predicted.torque
+        )
+    )
+    fast = (np.abs(motion.v @ C.T) > 20.0 * motion.rest_speed).all(axis=1)  # no sign in doubt
+    assert fast.sum() > 100
+    np.testing.assert_allclose(
+        RATIO * walked.motor.torque[fast], predicted.motor_torque[fast], rtol=1e-12, atol=1e-9
+    )
+
+
+def test_standing_with_a_coupling_the_friction_of_a_motor_is_its_own() -> None:
+    """What a joint's friction holds, its motor need not; the other joint feels the whole load."""
+    torque = np.array([3.0, -7.0, 5.0])
+    held = Drivetrains("lossy", lossy()).holding(torque)
+    load = np.linalg.solve(C.T, torque)
+    for k in range(3):
+        friction = 2.0 + 0.1 * abs(load[k])
+        ends = (load[k] - friction) / RATIO, (load[k] + friction) / RATIO
+        np.testing.assert_allclose((held.low[k], held.high[k]), ends, atol=1e-12)
+    assert held.motor_torque[0] == pytest.approx((3.0 - 2.3) / RATIO)

@@ -9,8 +9,8 @@ import pytest
 
 from actuators.loading.build import Catalog, load_catalog
 from pipeline.effects.registry import effect_named
-from pipeline.machine.edited_chain import EditedChain, edited_chain
-from pipeline.machine.machine import MachineModel, machine_of_robot
+from pipeline.machine.drivetrains import Actuators, Drivetrains, drivetrains_of
+from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import Effects, effects
 from pipeline.simulation.energy_change import Cost, break_even, energy_change
@@ -45,7 +45,7 @@ def test_a_friction_of_nothing_changes_nothing(hexapod: Robot, catalog: Catalog)
     friction = ("coulomb_friction", JOINT, {"torque": 0.0}, "irreversible")
     edit = with_effect(hexapod, catalog, *friction)
     edited = edit.chain(chain)
-    assert isinstance(edited, EditedChain)
+    assert isinstance(edited, Drivetrains)
     walking = walk(hexapod, {"as it was": chain, "edited": edited}, samples=SAMPLES)
     before, after = (walking.results[k] for k in ("as it was", "edited"))
     assert list(after.shafts) == list(before.shafts)
@@ -55,9 +55,17 @@ def test_a_friction_of_nothing_changes_nothing(hexapod: Robot, catalog: Catalog)
     np.testing.assert_array_equal(after.electrical_power, before.electrical_power)
 
 
-def test_without_effects_the_chain_is_itself(hexapod: Robot, catalog: Catalog) -> None:
+def test_drivetrains_that_are_all_alike_answer_as_their_chain(
+    hexapod: Robot, catalog: Catalog
+) -> None:
     chain = catalog.chain("reversible")
-    assert edited_chain(chain, machine_of_robot(hexapod, chain).actuators) is chain
+    alike = drivetrains_of(chain, hexapod.joints)
+    both: dict[str, Actuators] = {"one": chain, "each": alike}
+    walking, standing = walk(hexapod, both, samples=SAMPLES), stand(hexapod, both)
+    one, each = (walking.results[k] for k in both)
+    np.testing.assert_array_equal(each.electrical_power, one.electrical_power)
+    assert list(each.losses) == list(one.losses)
+    np.testing.assert_array_equal(*(standing.holding[k].power for k in both))
 
 
 def test_coulomb_friction_loses_torque_times_travel(hexapod: Robot, catalog: Catalog) -> None:

@@ -20,7 +20,8 @@ from actuators.elements.ratio import Ratio
 from actuators.elements.stribeck import Stribeck
 from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
-from pipeline.machine.machine import JointModel, MachineModel, machine_of_urdf
+from pipeline.machine.joint import JointModel
+from pipeline.machine.machine import MachineModel, machine_of_urdf
 from pipeline.simulation.forward import ForwardSimulator, ServoInput, servo_input
 
 Array = NDArray[np.float64]

@@ -1,0 +1,199 @@
+"""All drivetrains of a machine, asked together: the one place where joints meet.
+
+Motors may turn with other joints, too: with motor angles theta = C q at the joint side the power
+that motors give is the power that joints take, for any motion, so that tau = C^T sigma: a motor
+that also turns with another joint carries a part of that joint's torque (virtual work). Its
+friction is its own: it acts between motor and frame, and does work on theta.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.chain import Chain, ChainResult, HoldingResult
+from actuators.shaft import ShaftSeries
+from pipeline.machine.joint import JointModel, joints_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Drivetrains:
+    """One drivetrain per joint; it answers `moving` and `holding` as a chain for all joints does.
+
+    Attributes:
+        name: Of the alternative.
+        joints: In the order of the columns.
+    """
+
+    name: str
+    joints: tuple[JointModel, ...]
+
+    @cached_property
+    def coupled(self) -> dict[int, tuple[int, float]]:
+        """Joint to (other joint, turns of this one's motor per turn of the other)."""
+        at = {joint.name: k for k, joint in enumerate(self.joints)}
+        return {
+            k: (at[joint.coupled_to], joint.coupling)
+            for k, joint in enumerate(self.joints)
+            if joint.coupled_to
+        }
+
+    def turned(self, joint: int, motion: Array) -> Array:
+        """Motion of a joint's motor at the joint side, theta = C q, (...).
+
+        Args:
+            joint: Column.
+            motion: Position, velocity or acceleration of all joints (..., J).
+        """
+        own: Array = motion[..., joint]
+        if joint in self.coupled:
+            other, turns = self.coupled[joint]
+            own = own + turns * motion[..., other]
+        return own
+
+    def load(self, joint: int, demand: Callable[[int], Array]) -> Array:
+        """What one drivetrain supplies at the joint side, sigma of tau = C^T sigma, (...) [N*m].
+
+        Args:
+            joint: Column.
+            demand: Torque (...) [N*m] asked of a joint, by column.
+        """
+        own = demand(joint)
+        for k, (other, turns) in self.coupled.items():
+            if other == joint:
+                own = own - turns * self.load(k, demand)
+        return own
+
+    def carried(self, joint: int, motor: Array) -> Array:
+        """What other joints' motors bring to a joint besides its own, (...) [N*m].
+
+        Args:
+            joint: Column.
+            motor: Torque of all motors brought to their joint side (..., J) [N*m].
+        """
+        out = np.zeros(motor.shape[:-1])
+        for k, (other, turns) in self.coupled.items():
+            if other == joint:
+                out = out + turns * motor[..., k]
+        return out
+
+    @cached_property
+    def _groups(self) -> list[tuple[Chain, list[int]]]:
+        """Chains with the joints that share them; a coupled joint is computed apart."""
+        groups: dict[object, tuple[Chain, list[int]]] = {}
+        for k, joint in enumerate(self.joints):
+            key = (*map(id, joint.elements), id(joint.motor), k if k in self.coupled else -1)
+            if key not in groups:
+                groups[key] = (joint.chain, [])
+            groups[key][1].append(k)
+        return list(groups.values())
+
+    def moving(self, joint: ShaftSeries) -> ChainResult:
+        """Return everything the drivetrains need; a loss that a joint does not have is zero there.
+
+        Args:
+            joint: Series at all joints, in their order; see `Chain.moving`.
+        """
+        if len(self._groups) == 1 and not self.coupled:
+            return replace(self._groups[0][0].moving(joint), chain=self.name)
+        parts = [
+            (columns, chain.moving(self._side(joint, columns))) for chain, columns in self._groups
+        ]
+        return _merged(self.name, joint, parts)
+
+    def _side(self, joint: ShaftSeries, columns: list[int]) -> ShaftSeries:
+        """The joints' side of one group; a coupled motor turns with another joint, too."""
+        names = tuple(joint.joints[k] for k in columns)
+        torque = np.stack([self.load(k, lambda i: joint.torque[:, i]) for k in columns], axis=1)
+        position, velocity, acceleration = (
+            np.stack([self.turned(k, x) for k in columns], axis=1)
+            for x in (joint.position, joint.velocity, joint.acceleration)
+        )
+        if not self.coupled.keys() & set(columns):
+            direction = joint.direction[:, columns]
+            return ShaftSeries(
+                names, joint.time, position, velocity, acceleration, torque, direction
+            )
+        return ShaftSeries.at_joint(names, joint.time, position, velocity, acceleration, torque)
+
+    def holding(self, torque: Array) -> HoldingResult:
+        """Return what holds joint torques at standstill; see `Chain.holding`.
+
+        Args:
+            torque: (..., J) [N*m].
+        """
+        asked = np.asarray(torque, dtype=float)
+        out: dict[str, Array] = {}
+        for chain, columns in self._groups:
+            load = [self.load(k, lambda i: asked[..., i]) for k in columns]
+            result = chain.holding(np.stack(load, axis=-1))
+            for name in ("low", "high", "motor_torque", "current", "voltage", "power"):
+                out.setdefault(name, np.empty_like(asked))[..., columns] = getattr(result, name)
+        return HoldingResult(**out)
+
+
+#: Who answers for all joints of a machine: one chain that they share, or a drivetrain for each.
+Actuators = Chain | Drivetrains
+
+
+def drivetrains_of(actuators: Actuators, names: Sequence[str]) -> Drivetrains:
+    """A drivetrain per joint.
+
+    Args:
+        actuators: For all joints.
+        names: Of the joints, in the order of the columns.
+    """
+    if isinstance(actuators, Drivetrains):
+        return actuators
+    return Drivetrains(actuators.name, joints_of(actuators, tuple(names)))
+
+
+def _merged(
+    name: str, joint: ShaftSeries, parts: Sequence[tuple[list[int], ChainResult]]
+) -> ChainResult:
+    first = parts[0][1]
+
+    def gathered(values: Sequence[Array | None]) -> Array:
+        out = np.zeros(joint.torque.shape)
+        for (columns, _), value in zip(parts, values, strict=True):
+            if value is not None:
+                out[:, columns] = value
+        return out
+
+    def of_shaft(sides: Sequence[ShaftSeries]) -> ShaftSeries:
+        fields = ("position", "velocity", "acceleration", "torque", "direction")
+        columns = {field: gathered([getattr(side, field) for side in sides]) for field in fields}
+        return ShaftSeries(joints=joint.joints, time=joint.time, **columns)
+
+    def of_result(attribute: str) -> Array:
+        return gathered([getattr(result, attribute) for _, result in parts])
+
+    def union(attribute: str, last: str = "") -> dict[str, Array]:
+        keys: dict[str, None] = {}
+        for _, result in parts:
+            keys |= dict.fromkeys(getattr(result, attribute))
+        ordered = [k for k in keys if k != last] + [k for k in keys if k == last]
+        return {k: gathered([getattr(r, attribute).get(k) for _, r in parts]) for k in ordered}
+
+    motors = {k: m for columns, r in parts for k, m in zip(columns, r.motors, strict=True)}
+    *inner, motor = first.shafts
+    # Shafts that all of them have, and the motors' whatever they are called.
+    shared = [stage for stage in inner if all(stage in result.shafts for _, result in parts)]
+    shafts = {stage: of_shaft([r.shafts[stage] for _, r in parts]) for stage in shared}
+    shafts[motor] = of_shaft([result.motor for _, result in parts])
+    return ChainResult(
+        chain=name,
+        shafts=shafts,
+        losses=union("losses", last=tuple(first.losses)[-1]),
+        stored=union("stored"),
+        current=of_result("current"),
+        voltage=of_result("voltage"),
+        electrical_power=of_result("electrical_power"),
+        motors=tuple(motors[k] for k in range(len(motors))),
+    )

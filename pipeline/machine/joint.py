@@ -1,0 +1,166 @@
+"""One joint's drivetrain and sensors: laws in a row, what stands beside them, and their answers.
+
+Everything is told at the joint side: the motor's angle is divided by the ratio, its torque
+multiplied with it. A joint at q that demands the torque tau of its drivetrain gets it from
+
+    load    sigma = tau + springs and ripples at q        `beside`
+    motion  theta = q + compliance sigma + (backlash / 2) tanh(sigma / crossing)      `wind`
+    motor   the elements in a row                         `at_motor`, `holding`
+
+and from what coupled motors carry, which `pipeline.machine.drivetrains` adds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.chain import Chain, held, moved
+from actuators.elements.element import Element
+from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
+from actuators.elements.motor import DCMotor
+from actuators.elements.position_torque import PositionTorque
+from actuators.shaft import ShaftSeries
+from pipeline.logs.errors import ModelError
+
+Array = NDArray[np.float64]
+_LEAST_CROSSING = 1e-9  # [N*m]
+_MOTOR_STAGE = "m"
+
+
+@dataclass(frozen=True, eq=False)
+class JointModel:
+    """One joint's actuator and sensors.
+
+    Attributes:
+        name: Of the joint.
+        elements: From the joint to the motor; those that effects add stand first.
+        motor: The converter; None where the log's torque is the actuator's, as of a bare URDF.
+        position_torques: Torques that depend on the joint's position alone.
+        compliance: Of the transmission [rad/(N*m)].
+        backlash: Whole width [rad].
+        crossing: Torque over which the joint passes from one flank to the other [N*m].
+        coupled_to: Joint with which this one's motor also turns; empty without.
+        coupling: Turns of the motor, at the joint side, per turn of that other joint [1].
+        heating: Thermal node of the motor; None for a motor that stays cold.
+        encoder_offset: The position sensor reads high by this [rad].
+        effort_offset: The effort sensor reads high by this, in the unit of its channel.
+        delay: The effort channels lag behind the position by this [s].
+        gains: Channel to how many times what it should its column reads; once where absent.
+        stages: Names of shafts to the elements they follow, as a chain has them; the last one is
+            the motor's.
+    """
+
+    name: str
+    elements: tuple[Element, ...] = ()
+    motor: DCMotor | None = None
+    position_torques: tuple[PositionTorque, ...] = ()
+    compliance: float = 0.0
+    backlash: float = 0.0
+    crossing: float = 0.0
+    coupled_to: str = ""
+    coupling: float = 0.0
+    heating: Heating | None = None
+    encoder_offset: float = 0.0
+    effort_offset: float = 0.0
+    delay: float = 0.0
+    gains: Mapping[str, float] = field(default_factory=dict)
+    stages: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def ratio(self) -> float:
+        """Motor speed over joint speed."""
+        total = 1.0
+        for element in self.elements:
+            total *= float(np.asarray(element.gearing))
+        return total
+
+    @property
+    def wound(self) -> bool:
+        """Whether motor and joint turn apart from one another."""
+        return self.compliance != 0.0 or self.backlash != 0.0
+
+    def with_element(self, element: Element, *, at_motor: bool = False) -> JointModel:
+        """The same with an element more, at the joint's or the motor's shaft; names made unique."""
+        taken = {e.name for e in self.elements}
+        name, k = element.name, 2
+        while name in taken:
+            name, k = f"{element.name}_{k}", k + 1
+        named = replace(element, name=name)
+        elements = (*self.elements, named) if at_motor else (named, *self.elements)
+        return replace(self, elements=elements)
+
+    def beside(self, position: Array, torque: Array) -> Array:
+        """What the drivetrain has to supply with springs and ripples beside it, (...) [N*m].
+
+        Args:
+            position: Of the joint (...) [rad].
+            torque: Demanded by bodies and ground (...) [N*m].
+        """
+        for law in self.position_torques:
+            torque = torque + law.torque(position)
+        return torque
+
+    def wind(self, load: Array) -> Array:
+        """Motor angle less joint angle at the joint side under a load (...) [N*m], (...) [rad]."""
+        wind: Array = self.compliance * load
+        if self.backlash:
+            flank = np.tanh(load / max(self.crossing, _LEAST_CROSSING))
+            wind = wind + 0.5 * self.backlash * flank
+        return wind
+
+    def at_motor(self, side: ShaftSeries) -> ShaftSeries:
+        """What the motor's shaft needs for a motion and load at the joint side (inverse)."""
+        return moved(self.elements, side)
+
+    def holding(self, low: Array, high: Array) -> tuple[Array, Array]:
+        """Motor torques that hold a load between `low` and `high` (...) [N*m] at standstill."""
+        return held(self.elements, low, high)
+
+    def warm(self, rise: Array) -> DCMotor:
+        """The motor with its winding warmer than the data sheet's by `rise` (...) [K].
+
+        Raises:
+            ModelError: The model has no motor here.
+        """
+        if self.motor is None:
+            raise ModelError(f"joint '{self.name}': no motor; name the actuator with --alternative")
+        constant = float(np.asarray(self.motor.torque_constant))
+        resistance = float(np.asarray(self.motor.resistance))
+        return replace(
+            self.motor,
+            torque_constant=warm_torque_constant(constant, rise),
+            resistance=warm_resistance(resistance, rise),
+        )
+
+    @property
+    def chain(self) -> Chain:
+        """Elements and motor as a chain, whose losses are told element by element.
+
+        Raises:
+            ModelError: The model has no motor here.
+        """
+        if self.motor is None:
+            raise ModelError(f"joint '{self.name}': no motor, so that its chain has no end")
+        *inner, last = self.stages or (_MOTOR_STAGE,)
+        # The motor's stage stays at the motor: behind an element that was added there.
+        stages = {stage: self.stages[stage] for stage in inner}
+        return Chain(self.name, self.elements, self.motor, stages | {last: self.elements[-1].name})
+
+
+def joints_of(chain: Chain | None, names: tuple[str, ...]) -> tuple[JointModel, ...]:
+    """A joint model per name, all with the same actuator.
+
+    Args:
+        chain: The actuator; None where a log's torque is the actuator's own at the joint side.
+        names: Of the joints.
+    """
+    if chain is None:
+        return tuple(JointModel(name) for name in names)
+    return tuple(
+        JointModel(name, elements=chain.elements, motor=chain.motor, stages=chain.stages)
+        for name in names
+    )
