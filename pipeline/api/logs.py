@@ -20,7 +20,6 @@ from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
 from pipeline.identification.workflow.story import Story, tell
 from pipeline.identification.workflow.validate import check
-from pipeline.logs.errors import LogContentError
 from reports.table import Table
 from reports.writer import write_text
 
@@ -213,13 +212,9 @@ class _Run:
             holdout=tuple(map(_path, _several(test))),
             robot=machine.path,
             actuators=machine.actuators,
+            changes=machine.changes,
             **named,
         )
-        if machine.changes:
-            raise LogContentError(
-                "numbers changed on loading do not reach a comparison with logs; write them into "
-                "the robot or actuator files"
-            )
         check_options(self.options, machine.model)
         self.given: Setup = setup(self.options, machine.model)
         self.meta = metadata(self.options, self.given)

@@ -53,6 +53,8 @@ class Machine:
     def save(self, path: str | Path) -> Path:
         """Write the effects as a model file, which `load` and the command line's ``--model`` read.
 
+        Changed numbers are not in it: `load` takes them again.
+
         Raises:
             RobotFileError: The machine has no effects.
             ReportError: The file cannot be written.

@@ -79,6 +79,7 @@ def table_of_parameters(given: Settings) -> Table:
     """Every number that went in."""
     groups = [(given.robot.spec.name, given.robot.spec.parameters.rows())]
     groups += [(c.name, c.parameters.rows()) for c in given.catalog.components.values()]
+    groups += given.own.groups
     return parameter_tables.parameters(groups)
 
 

@@ -42,6 +42,7 @@ from pipeline.effects.base import CHANNEL_UNITS, Effect
 from pipeline.effects.registry import effect_named
 from pipeline.logs.errors import EffectError, ModelFileError
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.machine.own_actuators import actuator_folder, own_actuators
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 
@@ -166,10 +167,15 @@ def base_model(file: ModelFile) -> MachineModel:
         actuators.errors.ActuatorError: The catalogue has no such alternative.
         ModelFileError: A bare URDF that is not there.
     """
-    chain = load_catalog().chain(file.alternative) if file.alternative else None
     if file.robot.suffix == ".urdf":
+        chain = load_catalog().chain(file.alternative) if file.alternative else None
         return machine_of_urdf(file.robot, actuators=chain)
-    return machine_of_robot(load_robot(load_robot_file(file.robot)), chain)
+    spec = load_robot_file(file.robot)
+    catalog = load_catalog(actuator_folder(spec) or CATALOG)
+    own = own_actuators(spec, catalog)
+    name = file.alternative
+    actuators = own.actuators(own.catalog(catalog), name) if name else None
+    return machine_of_robot(load_robot(spec), actuators)
 
 
 def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:

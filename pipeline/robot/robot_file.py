@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -66,7 +66,10 @@ LARGEST_GRAVITY = 30.0
 _ANY_LENGTH = ("coxa_length", "joint_2_lateral", "trunk_com_left")
 STATIONS = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 
-_TOP_KEYS = {"extends", "robot", "parameters", "legs", "held", "gait", "standing", "assumed"}
+_TOP_KEYS = {
+    *("extends", "robot", "parameters", "legs", "held", "gait", "standing", "assumed"),
+    "actuators",
+}
 _ROBOT_KEYS = {"name", "urdf", "base_link", "base", "build", "zero_pose", "note"}
 _LEG_KEYS = {"joints", "foot", "side", "station", "neutral_foot", "start_posture"}
 _GAIT_KEYS = {"transfer_path", "tripods"}
@@ -121,6 +124,7 @@ class RobotSpec:
         standing_feet: Legs that stand in the standing mode.
         held: Joints outside the legs and where they are held [rad, m].
         assumed: Keys of the file that are guesses, each with its reason.
+        actuator_table: What joints have of their own, as written; `pipeline.machine` reads it.
     """
 
     path: Path
@@ -138,6 +142,7 @@ class RobotSpec:
     standing_feet: tuple[str, ...]
     held: tuple[tuple[str, float], ...] = ()
     assumed: tuple[tuple[str, str], ...] = ()
+    actuator_table: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -253,6 +258,7 @@ def load_robot_file(path: Path) -> RobotSpec:
         standing_feet=_leg_list(standing.get("feet", names), names, f"{where}: standing.feet"),
         held=held,
         assumed=_assumed(table.get("assumed", {}), where),
+        actuator_table=table.get("actuators", {}),
     )
 
 
@@ -309,7 +315,7 @@ def _refuse_missing(table: Mapping[str, Any], where: str) -> None:
     for name, entry in under("parameters").items():
         if isinstance(entry, dict):
             missing += [f"parameters.{name}.{key}" for key in REQUIRED_KEYS if key not in entry]
-    tables = ("robot", "legs", "held", "gait", "parameters", "standing", "assumed")
+    tables = ("robot", "legs", "held", "gait", "parameters", "standing", "assumed", "actuators")
     wrong = [k for k in tables if not isinstance(table.get(k, {}), dict)]
     if wrong:
         raise RobotFileError(f"{where}: {wrong[0]} must be a table, [{wrong[0]}]")

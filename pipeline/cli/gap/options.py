@@ -57,6 +57,14 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--actuators", type=named_path, metavar="DIR", help="folder of actuator files of your own"
     )
+    sub.add_argument(
+        "--set",
+        dest="changes",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a number for this run, as `walk` takes it",
+    )
     sub.add_argument("--effort", metavar="CHANNEL", help="torque, current, voltage or power")
     sub.add_argument("--cutoff", type=float, metavar="HZ", help="bandwidth of the comparison")
     sub.add_argument(
@@ -86,4 +94,5 @@ def options_of(given: argparse.Namespace) -> Options:
     )
     named = {f.name: getattr(given, f.name) for f in fields(Options) if hasattr(given, f.name)}
     named |= {"step": step, "logs": tuple(Path(item) for item in logs)}
-    return Options(**{**named, "holdout": tuple(given.holdout), "decimal": decimal_of(given)})
+    named |= {"holdout": tuple(given.holdout), "changes": tuple(given.changes)}
+    return Options(**{**named, "decimal": decimal_of(given)})

@@ -33,6 +33,7 @@ class Options:
         mapping: Mapping file for foreign columns.
         alternative: Actuator between joint and supply, by name.
         actuators: Folder of actuator files of one's own.
+        changes: Numbers that differ from the files', ``KEY=VALUE`` each.
         effort: Channel to compare; the log's most direct by default.
         cutoff: Bandwidth of the comparison [Hz]; the data's own by default.
         prove_last: Last share of every log that only proves; blocks in between by default.
@@ -51,6 +52,7 @@ class Options:
     mapping: Path | None = None
     alternative: str | None = None
     actuators: Path | None = None
+    changes: tuple[str, ...] = ()
     effort: str | None = None
     cutoff: float | None = None
     prove_last: float | None = None

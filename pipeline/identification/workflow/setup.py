@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 
-from actuators.chain import Chain
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file, read_model_file
 from pipeline.errors import RobotFileError
@@ -27,10 +26,13 @@ from pipeline.logs.reading.log import EFFORTS, Log
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.logs.reading.read import plan_reading
 from pipeline.logs.reading.table_file import sha256
+from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
+from pipeline.simulation.changes import changed
 
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
 DEFAULT_ALTERNATIVE = "rotor"
@@ -50,6 +52,7 @@ class Setup:
         model: As the workflow computes it.
         expected: What a log of it looks like.
         catalog: Actuator components and alternatives.
+        own: What single joints have of their own.
         alternative: Name of the actuator chain; empty without one.
         file: The model file whose edits are in `model`; without edits where none was given.
         bare: The model before those edits.
@@ -62,6 +65,7 @@ class Setup:
     model: MachineModel
     expected: Expected
     catalog: Catalog
+    own: OwnActuators
     alternative: str
     file: ModelFile
     bare: MachineModel
@@ -85,44 +89,87 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         ActuatorError: The catalogue cannot be used, or has no such alternative.
         GapError: `--base` does not fit the robot, or the model file cannot be used.
     """
-    folder = options.actuators or Path(CATALOG)
-    catalog = load_catalog(folder)
+    folder = options.actuators or CATALOG
     given_file = read_model_file(options.model, folder) if options.model else known
     path: Path = options.robot or (given_file.robot if given_file else DEFAULT_ROBOT)
+    parts = _parts(path, options)
+    catalog, own = parts.catalog, parts.own
     alternative = _alternative(options, given_file)
-    if not path.is_file():
-        fact = "is a folder" if path.is_dir() else "no such robot file"
-        raise RobotFileError(f"{path}: {fact}; name a robot file or URDF with --robot")
-    robot = _robot(path, options.base)
-    if robot is None:
+    if parts.spec is None:
         chain = catalog.chain(alternative) if alternative else None
         bare = machine_of_urdf(path, actuators=chain)
-        ratio = _ratio(chain, len(bare.joints))
-        expected = expected_of_model(bare.rigid, bare.name, joints=bare.joints, ratio=ratio)
+        robot = None
+        expected = expected_of_model(
+            bare.rigid, bare.name, joints=bare.joints, ratio=_ratio(chain, bare.joints)
+        )
         sources: tuple[Path, ...] = (path,)
     else:
+        robot = load_robot(parts.spec)
+        refuse_impossible(robot)
         # Motor-side positions need a ratio whatever channel is compared.
-        usual = catalog.chain(alternative or DEFAULT_ALTERNATIVE)
-        expected = expected_of_robot(robot, ratio=_ratio(usual, len(robot.joints)))
+        usual = alternative or own.usual or DEFAULT_ALTERNATIVE
+        actuators = own.actuators(catalog, usual)
+        expected = expected_of_robot(robot, ratio=_ratio(actuators, robot.joints))
         if not alternative and _channel(options, expected) != AT_JOINT:
-            alternative = DEFAULT_ALTERNATIVE
-        chain = usual if alternative else None
-        bare = machine_of_robot(robot, chain)
+            alternative = usual
+        bare = machine_of_robot(robot, actuators if alternative else None)
         sources = (*robot.spec.sources, *(() if robot.spec.build else (robot.spec.urdf,)))
     edits = given_file.edits if given_file else ()
-    file = replace(new_model_file(path, alternative, folder), edits=edits)
+    file = replace(new_model_file(path, alternative, parts.folder), edits=edits)
     return Setup(
         path=path,
-        sources=(*sources, *(_catalog_files(folder) if chain else ())),
+        sources=(*sources, *(_catalog_files(parts.folder) if alternative else ())),
         robot=robot,
         model=apply_edits(bare, edits),
         expected=expected,
         catalog=catalog,
+        own=own,
         alternative=alternative,
         file=file,
         bare=bare,
-        warnings=given_file.changed if given_file else (),
+        warnings=(*parts.remarks, *(given_file.changed if given_file else ())),
     )
+
+
+@dataclass(frozen=True)
+class _Parts:
+    """What the files say, numbers changed: no robot file for a bare URDF."""
+
+    spec: RobotSpec | None
+    folder: Path
+    catalog: Catalog
+    own: OwnActuators
+    remarks: tuple[str, ...]
+
+
+def _parts(path: Path, options: Options) -> _Parts:
+    """Robot file and actuators as asked for.
+
+    Raises:
+        PipelineError: The robot file or a change cannot be used.
+        ActuatorError: The catalogue cannot be used.
+        GapError: `--base` does not fit the robot.
+    """
+    if not path.is_file():
+        fact = "is a folder" if path.is_dir() else "no such robot file"
+        raise RobotFileError(f"{path}: {fact}; name a robot file or URDF with --robot")
+    told = (
+        [
+            f"numbers changed for this run alone: {', '.join(options.changes)}; a model file does "
+            "not hold them"
+        ]
+        if options.changes
+        else []
+    )
+    spec = _spec(path, options.base)
+    if spec is None:
+        folder = options.actuators or CATALOG
+        _, catalog, _ = changed(None, load_catalog(folder), options.changes)
+        return _Parts(None, folder, catalog, OwnActuators(), tuple(told))
+    folder = options.actuators or actuator_folder(spec) or CATALOG
+    spec, catalog, remarks = changed(spec, load_catalog(folder), options.changes)
+    own = own_actuators(spec, catalog)
+    return _Parts(spec, folder, own.catalog(catalog), own, (*told, *remarks))
 
 
 def _alternative(options: Options, file: ModelFile | None) -> str:
@@ -150,8 +197,8 @@ def _channel(options: Options, expected: Expected) -> str:
     return plan_reading(options.logs[0], expected, mapping).channel
 
 
-def _robot(path: Path, base: str | None) -> Robot | None:
-    """The robot of a robot file, its base as asked for; None for a bare URDF."""
+def _spec(path: Path, base: str | None) -> RobotSpec | None:
+    """A robot file, its base as asked for; None for a bare URDF."""
     if path.suffix.lower() != ".toml":
         if base in ("level", "measured"):
             raise GapError(
@@ -163,17 +210,17 @@ def _robot(path: Path, base: str | None) -> Robot | None:
         spec = replace(spec, floating=False)
     if base in ("level", "measured") and not spec.floating:
         raise GapError(f"{path}: its base is fixed; leave --base {base} out")
-    robot = load_robot(spec)
-    refuse_impossible(robot)
-    return robot
+    return spec
 
 
 def _catalog_files(folder: Path) -> tuple[Path, ...]:
     return tuple(sorted(folder.glob("*.toml")))
 
 
-def _ratio(chain: Chain | None, joints: int) -> np.ndarray | None:
-    return None if chain is None else np.full(joints, float(np.asarray(chain.ratio)))
+def _ratio(actuators: Actuators | None, joints: tuple[str, ...]) -> np.ndarray | None:
+    if actuators is None:
+        return None
+    return np.array([joint.ratio for joint in drivetrains_of(actuators, joints).joints])
 
 
 def open_logs(given: Setup, options: Options) -> list[Stream]:

@@ -91,12 +91,13 @@ def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -
     edits = given.file.edits if known else ()
     names = (*(edit.effect for edit in edits), *(f.effect for f in found))
     # A log that was compared without an actuator: what bodies and ground change needs none.
-    chain = given.catalog.chain(given.alternative or next(iter(given.catalog.alternatives)))
+    name = given.alternative or next(iter(given.catalog.alternatives))
+    actuators = given.own.actuators(given.catalog, name)
 
     def apply(model: MachineModel) -> MachineModel:
         return with_found(apply_edits(model, edits), found)
 
-    return effects(given.robot, chain, apply, names, "model.toml", found_with=given.alternative)
+    return effects(given.robot, actuators, apply, names, "model.toml", found_with=given.alternative)
 
 
 def cost(
@@ -114,7 +115,8 @@ def cost(
     edits = found_effects(given, found, known=known)
     start = found_effects(given, ()) if known and given.file.edits else None
     try:
-        return energy_change(given.robot, given.catalog.chains(), edits, start), edits.remarks
+        every = given.own.every(given.catalog)
+        return energy_change(given.robot, every, edits, start), edits.remarks
     except TippingError as error:
         return None, (f"With these effects {error}",)
 

@@ -103,6 +103,8 @@ def basis(given: Settings) -> Basis | str:
     results = load_results()
     if given.robot.spec.path.name != results.get("robot"):
         return f"{given.robot.spec.path.name} is not the paper's robot"
+    if given.own:
+        return "its joints have actuators of their own, of which the paper says nothing"
     if given.effects is not None:
         return "a model file changes the robot, and the paper knows nothing of its effects"
     if given.quasi_static:

@@ -6,6 +6,7 @@ import doctest
 import runpy
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -68,6 +69,21 @@ def test_changed_numbers_are_those_of_set(machine: lw.Machine, tmp_path: Path) -
     more = ["--set", "harmonic_drive.load=0.1", "--samples", "101", "--out", str(tmp_path)]
     assert exit_code(["walk", *more]) == 0
     same(tmp_path, walk, {"walking_energy"})
+
+
+def test_changed_numbers_reach_a_comparison_with_logs(machine: lw.Machine, tmp_path: Path) -> None:
+    """Current is torque over the torque constant: a tenth more constant, a tenth less current."""
+    log, key = "pipeline/identification/demo/walk.parquet", "motor_re40_24v.torque_constant"
+    changed = lw.load(changes={key: 33})
+    where, plain = lw.compare(log, changed), lw.compare(log, machine)
+    gaps = [r.where.frame()["gap"].to_numpy() for r in (plain, where)]
+    assert max(gaps[1]) != pytest.approx(max(gaps[0]), rel=1e-3)
+    options = [log, "--robot", "urdf/hexapod.toml", "--out", str(tmp_path)]
+    assert exit_code(["gap", "where", *options, "--set", f"{key}=33"]) == 0
+    same(tmp_path, where, {"where"})
+    assert f"{key}=33" in where.meta["warnings"][0]
+    with pytest.raises(PipelineError, match="no such number; did you mean"):
+        lw.compare(log, replace(changed, changes=("hip_spacin=3",)))
 
 
 def test_what_is_found_is_in_the_model_and_read_back(machine: lw.Machine, tmp_path: Path) -> None:

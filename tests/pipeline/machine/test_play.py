@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from pipeline.effects.registry import effect_named
-from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
 
 J3 = ("rm_joint_3",)
@@ -14,12 +13,9 @@ VALUES = {"width": 0.01, "stiffness": 1e3, "crossing": 0.2}
 
 
 def lead(torque: np.ndarray) -> np.ndarray:
-    """How far the motor leads at torques that are held, before the log's filter."""
+    """How far the motor leads its joint."""
     model = effect_named("backlash").apply(leg.leg_model(), J3, VALUES)
-    simulator = Simulator(leg.leg_motion())
-    constant = [np.full(len(simulator.measurement), t) for t in torque]
-    middle = len(simulator.measurement) // 2
-    return np.array([simulator._wind(model.actuator(J3[0]), t)[middle] for t in constant])
+    return model.actuator(J3[0]).wind(torque)
 
 
 def test_play_is_odd_nothing_without_load_and_ends_at_its_flanks() -> None:

@@ -1,0 +1,116 @@
+"""Numbers that differ from the files' for one run, ``KEY=VALUE`` each, as ``--set`` takes them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import overload
+
+from actuators.errors import ActuatorError, closest, one_line
+from actuators.loading.build import Catalog
+from actuators.parameters import ParameterSet
+from actuators.units import to_si
+from pipeline.errors import GaitError, RobotFileError
+from pipeline.motion.transfer_path import transfer_path
+from pipeline.robot.robot_file import RobotSpec, check_parameters
+
+TRANSFER_PATH_KEY = "gait.transfer_path"
+#: Between these a ratio looks like a slip by a prefix of the unit, the value itself a little off.
+_THOUSAND = (200.0, 5000.0)
+
+
+@overload
+def changed(
+    spec: RobotSpec, catalog: Catalog, changes: Sequence[str]
+) -> tuple[RobotSpec, Catalog, list[str]]: ...
+@overload
+def changed(
+    spec: None, catalog: Catalog, changes: Sequence[str]
+) -> tuple[None, Catalog, list[str]]: ...
+def changed(
+    spec: RobotSpec | None, catalog: Catalog, changes: Sequence[str]
+) -> tuple[RobotSpec | None, Catalog, list[str]]:
+    """Robot and actuators with changed numbers.
+
+    Args:
+        spec: Robot file; None for a bare URDF, which has no numbers of its own.
+        catalog: Actuator components and alternatives.
+        changes: ``KEY=VALUE`` each, in the unit that the key's file writes.
+
+    Returns:
+        Both, and what a reader should know of the changes.
+
+    Raises:
+        RobotFileError: No such number, or none that can be; names it and the closest match.
+    """
+    remarks = []
+    for change in changes:
+        key, equals, value = (part.strip() for part in change.partition("="))
+        if not equals or not key or not value:
+            raise RobotFileError(f"--set {one_line(change)}: expected KEY=VALUE")
+        before = spec
+        spec, catalog = _one(spec, catalog, key, value)
+        if before is not None and spec is not None:
+            remarks += _thousandfold(before.parameters, spec.parameters, key)
+    if changes and spec is not None:
+        # After all changes: two numbers that bind each other may be changed together.
+        check_parameters(spec.parameters, spec.build, "--set")
+    return spec, catalog, remarks
+
+
+def _one(
+    spec: RobotSpec | None, catalog: Catalog, key: str, value: str
+) -> tuple[RobotSpec | None, Catalog]:
+    """One change; numbers in the unit their file writes."""
+    place = f"--set {one_line(key)}={one_line(value)}"
+    if key == TRANSFER_PATH_KEY and spec is not None:
+        try:
+            return replace(spec, transfer_path=transfer_path(value).name), catalog
+        except GaitError as error:
+            raise RobotFileError(f"{place}: {error}") from None
+    references = [f"{component}.{p.name}" for component, p in catalog.rows()]
+    numbers = spec.parameters if spec is not None else {}
+    if key not in numbers and key not in references:
+        known = [*([TRANSFER_PATH_KEY] if spec else []), *numbers, *references]
+        raise RobotFileError(f"{place}: there is no such number; {_hint(key, known)}")
+    try:
+        if spec is not None and key in spec.parameters:
+            unit = spec.parameters.parameter(key).unit
+            return spec.with_parameters({key: to_si(_number(place, value), unit)}), catalog
+        unit = catalog.parameter(key).unit
+        return spec, catalog.replaced(key, to_si(_number(place, value), unit))
+    except ActuatorError as error:
+        raise RobotFileError(f"{place}: {error}") from None
+
+
+def _thousandfold(before: ParameterSet, after: ParameterSet, key: str) -> list[str]:
+    """Say when a change looks like another unit: about a thousand times more or less."""
+    if key not in before or before[key] == 0 or after[key] == 0:
+        return []
+    ratio = abs(after[key] / before[key])
+    if not (_THOUSAND[0] < max(ratio, 1 / ratio) < _THOUSAND[1]):
+        return []
+    old, new = before.parameter(key), after.parameter(key)
+    return [
+        f"{key} = {new.value_as_written:g} {new.unit} is about a thousand times "
+        f"{'more' if ratio > 1 else 'less'} than the file's {old.value_as_written:g}; --set takes "
+        f"it in {new.unit}"
+    ]
+
+
+def _hint(key: str, known: list[str]) -> str:
+    hint = closest(key, known)
+    # All names fill several screens; parameters.csv has them in order.
+    return hint if hint.startswith("did") else "parameters.csv of any run lists all names"
+
+
+def _number(place: str, text: str) -> float:
+    """A finite number in Python's and TOML's writing."""
+    try:
+        number = float(text)
+    except ValueError:
+        raise RobotFileError(f"{place}: expected a number in the unit its file writes") from None
+    if not math.isfinite(number):
+        raise RobotFileError(f"{place}: expected a finite number")
+    return number

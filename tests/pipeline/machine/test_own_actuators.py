@@ -1,0 +1,152 @@
+"""Joints with actuators of their own: the robot file's table, held against closed forms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuators.chain import Chain
+from actuators.energy.energy import stage_energy
+from actuators.loading.build import load_catalog
+from pipeline.errors import RobotFileError
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup
+from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
+from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.settings import Settings, settings
+from pipeline.simulation.walk_stand import stand, walk
+
+OWN = """
+[actuators]
+alternative = "reversible"
+
+[[actuators.joint]]
+joints = ["*_joint_1", "rm_joint_3"]
+alternative = "rotor"
+
+[[actuators.joint]]
+joints = ["*_joint_2"]
+[actuators.joint.parameters]
+ratio = {value = 160, unit = "1", basis = "datasheet", source = "an example"}
+torque_constant = {value = 60, unit = "mN*m/A", basis = "datasheet", source = "an example"}
+"""
+
+
+def robot_file(root: Path, folder: Path, table: str, robot: str = "hexapod") -> Path:
+    path = folder / "robot.toml"
+    head = f'extends = "{root}/urdf/{robot}.toml"\n[robot]\nurdf = "{root}/urdf/{robot}.urdf"\n'
+    path.write_text(head + table, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def given(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Settings:
+    return settings(robot=robot_file(root, tmp_path_factory.mktemp("own"), OWN), samples=51)
+
+
+def test_without_a_table_all_joints_share_one_chain(root: Path) -> None:
+    chains = settings(robot=root / "urdf" / "hexapod.toml", samples=51).chains()
+    assert all(isinstance(chain, Chain) for chain in chains.values())
+
+
+def test_current_is_torque_over_own_ratio_and_own_constant(given: Settings) -> None:
+    standing = stand(given.robot, given.chains())
+    ratio, constant = np.full(18, 400.0), np.full(18, 30.186992e-3)
+    second = [k for k, name in enumerate(given.robot.joints) if name.endswith("_joint_2")]
+    ratio[second], constant[second] = 160.0, 60e-3
+    np.testing.assert_allclose(
+        standing.holding["ideal"].current, standing.demand.torque[0] / ratio / constant, rtol=1e-12
+    )
+
+
+def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Settings) -> None:
+    stock = {c: load_catalog().parameter(f"{c}.ratio").value for c in ("harmonic_drive", "hypoid")}
+    for name, kept, free in (
+        ("reversible", "harmonic_drive", "timing_belt"),
+        ("irreversible", "hypoid", "planetary"),
+    ):
+        drives = given.own.actuators(given.catalog, name)
+        assert not isinstance(drives, Chain)
+        joint = drives.joints[given.robot.joints.index("lf_joint_2")]
+        ratios = {e.name: e.gearing for e in joint.elements if e.gearing != 1.0}
+        assert ratios == pytest.approx({kept: stock[kept], free: 160.0 / stock[kept]})
+
+
+def test_as_built_every_joint_takes_what_its_own_alternative_takes(given: Settings) -> None:
+    chains = given.chains()
+    assert list(chains) == ["ideal", "rotor", "reversible", "irreversible", AS_BUILT]
+    walking = walk(given.robot, chains, samples=51)
+    standing = stand(given.robot, chains)
+    drawn = {name: stage_energy(r, "el").forward for name, r in walking.results.items()}
+    for k, joint in enumerate(given.robot.joints):
+        alone = "rotor" if joint.endswith("_1") or joint == "rm_joint_3" else "reversible"
+        assert drawn[AS_BUILT][k] == pytest.approx(drawn[alone][k], rel=1e-12)
+        assert standing.holding[AS_BUILT].power[k] == standing.holding[alone].power[k]
+
+
+def test_as_built_every_watt_is_accounted_for(given: Settings) -> None:
+    result = walk(given.robot, given.chains(), samples=51).results[AS_BUILT]
+    spent = sum((*result.losses.values(), *result.stored.values()), result.joint.power)
+    scale = np.abs(result.electrical_power).max()
+    np.testing.assert_allclose(result.electrical_power, spent, atol=1e-9 * scale)
+    assert list(result.stages) == list(given.catalog.alternatives[AS_BUILT].stage_names)
+
+
+def test_a_log_is_compared_with_the_machine_as_it_is_built(root: Path, tmp_path: Path) -> None:
+    table = OWN.replace('"*_joint_1", ', "")
+    options = Options((), robot=robot_file(root, tmp_path, table, "leg"), effort="current")
+    made = setup(options)
+    assert made.alternative == AS_BUILT
+    assert made.expected.ratio == pytest.approx([400.0, 160.0, 400.0])
+    kinds = [a.elements[0].name for a in made.model.actuators]
+    assert kinds == ["harmonic_drive_friction", "harmonic_drive_friction", "transmission"]
+    motor = made.model.actuators[1].motor
+    assert motor is not None
+    assert motor.torque_constant == pytest.approx(60e-3)
+
+
+def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(
+    root: Path, tmp_path: Path
+) -> None:
+    path = robot_file(root, tmp_path, '[actuators]\nfolder = "ours"\n')
+    with pytest.raises(RobotFileError, match=r"actuators\.folder: no folder"):
+        actuator_folder(load_robot_file(path))
+    (tmp_path / "ours").symlink_to(root / "actuators" / "catalog")
+    assert actuator_folder(load_robot_file(path)) == tmp_path / "ours"
+    assert settings(robot=path, samples=51).actuators == tmp_path / "ours"
+
+
+JOINT = '[[actuators.joint]]\njoints = ["rm_joint_2"]\n'
+NUMBER = '{value = 160, unit = "1", basis = "datasheet", source = "x"}'
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ('[actuators]\nalternativ = "rotor"\n', "unknown key 'alternativ'; did you mean 'alter"),
+        ('[actuators]\nalternative = "rotr"\n', "no alternative 'rotr'; did you mean 'rotor'"),
+        ("actuators = 3\n", "actuators must be a table"),
+        ("[actuators]\njoint = 3\n", r"written \[\[actuators.joint\]\]"),
+        ('[[actuators.joint]]\njoints = ["rm_joint_9"]\n', "joint 1: no joint 'rm_joint_9'; did"),
+        ('[[actuators.joint]]\njoints = "rm_joint_2"\n', "joint 1: joints must be a list"),
+        (JOINT + 'alternative = "rotor"\n', "as what is joint 'lf_joint_1' built"),
+        (JOINT + f"parameters.ratioo = {NUMBER}\n", "unknown parameter 'ratioo': did you mean"),
+        (JOINT + "parameters.ratio = 160\n", "expected {value, unit, basis, source}"),
+        (JOINT + f"parameters.torque_constant = {NUMBER}\n", "'1' is a unit of ratio, expected"),
+        (JOINT + f'parameters."timing_belt.ratio" = {NUMBER}\n', "joint 'rm_joint_2'.*change them"),
+        (JOINT + f"parameters.ratio = {NUMBER.replace('160', '-1')}\n", "ratio must be positive"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_refused_in_one_line(
+    root: Path, tmp_path: Path, table: str, message: str
+) -> None:
+    if table.startswith("actuators"):
+        path = robot_file(root, tmp_path, "")
+        path.write_text(table + path.read_text(encoding="utf-8"), encoding="utf-8")
+    else:
+        path = robot_file(root, tmp_path, table)
+    with pytest.raises(RobotFileError, match=message) as error:
+        own_actuators(load_robot_file(path), load_catalog())
+    assert "\n" not in str(error.value)
