@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
-from typing import Final
-
-_Z: Final = 1.959963984540054  # 97.5 % point of the normal distribution
 
 
 @dataclass(frozen=True)
@@ -46,23 +42,18 @@ class Rate:
 
 
 def wilson(hits: int, trials: int) -> tuple[float, float]:
-    """95 % interval of a share, by Wilson's score.
+    """95 % interval of a share, by Wilson's score; without trials it is all there is, (0, 1).
 
     E. B. Wilson, "Probable inference, the law of succession, and statistical inference", Journal of
-    the American Statistical Association 22, 1927:
-
-        (p + z^2 / 2n +- z sqrt(p (1 - p) / n + z^2 / 4n^2)) / (1 + z^2 / n)
+    the American Statistical Association 22, 1927.
 
     Args:
         hits: How often.
-        trials: Out of how many; without any the interval is all there is, (0, 1).
+        trials: Out of how many.
     """
+    from scipy.stats import binomtest
+
     if trials <= 0:
         return 0.0, 1.0
-    p, z2 = hits / trials, _Z**2
-    middle = p + z2 / (2 * trials)
-    half = _Z * sqrt(p * (1 - p) / trials + z2 / (4 * trials**2))
-    scale = 1 + z2 / trials
-    # Rounding must not push an end past what was seen.
-    low, high = (middle - half) / scale, (middle + half) / scale
-    return max(0.0, min(low, p)), min(1.0, max(high, p))
+    low, high = binomtest(hits, trials).proportion_ci(method="wilson")
+    return float(low), float(high)

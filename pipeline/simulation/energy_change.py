@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from pipeline.machine.drivetrains import Actuators
 from pipeline.robot.robot import Robot
+from pipeline.simulation.break_even import break_even
 from pipeline.simulation.edited import Effects
 from pipeline.simulation.walk_stand import Adjust, stand, walk
 
@@ -71,7 +72,7 @@ def energy_change(
         before = _costs(known.robot, known.chains(chains), known.demand)
     told = {name: chain for name, chain in chains.items() if effects.counts_in(name)}
     after = _costs(effects.robot, effects.chains(told), effects.demand)
-    return EnergyChange(before, after, break_even(before, period), break_even(after, period))
+    return EnergyChange(before, after, crossing(before, period), crossing(after, period))
 
 
 def _costs(robot: Robot, chains: Mapping[str, Actuators], adjust: Adjust | None) -> dict[str, Cost]:
@@ -86,21 +87,11 @@ def _costs(robot: Robot, chains: Mapping[str, Actuators], adjust: Adjust | None)
     return out
 
 
-def break_even(costs: Mapping[str, Cost], period: float) -> float:
-    """Fraction of time standing at which both alternatives of `PAIR` cost the same.
-
-    (1 - f) dW / T = f dP with dW the extra walking energy of the irreversible actuator and dP the
-    power it saves standing. NaN where it never costs more walking, or saves nothing standing.
-
-    Args:
-        costs: By alternative.
-        period: Of the gait [s].
-    """
+def crossing(costs: Mapping[str, Cost], period: float) -> float:
+    """The break-even of the alternatives of `PAIR`; NaN without one of them, too."""
     if any(name not in costs for name in PAIR):
         return math.nan
     reversible, irreversible = (costs[name] for name in PAIR)
     extra = (irreversible.middle_cycle - reversible.middle_cycle) / period  # [W]
     saved = reversible.middle_standing - irreversible.middle_standing  # [W]
-    if extra <= 0 or saved <= 0:
-        return math.nan
-    return extra / (extra + saved)
+    return break_even(extra, saved)

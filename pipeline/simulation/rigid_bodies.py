@@ -9,6 +9,7 @@ feet let it (they do not move, and the base does not rotate), and the ground's f
 from __future__ import annotations
 
 import os
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -23,6 +24,9 @@ from pipeline.robot.kinematics import (
     foot_jacobians,
     foot_positions,
 )
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 _BLOCK = 2048
@@ -80,7 +84,7 @@ class RigidBodies:
         _place_joints(model, q, index_q, motion[0])
         v[:, index_v], a[:, index_v] = motion[1], motion[2]
         if machine.floating:
-            q[:, 3:7] = _quaternions(m, n)
+            q[:, 3:7] = _base_turn(m, n).as_quat()
             v[:, :3], a[:, :6] = self._base_motion(machine)
         threads = _threads(n)
         pool = pin.ModelPool(model, threads)
@@ -136,36 +140,21 @@ def _place_joints(model: pin.Model, q: Array, index_q: NDArray[np.intp], positio
             q[:, start] = position[:, k]
 
 
-def _angles(m: Measurement, n: int) -> tuple[Array, Array]:
+def _base_turn(m: Measurement, n: int) -> Rotation:
+    """Base to world, R_y(pitch) R_x(roll), at every sample."""
+    from scipy.spatial.transform import Rotation
+
     zero = np.zeros(n)
-    return (
-        zero if m.base_roll is None else m.base_roll,
-        zero if m.base_pitch is None else m.base_pitch,
-    )
-
-
-def _quaternions(m: Measurement, n: int) -> Array:
-    """Of R_y(pitch) R_x(roll), shape (N, 4) as x, y, z, w."""
-    roll, pitch = _angles(m, n)
-    cr, sr, cp, sp = np.cos(roll / 2), np.sin(roll / 2), np.cos(pitch / 2), np.sin(pitch / 2)
-    return np.stack([cp * sr, sp * cr, -sp * sr, cp * cr], axis=1)
+    roll = zero if m.base_roll is None else m.base_roll
+    pitch = zero if m.base_pitch is None else m.base_pitch
+    return Rotation.from_euler("YX", np.stack([pitch, roll], axis=1))
 
 
 def _base_rotation(m: Measurement, n: int) -> Array | None:
-    """Base to world, shape (N, 3, 3); None where it is level throughout."""
+    """The same as matrices, shape (N, 3, 3); None where the base is level throughout."""
     if m.base_roll is None and m.base_pitch is None:
         return None
-    roll, pitch = _angles(m, n)
-    cr, sr, cp, sp = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch)
-    zero = np.zeros(n)
-    return np.stack(
-        [
-            np.stack([cp, sp * sr, sp * cr], -1),
-            np.stack([zero, cr, -sr], -1),
-            np.stack([-sp, cp * sr, cp * cr], -1),
-        ],
-        axis=1,
-    )
+    return np.asarray(_base_turn(m, n).as_matrix())
 
 
 def _base_motion(
@@ -207,7 +196,7 @@ def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Arra
     q = np.tile(pin.neutral(model), (n, 1))
     v, a = np.zeros((n, model.nv)), np.zeros((n, model.nv))
     _place_joints(model, q, index_q, m.q)
-    q[:, 3:7] = _quaternions(m, n)
+    q[:, 3:7] = _base_turn(m, n).as_quat()
     v[:, index_v], a[:, index_v] = m.v, m.a
     v[:, :3] = velocity
     weightless = model.copy()

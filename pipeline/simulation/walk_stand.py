@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -74,16 +74,24 @@ class Walking:
     supplies: Mapping[str, Supply]
 
 
-def joint_series(demand: MotionDemand) -> ShaftSeries:
-    """The joints' side of the actuators: segments in a row, split at velocity zeros."""
+def joint_series(demand: MotionDemand, joints: Sequence[str] | None = None) -> ShaftSeries:
+    """The joints' side of the actuators: segments in a row, split at velocity zeros.
+
+    Args:
+        demand: Of all joints.
+        joints: Those to follow; all by default.
+    """
+    names = tuple(joints or demand.joints)
+    columns = [demand.joints.index(joint) for joint in names]
 
     def joined(name: str) -> Array:
-        return np.concatenate([getattr(part, name) for part in demand.segments])
+        parts = [getattr(part, name) for part in demand.segments]
+        return np.concatenate([part[:, columns] if joints else part for part in parts])
 
+    time = np.concatenate([part.time for part in demand.segments])
     return split_at_reversals(
         ShaftSeries.at_joint(
-            demand.joints,
-            *(joined(n) for n in ("time", "position", "velocity", "acceleration", "torque")),
+            names, time, *(joined(n) for n in ("position", "velocity", "acceleration", "torque"))
         )
     )
 
@@ -116,6 +124,18 @@ def stand(
     )
 
 
+def walking_demand(
+    robot: Robot, *, samples: int, quasi_static: bool = False, adjust: Adjust | None = None
+) -> tuple[Motion, MotionDemand]:
+    """One cycle and what it demands of the joints; see `walk`."""
+    motion = tripod_gait(robot, samples=samples)
+    demand = motion_demand(robot, motion, quasi_static=quasi_static)
+    if adjust is not None:
+        pairs = zip(motion.segments, demand.segments, strict=True)
+        demand = replace(demand, segments=tuple(adjust(segment, part) for segment, part in pairs))
+    return motion, demand
+
+
 def walk(
     robot: Robot,
     chains: Mapping[str, Actuators],
@@ -139,11 +159,9 @@ def walk(
         TippingError: A foot would have to pull.
     """
     policy = regeneration or Regeneration()
-    motion = tripod_gait(robot, samples=samples)
-    demand = motion_demand(robot, motion, quasi_static=quasi_static)
-    if adjust is not None:
-        pairs = zip(motion.segments, demand.segments, strict=True)
-        demand = replace(demand, segments=tuple(adjust(segment, part) for segment, part in pairs))
+    motion, demand = walking_demand(
+        robot, samples=samples, quasi_static=quasi_static, adjust=adjust
+    )
     series = joint_series(demand)
     results = {name: chain.moving(series) for name, chain in chains.items()}
     return Walking(

@@ -16,7 +16,6 @@ from functools import cached_property
 from typing import Final
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from pipeline.logs.errors import PreparationError
@@ -150,31 +149,20 @@ def _extended(x: Array, half: int) -> Array:
     return np.pad(y, half - reach, mode="edge") if reach < half else y
 
 
-def _convolve(padded: Array, kernels: Sequence[Array]) -> list[Array]:
-    """Overlap-save convolution of one column with several kernels of one odd length.
+def _convolve(padded: Array, kernels: Sequence[Array]) -> Array:
+    """Convolve one column with several kernels of one odd length, in overlapping blocks.
 
     Args:
         padded: Shape (N + 2 half,).
         kernels: Each of shape (2 half + 1,).
 
     Returns:
-        Each of shape (N,), aligned with the middle of the kernel.
+        Shape (kernels, N), aligned with the middle of the kernel.
     """
-    length = kernels[0].size
-    n = padded.size - length + 1
-    size = scipy.fft.next_fast_len(min(max(4 * length, 8192), max(padded.size, length)), real=True)
-    step = size - length + 1
-    blocks = -(-n // step)
-    tail = (blocks - 1) * step + size - padded.size
-    long = np.pad(padded, (0, max(0, tail)))
-    windows = np.lib.stride_tricks.sliding_window_view(long, size)[::step][:blocks]
-    spectrum = scipy.fft.rfft(windows, axis=1)
-    outs = []
-    for kernel in kernels:
-        product = spectrum * scipy.fft.rfft(kernel, size)
-        y = scipy.fft.irfft(product, size, axis=1)[:, length - 1 :]
-        outs.append(np.ascontiguousarray(y).reshape(-1)[:n])
-    return outs
+    from scipy.signal import oaconvolve
+
+    result: Array = oaconvolve(padded[None], np.stack(kernels), mode="valid", axes=1)
+    return result
 
 
 def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 0.0) -> Array:

@@ -18,14 +18,12 @@ from actuators.chain import Chain, ChainResult, HoldingResult
 from actuators.energy.energy import stage_energy
 from actuators.energy.limits import limit_rows
 from actuators.loading.build import Catalog
-from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
-from pipeline.dynamics.joint_demand import motion_demand, segment_demand
-from pipeline.motion.gait import standing_posture, tripod_gait
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.published import Published
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.walk_stand import joint_series, stand, walking_demand
 
 Array = NDArray[np.float64]
 MIDDLE_LEGS = ("lm", "rm")
@@ -107,11 +105,11 @@ def standing_targets(published: Mapping[str, Published]) -> Array:
 def standing_state(spec: RobotSpec) -> tuple[Robot, float, Array]:
     """Reaction and torques of the middle right leg, standing."""
     robot = load_robot(spec)
-    demand, contacts = segment_demand(robot, standing_posture(robot))
-    assert contacts is not None
+    standing = stand(robot, {})
+    contacts, torque = standing.contacts, standing.demand.torque[0]
     reaction = float(contacts.force_world[0, contacts.legs.index(PUBLISHED_LEG), 2])
-    columns = [demand.joints.index(j) for j in leg_joints(spec, PUBLISHED_LEG)]
-    return robot, reaction, demand.torque[0, columns]
+    columns = [robot.joints.index(j) for j in leg_joints(spec, PUBLISHED_LEG)]
+    return robot, reaction, torque[columns]
 
 
 def leg_joints(spec: RobotSpec, leg: str) -> tuple[str, ...]:
@@ -178,20 +176,9 @@ def part_of(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:
         PipelineError: Out of reach or tipping.
     """
     robot, reaction, torque = standing_state(spec)
-    demand = motion_demand(robot, tripod_gait(robot, samples=samples))
+    _, demand = walking_demand(robot, samples=samples)
     joints = tuple(j for leg in MIDDLE_LEGS for j in leg_joints(spec, leg))
-    columns = [demand.joints.index(j) for j in joints]
-
-    def joined(name: str) -> Array:
-        return np.concatenate([getattr(part, name)[:, columns] for part in demand.segments])
-
-    time = np.concatenate([part.time for part in demand.segments])
-    series = split_at_reversals(
-        ShaftSeries.at_joint(
-            joints, time, *(joined(n) for n in ("position", "velocity", "acceleration", "torque"))
-        )
-    )
-    return RobotPart(robot, reaction, torque, series)
+    return RobotPart(robot, reaction, torque, joint_series(demand, joints))
 
 
 def catalog_with(catalog: Catalog, values: Mapping[str, float], ratio: float) -> Catalog:

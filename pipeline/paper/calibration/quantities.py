@@ -9,6 +9,7 @@ import numpy as np
 
 from actuators.chain import HoldingResult
 from pipeline.paper.calibration.machine import PUBLISHED_LEG, ActuatorPart, RobotPart
+from pipeline.simulation.break_even import break_even
 
 STANDING_SECONDS = 3.0  # section IV.B adds up over the duration of a walking cycle
 #: Between which the break-even is.
@@ -48,7 +49,7 @@ class Quantity:
     needs: tuple[str, ...] = ()
 
 
-def break_even(
+def pair_break_even(
     energy: Mapping[str, Mapping[str, float]], standing_power: float, legs: int
 ) -> float:
     """Fraction of time standing above which the irreversible actuator uses less energy.
@@ -60,15 +61,9 @@ def break_even(
         energy: Electrical energy per cycle [J], alternative to leg.
         standing_power: Of one loaded leg with the reversible actuator [W].
         legs: How many of the two middle legs stand loaded.
-
-    Returns:
-        Solves (1 - f) dE = f P T; NaN where the irreversible actuator never costs more walking.
     """
     extra = sum(energy["irreversible"].values()) - sum(energy["reversible"].values())
-    held = legs * standing_power * STANDING_SECONDS
-    if extra <= 0 or held <= 0:
-        return float("nan")
-    return extra / (extra + held)
+    return break_even(extra, legs * standing_power * STANDING_SECONDS)
 
 
 def walking_extra(energy: Mapping[str, Mapping[str, float]]) -> float:
@@ -112,7 +107,7 @@ def _quantities() -> dict[str, Quantity]:
         )
     table["break_even_standing_fraction"] = Quantity(
         "ratio",
-        lambda r, a, n: break_even(a.energy, float(a.holding["reversible"].power.sum()), n),
+        lambda r, a, n: pair_break_even(a.energy, float(a.holding["reversible"].power.sum()), n),
         PAIR,
     )
     return table

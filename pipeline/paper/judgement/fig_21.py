@@ -14,6 +14,7 @@ from pipeline.paper.calibration.quantities import PAIR
 from pipeline.paper.calibration.whole_robot import Totals
 from pipeline.paper.judgement.evidence import BAND, NONE, Evidence, Interval, Point, quantiles
 from pipeline.paper.judgement.reproduction import PREDICTED_BY
+from pipeline.simulation.break_even import break_even
 
 Array = NDArray[np.float64]
 MINUTE = 60.0
@@ -70,14 +71,14 @@ class EnergyPerMinute:
 def crossing(whole: Mapping[str, Mapping[str, float]], cycle: str, stand: str) -> float:
     """Fraction of time standing at which reversible and irreversible cost the same.
 
-    (1 - f) dW/T = f dP with dW the extra walking energy of the irreversible actuator and dP the
-    power it saves standing. NaN where it never costs more walking or saves nothing standing.
+    Args:
+        whole: Per alternative: energies per cycle [J] and powers standing [W].
+        cycle: Whose energy per cycle.
+        stand: Whose power standing.
     """
     extra = whole["irreversible"][cycle] - whole["reversible"][cycle]
     saved = (whole["reversible"][stand] - whole["irreversible"][stand]) * CYCLE
-    if extra <= 0 or saved <= 0:
-        return math.nan
-    return extra / (extra + saved)
+    return break_even(extra, saved)
 
 
 def break_evens(whole: Totals, known: Evidence | None) -> tuple[BreakEven, ...]:

@@ -14,7 +14,7 @@ from typing import Any
 from actuators.units import from_si
 from pipeline.paper.calibration.machine import PUBLISHED_LEG
 from pipeline.paper.calibration.problem import EVEN
-from pipeline.paper.calibration.quantities import STANDING_SECONDS, break_even
+from pipeline.paper.calibration.quantities import STANDING_SECONDS, pair_break_even
 from pipeline.paper.judgement.evidence import numbers
 from pipeline.paper.published import Published
 
@@ -245,7 +245,7 @@ def _same_numbers(
     energy = consumption(point, net=True)
     values = {f"walking_ratio_{n}": ratio for n, ratio in ratios.items() if n != "ideal"}
     held = point["values"]["reversible_leg_energy_3s"] / STANDING_SECONDS
-    values[EVEN] = break_even(energy, held, 1)
+    values[EVEN] = pair_break_even(energy, held, 1)
     return [
         *(
             head | _row(name, published[name].unit, value, _fits(published[name], value))

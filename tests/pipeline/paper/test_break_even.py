@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from pipeline.paper.calibration.quantities import STANDING_SECONDS, break_even
+from pipeline.paper.calibration.quantities import STANDING_SECONDS, pair_break_even
 from pipeline.paper.judgement.fig_21 import crossing
 
 PERIOD = 3.0  # of the gait [s]
@@ -42,7 +42,7 @@ def test_the_papers_break_even_adds_up_both_middle_legs(legs: int) -> None:
         "irreversible": {"lm": 140.0, "rm": 145.0},
     }
     power = 0.9  # of one loaded leg [W]
-    f = break_even(energy, power, legs)
+    f = pair_break_even(energy, power, legs)
     walking = {name: (1 - f) * sum(e.values()) for name, e in energy.items()}  # [J] per period
     standing = f * legs * power * STANDING_SECONDS
     assert walking["irreversible"] == pytest.approx(walking["reversible"] + standing, rel=1e-12)

@@ -17,7 +17,7 @@ from pipeline.paper.calibration.machine import (
     solve_posture,
     standing_state,
 )
-from pipeline.paper.calibration.quantities import break_even, computed
+from pipeline.paper.calibration.quantities import computed, pair_break_even
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.walk_stand import walk
@@ -56,10 +56,12 @@ def test_split_ratios_keep_their_product() -> None:
 def test_break_even_solves_its_own_equation() -> None:
     energy = {"reversible": {"lm": 50.0, "rm": 50.0}, "irreversible": {"lm": 70.0, "rm": 71.0}}
     power, legs = 0.866, 1
-    f = break_even(energy, power, legs)
+    f = pair_break_even(energy, power, legs)
     walking = [(1 - f) * sum(energy[name].values()) for name in ("reversible", "irreversible")]
     assert walking[0] + f * legs * power * 3 == pytest.approx(walking[1])
-    assert np.isnan(break_even({"reversible": {"rm": 2.0}, "irreversible": {"rm": 1.0}}, power, 1))
+    assert np.isnan(
+        pair_break_even({"reversible": {"rm": 2.0}, "irreversible": {"rm": 1.0}}, power, 1)
+    )
 
 
 def test_every_id_is_a_number(hexapod: Robot) -> None:

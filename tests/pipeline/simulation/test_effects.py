@@ -13,7 +13,7 @@ from pipeline.machine.drivetrains import Actuators, Drivetrains, drivetrains_of
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import Effects, effects
-from pipeline.simulation.energy_change import Cost, break_even, energy_change
+from pipeline.simulation.energy_change import Cost, crossing, energy_change
 from pipeline.simulation.walk_stand import stand, walk
 from reports.pages.gap_words import energy_words
 
@@ -183,8 +183,8 @@ def test_at_the_break_even_both_cost_the_same() -> None:
         "reversible": Cost(300.0, 20.0, 120.0, 9.0),
         "irreversible": Cost(400.0, 3.0, 200.0, 1.0),
     }
-    f = break_even(costs, 3.0)
+    f = crossing(costs, 3.0)
     power = [(1 - f) * c.middle_cycle / 3.0 + f * c.middle_standing for c in costs.values()]
     assert power[0] == pytest.approx(power[1])
     swapped = {"reversible": costs["irreversible"], "irreversible": costs["reversible"]}
-    assert np.isnan(break_even(swapped, 3.0))
+    assert np.isnan(crossing(swapped, 3.0))
