@@ -89,6 +89,70 @@ class Accepted:
         return self.effect.edit(model, self.place, self.x, self.shape)
 
 
+@dataclass(frozen=True)
+class EffectKey:
+    """Which columns of an effect these are.
+
+    Attributes:
+        log: Number of the log.
+        effect: Its name.
+        place: Where.
+        shape: Its nonlinear parameters.
+    """
+
+    log: int
+    effect: str
+    place: Place
+    shape: tuple[tuple[str, float], ...]
+
+    @property
+    def of_body(self) -> bool:
+        """Whether effects of a joint hardly change it."""
+        return self.effect in ("link_mass", "center_of_mass_offset", "base_tilt")
+
+
+@dataclass(frozen=True)
+class ToleranceKey:
+    """Which column of a tolerance this is.
+
+    Attributes:
+        log: Number of the log.
+        kind: Of the tolerance.
+        place: Where.
+    """
+
+    log: int
+    kind: str
+    place: str
+
+    @property
+    def of_body(self) -> bool:
+        """Whether effects of a joint hardly change it."""
+        return self.kind in ("mass", "com_x", "com_y", "com_z", "inertia")
+
+
+Kept = dict[EffectKey | ToleranceKey, list[dict[int, Array]]]
+
+
+@dataclass
+class _Computed:
+    """What was computed of a problem; None where it was not yet.
+
+    Attributes:
+        start: Model with the tolerances as they are held.
+        near: Predictions of a problem that it was made from.
+        predictions: Of the present model.
+        stacks: Columns of all unknowns.
+        sums: Normal equations.
+    """
+
+    start: MachineModel | None = None
+    near: list[Prediction] | None = None
+    predictions: list[Prediction] | None = None
+    stacks: list[Stack] | None = None
+    sums: BlockSums | None = None
+
+
 @dataclass(eq=False)
 class Problem:
     """Everything linear about the machine at its present estimate.
@@ -110,8 +174,8 @@ class Problem:
     tolerances: tuple[Nuisance, ...] = ()
     held: Array = field(default_factory=lambda: np.zeros(0))
     floor: Array = field(default_factory=lambda: np.zeros(0))
-    _columns: dict[object, list[dict[int, Array]]] = field(default_factory=dict)
-    _cache: dict[str, object] = field(default_factory=dict)
+    _columns: Kept = field(default_factory=dict)
+    _computed: _Computed = field(default_factory=_Computed)
 
     def __post_init__(self) -> None:
         if not self.tolerances:
@@ -149,29 +213,25 @@ class Problem:
 
     def _start(self) -> MachineModel:
         """The model with tolerances as they are held."""
-        if "start" not in self._cache:
+        if self._computed.start is None:
             model = self.model
             for n, value in zip(self.tolerances, self.held, strict=True):
                 if value:
                     model = n.edit(model, float(value) * n.sigma)
-            self._cache["start"] = model
-        result = self._cache["start"]
-        assert isinstance(result, MachineModel)
-        return result
+            self._computed.start = model
+        return self._computed.start
 
     def predictions(self) -> list[Prediction]:
         """Of the present model, one per log."""
-        if "predictions" not in self._cache:
+        done = self._computed
+        if done.predictions is None:
             model = self.current()
-            near = self._cache.get("near")
-            starts = near if isinstance(near, list) else [None] * len(self.benches)
-            self._cache["predictions"] = [
+            starts: Sequence[Prediction | None] = done.near or [None] * len(self.benches)
+            done.predictions = [
                 b.simulator.predict(model, start)
                 for b, start in zip(self.benches, starts, strict=True)
             ]
-        result = self._cache["predictions"]
-        assert isinstance(result, list)
-        return result
+        return done.predictions
 
     def with_accepted(self, accepted: Sequence[Accepted], held: Array | None = None) -> Problem:
         """The problem at other effects; columns at untouched joints are kept.
@@ -185,11 +245,10 @@ class Problem:
             accepted=tuple(accepted),
             held=self.held if held is None else held,
             _columns=dict(self._columns),
-            _cache={},
+            _computed=_Computed(
+                start=self._start() if held is None else None, near=self.predictions()
+            ),
         )
-        if held is None:
-            other._cache["start"] = self._start()
-        other._cache["near"] = self.predictions()
         before = {id(a) for a in self.accepted}
         after = {id(a) for a in other.accepted}
         moved = [a for a in (*self.accepted, *other.accepted) if id(a) not in (before & after)]
@@ -198,7 +257,7 @@ class Problem:
         touched |= self._shifted(self.held, other.held)
         for key, per_log in self._columns.items():
             joints = {j for column in per_log for j in column}
-            if joints & scaled or (joints & touched and not _is_body(key)):
+            if joints & scaled or (joints & touched and not key.of_body):
                 del other._columns[key]
         return other
 
@@ -222,9 +281,8 @@ class Problem:
             accepted=(),
             held=np.zeros_like(self.held),
             _columns=dict(self._columns),
-            _cache={},
+            _computed=_Computed(near=self.predictions()),
         )
-        other._cache["near"] = self.predictions()
         moved = model.rigid is not before.rigid or model.bodies != before.bodies
         pairs = zip(before.actuators, model.actuators, strict=True)
         touched = {k for k, (old, new) in enumerate(pairs) if moved or old is not new}
@@ -237,7 +295,7 @@ class Problem:
         touched |= self._shifted(self.held, other.held)
         for key, per_log in self._columns.items():
             joints = {j for column in per_log for j in column}
-            if joints & scaled or (joints & touched and not _is_body(key)):
+            if joints & scaled or (joints & touched and not key.of_body):
                 del other._columns[key]
         return other
 
@@ -251,13 +309,13 @@ class Problem:
         self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
     ) -> list[dict[int, Array]]:
         """Columns of a candidate in one log, kept until a joint they touch changes."""
-        key = (log, effect.name, place, tuple(sorted(shape.items())))
+        key = EffectKey(log, effect.name, place, tuple(sorted(shape.items())))
         if key not in self._columns:
-            for sibling, columns in self._computed(log, effect, place, shape):
-                self._columns[(log, effect.name, sibling, key[3])] = columns
+            for sibling, columns in self._columns_of_legs(log, effect, place, shape):
+                self._columns[replace(key, place=sibling)] = columns
         return self._columns[key]
 
-    def _computed(
+    def _columns_of_legs(
         self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
     ) -> list[tuple[Place, list[dict[int, Array]]]]:
         """Columns of a candidate; of the like ones of all legs where one prediction serves all."""
@@ -278,7 +336,7 @@ class Problem:
 
     def _tolerance_columns(self, log: int) -> list[dict[int, Array]]:
         bench = self.benches[log]
-        keys = {id(n): (log, "tolerance", n.kind, n.place) for n in self.tolerances}
+        keys = {id(n): ToleranceKey(log, n.kind, n.place) for n in self.tolerances}
         for group in grouped(self.model, bench.measurement, self.tolerances):
             if any(keys[id(n)] not in self._columns for n in group):
                 base = self.predictions()[log]
@@ -303,8 +361,8 @@ class Problem:
 
     def stacks(self) -> list[Stack]:
         """Columns of all unknowns and the residual of the present model."""
-        if "stacks" not in self._cache:
-            self._cache["stacks"] = [
+        if self._computed.stacks is None:
+            self._computed.stacks = [
                 make_stack(
                     bench,
                     [*self._tolerance_columns(k), *self._accepted_columns(k)],
@@ -312,9 +370,7 @@ class Problem:
                 )
                 for k, bench in enumerate(self.benches)
             ]
-        result = self._cache["stacks"]
-        assert isinstance(result, list)
-        return result
+        return self._computed.stacks
 
     @property
     def precision(self) -> Array:
@@ -339,11 +395,9 @@ class Problem:
 
     def sums(self) -> BlockSums:
         """Normal equations of the present problem."""
-        if "sums" not in self._cache:
-            self._cache["sums"] = block_sums(self.stacks(), self.precision, self.mean)
-        result = self._cache["sums"]
-        assert isinstance(result, BlockSums)
-        return result
+        if self._computed.sums is None:
+            self._computed.sums = block_sums(self.stacks(), self.precision, self.mean)
+        return self._computed.sums
 
     def extended(self, candidate: Sequence[Columns], absorbed: Sequence[int] = ()) -> BlockSums:
         """Normal equations with the columns of a candidate appended.
@@ -409,13 +463,12 @@ class Problem:
     def rescaled(self, sigma: Array) -> Problem:
         """The problem at another noise level; columns are scaled, not computed anew."""
         share = self.sigma / sigma
-        columns = {
+        columns: Kept = {
             key: [{j: x * share[j] for j, x in column.items()} for column in per_log]
             for key, per_log in self._columns.items()
         }
-        other = replace(self, sigma=sigma, _columns=columns, _cache={})
-        other._cache["near"] = self.predictions()
-        return other
+        done = _Computed(near=self.predictions())
+        return replace(self, sigma=sigma, _columns=columns, _computed=done)
 
     def richest(self) -> Array:
         """Noise level that even all candidates together would leave, shape (J, C).
@@ -438,7 +491,7 @@ class Problem:
             head = self.head(log)
             own = [stack.X[j][k][head, c] for k in range(stack.ids[j].size)]
             for key, per_log in self._columns.items():
-                if isinstance(key, tuple) and key[0] == log and key[1] != "tolerance":
+                if isinstance(key, EffectKey) and key.log == log:
                     own += [column[j][head, c] for column in per_log if j in column]
             X = np.stack(own) if own else np.empty((0, head.stop - head.start))
             r = stack.r[j][head, c]
@@ -468,7 +521,7 @@ class Problem:
             mask = m.mask.copy()
             for k, a in enumerate(model.actuators):
                 if a.coupled_to:
-                    speed = m.v[:, k] + a.coupling * m.v[:, model.index(a.coupled_to)]
+                    speed = model.drivetrains.turned(k, m.v)
                     turning = near_rest(
                         speed[:, None], m.rest_speed[k : k + 1], m.pieces, m.rate, m.bandwidth
                     )[:, 0]
@@ -481,17 +534,9 @@ class Problem:
                 benches.append(bench)
         if not changed:
             return self
-        return replace(self, benches=tuple(benches), _columns={}, _cache={})
+        return replace(self, benches=tuple(benches), _columns={}, _computed=_Computed())
 
     def head(self, log: int) -> slice:
         """Rows of *fit* and *choose* of one log's bench."""
         parts = self.benches[log].parts
         return slice(parts[FIT].start, parts[CHOOSE].stop)
-
-
-def _is_body(key: object) -> bool:
-    """Whether a column belongs to a body or a sensor that effects of a joint hardly change."""
-    return isinstance(key, tuple) and (
-        (key[1] == "tolerance" and key[2] in ("mass", "com_x", "com_y", "com_z", "inertia"))
-        or key[1] in ("link_mass", "center_of_mass_offset", "base_tilt")
-    )
