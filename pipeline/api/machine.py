@@ -91,7 +91,7 @@ def load(
     folder = Path(actuators) if actuators else None
     file = None
     if model is not None:
-        file = read_model_file(Path(model), folder) if folder else read_model_file(Path(model))
+        file = read_model_file(Path(model), folder)
     path = Path(robot) if robot is not None else file.robot if file else DEFAULT_ROBOT
     texts = tuple(f"{name}={value}" for name, value in (changes or {}).items())
     machine = Machine(path, folder, texts, file)

@@ -203,12 +203,13 @@ def load_model(path: Path) -> MachineModel:
     return apply_edits(base_model(file), file.edits)
 
 
-def read_model_file(path: Path, catalog: Path = CATALOG) -> ModelFile:
+def read_model_file(path: Path, catalog: Path | None = None) -> ModelFile:
     """Read and check a model file.
 
     Args:
         path: The file.
-        catalog: Folder of the actuator files, to compare their hashes.
+        catalog: Folder of the actuator files, to compare their hashes; the robot file's or the
+            project's by default.
 
     Raises:
         ModelFileError: It cannot be read, is no TOML, or a key or value is wrong; the message names
@@ -274,15 +275,17 @@ def _edits(table: Mapping[str, Any], where: str) -> tuple[Edit, ...]:
 
 
 def _changed(
-    where: str, robot: Path, robot_hash: str, hashes: Mapping[str, str], catalog: Path
+    where: str, robot: Path, robot_hash: str, hashes: Mapping[str, str], catalog: Path | None
 ) -> tuple[str, ...]:
     """Files that are not those of the hashes, in words."""
     out = []
     since = "is not the one its effects were found with (other SHA-256)"
     if file_sha256(robot) != robot_hash:
         out.append(f"{where}: {one_line(robot.name)} {since}: they may not fit it any more")
+    if catalog is None and hashes and robot.suffix.lower() == ".toml":
+        catalog = actuator_folder(load_robot_file(robot))
     for name, written in hashes.items():
-        file = catalog / Path(name).name
+        file = (catalog or CATALOG) / Path(name).name
         if not file.exists() or file_sha256(file) != written:
             out.append(f"{where}: actuator file {one_line(name)} {since}")
     return tuple(out)

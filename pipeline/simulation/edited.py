@@ -24,7 +24,7 @@ from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.motion import Segment
 from pipeline.robot.kinematics import foot_force_torques
 from pipeline.robot.robot import Robot
-from pipeline.simulation.rigid_bodies import changed_model
+from pipeline.simulation.rigid_bodies import changed_model, outward
 
 Array = NDArray[np.float64]
 #: The alternative that stays without losses.
@@ -109,12 +109,9 @@ class Effects:
         squeeze = self._machine.bodies.squeeze
         if squeeze and segment.stance:
             robot = self.robot
+            standing = [[leg in segment.stance for leg in robot.leg_names]]
             force = np.zeros((segment.time.size, len(robot.leg_names), 3))
-            for side, sign in (("left", 1.0), ("right", -1.0)):
-                legs = [leg for leg in robot.spec.legs if leg.side == side]
-                standing = [leg.name for leg in legs if leg.name in segment.stance]
-                for name in standing:
-                    force[:, robot.leg_names.index(name), 1] = sign * squeeze / len(standing)
+            force[..., 1] = squeeze * outward(self._machine.left, np.array(standing))
             q = robot.leg_positions(segment.configuration)
             part = foot_force_torques(robot.chains, q, force)
             torque -= robot.layout.by_joint(part)

@@ -9,6 +9,7 @@ feet let it (they do not move, and the base does not rotate), and the ground's f
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -257,19 +258,24 @@ def _foot_forces(
     else:
         world = np.array(measured)
     if machine.bodies.squeeze:
-        world[..., 1] += machine.bodies.squeeze * _outward(machine, m, s, feet.shape)
+        standing = np.ones(feet.shape[:2]) if m.standing is None else m.standing[s]
+        world[..., 1] += machine.bodies.squeeze * outward(machine.left, standing)
     if turn is None:
         return world
     return np.einsum("nji,nfj->nfi", turn, world)
 
 
-def _outward(machine: MachineModel, m: Measurement, s: slice, shape: tuple[int, ...]) -> Array:
-    """Share of each standing foot in a lateral force of one newton per side, (n, F)."""
-    standing = np.ones(shape[:2]) if m.standing is None else m.standing[s].astype(float)
-    left = np.array(machine.left)
-    out = np.zeros(shape[:2])
-    for side, sign in ((left, 1.0), (~left, -1.0)):
-        part = standing * side
+def outward(left: Sequence[bool], standing: NDArray[np.generic]) -> Array:
+    """Share of each standing foot in a lateral force of one newton per side, (n, F).
+
+    Args:
+        left: Which feet are on the left side, (F,).
+        standing: Which feet stand, (n, F).
+    """
+    own = np.array(left)
+    out = np.zeros(standing.shape)
+    for side, sign in ((own, 1.0), (~own, -1.0)):
+        part = (standing * side).astype(float)
         out += sign * part / np.maximum(part.sum(axis=1, keepdims=True), 1.0)
     return out
 

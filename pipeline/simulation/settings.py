@@ -100,14 +100,7 @@ def settings(
         GapError: The model file cannot be used, or its effects do not fit the robot.
     """
     path = model if isinstance(model, Path) else None
-    catalogue = actuators or CATALOG
-    file = (
-        read_model_file(path, catalogue)
-        if path
-        else model
-        if isinstance(model, ModelFile)
-        else None
-    )
+    file = read_model_file(model, actuators) if isinstance(model, Path) else model
     spec = load_robot_file(robot or (file.robot if file else DEFAULT_ROBOT))
     actuators = actuators or actuator_folder(spec)
     catalog = load_catalog(actuators or CATALOG)

@@ -47,24 +47,8 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         help="time in the log at which a period of the robot file's gait begins: tells which feet "
         "stand where the log has neither foot forces nor contacts; the lowest feet without it",
     )
+    _machine_options(sub)
     sub.add_argument("--mapping", type=named_path, help="mapping file (TOML) for foreign columns")
-    sub.add_argument(
-        "--alternative",
-        metavar="NAME",
-        help="actuator between joint and supply: ideal, rotor (default), reversible or "
-        "irreversible, or one of --actuators; a bare URDF has none by default",
-    )
-    sub.add_argument(
-        "--actuators", type=named_path, metavar="DIR", help="folder of actuator files of your own"
-    )
-    sub.add_argument(
-        "--set",
-        dest="changes",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a number for this run, as `walk` takes it",
-    )
     sub.add_argument("--effort", metavar="CHANNEL", help="torque, current, voltage or power")
     sub.add_argument("--cutoff", type=float, metavar="HZ", help="bandwidth of the comparison")
     sub.add_argument(
@@ -83,6 +67,27 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
     )
     add_decimal_option(sub)
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
+
+
+def _machine_options(sub: argparse.ArgumentParser) -> None:
+    """What drives the joints, and numbers that differ."""
+    sub.add_argument(
+        "--alternative",
+        metavar="NAME",
+        help="actuator between joint and supply: ideal, rotor (default), reversible or "
+        "irreversible, or one of --actuators; a bare URDF has none by default",
+    )
+    sub.add_argument(
+        "--actuators", type=named_path, metavar="DIR", help="folder of actuator files of your own"
+    )
+    sub.add_argument(
+        "--set",
+        dest="changes",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a number for this run, as `walk` takes it",
+    )
 
 
 def options_of(given: argparse.Namespace) -> Options:

@@ -15,6 +15,7 @@ from pipeline.identification.regression.design_matrix import (
     make_bench,
     residual,
 )
+from pipeline.identification.regression.kept import EffectKey, Kept, ToleranceKey
 from pipeline.identification.regression.normal_equations import (
     BlockSums,
     Stack,
@@ -87,51 +88,6 @@ class Accepted:
     def apply(self, model: MachineModel) -> MachineModel:
         """The model with the effect."""
         return self.effect.edit(model, self.place, self.x, self.shape)
-
-
-@dataclass(frozen=True)
-class EffectKey:
-    """Which columns of an effect these are.
-
-    Attributes:
-        log: Number of the log.
-        effect: Its name.
-        place: Where.
-        shape: Its nonlinear parameters.
-    """
-
-    log: int
-    effect: str
-    place: Place
-    shape: tuple[tuple[str, float], ...]
-
-    @property
-    def of_body(self) -> bool:
-        """Whether effects of a joint hardly change it."""
-        return self.effect in ("link_mass", "center_of_mass_offset", "base_tilt")
-
-
-@dataclass(frozen=True)
-class ToleranceKey:
-    """Which column of a tolerance this is.
-
-    Attributes:
-        log: Number of the log.
-        kind: Of the tolerance.
-        place: Where.
-    """
-
-    log: int
-    kind: str
-    place: str
-
-    @property
-    def of_body(self) -> bool:
-        """Whether effects of a joint hardly change it."""
-        return self.kind in ("mass", "com_x", "com_y", "com_z", "inertia")
-
-
-Kept = dict[EffectKey | ToleranceKey, list[dict[int, Array]]]
 
 
 @dataclass

@@ -89,8 +89,7 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         ActuatorError: The catalogue cannot be used, or has no such alternative.
         GapError: `--base` does not fit the robot, or the model file cannot be used.
     """
-    folder = options.actuators or CATALOG
-    given_file = read_model_file(options.model, folder) if options.model else known
+    given_file = read_model_file(options.model, options.actuators) if options.model else known
     path: Path = options.robot or (given_file.robot if given_file else DEFAULT_ROBOT)
     parts = _parts(path, options)
     catalog, own = parts.catalog, parts.own

@@ -126,7 +126,6 @@ def motor_limits_figure(
     headline(figure, title, subtitle)
     whole, *panels = figure.subplots(1, 1 + len(joints), width_ratios=[0.8] + [1.0] * len(joints))
     _whole(whole, motors[columns[0]], columns[0], scale, factor)
-    alike = all(motors[column] is motors[columns[0]] for column in columns)
     whole.set_ylabel(f"motor torque [{unit}]")
     whole.set_title("whole region\n", loc="center", fontweight="bold")
     for column, value, axes, label in zip(columns, rms, panels, joints.values(), strict=True):
@@ -136,25 +135,24 @@ def motor_limits_figure(
         allowed = motor.continuous_current * _constants(motor, column)[0]
         share = f" of {number(allowed * factor)}" if np.isfinite(allowed) else ""
         axes.set_title(f"{label}\n", loc="center", fontweight="bold")
-        axes.text(
-            0.5,
-            1.015,
-            f"rms {number(float(value) * factor)}{share} {unit}",
-            transform=axes.transAxes,
-            ha="center",
-            va="bottom",
-            color=QUIET,
-            fontsize=8,
-        )
+        words = f"rms {number(float(value) * factor)}{share} {unit}"
+        look = {"ha": "center", "va": "bottom", "color": QUIET, "fontsize": 8}
+        axes.text(0.5, 1.015, words, transform=axes.transAxes, **look)
         if axes is not panels[0]:
             axes.tick_params(labelleft=False)
     for axes in (whole, *panels):
         axes.set_xlabel("motor speed [1000 rpm]")
-    if not alike:  # each panel has limits of its own: the key tells what they are, not how large
-        for handle in key:
-            handle.set_label(str(handle.get_label()).partition(":")[0])
+    key = _common(key, [motors[column] for column in columns])
     figure.legend(handles=key, loc="outside lower center", ncols=4, fontsize=8, handlelength=2.2)
     return figure
+
+
+def _common(key: list[Artist], motors: Sequence[DCMotor]) -> list[Artist]:
+    """The key of all panels: how large a limit is only where it is the same in each."""
+    if any(motor is not motors[0] for motor in motors):
+        for handle in key:
+            handle.set_label(str(handle.get_label()).partition(":")[0])
+    return key
 
 
 def _columns(series: ShaftSeries, joints: Sequence[str]) -> list[int]:

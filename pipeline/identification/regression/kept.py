@@ -1,0 +1,58 @@
+"""Which columns of a least-squares problem are kept from one estimate to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.effects.base import Place
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EffectKey:
+    """Which columns of an effect these are.
+
+    Attributes:
+        log: Number of the log.
+        effect: Its name.
+        place: Where.
+        shape: Its nonlinear parameters.
+    """
+
+    log: int
+    effect: str
+    place: Place
+    shape: tuple[tuple[str, float], ...]
+
+    @property
+    def of_body(self) -> bool:
+        """Whether effects of a joint hardly change it."""
+        return self.effect in ("link_mass", "center_of_mass_offset", "base_tilt")
+
+
+@dataclass(frozen=True)
+class ToleranceKey:
+    """Which column of a tolerance this is.
+
+    Attributes:
+        log: Number of the log.
+        kind: Of the tolerance.
+        place: Where.
+    """
+
+    log: int
+    kind: str
+    place: str
+
+    @property
+    def of_body(self) -> bool:
+        """Whether effects of a joint hardly change it."""
+        return self.kind in ("mass", "com_x", "com_y", "com_z", "inertia")
+
+
+#: Columns in one log, each by the joints on which it acts.
+Kept = dict[EffectKey | ToleranceKey, list[dict[int, Array]]]
