@@ -10,6 +10,7 @@ import pytest
 from actuators.chain import Chain
 from actuators.energy.energy import stage_energy
 from actuators.loading.build import load_catalog
+from pipeline.effects.model_file import Edit, EditParameter, base_model, new_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
@@ -150,3 +151,15 @@ def test_a_table_that_cannot_be_used_is_refused_in_one_line(
     with pytest.raises(RobotFileError, match=message) as error:
         own_actuators(load_robot_file(path), load_catalog())
     assert "\n" not in str(error.value)
+
+
+def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Settings) -> None:
+    value = EditParameter("torque", 2.0, "N*m", (2.0, 2.0))
+    edit = Edit("coulomb_friction", ("rm_joint_2",), (value,), source="log.csv")
+    file = new_model_file(given.robot.spec.path, AS_BUILT).with_edits([edit])
+    edited = settings(robot=given.robot.spec.path, model=file, samples=51)
+    walking = walk(edited.machine, edited.chains(), samples=51, adjust=edited.adjust)
+    told = [n for n, r in walking.results.items() if "coulomb_friction" in r.losses]
+    assert told == [AS_BUILT]
+    column = given.robot.joints.index("rm_joint_2")
+    assert base_model(file).actuators[column].ratio == pytest.approx(160.0)
