@@ -7,12 +7,15 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from matplotlib.figure import Figure
 
+from pipeline.cli.demo import DEMO
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
 from pipeline.motion.gait import tripod_gait
 from pipeline.motion.motion import Motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
+from reports.figures import several
 from tests.command_line import Command, exit_code, stand_and_walk
 
 # No clock in a test: a loaded machine is no failure.
@@ -20,6 +23,7 @@ settings.register_profile("legwatt", deadline=None)
 settings.load_profile("legwatt")
 
 ROOT = Path(__file__).parents[1]
+SKETCH = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"></svg>\n'
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 
@@ -64,3 +68,28 @@ def shared_data() -> Path:
     if not root or not (Path(root) / "data").is_dir():
         pytest.skip("LEGWATT_SHARED does not name the folder of the measured logs")
     return Path(root) / "data"
+
+
+@pytest.fixture
+def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are made but not rendered, for tests of what stands beside them.
+
+    Every figure of a run is rendered and measured in `tests/reports/test_geometry_of_run.py`.
+    """
+
+    def save(figure: Figure, folder: Path, name: str) -> None:
+        assert figure.axes
+        (folder / f"{name}.svg").write_text(SKETCH, encoding="utf-8")
+        (folder / f"{name}.png").write_bytes(b"")
+
+    monkeypatch.setattr(several, "save_figure", save)
+
+
+@pytest.fixture(scope="session")
+def short_demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first four seconds of the demonstration's log: two steps of each tripod."""
+    import pyarrow.parquet as pq
+
+    path = tmp_path_factory.mktemp("demo") / "short.parquet"
+    pq.write_table(pq.read_table(DEMO).slice(0, 2000), path)
+    return path

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import doctest
+import io
 import runpy
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -20,7 +25,9 @@ from pipeline.logs.errors import GapError
 from reports.errors import TableError
 from tests.command_line import exit_code
 
-EXAMPLES = sorted((Path(__file__).parents[3] / "pipeline" / "examples").glob("*.py"))
+FOLDER = Path(__file__).parents[3] / "pipeline" / "examples"
+EXAMPLES = sorted(path.stem for path in FOLDER.glob("*.py"))
+Example = Callable[[str], tuple[str, dict[str, Any]]]
 
 
 @pytest.fixture
@@ -71,9 +78,11 @@ def test_changed_numbers_are_those_of_set(machine: lw.Machine, tmp_path: Path) -
     same(tmp_path, walk, {"walking_energy"})
 
 
-def test_changed_numbers_reach_a_comparison_with_logs(machine: lw.Machine, tmp_path: Path) -> None:
+def test_changed_numbers_reach_a_comparison_with_logs(
+    machine: lw.Machine, short_demo: Path, tmp_path: Path
+) -> None:
     """Current is torque over the torque constant: a tenth more constant, a tenth less current."""
-    log, key = "pipeline/identification/demo/walk.parquet", "motor_re40_24v.torque_constant"
+    log, key = str(short_demo), "motor_re40_24v.torque_constant"
     changed = lw.load(changes={key: 33})
     where, plain = lw.compare(log, changed), lw.compare(log, machine)
     gaps = [r.where.frame()["gap"].to_numpy() for r in (plain, where)]
@@ -86,10 +95,26 @@ def test_changed_numbers_reach_a_comparison_with_logs(machine: lw.Machine, tmp_p
         lw.compare(log, replace(changed, changes=("hip_spacin=3",)))
 
 
-def test_what_is_found_is_in_the_model_and_read_back(machine: lw.Machine, tmp_path: Path) -> None:
-    log = lw.read_log("pipeline/identification/demo/walk.parquet", machine)
-    assert "ok" in set(log.quality.frame()["verdict"])
-    found = lw.identify(log, machine, test="pipeline/identification/demo/walk_slow.parquet")
+@pytest.fixture(scope="module")
+def example(root: Path) -> Example:
+    """Runs an example, once; what it printed and the names it leaves."""
+
+    @cache
+    def run(name: str) -> tuple[str, dict[str, Any]]:
+        with contextlib.chdir(root), contextlib.redirect_stdout(io.StringIO()) as said:
+            left = runpy.run_path(str(FOLDER / f"{name}.py"))
+        return said.getvalue(), left
+
+    return run
+
+
+def test_what_is_found_is_in_the_model_and_read_back(
+    machine: lw.Machine, example: Example, tmp_path: Path
+) -> None:
+    """Of the example that identifies from a log with another one as its test."""
+    _, left = example("log_with_a_gap")
+    assert "ok" in set(left["log"].quality.frame()["verdict"])
+    found = left["result"]
     assert list(found.found.frame()["effect"]) == ["coulomb_friction"]
     before, after = found.gap
     assert after < 0.1 * before
@@ -126,13 +151,10 @@ def test_errors_are_one_line(machine: lw.Machine, tmp_path: Path) -> None:
         assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("path", EXAMPLES, ids=lambda p: p.stem)
-def test_examples_run(
-    path: Path, root: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(root)
-    runpy.run_path(str(path))
-    assert capsys.readouterr().out.count("\n") >= 2
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_examples_run(name: str, example: Example) -> None:
+    said, _ = example(name)
+    assert said.count("\n") >= 2
 
 
 def test_the_example_of_the_package_is_true(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import random
 import re
+import resource
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -20,28 +23,33 @@ from reports.errors import FigureError
 from reports.folder.exchange import EXCHANGE
 from reports.folder.manifest import MANIFEST, read_manifest
 from reports.folder.staging import holding
-from tests.command_line import Command, exit_code, results
+from tests.command_line import Command, exit_code, in_another_process, results
 
-#: Kills its own process at the given call of os.rename, by which a finished set is put in place.
-KILLED = """
-import os, signal, sys
-real, calls = os.rename, []
-def rename(source, target):
-    calls.append(target)
-    if len(calls) == {at}:
-        os.kill(os.getpid(), signal.SIGKILL)
-    real(source, target)
-os.rename = rename
+CODE = """
+import sys
 from pipeline.cli.main import main
 sys.exit(main(sys.argv[1:]))
 """
-#: No file may grow beyond so many bytes, as on a disk that is full: the system itself refuses.
-FULL = """
-import resource, sys
-resource.setrlimit(resource.RLIMIT_FSIZE, ({bytes}, {bytes}))
-from pipeline.cli.main import main
-sys.exit(main(sys.argv[1:]))
-"""
+
+
+def killed(at: int) -> None:
+    """This process kills itself at a call of os.rename, by which a finished set is put in place."""
+    real, calls = os.rename, []
+
+    def rename(source: str, target: str) -> None:
+        calls.append(target)
+        if len(calls) == at:
+            os.kill(os.getpid(), signal.SIGKILL)
+        real(source, target)
+
+    os.rename = rename  # type: ignore[assignment]
+
+
+def full(most: int) -> None:
+    """No file may grow beyond so many bytes, as on a disk that is full: the system refuses."""
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+
+
 CHANGE = ("--set", "hip_spacing=280")
 
 
@@ -109,7 +117,8 @@ def test_a_process_killed_while_it_puts_files_in_place(
     assert command("stand", tmp_path / "out") == 0
     old = contents(tmp_path / "out")
     arguments = ("stand", "--out", str(tmp_path / "out"), *CHANGE)
-    assert python(root, KILLED.format(at=at), *arguments).returncode == -signal.SIGKILL
+    ended = in_another_process(arguments, tmp_path, partial(killed, at))
+    assert ended.returncode == -signal.SIGKILL
     left = contents(tmp_path / "out").items()
     assert left <= old.items() or left <= new.items()
     assert (tmp_path / "out" / EXCHANGE).is_dir() == (at > 1)
@@ -119,11 +128,12 @@ def test_a_process_killed_while_it_puts_files_in_place(
 def killed_at_random(root: Path, folder: Path, verb: str, kills: int, seed: int) -> None:
     """Kill runs of a verb at random instants; the folder holds a whole set after every one."""
     command = [sys.executable, "-m", "pipeline", verb, "--out"]
-    for name, more in (("old", ()), ("new", CHANGE), ("out", ())):
+    for name, more in (("old", ()), ("new", CHANGE)):
         begin = time.monotonic()
         run = [*command, str(folder / name), *more]
         subprocess.run(run, cwd=root, check=True, capture_output=True, timeout=300)
-    takes = time.monotonic() - begin
+        takes = time.monotonic() - begin
+    shutil.copytree(folder / "old", folder / "out")
     sets = {"old": contents(folder / "old"), "new": contents(folder / "new")}
     here, instants, seen = "old", random.Random(seed), []
     for kill in range(kills):
@@ -172,7 +182,7 @@ def test_two_at_once(root: Path, tmp_path: Path, command: Command) -> None:
     )
     assert first.stdout is not None
     first.stdout.readline()
-    second = python(root, KILLED.format(at=0), "stand", "--out", str(tmp_path))
+    second = python(root, CODE, "stand", "--out", str(tmp_path))
     assert second.returncode == 2
     assert second.stderr.count("\n") == 1
     assert f"{tmp_path}: another run is writing here" in second.stderr
@@ -255,7 +265,8 @@ def test_a_full_disk(root: Path, tmp_path: Path, command: Command, verb: str) ->
     if verb != "twin":
         assert command("stand", place) == 0
         before = contents(place)
-    done = python(root, FULL.format(bytes=30_000), *VERBS[verb], "--out", str(place))
+    arguments = [*VERBS[verb], "--out", str(place)]
+    done = in_another_process(arguments, tmp_path, partial(full, 30_000))
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("\n") == 1
     assert "cannot be written (File too large); choose another folder" in done.stderr

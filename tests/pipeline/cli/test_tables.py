@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.demo import DEMO
 from tests.command_line import Command, exit_code, rows_of, sidecar_of, stand_and_walk
 
 LEGS = ("lf", "lm", "lr", "rf", "rm", "rr")
@@ -152,10 +151,11 @@ def test_stages_are_spelled_out_beside_their_codes(out: Path) -> None:
         assert name not in (stage, "")
 
 
-def test_comma_copies_of_a_run(out: Path, tmp_path: Path, command: Command) -> None:
+@pytest.mark.usefixtures("sketched")
+def test_comma_copies_of_a_run(tmp_path: Path, short_demo: Path, command: Command) -> None:
     """No quotes around numbers and no dot in them; the paper's 0.94 in a text column, too."""
     assert command("reports", tmp_path / "reports", "--decimal", "comma") == 0
-    gap = ["gap", "where", str(DEMO), "--out", str(tmp_path / "gap"), "--decimal", "comma"]
+    gap = ["gap", "where", str(short_demo), "--out", str(tmp_path / "gap"), "--decimal", "comma"]
     assert exit_code(gap) == 0
     number = re.compile(r"[-+]?[0-9]+\.[0-9]*(e[-+]?[0-9]+)?")
     copies = sorted(tmp_path.glob("*/*.comma.csv"))

@@ -47,8 +47,9 @@ def truth() -> MachineModel:
     return effect_named("viscous_friction").apply(model, (JOINT,), {"coefficient": VISCOUS})
 
 
-def log(seed: int, bridge: str | None, seconds: float = 8.0) -> Log:
-    """Driven by sines, and every second second without a drive."""
+@cache
+def driven(seed: int, open_bridge: bool, seconds: float = 8.0) -> Log:
+    """Driven by sines, and without a drive every second second; of the bridge nothing is told."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * 200)) / 200
     w = rng.uniform(1.5, 6.0, 3)
@@ -61,7 +62,7 @@ def log(seed: int, bridge: str | None, seconds: float = 8.0) -> Log:
         supply=np.full(time.size, 7.3),
         gain=1.5,
         off=off,
-        open_bridge=bridge != "shorted",
+        open_bridge=open_bridge,
         position=np.zeros(1),
         velocity=np.zeros(1),
     )
@@ -76,14 +77,15 @@ def log(seed: int, bridge: str | None, seconds: float = 8.0) -> Log:
         voltage=voltage,
         valid=~off,
         torque_off=off,
-        torque_off_bridge=bridge,
     )
 
 
 @cache
 def measurements(bridge: str | None) -> tuple[Measurement, ...]:
     model = stated()
-    logs = [log(seed, bridge) for seed in (1, 2, 3)]
+    logs = [
+        replace(driven(seed, bridge != "shorted"), torque_off_bridge=bridge) for seed in (1, 2, 3)
+    ]
     expected = expected_of_model(model.rigid, model.name, joints=model.joints)
     intake = prepare_logs(logs, expected, cutoff=12.0)
     parts = split(intake.prepared[:2], holdout=intake.prepared[2:])

@@ -28,12 +28,20 @@ from tests.pipeline.logs.made import made_log, motion
 JOINTS = ("rm_joint_1", "rm_joint_2", "rm_joint_3")
 
 
-def long_leg(path: Path, effects: list[str], logs: int, seed: int = 5) -> Path:
-    """Several motions of one leg with something hidden, in one file with gaps between them."""
+def long_leg(path: Path, effects: list[str], logs: int, seed: int = 5, times: int = 1) -> Path:
+    """Several motions of one leg with something hidden, in one file with gaps between them.
+
+    Args:
+        path: To write.
+        effects: To hide.
+        logs: How many motions.
+        seed: Of the machine.
+        times: How often each motion is there.
+    """
     made = make_trial(seed, effects, "leg", "low", logs=logs).logs
     columns: dict[str, list[np.ndarray]] = {}
     start = 0.0
-    for log in made.values():
+    for log in list(made.values()) * times:
         for name, values in log.items():
             shifted = values - values[0] + start if name == "time_s" else values
             columns.setdefault(name, []).append(shifted)
@@ -84,7 +92,9 @@ def test_nothing_is_taken_where_nothing_can_be_compared() -> None:
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return long_leg(tmp_path_factory.mktemp("long") / "long.parquet", ["viscous_friction"], 6)
+    return long_leg(
+        tmp_path_factory.mktemp("long") / "long.parquet", ["viscous_friction"], 2, times=3
+    )
 
 
 def test_chunks_hold_every_row_once_and_what_proves_had_no_say(

@@ -233,14 +233,16 @@ def test_a_start_of_the_gait_tells_contact_where_the_log_does_not(tmp_path: Path
     assert "forces" in _contact_source(tmp_path, DEMO, start)
 
 
-def test_vertical_foot_forces_alone_tell_contact_and_say_what_they_do_not(tmp_path: Path) -> None:
-    whole = pq.read_table(DEMO)
+def test_vertical_foot_forces_alone_tell_contact_and_say_what_they_do_not(
+    tmp_path: Path, short_demo: Path
+) -> None:
+    whole = pq.read_table(short_demo)
     lateral = [n for n in whole.column_names if "force_x" in n or "force_y" in n]
     vertical = tmp_path / "vertical.parquet"
     pq.write_table(whole.drop(lateral), vertical)
     out = tmp_path / "out"
     gaps = []
-    for log in (DEMO, vertical):
+    for log in (short_demo, vertical):
         assert exit_code(["gap", "where", str(log), "--out", str(out)]) == 0
         rows = rows_of(out / "where.csv")
         assert rows[0]["joint"] == "rm_joint_1"

@@ -30,6 +30,7 @@ def _gap(step: str, folder: Path, out: Path, *more: str) -> list[dict[str, str]]
     return rows_of(out / "found.csv") if (out / "found.csv").exists() else []
 
 
+@pytest.mark.slow
 def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) -> None:
     bare, loaded = tmp_path / "bare", tmp_path / "loaded"
     _twin(bare, "coulomb_friction")

@@ -132,9 +132,9 @@ def test_a_model_that_a_step_reads_from_its_own_folder_stays(
     }
 
 
-def test_where_gives_the_same_bytes_twice(tmp_path: Path) -> None:
+def test_where_gives_the_same_bytes_twice(tmp_path: Path, short_demo: Path) -> None:
     for name in ("one", "two"):
-        assert exit_code(["gap", "where", str(DEMO), "--out", str(tmp_path / name)]) == 0
+        assert exit_code(["gap", "where", str(short_demo), "--out", str(tmp_path / name)]) == 0
     files = sorted(p.name for p in (tmp_path / "one").iterdir())
     assert files == sorted(p.name for p in (tmp_path / "two").iterdir())
     for name in files:
@@ -146,6 +146,7 @@ def test_where_gives_the_same_bytes_twice(tmp_path: Path) -> None:
     assert sum(shares) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_the_shipped_logs_are_of_the_shipped_robot(tmp_path: Path) -> None:
     """A changed robot file or catalogue asks for `python -m pipeline.cli.demo`."""
     import pyarrow.parquet as pq
