@@ -1,19 +1,22 @@
-"""Parameters with unit, basis, source and interval, loaded from TOML; standard library only."""
+"""Parameters with unit, basis, source and interval, loaded from TOML."""
 
 import dataclasses
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-from actuators.errors import ParameterError, UnitError, closest, one_line
+from pydantic import AfterValidator, create_model
+
+from actuators.checked import Number, Pair, Table, checked
+from actuators.errors import ActuatorError, ParameterError, UnitError, closest, one_line
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, from_si, si_unit, to_si
 
 BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified", "assumed")
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
-_KEYS: Final = ("value", "unit", "basis", "source", "interval", "bounds", "reason")
 #: Without these a number cannot be judged.
 REQUIRED_KEYS: Final = ("value", "unit", "basis", "source")
 _SIGMAS_95: Final = 1.96
@@ -187,24 +190,12 @@ def parameters_from_table(
 
     Raises:
         ParameterError: A name or key that is unknown or missing, a value that is not a finite
-            number of the right dimension, or attributes that contradict one another.
+            number of the right dimension, or attributes that contradict one another; all of them.
     """
-    if not isinstance(table, Mapping):
-        raise ParameterError(f"{where}: expected a table of parameters")
-    for name in table:
-        if name not in schema:
-            raise ParameterError(
-                f"{where}: unknown parameter '{one_line(name)}': {closest(name, list(schema))}"
-            )
-    missing = [name for name in schema if name not in table and name not in optional]
-    if missing:  # all at once: whoever writes a file sees the whole list
-        what = "parameter" if len(missing) == 1 else "parameters"
-        names = ", ".join(f"'{name}'" for name in missing)
-        raise ParameterError(f"{where}: missing {what} {names}: add each with its basis")
-    rows = tuple(
-        _parameter(name, table[name], schema[name], where) for name in schema if name in table
-    )
-    return ParameterSet(rows, where)
+    names = _named(tuple(schema.items()), optional)
+    read = checked(names, table, where, ParameterError)
+    rows = (getattr(read, name) for name in schema)
+    return ParameterSet(tuple(row for row in rows if row is not None), where)
 
 
 def load_parameters(
@@ -227,67 +218,68 @@ def load_parameters(
     return parameters_from_table(contents[table], schema, f"{name} [{table}]")
 
 
-def _parameter(name: str, entry: object, expected: str, where: str) -> Parameter:
-    """Return one parameter from its TOML entry."""
-    place = f"{where}: '{name}'"
-    if not isinstance(entry, Mapping):
-        raise ParameterError(f"{place}: expected {{value, unit, basis, source}}")
-    for key in entry:
-        if key not in _KEYS:
-            raise ParameterError(f"{place}: unknown key '{one_line(key)}': {closest(key, _KEYS)}")
-    missing = ", ".join(f"'{key}'" for key in REQUIRED_KEYS if key not in entry)
-    if missing:
-        raise ParameterError(f"{place}: missing key{'s' if ',' in missing else ''} {missing}")
-    for key in ("unit", "basis", "source", "reason"):
-        if not isinstance(entry.get(key, ""), str):
-            raise ParameterError(f"{place}: '{key}' must be text in quotation marks")
-    unit: str = entry["unit"]
+class _Written(Table):
+    """A parameter as it stands in a file."""
+
+    expected = "{value, unit, basis, source}"
+    value: Number
+    unit: str
+    basis: str
+    source: str
+    interval: Pair | None = None
+    bounds: Pair | None = None
+    reason: str = ""
+
+
+class _Names(Table):
+    """Parameters by name."""
+
+    noun = "parameter"
+    expected = "parameters by name"
+
+
+@cache
+def _named(schema: tuple[tuple[str, str], ...], optional: frozenset[str]) -> type[_Names]:
+    """The table of the parameters of a schema, which become `Parameter` as they are read."""
+    fields: dict[str, Any] = {}
+    for name, kind in schema:
+        entry = Annotated[_Written, AfterValidator(partial(_parameter, name, kind))]
+        fields[name] = (entry | None, None) if name in optional else (entry, ...)
+    return create_model("_Named", __base__=_Names, **fields)
+
+
+def _parameter(name: str, expected: str, entry: _Written) -> Parameter:
+    """One parameter in SI units.
+
+    Args:
+        name: Its key.
+        expected: Dimension it must have.
+        entry: As written.
+
+    Raises:
+        ValueError: A unit of another dimension, or attributes that contradict one another.
+    """
+    unit = entry.unit
     try:
         found = dimension(unit)
-    except UnitError as error:
-        raise ParameterError(f"{place}: {error}") from None
-    if found != expected:
-        raise ParameterError(
-            f"{place}: '{unit}' is a unit of {found}, expected {expected} "
-            f"such as '{si_unit(expected)}'"
-        )
-    written = _number(entry["value"], f"{place}: value")
-    try:
+        if found != expected:
+            raise UnitError(
+                f"'{unit}' is a unit of {found}, expected {expected} such as '{si_unit(expected)}'"
+            )
         return Parameter(
             name=name,
-            value=to_si(written, unit),
+            value=to_si(entry.value, unit),
             unit=unit,
-            value_as_written=written,
-            basis=entry["basis"],
-            source=entry["source"],
-            interval=_pair(entry.get("interval"), unit, f"{place}: interval"),
-            bounds=_pair(entry.get("bounds"), unit, f"{place}: bounds"),
-            reason=entry.get("reason", ""),
+            value_as_written=entry.value,
+            basis=entry.basis,
+            source=entry.source,
+            interval=_in_si(entry.interval, unit),
+            bounds=_in_si(entry.bounds, unit),
+            reason=entry.reason,
         )
-    except ParameterError as error:
-        message = str(error)
-        raise ParameterError(
-            message if message.startswith(where) else f"{where}: {message}"
-        ) from None
+    except ActuatorError as error:
+        raise ValueError(str(error).removeprefix(f"'{name}'").lstrip(": ")) from None
 
 
-def _number(value: object, place: str) -> float:
-    """Return a finite float."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ParameterError(f"{place} must be a number, not {one_line(repr(value))[:40]}")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ParameterError(f"{place} must be a finite number")
-    return number
-
-
-def _pair(value: object, unit: str, place: str) -> Interval | None:
-    """Return a pair [low, high] in SI units, or None where there is none."""
-    if value is None:
-        return None
-    if not isinstance(value, list) or len(value) != 2:
-        raise ParameterError(f"{place} must be [low, high]")
-    return to_si(_number(value[0], place), unit), to_si(_number(value[1], place), unit)
+def _in_si(pair: Interval | None, unit: str) -> Interval | None:
+    return None if pair is None else (to_si(pair[0], unit), to_si(pair[1], unit))

@@ -3,9 +3,12 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Final
+from typing import Annotated, Final
+
+from pydantic import AfterValidator, ConfigDict, Field, Strict
 
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
+from actuators.checked import Table, checked
 from actuators.elements.element import Element
 from actuators.elements.friction import Friction
 from actuators.elements.hypoid import Hypoid
@@ -14,8 +17,6 @@ from actuators.elements.ratio import Ratio
 from actuators.errors import CatalogError, closest, one_line
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
-_ALTERNATIVE_KEYS: Final = ("title", "motor", "ratio", "element")
-_ELEMENT_KEYS: Final = ("name", "law", "stage", "shaft")  # what else it has are arguments
 
 # law -> class, arguments it must have, arguments it may have
 LAWS: Final[Mapping[str, tuple[Callable[..., Element], frozenset[str], frozenset[str]]]] = {
@@ -85,6 +86,69 @@ class Alternative:
         return (self.ratio, *(r for e in self.elements for r in e.arguments.values()))
 
 
+class _Element(Table):
+    """An element as it stands in a file: what is none of its keys is an argument of its law."""
+
+    model_config = ConfigDict(extra="allow")
+    expected = "name, law and arguments"
+    __pydantic_extra__: dict[str, str] = Field(init=False)
+    name: str
+    law: str
+    stage: str = ""
+    shaft: str = ""
+
+    @property
+    def arguments(self) -> dict[str, str]:
+        """Argument to `component.parameter`."""
+        return self.__pydantic_extra__
+
+
+def _argument_names(entry: _Element) -> _Element:
+    """Arguments are those of the law.
+
+    Raises:
+        ValueError: The law is unknown, or an argument is unknown or missing.
+    """
+    if entry.law not in LAWS:
+        raise ValueError(f"unknown law '{one_line(entry.law)}': {closest(entry.law, list(LAWS))}")
+    _, needed, possible = LAWS[entry.law]
+    for argument in entry.arguments:
+        if argument not in needed | possible:
+            raise ValueError(
+                f"law '{entry.law}' has no argument '{one_line(argument)}': "
+                f"{closest(argument, sorted(needed | possible))}"
+            )
+    lacking = sorted(needed - set(entry.arguments))
+    if lacking:
+        names = ", ".join(f"'{name}'" for name in lacking)
+        raise ValueError(f"law '{entry.law}' lacks its argument {names}")
+    if entry.shaft and not entry.stage:
+        raise ValueError("'shaft' says where a stage is; name the stage, too")
+    return entry
+
+
+def _stages_differ(elements: tuple[_Element, ...]) -> tuple[_Element, ...]:
+    stages = [element.stage for element in elements if element.stage]
+    if not elements:
+        raise ValueError("is empty, expected at least one [[NAME.element]]")
+    if len(set(stages)) != len(stages):
+        raise ValueError(f"a stage is named twice among {', '.join(stages)}")
+    return elements
+
+
+class _Written(Table):
+    """An alternative as it stands in a file."""
+
+    title: str
+    motor: str
+    ratio: str
+    element: Annotated[
+        tuple[Annotated[_Element, AfterValidator(_argument_names)], ...],
+        Strict(False),
+        AfterValidator(_stages_differ),
+    ]
+
+
 def read_alternative(name: str, entry: object) -> Alternative:
     """Return one alternative from its table.
 
@@ -95,50 +159,9 @@ def read_alternative(name: str, entry: object) -> Alternative:
     Raises:
         CatalogError: A key, law or argument is unknown or missing, or a stage is named twice.
     """
-    where = f"{ALTERNATIVES_FILE} [{one_line(name)}]"
-    if not isinstance(entry, Mapping):
-        raise CatalogError(f"{where}: expected a table")
-    for key in entry:
-        if key not in _ALTERNATIVE_KEYS:
-            raise CatalogError(
-                f"{where}: unknown key '{one_line(key)}': {closest(key, _ALTERNATIVE_KEYS)}"
-            )
-    for key in _ALTERNATIVE_KEYS:
-        if key not in entry:
-            raise CatalogError(f"{where}: missing key '{key}'")
-    for key in ("title", "motor", "ratio"):
-        if not isinstance(entry[key], str):
-            raise CatalogError(f"{where}: '{key}' must be text in quotation marks")
-    if not isinstance(entry["element"], list) or not entry["element"]:
-        raise CatalogError(f"{where}: expected at least one [[{one_line(name)}.element]]")
-    elements = tuple(_element(item, where) for item in entry["element"])
-    stages = [e.stage for e in elements if e.stage]
-    if len(set(stages)) != len(stages):
-        raise CatalogError(f"{where}: a stage is named twice among {', '.join(stages)}")
-    return Alternative(name, entry["title"], entry["motor"], entry["ratio"], elements)
-
-
-def _element(entry: object, where: str) -> ElementEntry:
-    """Return one element of an alternative from its table."""
-    if not isinstance(entry, Mapping) or not all(isinstance(v, str) for v in entry.values()):
-        raise CatalogError(f"{where}: an element is a table of texts: name, law and arguments")
-    for key in ("name", "law"):
-        if key not in entry:
-            raise CatalogError(f"{where}: an element lacks its '{key}'")
-    place, law = f"{where}: element '{one_line(entry['name'])}'", entry["law"]
-    if law not in LAWS:
-        raise CatalogError(f"{place}: unknown law '{one_line(law)}': {closest(law, list(LAWS))}")
-    arguments = {k: v for k, v in entry.items() if k not in _ELEMENT_KEYS}
-    _, needed, possible = LAWS[law]
-    for argument in arguments:
-        if argument not in needed | possible:
-            raise CatalogError(
-                f"{place}: law '{law}' has no argument '{one_line(argument)}': "
-                f"{closest(argument, sorted(needed | possible))}"
-            )
-    for argument in sorted(needed - set(arguments)):
-        raise CatalogError(f"{place}: law '{law}' lacks its argument '{argument}'")
-    stage, shaft = entry.get("stage", ""), entry.get("shaft", "")
-    if shaft and not stage:
-        raise CatalogError(f"{place}: 'shaft' says where a stage is; name the stage, too")
-    return ElementEntry(entry["name"], law, MappingProxyType(arguments), stage, shaft)
+    written = checked(_Written, entry, f"{ALTERNATIVES_FILE} [{one_line(name)}]", CatalogError)
+    elements = tuple(
+        ElementEntry(e.name, e.law, MappingProxyType(dict(e.arguments)), e.stage, e.shaft)
+        for e in written.element
+    )
+    return Alternative(name, written.title, written.motor, written.ratio, elements)

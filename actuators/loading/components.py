@@ -3,8 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
+from pydantic import AfterValidator
+
+from actuators.checked import Table, checked
 from actuators.errors import CatalogError, closest, one_line
 from actuators.parameters import ParameterSet, parameters_from_table, read_toml
 
@@ -36,7 +39,21 @@ KINDS: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "bearing": _DRAG,
 }
-_KEYS: Final = ("kind", "title", "note", "parameters")
+
+
+def _known_kind(kind: str) -> str:
+    if kind not in KINDS:
+        raise ValueError(f"unknown kind '{one_line(kind)}': {closest(kind, list(KINDS))}")
+    return kind
+
+
+class _Written(Table):
+    """A component file; which parameters it has, its kind says."""
+
+    kind: Annotated[str, AfterValidator(_known_kind)]
+    title: str
+    note: str = ""
+    parameters: dict[str, object]
 
 
 @dataclass(frozen=True)
@@ -66,19 +83,6 @@ def load_component(path: Path) -> Component:
         CatalogError: A key or the kind is unknown or missing.
     """
     file = one_line(path.name)
-    contents = read_toml(path)
-    for key in contents:
-        if key not in _KEYS:
-            raise CatalogError(f"{file}: unknown key '{one_line(key)}': {closest(key, _KEYS)}")
-    for key in ("kind", "title", "parameters"):
-        if key not in contents:
-            raise CatalogError(f"{file}: missing key '{key}'")
-    texts = {key: contents.get(key, "") for key in ("kind", "title", "note")}
-    for key, value in texts.items():
-        if not isinstance(value, str):
-            raise CatalogError(f"{file}: '{key}' must be text in quotation marks")
-    kind = texts["kind"]
-    if kind not in KINDS:
-        raise CatalogError(f"{file}: unknown kind '{one_line(kind)}': {closest(kind, list(KINDS))}")
-    parameters = parameters_from_table(contents["parameters"], KINDS[kind], file)
-    return Component(path.stem, kind, texts["title"], texts["note"], parameters)
+    written = checked(_Written, read_toml(path), file, CatalogError)
+    parameters = parameters_from_table(written.parameters, KINDS[written.kind], file)
+    return Component(path.stem, written.kind, written.title, written.note, parameters)

@@ -53,7 +53,7 @@ def test_values_are_si_and_rows_keep_what_was_written():
         ({"mass": entry(basis="identified")}, "needs an interval"),
         ({"mass": entry(basis="assumed", interval=[1, 3])}, "needs a reason"),
         ({"mass": 3.0}, "expected {value, unit, basis, source}"),
-        ({"mass": entry(reason=3)}, "'reason' must be text"),
+        ({"mass": entry(reason=3)}, "'mass.reason' must be text"),
     ],
 )
 def test_bad_entries_say_where_and_what(entries, message):

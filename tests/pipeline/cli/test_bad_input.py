@@ -37,8 +37,8 @@ ROBOT_FILES = {
     ),
     "no source": (r'source = "Table I"', 'source = ""', r"'body_length': no source"),
     "unknown basis": (r'"published"', '"publishd"', r"unknown basis.*did you mean 'published'"),
-    "NaN": (r"value = 40$", "value = nan", r"'total_mass': value must be a finite number"),
-    "text for a number": (r"value = 40$", 'value = "40"', r"'total_mass': value must be a number"),
+    "NaN": (r"value = 40$", "value = nan", r"'total_mass.value' must be a finite number"),
+    "text for a number": (r"value = 40$", 'value = "40"', r"'total_mass.value' must be a number"),
     "negative mass": (r"value = 40$", "value = -40", r"total_mass = -40 kg must be positive"),
     "negative link mass": (
         r"(\[parameters\.tibia_mass\]\nvalue = )[\d.]+(.*?interval = \[)[\d.]+",

@@ -1,0 +1,128 @@
+"""Tables held against a schema: every error at once, each with its place, all in one line."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from typing import Annotated, Literal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import AfterValidator, Field
+
+from actuators.checked import Names, Number, Pair, Table, checked
+
+
+def _positive(value: float) -> float:
+    if value <= 0.0:
+        raise ValueError("must be positive")
+    return value
+
+
+class Spring(Table):
+    noun = "property"
+    expected = "{stiffness, range}"
+    stiffness: Annotated[Number, AfterValidator(_positive)]
+    range: Pair | None = None
+    name: str = ""
+
+
+class Robot(Table):
+    kind: Literal["arm", "leg"]
+    rigid: bool = False
+    joints: Names = ()
+    springs: dict[str, Spring] = Field(default={})
+    spring: Annotated[tuple[Spring, ...], Field(strict=False)] = ()
+    as_: Number = Field(default=0.0, alias="as")
+
+
+def said(text: str) -> str:
+    with pytest.raises(KeyError) as caught:
+        checked(Robot, tomllib.loads(text), "robot.toml", KeyError)
+    (message,) = caught.value.args
+    assert "\n" not in message
+    assert message.startswith("robot.toml: ")
+    return str(message).removeprefix("robot.toml: ")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("kind = 'lge'", "'kind' = 'lge': did you mean 'leg'?"),
+        ("kind = 3", "'kind' = 3: expected 'arm' or 'leg'"),
+        ("", "missing key 'kind'"),
+        ("kind = 'arm'\nrigit = true", "unknown key 'rigit': did you mean 'rigid'?"),
+        ("kind = 'arm'\nass = 3", "unknown key 'ass': did you mean 'as'?"),
+        ("kind = 'arm'\nrigid = 1", "'rigid' must be true or false"),
+        ("kind = 'arm'\nas = true", "'as' must be a number, not True"),
+        ("kind = 'arm'\nas = nan", "'as' must be a finite number"),
+        ("kind = 'arm'\njoints = 'a'", "'joints' must be a list"),
+        ("kind = 'arm'\njoints = [1]", "'joints 1' must be text in quotation marks"),
+        ("kind = 'arm'\nspring = 3", "'spring' must be a list"),
+        ("kind = 'arm'\nsprings = 3", "'springs' must be a table"),
+        (
+            "kind = 'arm'\nsprings.knee = 3",
+            "'springs.knee' must be a table, expected {stiffness, range}",
+        ),
+        ("kind = 'arm'\n[springs.knee]", "'springs.knee': missing property 'stiffness'"),
+        (
+            "kind = 'arm'\n[springs.knee]\nstifness = 3\nstiffness = 1",
+            "'springs.knee': unknown property 'stifness': did you mean 'stiffness'?",
+        ),
+        (
+            "kind = 'arm'\n[[spring]]\nstiffness = 1\n[[spring]]\nname = 'knee'\nstiffness = -1",
+            "'spring 2 (knee).stiffness' must be positive",
+        ),
+        (
+            "kind = 'arm'\n[[spring]]\nstiffness = 1\nrange = [1]",
+            "'spring 1.range' must be [low, high]",
+        ),
+    ],
+)
+def test_each_error_has_its_place_and_what_was_expected(text: str, message: str) -> None:
+    assert said(text) == message
+
+
+def test_all_errors_of_a_table_are_told_at_once() -> None:
+    parts = said("rigid = 1\nas = 'x'\n[springs.a]\n[springs.b]\nstiffness = 0").split("; ")
+    assert sorted(parts) == [
+        "'as' must be a number, not 'x'",
+        "'rigid' must be true or false",
+        "'springs.a': missing property 'stiffness'",
+        "'springs.b.stiffness' must be positive",
+        "missing key 'kind'",
+    ]
+
+
+def test_more_errors_than_one_reads_are_counted() -> None:
+    many = "".join(f"[springs.s{k}]\nstiffness = 0\n" for k in range(20))
+    assert said("kind = 'arm'\n" + many).endswith("; and 14 more")
+
+
+def test_what_is_right_is_read_and_cannot_be_changed() -> None:
+    text = "kind = 'arm'\njoints = ['a']\nas = 2\n[springs.a]\nstiffness = 3\nrange = [0, 1]"
+    robot = checked(Robot, tomllib.loads(text), "robot.toml", KeyError)
+    assert (robot.kind, robot.joints, robot.as_) == ("arm", ("a",), 2.0)
+    assert robot.springs["a"].range == (0.0, 1.0)
+    with pytest.raises(ValueError, match="frozen"):
+        robot.kind = "leg"
+
+
+LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=6)
+KEYS = st.sampled_from(["kind", "rigid", "joints", "springs", "spring", "as", "stiffness", "x"])
+TABLES = st.recursive(
+    LEAVES,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=4),
+    max_leaves=10,
+)
+
+
+@given(TABLES)
+def test_any_table_is_read_or_refused_in_one_line(table: object) -> None:
+    message = ""
+    try:
+        assert math.isfinite(checked(Robot, table, "robot.toml", KeyError).as_)
+    except KeyError as error:
+        message = error.args[0]
+    assert "\n" not in message
