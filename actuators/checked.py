@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import accumulate
 from types import NoneType, UnionType
 from typing import (
     Annotated,
@@ -23,16 +24,15 @@ from typing import (
     get_origin,
 )
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Strict, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Strict, ValidationError
 from pydantic_core import ErrorDetails
 
 from actuators.errors import closest, one_line
 
-#: More than these are counted only: a line is to be read.
-_MOST_ERRORS: Final = 6
+#: Errors beyond so many characters are counted only: a line is to be read.
+_LONGEST: Final = 400
 _KINDS: Final[Mapping[str, str]] = {
     "string_type": "must be text in quotation marks",
-    "string_too_short": "is empty",
     "bool_type": "must be true or false",
     "int_type": "must be a whole number",
     "list_type": "must be a list",
@@ -80,6 +80,14 @@ def _pair(value: object) -> object:
     return tuple(value)
 
 
+def _text(value: str) -> str:
+    if not value.strip() or "\x00" in value:
+        raise ValueError("is empty" if not value.strip() else "holds what no name can")
+    return value
+
+
+#: Text that says something.
+Text = Annotated[str, AfterValidator(_text)]
 #: A finite number.
 Number = Annotated[float, BeforeValidator(_number)]
 #: Two numbers.
@@ -103,9 +111,16 @@ def checked(schema: type[_Table], table: object, where: str, error: type[Excepti
     try:
         return schema.model_validate(table)
     except ValidationError as wrong:
-        said = list(dict.fromkeys(_said(schema, table, wrong.errors(include_url=False))))
-        more = f"; and {len(said) - _MOST_ERRORS} more" if len(said) > _MOST_ERRORS else ""
-        raise error(f"{where}: {'; '.join(said[:_MOST_ERRORS])}{more}") from None
+        raise error(f"{where}: {_line(schema, table, wrong)}") from None
+
+
+def _line(schema: type[Table], table: object, wrong: ValidationError) -> str:
+    """As many errors as one reads, and how many more there are."""
+    said = list(dict.fromkeys(_said(schema, table, wrong.errors(include_url=False))))
+    length = accumulate(map(len, said))
+    shown = max(1, sum(so_far <= _LONGEST for so_far in length))
+    more = f"; and {len(said) - shown} more" if len(said) > shown else ""
+    return "; ".join(said[:shown]) + more
 
 
 def _said(schema: type[Table], table: object, errors: Sequence[ErrorDetails]) -> Iterator[str]:

@@ -70,7 +70,15 @@ def read_toml_file(path: Path) -> dict[str, Any]:
     Raises:
         UnreadableTextError: As for `read_file`, or the text is not TOML.
     """
-    text = utf8(read_file(path, LARGEST_TOML))
+    return parsed(utf8(read_file(path, LARGEST_TOML)))
+
+
+def parsed(text: str) -> dict[str, Any]:
+    """The contents of a TOML text.
+
+    Raises:
+        UnreadableTextError: It is not TOML.
+    """
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:

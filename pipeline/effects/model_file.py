@@ -27,18 +27,19 @@ Edits are applied in order to what the files say; the files themselves are never
 from __future__ import annotations
 
 import hashlib
-import math
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final
+from typing import Annotated, Final, Literal, Self
 
+from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
+
+from actuators.checked import Names, Number, Pair, Table, Text, checked
 from actuators.errors import closest, one_line
 from actuators.loading.build import CATALOG, load_catalog
-from actuators.text_file import UnreadableTextError, read_toml_file
-from pipeline.effects.base import CHANNEL_UNITS, Effect
+from actuators.text_file import UnreadableTextError, parsed, read_toml_file
+from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.logs.errors import EffectError, ModelFileError
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
@@ -47,13 +48,7 @@ from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 
 SCHEMA: Final = 1
-_TOP: Final = ("schema", "robot", "actuators", "edit")
-_ROBOT: Final = ("file", "sha256")
-_ACTUATORS: Final = ("alternative", "sha256")
-_EDIT: Final = ("effect", "place", "basis", "source", "parameters")
-_PARAMETER: Final = ("value", "unit", "interval")
 _HASH: Final = re.compile(r"[0-9a-f]{64}")
-_BASES: Final = ("identified", "doubtful", "assumed")
 
 
 @dataclass(frozen=True)
@@ -128,6 +123,97 @@ class ModelFile:
             (*self.edits, *edits),
             self.changed,
         )
+
+
+def _sha256(text: str) -> str:
+    if not _HASH.fullmatch(text):
+        raise ValueError(
+            f"= '{one_line(text)}' is no SHA-256; expected 64 hexadecimal digits in lower case"
+        )
+    return text
+
+
+def _known_effect(name: str) -> str:
+    try:
+        return effect_named(name).name
+    except EffectError as error:
+        raise ValueError(str(error)) from None
+
+
+def _version(number: object) -> object:
+    if isinstance(number, bool) or number != SCHEMA:
+        raise ValueError(f"must be {SCHEMA}")
+    return number
+
+
+_Sha256 = Annotated[str, AfterValidator(_sha256)]
+
+
+class _Value(Table):
+    """A parameter of an edit as it stands in a file."""
+
+    expected = "{value, unit, interval}"
+    value: Number
+    unit: Text
+    interval: Pair | None = None
+
+    @model_validator(mode="after")
+    def _inside(self) -> Self:
+        low, high = self.interval or (self.value, self.value)
+        if not low <= self.value <= high:
+            raise ValueError(f"value {self.value:g} lies outside its interval")
+        return self
+
+
+class _Edit(Table):
+    """An edit as it stands in a file."""
+
+    expected = "effect, place and parameters"
+    effect: Annotated[Text, AfterValidator(_known_effect)]
+    place: Annotated[Names, Field(min_length=1)]
+    basis: Literal["identified", "doubtful", "assumed"] = "identified"
+    source: Text
+    parameters: dict[str, _Value]
+
+    @model_validator(mode="after")
+    def _of_the_effect(self) -> Self:
+        """The effect's parameters, all and no others, in its units."""
+        known = {p.name: p for p in effect_named(self.effect).parameters}
+        for name, written in self.parameters.items():
+            if name not in known:
+                raise ValueError(
+                    f"{self.effect} has no parameter '{one_line(name)}': "
+                    f"{closest(name, list(known))}"
+                )
+            own = known[name].unit
+            allowed = tuple(CHANNEL_UNITS.values()) if own == "channel" else (own,)
+            if written.unit not in allowed:
+                raise ValueError(
+                    f"{name}: unit '{one_line(written.unit)}'; expected '{' or '.join(allowed)}'"
+                )
+        for name, parameter in known.items():
+            if name not in self.parameters and not parameter.optional:
+                raise ValueError(f"{self.effect} needs the parameter '{name}'")
+        return self
+
+
+class _Robot(Table):
+    file: Text
+    sha256: _Sha256
+
+
+class _Actuators(Table):
+    alternative: str = ""
+    sha256: dict[str, _Sha256] = Field(default_factory=dict)
+
+
+class _Model(Table):
+    """A model file as it stands."""
+
+    schema_: Annotated[int, BeforeValidator(_version)] = Field(alias="schema")
+    robot: _Robot
+    actuators: _Actuators = _Actuators()
+    edit: Annotated[tuple[_Edit, ...], Strict(False)] = ()
 
 
 def file_sha256(path: Path) -> str:
@@ -220,34 +306,15 @@ def read_model_file(path: Path, catalog: Path | None = None) -> ModelFile:
         table = read_toml_file(path)
     except UnreadableTextError as error:
         raise ModelFileError(f"{one_line(path)}: {error}") from None
-    _known(table, _TOP, where)
-    if table.get("schema") != SCHEMA or isinstance(table["schema"], bool):
-        raise ModelFileError(f"{where}: schema must be {SCHEMA}")
-    robot = _table(table, "robot", where)
-    _known(robot, _ROBOT, f"{where} [robot]")
-    actuators = _table(table, "actuators", where) if "actuators" in table else {}
-    _known(actuators, _ACTUATORS, f"{where} [actuators]")
-    hashes = actuators.get("sha256", {})
-    if not isinstance(hashes, dict) or not all(isinstance(v, str) for v in hashes.values()):
-        raise ModelFileError(f"{where} [actuators.sha256]: expected file = hash")
-    robot_path = path.parent / _text(robot, "file", f"{where} [robot]")
-    robot_hash = _text(robot, "sha256", f"{where} [robot]")
-    for name, value in {"robot": robot_hash, **hashes}.items():
-        if not _HASH.fullmatch(value):
-            raise ModelFileError(
-                f"{where}: sha256 of {one_line(name)}: '{one_line(value)}' is no SHA-256; expected "
-                "64 hexadecimal digits"
-            )
-    alternative = actuators.get("alternative", "")
-    if not isinstance(alternative, str):
-        raise ModelFileError(f"{where} [actuators]: alternative must be a text")
+    model = checked(_Model, table, where, ModelFileError)
+    robot, hashes = path.parent / model.robot.file, model.actuators.sha256
     return ModelFile(
-        robot=robot_path,
-        robot_sha256=robot_hash,
-        alternative=alternative,
+        robot=robot,
+        robot_sha256=model.robot.sha256,
+        alternative=model.actuators.alternative,
         actuators_sha256=hashes,
-        edits=_edits(table, where),
-        changed=_changed(where, robot_path, robot_hash, hashes, catalog),
+        edits=tuple(map(_as_edit, model.edit)),
+        changed=_changed(where, robot, model.robot.sha256, hashes, catalog),
     )
 
 
@@ -257,21 +324,11 @@ def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
     Raises:
         ModelFileError: As for `read_model_file`.
     """
-    return _edits(_parsed(text, where), where)
-
-
-def _parsed(text: str, where: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise ModelFileError(f"{where}: malformed TOML: {one_line(error)}") from None
-
-
-def _edits(table: Mapping[str, Any], where: str) -> tuple[Edit, ...]:
-    edits = table.get("edit", [])
-    if not isinstance(edits, list):
-        raise ModelFileError(f"{where}: edits are written [[edit]]")
-    return tuple(_edit(e, f"{where}: edit {k}") for k, e in enumerate(edits, start=1))
+        table = parsed(text)
+    except UnreadableTextError as error:
+        raise ModelFileError(f"{where}: {error}") from None
+    return tuple(map(_as_edit, checked(_Model, table, where, ModelFileError).edit))
 
 
 def _changed(
@@ -291,83 +348,12 @@ def _changed(
     return tuple(out)
 
 
-def _edit(entry: object, where: str) -> Edit:
-    if not isinstance(entry, dict):
-        raise ModelFileError(f"{where}: expected a table with effect, place and parameters")
-    _known(entry, _EDIT, where)
-    name = _text(entry, "effect", where)
-    try:
-        effect = effect_named(name)
-    except EffectError as error:
-        raise ModelFileError(f"{where}: {error}") from None
-    place = entry.get("place")
-    if not isinstance(place, list) or not place or not all(isinstance(p, str) for p in place):
-        raise ModelFileError(f"{where}: place must be a list of names")
-    basis = entry.get("basis", "identified")
-    if basis not in _BASES:
-        raise ModelFileError(f"{where}: basis '{one_line(basis)}'; {closest(str(basis), _BASES)}")
-    source = _text(entry, "source", where)
-    table = _table(entry, "parameters", where)
-    names = [p.name for p in effect.parameters]
-    for key in table:
-        if key not in names:
-            raise ModelFileError(
-                f"{where}: {name} has no parameter '{one_line(key)}'; {closest(key, names)}"
-            )
-    missing = [p.name for p in effect.parameters if p.name not in table and not p.optional]
-    if missing:
-        raise ModelFileError(f"{where}: {name} needs the parameter '{missing[0]}'")
-    parameters = tuple(_parameter(n, table[n], effect, where) for n in names if n in table)
-    return Edit(name, tuple(place), parameters, str(basis), source)
-
-
-def _parameter(name: str, entry: object, effect: Effect, where: str) -> EditParameter:
-    place = f"{where}: {name}"
-    if not isinstance(entry, dict):
-        raise ModelFileError(f"{place}: expected value, unit and interval")
-    _known(entry, _PARAMETER, place)
-    unit = _text(entry, "unit", place)
-    own = next(p.unit for p in effect.parameters if p.name == name)
-    allowed = tuple(CHANNEL_UNITS.values()) if own == "channel" else (own,)
-    if unit not in allowed:
-        raise ModelFileError(f"{place}: unit '{one_line(unit)}'; expected '{' or '.join(allowed)}'")
-    value = _number(entry.get("value"), f"{place}: value")
-    interval = entry.get("interval", [value, value])
-    if not isinstance(interval, list) or len(interval) != 2:
-        raise ModelFileError(f"{place}: interval must be [low, high]")
-    low, high = (_number(v, f"{place}: interval") for v in interval)
-    if not low <= value <= high:
-        raise ModelFileError(f"{place}: value {value:g} lies outside its interval")
-    return EditParameter(name, value, unit, (low, high))
-
-
-def _number(value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ModelFileError(f"{where} must be a number")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise ModelFileError(f"{where} must be a finite number")
-    return number
-
-
-def _known(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    for key in table:
-        if key not in known:
-            raise ModelFileError(f"{where}: unknown key '{one_line(key)}'; {closest(key, known)}")
-
-
-def _table(table: Mapping[str, Any], key: str, where: str) -> dict[str, Any]:
-    value = table.get(key)
-    if not isinstance(value, dict):
-        raise ModelFileError(f"{where}: the table [{key}] is missing")
-    return value
-
-
-def _text(table: Mapping[str, Any], key: str, where: str) -> str:
-    value = table.get(key)
-    if not isinstance(value, str) or not value or "\x00" in value:
-        raise ModelFileError(f"{where}: '{key}' is missing or not a text")
-    return value
+def _as_edit(entry: _Edit) -> Edit:
+    """An edit, its parameters in the effect's order."""
+    written = {p.name: entry.parameters.get(p.name) for p in effect_named(entry.effect).parameters}
+    parameters = tuple(
+        EditParameter(name, p.value, p.unit, p.interval or (p.value, p.value))
+        for name, p in written.items()
+        if p is not None
+    )
+    return Edit(entry.effect, entry.place, parameters, entry.basis, entry.source)

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import model_validator
 
-from actuators.errors import UnitError, closest
-from actuators.units import to_si
+from actuators.checked import Number, Pair, Table, checked
+from actuators.errors import UnitError, one_line
+from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.units import dimension, to_si
 from pipeline.paper.errors import PriorError
 
 Array = NDArray[np.float64]
 PRIOR_FILE = Path(__file__).parent / "prior.toml"
-_KEYS = ("value", "unit", "interval", "bounds", "scale", "source", "reason")
 #: Half of a 95 % interval in standard deviations.
 _SIGMAS = 1.96
 
@@ -114,49 +116,56 @@ def load_prior(path: Path = PRIOR_FILE) -> Prior:
         PriorError: Missing or malformed, an unknown key or unit, or bounds that exclude the value.
     """
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else " ".join(str(error).split())
-        raise PriorError(f"{path.name}: cannot be read ({reason})") from None
+        table = read_toml_file(path)
+    except UnreadableTextError as error:
+        raise PriorError(f"{path.name}: cannot be read ({error})") from None
     return Prior(tuple(_free(key, entry, path.name) for key, entry in table.items()))
 
 
+class _Written(Table):
+    """A free number as it stands in the file."""
+
+    expected = "value, unit, interval, bounds, scale, source and reason"
+    value: Number
+    unit: str
+    interval: Pair
+    bounds: Pair
+    scale: Literal["linear", "log"]
+    source: str
+    reason: str
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        try:
+            dimension(self.unit)
+        except UnitError as error:
+            raise ValueError(str(error)) from None
+        (low, high), (least, most) = self.interval, self.bounds
+        if not low < high or not least < most:
+            raise ValueError("interval and bounds must be [low, high]")
+        if not least <= self.value <= most:
+            raise ValueError("the bounds exclude the value; widen them or move it")
+        if not low <= self.value <= high:
+            raise ValueError("the interval excludes the value; widen it or move it")
+        if self.scale == "log" and min(to_si(x, self.unit) for x in (low, least, self.value)) <= 0:
+            raise ValueError("a logarithmic scale needs positive numbers")
+        return self
+
+
 def _free(key: str, entry: object, file: str) -> Free:
-    where = f"{file}: '{key}'"
-    if not isinstance(entry, dict):
-        raise PriorError(f"{where}: expected a table")
-    for name in entry:
-        if name not in _KEYS:
-            raise PriorError(f"{where}: unknown key '{name}'; {closest(name, _KEYS)}")
-    for name in _KEYS:
-        if name not in entry:
-            raise PriorError(f"{where}: missing key '{name}'")
-    if entry["scale"] not in ("linear", "log"):
-        raise PriorError(f"{where}: scale must be 'linear' or 'log'")
-    try:
-        numbers = [float(entry["value"]), *map(float, entry["interval"] + entry["bounds"])]
-        value, low, high, least, most = (to_si(x, entry["unit"]) for x in numbers)
-    except UnitError as error:
-        raise PriorError(f"{where}: {error}") from None
-    except (TypeError, ValueError):
-        raise PriorError(
-            f"{where}: value, interval and bounds must be 1, 2 and 2 numbers"
-        ) from None
-    if not low < high or not least < most:
-        raise PriorError(f"{where}: interval and bounds must be [low, high]")
-    if not least <= value <= most:
-        raise PriorError(f"{where}: the bounds exclude the value; widen them or move it")
-    if not (low <= value <= high):
-        raise PriorError(f"{where}: the interval excludes the value; widen it or move it")
-    if entry["scale"] == "log" and min(low, least, value) <= 0:
-        raise PriorError(f"{where}: a logarithmic scale needs positive numbers")
+    """One free number in SI units."""
+    written = checked(_Written, entry, f"{file}: '{one_line(key)}'", PriorError)
+
+    def si(pair: tuple[float, float]) -> tuple[float, float]:
+        return to_si(pair[0], written.unit), to_si(pair[1], written.unit)
+
     return Free(
-        key,
-        value,
-        (low, high),
-        (least, most),
-        entry["scale"] == "log",
-        entry["unit"],
-        str(entry["source"]),
-        str(entry["reason"]),
+        key=key,
+        centre=to_si(written.value, written.unit),
+        interval=si(written.interval),
+        bounds=si(written.bounds),
+        logarithmic=written.scale == "log",
+        unit=written.unit,
+        source=written.source,
+        reason=written.reason,
     )

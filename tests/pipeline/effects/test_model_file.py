@@ -59,7 +59,7 @@ def test_edits_leave_the_base_model_alone(root: Path) -> None:
         ('unit = "N*m"', 'unit = "mm"', "expected 'N*m'"),
         ("value = 0.4", "value = 9.0", "outside its interval"),
         ("value = 0.4", "value = nan", "finite"),
-        ("schema = 1", "schema = 2", "schema must be 1"),
+        ("schema = 1", "schema = 2", "'schema' must be 1"),
         ("basis =", "bases =", "did you mean 'basis'"),
         ("parameters.torque", "parameters.torqe", "did you mean 'torque'"),
         ("schema = 1", "schema = [", "malformed TOML"),
