@@ -61,8 +61,12 @@ class Table(BaseModel):
     expected: ClassVar[str] = ""
 
 
-def _number(value: object) -> float:
-    """A finite float; `true` is none, though Python says so."""
+def finite(value: object) -> float:
+    """A finite float; `true` is none, though Python says so.
+
+    Raises:
+        ValueError: It is no number, or not a finite one.
+    """
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"must be a number, not {one_line(repr(value))[:40]}")
     try:
@@ -89,7 +93,7 @@ def _text(value: str) -> str:
 #: Text that says something.
 Text = Annotated[str, AfterValidator(_text)]
 #: A finite number.
-Number = Annotated[float, BeforeValidator(_number)]
+Number = Annotated[float, BeforeValidator(finite)]
 #: Two numbers.
 Pair = Annotated[tuple[Number, Number], BeforeValidator(_pair)]
 #: A list of names.

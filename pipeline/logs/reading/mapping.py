@@ -50,26 +50,19 @@ All tables are optional::
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping as MappingType
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
-from actuators.errors import UnitError, closest, one_line
+from actuators.checked import checked
+from actuators.errors import one_line
 from actuators.text_file import UnreadableTextError, read_toml_file
-from actuators.units import dimension, from_si, to_si
+from actuators.units import from_si, to_si
 from pipeline.logs.errors import MappingError
-from pipeline.logs.reading.log import EFFORTS
+from pipeline.logs.reading.mapping_schema import ColumnTable, Constants, MappingTable
 from pipeline.logs.reading.table_file import CsvDialect
-
-_TOP: Final = (
-    *("effort", "locked", "csv", "time", "columns", "joints", "torque_enabled", "controller"),
-    *("supply", "constants", "keep", "logs"),
-)
-_COLUMN: Final = ("as", "unit", "zero", "scale", "flip")
-_BRIDGES: Final = ("open", "shorted")
 
 
 @dataclass(frozen=True)
@@ -177,189 +170,37 @@ def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
     Raises:
         MappingError: Unknown key or unit, or a value of the wrong kind; one line.
     """
-    top = _Table(table, where)
-    top.only(_TOP)
-    effort = top.text("effort")
-    if effort is not None and effort not in EFFORTS:
-        raise MappingError(f"{where}: effort = '{one_line(effort)}'; {closest(effort, [*EFFORTS])}")
-    time = top.table("time")
-    time.only(("column", "unit", "sample_rate"))
-    unit = time.unit("unit", "time") or "s"
-    rate = time.quantity("sample_rate", "frequency")
-    if rate is not None and not 0 < rate < 1e9:
-        raise MappingError(f"{time.where}: sample_rate must be positive and below 1 GHz")
-    if rate is not None and time.text("column") is not None:
-        raise MappingError(f"{time.where}: give column or sample_rate, not both")
-    csv = top.table("csv")
-    csv.only(("delimiter", "decimal"))
-    delimiter, decimal = csv.text("delimiter") or ",", csv.text("decimal") or "."
-    if delimiter not in (",", ";", "\t", " ", "|") or decimal not in (".", ","):
-        raise MappingError(
-            f"{csv.where}: delimiter must be one of , ; tab space | and decimal . or ,"
-        )
-    if delimiter == decimal:
-        raise MappingError(f"{csv.where}: delimiter and decimal are both '{decimal}'")
-    controller = top.table("controller")
-    controller.only(("gain_per_rad", "law", "torque_off_bridge"))
-    bridge = controller.text("torque_off_bridge")
-    if bridge is not None and bridge not in _BRIDGES:
-        raise MappingError(
-            f"{controller.where}: torque_off_bridge = '{one_line(bridge)}'; "
-            f"{closest(bridge, _BRIDGES)}"
-        )
-    law = controller.text("law")
-    if law not in (None, "duty"):
-        raise MappingError(f"{controller.where}: law = '{one_line(law)}'; known: duty")
-    supply = top.table("supply")
-    supply.only(("voltage", "column", "unit"))
-    keep = top.table("keep")
-    keep.only(("columns",))
-    columns = top.table("columns")
+    read = checked(MappingTable, table, where, MappingError)
     return Mapping(
         where=where,
-        effort=effort,
-        locked=top.texts("locked"),
-        dialect=CsvDialect(delimiter, decimal),
-        time_column=time.text("column"),
-        time_unit=unit,
-        sample_rate=rate,
-        columns=tuple(_column(key, columns.table(key)) for key in columns.values),
-        joints=top.table("joints").all_texts(),
-        torque_enabled=top.table("torque_enabled").all_texts(),
-        gain=controller.number("gain_per_rad"),
-        law=law,
-        torque_off_bridge=bridge,
-        supply_voltage=supply.quantity("voltage", "voltage"),
-        supply_column=supply.text("column"),
-        supply_unit=supply.unit("unit", "voltage") or "V",
-        constants=_constants(top.table("constants")),
-        keep=keep.texts("columns"),
-        logs=_logs(top),
+        effort=read.effort,
+        locked=read.locked,
+        dialect=CsvDialect(read.csv.delimiter, read.csv.decimal),
+        time_column=read.time.column,
+        time_unit=read.time.unit,
+        sample_rate=read.time.sample_rate.si if read.time.sample_rate else None,
+        columns=tuple(_column(name, column) for name, column in read.columns.items()),
+        joints=read.joints,
+        torque_enabled=read.torque_enabled,
+        gain=read.controller.gain_per_rad,
+        law=read.controller.law,
+        torque_off_bridge=read.controller.torque_off_bridge,
+        supply_voltage=read.supply.voltage.si if read.supply.voltage else None,
+        supply_column=read.supply.column,
+        supply_unit=read.supply.unit,
+        constants=_constants(read.constants),
+        keep=read.keep.columns,
+        logs=tuple(
+            LogRule(log.match, log.gain_per_rad, log.condition, _constants(log.constants))
+            for log in read.logs
+        ),
     )
 
 
-def _column(pattern: str, table: _Table) -> ColumnRule:
-    table.only(_COLUMN)
-    target = table.text("as") or pattern
-    if pattern.count("*") > 1 or target.count("*") != min(1, target.count("*")):
-        raise MappingError(f"{table.where}: at most one star in a pattern")
-    if "*" in target and "*" not in pattern:
-        raise MappingError(f"{table.where}: as = '{one_line(target)}' has a star, the column none")
-    unit = table.unit("unit", None)
-    scale = table.number("scale")
-    scale = 1.0 if scale is None else scale
-    if scale == 0:
-        raise MappingError(f"{table.where}: scale must not be zero")
-    flip = table.truth("flip")
-    return ColumnRule(pattern, target, unit, table.number("zero") or 0.0, -scale if flip else scale)
+def _column(pattern: str, table: ColumnTable) -> ColumnRule:
+    scale = -table.scale if table.flip else table.scale
+    return ColumnRule(pattern, table.target or pattern, table.unit, table.zero, scale)
 
 
-def _constants(table: _Table) -> dict[str, float]:
-    out = {}
-    for key in table.values:
-        value = table.quantity(key, None)
-        assert value is not None
-        out[key] = value
-    return out
-
-
-def _logs(top: _Table) -> tuple[LogRule, ...]:
-    entries = top.values.get("logs", [])
-    if not isinstance(entries, list):
-        raise MappingError(f"{top.where}: write [[logs]] with two brackets")
-    rules = []
-    for k, entry in enumerate(entries, start=1):
-        if not isinstance(entry, dict):
-            raise MappingError(f"{top.where}: write [[logs]] with two brackets")
-        table = _Table(entry, f"{top.where}: logs {k}")
-        table.only(("match", "gain_per_rad", "condition", "constants"))
-        match = table.text("match")
-        if match is None:
-            raise MappingError(f"{table.where}: match is missing; give a pattern of file names")
-        condition = table.table("condition")
-        for key, value in condition.values.items():
-            if not isinstance(value, str):
-                condition.number(key)
-        rules.append(
-            LogRule(
-                match,
-                table.number("gain_per_rad"),
-                {k: v if isinstance(v, str) else float(v) for k, v in condition.values.items()},
-                _constants(table.table("constants")),
-            )
-        )
-    return tuple(rules)
-
-
-class _Table:
-    """A TOML table whose getters check kind and unit."""
-
-    def __init__(self, values: MappingType[str, Any], where: str) -> None:
-        self.values = values
-        self.where = where
-
-    def only(self, known: tuple[str, ...]) -> None:
-        for key in self.values:
-            if key not in known:
-                raise MappingError(
-                    f"{self.where}: unknown key '{one_line(key)}'; {closest(key, known)}"
-                )
-
-    def table(self, key: str) -> _Table:
-        value = self.values.get(key, {})
-        if not isinstance(value, dict):
-            raise MappingError(f"{self.where}: [{one_line(key)}] must be a table")
-        return _Table(value, f"{self.where}: {one_line(key)}")
-
-    def text(self, key: str) -> str | None:
-        value = self.values.get(key)
-        if value is not None and not isinstance(value, str):
-            raise MappingError(f"{self.where}: {one_line(key)} must be text in quotation marks")
-        return value
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        value = self.values.get(key, [])
-        if not isinstance(value, list) or not all(isinstance(item, str) for item in value):
-            raise MappingError(f"{self.where}: {one_line(key)} must be a list of names")
-        return tuple(value)
-
-    def all_texts(self) -> dict[str, str]:
-        return {key: self.text(key) or "" for key in self.values}
-
-    def truth(self, key: str) -> bool:
-        value = self.values.get(key, False)
-        if not isinstance(value, bool):
-            raise MappingError(f"{self.where}: {one_line(key)} must be true or false")
-        return value
-
-    def number(self, key: str) -> float | None:
-        value = self.values.get(key)
-        if value is None:
-            return None
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise MappingError(f"{self.where}: {one_line(key)} must be a number")
-        if not math.isfinite(value) or abs(value) > 1e12:
-            raise MappingError(f"{self.where}: {one_line(key)} must be a finite number below 1e12")
-        return float(value)
-
-    def unit(self, key: str, expected: str | None) -> str | None:
-        unit = self.text(key)
-        if unit is None:
-            return None
-        try:
-            found = dimension(unit)
-        except UnitError as error:
-            raise MappingError(f"{self.where}: {one_line(error)}") from None
-        if expected is not None and found != expected:
-            raise MappingError(f"{self.where}: '{unit}' is a unit of {found}, expected {expected}")
-        return unit
-
-    def quantity(self, key: str, expected: str | None) -> float | None:
-        if key not in self.values:
-            return None
-        table = self.table(key)
-        table.only(("value", "unit"))
-        value, unit = table.number("value"), table.unit("unit", expected)
-        if value is None or unit is None:
-            raise MappingError(f"{table.where}: write {{value = ..., unit = ...}}")
-        return to_si(value, unit)
+def _constants(table: Constants) -> dict[str, float]:
+    return {name: quantity.si for name, quantity in table.items()}
