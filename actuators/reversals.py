@@ -41,12 +41,9 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
     inside = ~(on_left | on_right)
     interval, fraction, joint = interval[inside], fraction[inside], joint[inside]
 
-    # Zeros of several joints at one instant become one break.
     order = np.lexsort((fraction, interval))
     interval, fraction, joint = interval[order], fraction[order], joint[order]
-    new = np.ones(interval.size, dtype=bool)
-    new[1:] = (np.diff(interval) != 0) | (np.diff(fraction) > _SNAP)
-    group = np.cumsum(new) - 1
+    group, new = _instants(interval, fraction)
     at, u = interval[new], fraction[new]
 
     columns = _interpolated(series, at, u)
@@ -77,6 +74,23 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
         acceleration=merged(series.acceleration, columns["acceleration"]),
         torque=merged(series.torque, columns["torque"]),
     )
+
+
+def _instants(
+    interval: NDArray[np.intp], fraction: FloatArray
+) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    """Zeros of several joints at one instant become one break.
+
+    Args:
+        interval: Of each zero, ascending, (Z,).
+        fraction: Of the interval, ascending within it, (Z,).
+
+    Returns:
+        Number of the instant of each zero (Z,), and whether a zero is the first of its instant.
+    """
+    new = np.ones(interval.size, dtype=bool)
+    new[1:] = (np.diff(interval) != 0) | (np.diff(fraction) > _SNAP)
+    return np.cumsum(new) - 1, new
 
 
 def _crossings(

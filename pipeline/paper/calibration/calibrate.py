@@ -17,12 +17,16 @@ from pipeline.paper.calibration import search
 from pipeline.paper.calibration.checkpoint import Checkpoint
 from pipeline.paper.calibration.machine import MIDDLE_LEGS
 from pipeline.paper.calibration.prior import PRIOR_FILE
-from pipeline.paper.calibration.problem import EXTRA, fixed_before
+from pipeline.paper.calibration.problem import EXTRA, Problem, fixed_before
 from pipeline.paper.calibration.search import Reading
 from pipeline.paper.constants.rotor_friction import HELD, friction_ranges
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.published import PUBLISHED_FILE, Published
 
+#: Plain results of one task.
+Point = dict[str, Any]
+#: Given a title and a total, returns what is called per finished task.
+Progress = Callable[[str, int], Callable[[int], None]]
 logger = logging.getLogger("legwatt")
 AXES_DEG = (0.0, 15.0, 30.0, 45.0, 90.0)
 COUNTS = (1, 2)  # middle legs that Fig. 21 counts as loaded
@@ -96,7 +100,7 @@ def calibrate(
     robot: Path,
     effort: Effort,
     work: Path,
-    progress: Callable[[str, int], Callable[[int], None]],
+    progress: Progress,
 ) -> dict[str, Any]:
     """Run everything, going on where an earlier run stopped.
 
@@ -113,105 +117,29 @@ def calibrate(
     Raises:
         CalibrationError: No admissible point at all.
     """
-    name = str(robot)
-    task = search.base_problem(name)  # bad input is an error here, before any process starts
-    missing = [leg for leg in MIDDLE_LEGS if leg not in {own.name for own in task.spec.legs}]
-    if missing or not task.spec.floating:
-        raise CalibrationError(
-            f"{robot.name}: the paper's numbers are those of a walking hexapod with the middle "
-            f"legs {' and '.join(MIDDLE_LEGS)}; this robot "
-            + (f"has no leg '{missing[0]}'" if missing else "is on a stand")
-        )
-    logger.info("rotor friction leaves unmet: %s", ", ".join(task.sliver.frictions.unmet) or "none")
+    task = _task(robot)
     store = Checkpoint(work / "tasks.jsonl", input_hash(robot, effort))
     with ProcessPoolExecutor(effort.workers) as pool:
-        starts = store.run(
-            pool,
-            search.nearest,
-            [
-                (f"start/{path}/{i}", (name, path, search.READ, effort.seed, i, 30))
-                for path in search.PATHS
-                for i in range(effort.starts)
-            ],
-            progress("nearest point", effort.starts * len(search.PATHS)),
-        )
+        run = _Run(str(robot), effort, store, pool, progress)
+        starts = run.starts()
         good = [s for s in starts if s.get("admissible")]
         if not good:
             raise CalibrationError("no start reaches a point that meets every target and limit")
         best = min(good, key=lambda s: s["prior_distance"])
         paths = tuple(p for p in search.PATHS if any(s["path"] == p for s in good))
-        ensemble = store.run(
-            pool,
-            search.member,
-            [
-                (f"member/{'+'.join(paths)}/{i}", (name, paths, effort.seed, i))
-                for i in range(effort.draws)
-            ],
-            progress("ensemble", effort.draws),
-        )
-        unmoved = store.run(
-            pool,
-            search.prior_member,
-            [
-                (f"prior/{'+'.join(paths)}/{i}", (name, paths, effort.seed, i))
-                for i in range(effort.prior_draws)
-            ],
-            progress("prior", effort.prior_draws),
-        )
-        left_out = {
-            "+".join(targets): store.run(
-                pool,
-                search.member,
-                [
-                    (f"without/{'+'.join(targets)}/{i}", (name, paths, effort.seed, i, targets))
-                    for i in range(effort.left_out_draws)
-                ],
-                progress(f"without {' and '.join(targets)}", effort.left_out_draws),
-            )
-            for targets in LEAVE_OUT
-        }
-
-        def with_totals(kind: str, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
-            """Points with the energy of the whole robot."""
-            found = store.run(
-                pool,
-                search.robot_totals,
-                [
-                    (f"totals/{kind}/{i}", (name, p["path"], p["z"], p["constants"]))
-                    for i, p in enumerate(points)
-                ],
-                progress(f"whole robot, {kind}", len(points)),
-            )
-            return [p | {"totals": t} for p, t in zip(points, found, strict=True)]
-
-        members = with_totals("ensemble", [m for m in ensemble if m.get("admissible")])
+        ensemble = run.drawn("member", search.member, paths, effort.draws, "ensemble")
+        unmoved = run.drawn("prior", search.prior_member, paths, effort.prior_draws, "prior")
+        left_out = {"+".join(targets): run.without(targets, paths) for targets in LEAVE_OUT}
+        members = run.with_totals("ensemble", [m for m in ensemble if m.get("admissible")])
         # The motor's limits are the data sheet's, so a draw beyond them is not what it says.
-        before = with_totals("prior", [m for m in unmoved if m.get("inside")])
+        before = run.with_totals("prior", [m for m in unmoved if m.get("inside")])
         predicted = {
-            key: with_totals(key, [m for m in tries if m.get("admissible")])
+            key: run.with_totals(key, [m for m in tries if m.get("admissible")])
             for key, tries in left_out.items()
         }
-        readings = store.run(
-            pool,
-            search.read,
-            [
-                (
-                    f"reading/{_task_name(reading)}/{i}",
-                    (name, best["path"], reading, effort.seed, i, 30),
-                )
-                for reading in READINGS
-                for i in range(effort.reading_starts)
-            ],
-            progress("readings", len(READINGS) * effort.reading_starts),
-        )
-        sensitivity = _sensitivity(pool, store, name, best, effort, progress)
+        readings = run.readings(best["path"])
+        sensitivity = _sensitivity(pool, store, str(robot), best, effort, progress)
     published = task.published
-    grouped = []
-    for r, reading in enumerate(READINGS):
-        at = r * effort.reading_starts
-        tries = [p for p in readings[at : at + effort.reading_starts] if "failed" not in p]
-        chosen = min(tries, key=_reading_cost) if tries else None
-        grouped.append(asdict(reading) | {"point": chosen})
     return {
         "nearest": best,
         "starts": starts,
@@ -223,10 +151,113 @@ def calibrate(
             key: [_kept(p, published) for p in points] for key, points in predicted.items()
         },
         "left_out_draws": effort.left_out_draws,
-        "readings": grouped,
+        "readings": readings,
         "sensitivity": sensitivity,
         "rotor_friction": [asdict(row) for row in friction_ranges(published)],
     }
+
+
+def _task(robot: Path) -> Problem:
+    """The problem of a robot file; bad input is an error here, before any process starts.
+
+    Raises:
+        CalibrationError: The robot is none that the paper's numbers can be of.
+    """
+    task = search.base_problem(str(robot))
+    missing = [leg for leg in MIDDLE_LEGS if leg not in {own.name for own in task.spec.legs}]
+    if missing or not task.spec.floating:
+        raise CalibrationError(
+            f"{robot.name}: the paper's numbers are those of a walking hexapod with the middle "
+            f"legs {' and '.join(MIDDLE_LEGS)}; this robot "
+            + (f"has no leg '{missing[0]}'" if missing else "is on a stand")
+        )
+    logger.info("rotor friction leaves unmet: %s", ", ".join(task.sliver.frictions.unmet) or "none")
+    return task
+
+
+@dataclass(frozen=True)
+class _Run:
+    """The tasks of one calibration, each with the name under which its result is kept.
+
+    Attributes:
+        robot: Robot file.
+        effort: How much.
+        store: Of finished tasks.
+        pool: Of processes.
+        progress: As for `calibrate`.
+    """
+
+    robot: str
+    effort: Effort
+    store: Checkpoint
+    pool: ProcessPoolExecutor
+    progress: Progress
+
+    def starts(self) -> list[Point]:
+        """Nearest points to the prior's centre from every start."""
+        seed, number = self.effort.seed, self.effort.starts
+        tasks = [
+            (f"start/{path}/{i}", (self.robot, path, search.READ, seed, i, 30))
+            for path in search.PATHS
+            for i in range(number)
+        ]
+        done = self.progress("nearest point", number * len(search.PATHS))
+        return self.store.run(self.pool, search.nearest, tasks, done)
+
+    def drawn(
+        self, kind: str, task: Callable[..., Point], paths: tuple[str, ...], draws: int, title: str
+    ) -> list[Point]:
+        """Draws of the ensemble or of the prior.
+
+        Args:
+            kind: Begins the tasks' names.
+            task: Makes one draw.
+            paths: Transfer paths that are possible.
+            draws: How many.
+            title: Of the progress.
+        """
+        tasks = [
+            (f"{kind}/{'+'.join(paths)}/{i}", (self.robot, paths, self.effort.seed, i))
+            for i in range(draws)
+        ]
+        return self.store.run(self.pool, task, tasks, self.progress(title, draws))
+
+    def without(self, targets: tuple[str, ...], paths: tuple[str, ...]) -> list[Point]:
+        """Draws that do not know some of the targets."""
+        draws = self.effort.left_out_draws
+        tasks = [
+            (f"without/{'+'.join(targets)}/{i}", (self.robot, paths, self.effort.seed, i, targets))
+            for i in range(draws)
+        ]
+        done = self.progress(f"without {' and '.join(targets)}", draws)
+        return self.store.run(self.pool, search.member, tasks, done)
+
+    def with_totals(self, kind: str, points: list[Point]) -> list[Point]:
+        """Points with the energy of the whole robot."""
+        tasks = [
+            (f"totals/{kind}/{i}", (self.robot, p["path"], p["z"], p["constants"]))
+            for i, p in enumerate(points)
+        ]
+        done = self.progress(f"whole robot, {kind}", len(points))
+        found = self.store.run(self.pool, search.robot_totals, tasks, done)
+        return [p | {"totals": t} for p, t in zip(points, found, strict=True)]
+
+    def readings(self, path: str) -> list[Point]:
+        """Every other reading of the paper, with its nearest point where there is one."""
+        seed, number = self.effort.seed, self.effort.reading_starts
+        tasks = [
+            (f"reading/{_task_name(reading)}/{i}", (self.robot, path, reading, seed, i, 30))
+            for reading in READINGS
+            for i in range(number)
+        ]
+        done = self.progress("readings", len(READINGS) * number)
+        found = self.store.run(self.pool, search.read, tasks, done)
+        grouped = []
+        for r, reading in enumerate(READINGS):
+            tries = [p for p in found[r * number : (r + 1) * number] if "failed" not in p]
+            chosen = min(tries, key=_reading_cost) if tries else None
+            grouped.append(asdict(reading) | {"point": chosen})
+        return grouped
 
 
 def _task_name(reading: Reading) -> str:
@@ -259,7 +290,7 @@ def _sensitivity(
     robot: str,
     best: dict[str, Any],
     effort: Effort,
-    progress: Callable[[str, int], Callable[[int], None]],
+    progress: Progress,
 ) -> dict[str, Any]:
     """Sobol indices with every free number uniform within one prior sigma of the nearest point."""
     from SALib.analyze import sobol as analyze

@@ -7,9 +7,9 @@ the energy difference it asks for is fitted in its place.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -231,22 +231,12 @@ class Problem:
                 # Out of reach or tipping: a wall, felt as a large but finite residual.
                 return np.full(self._size, 30.0)
 
-        def jacobian(x: Array) -> Array:
-            base = residuals(x)
-            out = np.empty((base.size, x.size))
-            for i in range(x.size):
-                step = _STEP if x[i] + _STEP <= upper[i] else -_STEP
-                moved = x.copy()
-                moved[i] += step
-                out[:, i] = (residuals(moved) - base) / step
-            return out
-
         lower, upper = self.prior.lower[columns], self.prior.upper[columns]
         inside = np.clip(start[columns], lower + 1e-9, upper - 1e-9)
         found = optimize.least_squares(
             residuals,
             inside,
-            jac=jacobian,
+            jac=partial(_differences, residuals, upper),
             bounds=(lower, upper),
             method="trf",
             x_scale=1.0,
@@ -303,3 +293,24 @@ def extra_target(published: Mapping[str, Published], standing_legs: int) -> Targ
 
     low, high = extra(row.value - row.half_width), extra(row.value + row.half_width)
     return Target(EXTRA, (low + high) / 2, (high - low) / 2)
+
+
+def _differences(function: Callable[[Array], Array], upper: Array, x: Array) -> Array:
+    """Jacobian by one-sided differences, backwards where a step would leave the bounds.
+
+    Args:
+        function: Of coordinates (D,), returns residuals (R,).
+        upper: Bounds (D,).
+        x: Where, (D,).
+
+    Returns:
+        (R, D).
+    """
+    base = function(x)
+    out = np.empty((base.size, x.size))
+    for i in range(x.size):
+        step = _STEP if x[i] + _STEP <= upper[i] else -_STEP
+        moved = x.copy()
+        moved[i] += step
+        out[:, i] = (function(moved) - base) / step
+    return out
