@@ -9,7 +9,8 @@ from pathlib import Path
 from pipeline.effects.model_file import ModelFile, read_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.model_writer import model_text
-from pipeline.robot.robot_file import DEFAULT_ROBOT
+from pipeline.robot.published import published_names
+from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
 from pipeline.simulation.settings import Settings, settings
 from reports.atomic import write_text
 
@@ -104,5 +105,7 @@ def load(
     if path.suffix.lower() == ".toml":
         machine.settings(samples=51, walks=False)
     elif not path.is_file():
+        if str(robot) in published_names():
+            load_robot_file(path)  # says how to make one
         raise RobotFileError(f"{path}: no such robot file; name a robot file or URDF")
     return machine

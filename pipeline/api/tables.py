@@ -9,22 +9,27 @@ from typing import Any
 
 from actuators.loading.build import CATALOG
 from pipeline.motion.gait import gait_of, gait_table
+from pipeline.robot.foot_tracking import foot_tracking
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking, walk
 from reports.table import Table
+from reports.tables import kinematics as kinematics_tables
 from reports.tables import parameters as parameter_tables
 from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
 from reports.tables.gait import walking_base, walking_gait
 
 IDEAL = "ideal"
+HELD = "held joints"
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
 def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
-    """Each leg's joints."""
-    return {leg.name: leg.joints for leg in spec.legs}
+    """Each leg's joints, and those outside the legs together."""
+    legs = {leg.name: leg.joints for leg in spec.legs}
+    held = tuple(joint for joint, _ in spec.held)
+    return legs | {HELD: held} if held else legs
 
 
 def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:
@@ -50,6 +55,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
         walking_gait(gait),
         walking_base(walking.motion),
         walking_tables.walking_stability(walking.demand, walking.margins),
+        *_foot_tracking(given, walking),
         walking_tables.walking_stage_energy(
             walking.results, {n: a.stage_names for n, a in given.catalog.alternatives.items()}
         ),
@@ -77,6 +83,18 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
             walking.demand, static.demand, walking.supplies, static.supplies, legs
         )
     return tables
+
+
+def _foot_tracking(given: Settings, walking: Walking) -> list[Table]:
+    """How well the legs follow, where the motion says where the feet should be."""
+    pieces = [
+        (segment.time, given.robot.leg_positions(segment.configuration), segment.foot_target)
+        for segment in walking.motion.segments
+        if segment.foot_target is not None
+    ]
+    if not pieces:
+        return []
+    return [kinematics_tables.foot_tracking(foot_tracking(given.robot.chains, pieces))]
 
 
 def table_of_parameters(given: Settings) -> Table:
