@@ -20,7 +20,6 @@ LONGER = {
     "pipeline/logs/prepared/prepare.py:prepare": 86,
     "pipeline/logs/quality/quality.py:_efforts": 68,
     "pipeline/logs/reading/read.py:assemble": 71,
-    "pipeline/motion/gait.py:tripod_gait": 81,
     "pipeline/regression/preprocess.py:rows": 61,
     "pipeline/regression/reporting.py:Reporting._result": 80,
     "pipeline/robot/robot_file.py:_legs": 65,

@@ -11,7 +11,8 @@ from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.model_writer import model_text
 from pipeline.robot.published import published_names
 from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
-from pipeline.simulation.settings import Settings, settings
+from pipeline.simulation.force_choice import ForceChoice
+from pipeline.simulation.settings import PAPER_FORCES, Settings, settings
 from reports.atomic import write_text
 
 
@@ -39,6 +40,8 @@ class Machine:
         samples: int,
         quasi_static: bool = False,
         regeneration: str = "none",
+        forces: ForceChoice = PAPER_FORCES,
+        compare_forces: bool = False,
         walks: bool = True,
     ) -> Settings:
         """The machine ready to stand and walk; see `pipeline.simulation.settings.settings`."""
@@ -51,6 +54,8 @@ class Machine:
             quasi_static=quasi_static,
             regeneration=regeneration,
             actuators=self.actuators,
+            forces=forces,
+            compare_forces=compare_forces,
             walks=walks,
         )
 

@@ -12,7 +12,7 @@ import pytest
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.dynamics.stability import support_margin
 from pipeline.errors import PipelineError, RobotFileError
-from pipeline.motion.gait import standing_posture
+from pipeline.motion.standing import standing_posture
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess.guess import Guess, guess_robot
 from pipeline.robot.guess.writer import robot_text
