@@ -12,6 +12,7 @@ import pytest
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.dynamics.stability import support_margin
 from pipeline.errors import PipelineError, RobotFileError
+from pipeline.motion.gait import gait_of
 from pipeline.motion.standing import standing_posture
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess.guess import Guess, guess_robot
@@ -84,11 +85,8 @@ def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_p
     assert [(leg.name, leg.joints, leg.foot, leg.side) for leg in robot.spec.legs] == [
         (leg.name, leg.joints, leg.foot, leg.side) for leg in hexapod.spec.legs
     ]
-    gaits = [
-        tomllib.loads(p.read_text(encoding="utf-8"))["gait"]
-        for p in (robot.spec.path, hexapod.spec.path)
-    ]
-    assert gaits[0] == gaits[1]
+    stances = [gait_of(each.spec).footfall.stances() for each in (robot, hexapod)]
+    assert stances[0] == stances[1]
     assert robot.mass == pytest.approx(hexapod.mass)
     feet = guess.stance.feet
     assert np.ptp(feet[:, 2]) < 1e-9
@@ -114,7 +112,7 @@ def test_every_guess_has_its_reason(tmp_path: Path) -> None:
         f"held.{joint}" for joint in table["held"]
     }
     assert dict(robot.spec.assumed) == table["assumed"]
-    for name in ("foot_stroke", "foot_lift", "walking_speed", "gait_period"):
+    for name in ("foot_stroke", "foot_lift", "gait_period"):
         row = robot.spec.parameters.parameter(name)
         assert row.basis == "assumed"
         assert row.interval is not None
