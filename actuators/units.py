@@ -1,6 +1,7 @@
 """Catalogue units and their SI factors; standard library only."""
 
 import math
+import re
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
@@ -52,6 +53,8 @@ _TABLE: Final[Mapping[str, Mapping[str, float]]] = {
     "temperature coefficient": {"1/K": 1.0, "%/K": 1e-2},
     "temperature": {"K": 1.0, "degC": 1.0},
 }
+#: A number and what follows it.
+_QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*)?")
 _OFFSET: Final[Mapping[str, float]] = {"degC": 273.15}  # added after scaling [K]
 
 _DIMENSION: Final = MappingProxyType(
@@ -109,6 +112,37 @@ def to_si(value: float, unit: str) -> float:
     """
     dimension(unit)
     return value * _FACTOR[unit] + _OFFSET.get(unit, 0.0)
+
+
+def quantity(written: object, dimension_name: str) -> float:
+    """Return a number written with its unit, such as ``"240 mm"``, in SI units.
+
+    Args:
+        written: Number and unit in one text; a bare number only for a ratio, or 0.
+        dimension_name: Of the table, e.g. ``length``.
+
+    Raises:
+        UnitError: No number, no unit, or a unit of another dimension; says what is expected.
+    """
+    number = isinstance(written, (int, float)) and not isinstance(written, bool)
+    ratio = dimension_name == "ratio"
+    example = "0.5" if ratio else f"'1 {si_unit(dimension_name)}'"
+    if number and (ratio or written == 0):  # nothing is nothing in every unit
+        written = f"{written!r} {si_unit(dimension_name)}"
+    if not isinstance(written, str):
+        raise UnitError(f"{written!r:.40} has no unit; expected text such as {example}")
+    match = _QUANTITY.fullmatch(written.strip())
+    if match is None:
+        raise UnitError(f"{written!r:.40} is no number with a unit; expected such as {example}")
+    value, unit = float(match[1]), match[2] or ("1" if ratio else "")
+    if not unit:
+        raise UnitError(f"{written!r:.40} has no unit; expected such as {example}")
+    if dimension(unit) != dimension_name:
+        known = ", ".join(_TABLE[dimension_name])
+        raise UnitError(f"{written!r:.40}: expected a {dimension_name} in one of {known}")
+    if not math.isfinite(value):
+        raise UnitError(f"{written!r:.40} is not finite")
+    return to_si(value, unit)
 
 
 def from_si(value: float, unit: str) -> float:

@@ -30,8 +30,8 @@ import pyarrow.csv as pacsv
 
 from actuators.loading.build import load_catalog
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
-from pipeline.motion.gait import tripod_gait
 from pipeline.motion.motion import Motion
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.walk_stand import joint_series
@@ -245,7 +245,7 @@ def cold_run() -> None:
 def main() -> None:
     """Print everything."""
     robot = load_robot(load_robot_file(ROOT / "urdf" / "hexapod.toml"))
-    motion = tripod_gait(robot, samples=SAMPLES // 2)
+    motion = walking_motion(robot, samples=SAMPLES // 2)
     demand_ratios(robot, motion)
     csv_ratio(robot, motion)
     cold_run()

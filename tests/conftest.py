@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from pipeline.cli.demo import DEMO
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
-from pipeline.motion.gait import tripod_gait
 from pipeline.motion.motion import Motion
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures import several
@@ -39,7 +39,7 @@ def hexapod() -> Robot:
 
 @pytest.fixture(scope="session")
 def walk(hexapod: Robot) -> Motion:
-    return tripod_gait(hexapod)
+    return walking_motion(hexapod)
 
 
 @pytest.fixture(scope="session")

@@ -11,6 +11,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.energy.energy import stage_energies
+from pipeline.motion.gait import gait_of
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.robot.robot import Robot
@@ -188,8 +189,8 @@ def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawin
             _gait_stretches(robot, walking),
             shown=leg,
             body=(0.0, 0.0) if trunk is None else (float(trunk.size[0]), float(trunk.size[1])),
-            title=f"{robot.spec.name}: tripod gait",
-            subtitle=f"transfer path '{robot.spec.transfer_path}'",
+            title=f"{robot.spec.name}: {gait_of(robot.spec).title}",
+            subtitle=f"transfer path '{gait_of(robot.spec).path}'",
         )
 
     return [

@@ -23,12 +23,14 @@ class Machine:
         actuators: Folder of actuator files; None for the project's catalogue.
         changes: Numbers that differ from the files', ``KEY=VALUE`` each, as ``--set`` takes them.
         model: Effects on top of the files; None without.
+        gait: Gait file to walk instead of the robot file's gait; None without.
     """
 
     path: Path
     actuators: Path | None = None
     changes: tuple[str, ...] = ()
     model: ModelFile | None = None
+    gait: Path | None = None
 
     def settings(
         self,
@@ -42,6 +44,7 @@ class Machine:
         return settings(
             robot=self.path,
             model=self.model,
+            gait=self.gait,
             changes=self.changes,
             samples=samples,
             quasi_static=quasi_static,
@@ -71,6 +74,7 @@ def load(
     *,
     model: str | Path | None = None,
     actuators: str | Path | None = None,
+    gait: str | Path | None = None,
     changes: Mapping[str, object] | None = None,
 ) -> Machine:
     """Name a machine by its files, and refuse what cannot be used.
@@ -80,8 +84,10 @@ def load(
             project's hexapod by default.
         model: Model file with effects that `identify` found.
         actuators: Folder of actuator files; the project's catalogue by default.
+        gait: File with a table ``[gait]`` to walk instead of the robot file's.
         changes: Name of a number to its value, in the unit its file writes: ``hip_spacing``,
-            ``harmonic_drive.load``, ``gait.transfer_path``.
+            ``harmonic_drive.load``; what ``[gait]`` states, ``gait.slope_forward`` with its unit in
+            the text; ``standing.feet``.
 
     Raises:
         PipelineError: Robot file or URDF cannot be used; one line says where and what to do.
@@ -94,7 +100,7 @@ def load(
         file = read_model_file(Path(model), folder)
     path = Path(robot) if robot is not None else file.robot if file else DEFAULT_ROBOT
     texts = tuple(f"{name}={value}" for name, value in (changes or {}).items())
-    machine = Machine(path, folder, texts, file)
+    machine = Machine(path, folder, texts, file, Path(gait) if gait else None)
     if path.suffix.lower() == ".toml":
         machine.settings(samples=51, walks=False)
     elif not path.is_file():

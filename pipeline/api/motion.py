@@ -107,7 +107,7 @@ def walk(
         machine: From `load`, with a floating base.
         actuator: Name of an alternative, which the ideal one is put beside, since ratios refer to
             it; all alternatives by default.
-        samples: Per segment of the gait.
+        samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
 

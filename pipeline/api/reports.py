@@ -38,7 +38,7 @@ def reports(
     Args:
         machine: From `load`, with a floating base.
         folder: For everything written; a run that it held is replaced.
-        samples: Per segment of the gait.
+        samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
         decimal: ``","`` writes copies for a decimal-comma spreadsheet, too.

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from actuators.loading.build import CATALOG
+from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking, walk
@@ -15,6 +16,7 @@ from reports.table import Table
 from reports.tables import parameters as parameter_tables
 from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
+from reports.tables.gait import walking_base, walking_gait
 
 IDEAL = "ideal"
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
@@ -41,10 +43,12 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
     """The tables of one walking cycle."""
     legs = leg_joints(given.robot.spec)
     chains = given.chains()
-    p = given.robot.spec.parameters
+    p, gait = given.robot.spec.parameters, gait_of(given.robot.spec)
     tables = [
         walking_tables.walking_joint_demand(walking.demand),
         walking_tables.walking_contact_forces(walking.demand),
+        walking_gait(gait),
+        walking_base(walking.motion),
         walking_tables.walking_stability(walking.demand, walking.margins),
         walking_tables.walking_stage_energy(
             walking.results, {n: a.stage_names for n, a in given.catalog.alternatives.items()}
@@ -56,7 +60,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
             walking.supplies,
             legs,
             given.machine.mass * p["gravity"],  # the mass that the forces rest on
-            p["walking_speed"],
+            gait.speed,
         ),
         walking_tables.motor_limits(walking.results),
     ]
@@ -88,7 +92,7 @@ def inputs_of(given: Settings) -> list[Path]:
     spec = given.robot.spec
     files = [*spec.sources, *([] if spec.build else [spec.urdf])]
     files += sorted((given.actuators or Path(CATALOG)).glob("*.toml"))
-    return [*files, given.model] if given.model else files
+    return [*files, *(path for path in (given.gait, given.model) if path)]
 
 
 def metadata(given: Settings) -> dict[str, Any]:
@@ -105,7 +109,7 @@ def metadata(given: Settings) -> dict[str, Any]:
             "quasi_static": given.quasi_static,
             "regeneration": given.regeneration.policy,
             "regeneration_fraction": given.regeneration.fraction,
-            "transfer_path": spec.transfer_path,
+            "transfer_path": gait_table(spec).transfer_path,
             "effects": list(given.effects.names) if given.effects else [],
         },
         "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "

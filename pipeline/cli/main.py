@@ -89,6 +89,12 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
         "--robot", type=named_path, help="robot file; the model file's or the hexapod by default"
     )
     sub.add_argument(
+        "--gait",
+        type=named_path,
+        metavar="FILE",
+        help="TOML with a table [gait] to walk instead of the robot file's",
+    )
+    sub.add_argument(
         "--model", type=named_path, help="model file: include the effects that `gap` found"
     )
     sub.add_argument(
@@ -106,9 +112,10 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         help="change a number for this run: NAME=VALUE in the unit the robot file writes, "
-        "COMPONENT.NAME=VALUE for an actuator, gait.transfer_path=NAME",
+        "COMPONENT.NAME=VALUE for an actuator, gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
+        "standing.feet=LEG,LEG,LEG",
     )
-    sub.add_argument("--samples", type=int, default=751, help="samples per segment of the gait")
+    sub.add_argument("--samples", type=int, default=751, help="samples per half period of the gait")
     sub.add_argument(
         "--quasi-static", action="store_true", help="leave out the links' inertial terms"
     )

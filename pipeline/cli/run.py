@@ -27,6 +27,7 @@ def settings_of(options: argparse.Namespace) -> Settings:
     return settings(
         robot=options.robot,
         model=options.model,
+        gait=options.gait,
         changes=options.set,
         samples=options.samples,
         quasi_static=options.quasi_static,

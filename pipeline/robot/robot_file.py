@@ -72,8 +72,11 @@ _TOP_KEYS = {
 }
 _ROBOT_KEYS = {"name", "urdf", "base_link", "base", "build", "zero_pose", "note"}
 _LEG_KEYS = {"joints", "foot", "side", "station", "neutral_foot", "start_posture"}
-_GAIT_KEYS = {"transfer_path", "tripods"}
 _STANDING_KEYS = {"feet"}
+#: A gait's numbers among the parameters; ``[gait]`` may state its own instead.
+GAIT_NUMBERS = frozenset({"foot_stroke", "foot_lift", "walking_speed", "gait_period"})
+#: Keys of ``[gait]`` that say which legs stand when, the duty factor aside.
+FOOTFALLS = ("name", "sets", "tripods", "phase")
 _MOST_EXTENDED = 20
 _COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven"}
 
@@ -119,8 +122,7 @@ class RobotSpec:
         zero_pose: Zero pose and positive directions, in words.
         parameters: Numbers with unit, basis and source, SI on reading.
         legs: In order.
-        transfer_path: Name of the foot's path through the air.
-        tripods: The two sets of legs that support in turn.
+        gait: Table ``[gait]`` as written; `pipeline.motion.gait_table` reads it.
         standing_feet: Legs that stand in the standing mode.
         held: Joints outside the legs and where they are held [rad, m].
         assumed: Keys of the file that are guesses, each with its reason.
@@ -137,8 +139,7 @@ class RobotSpec:
     zero_pose: str
     parameters: ParameterSet
     legs: tuple[LegSpec, ...]
-    transfer_path: str
-    tripods: tuple[tuple[str, ...], ...]
+    gait: Mapping[str, Any]
     standing_feet: tuple[str, ...]
     held: tuple[tuple[str, float], ...] = ()
     assumed: tuple[tuple[str, str], ...] = ()
@@ -149,6 +150,10 @@ class RobotSpec:
         """All actuated joints: the legs' leg by leg, then those that are held."""
         legs = (joint for leg in self.legs for joint in leg.joints)
         return (*legs, *(joint for joint, _ in self.held))
+
+    def with_gait(self, **changes: Any) -> RobotSpec:
+        """The same robot with another gait: keys of ``[gait]`` as the file would write them."""
+        return replace(self, gait=merged_gait(self.gait, changes))
 
     def with_parameters(self, values: Mapping[str, float]) -> RobotSpec:
         """The same robot with some parameters at other values.
@@ -229,19 +234,15 @@ def load_robot_file(path: Path) -> RobotSpec:
     if base not in ("floating", "fixed"):
         raise RobotFileError(f"{where}: robot.base = '{base}'; expected 'floating' or 'fixed'")
     schema = GAIT_SCHEMA | (BUILD_SCHEMA if build else {})
-    parameters = parameters_from_table(table["parameters"], schema, f"{where}: parameters")
+    parameters = parameters_from_table(
+        table["parameters"], schema, f"{where}: parameters", optional=GAIT_NUMBERS
+    )
     check_parameters(parameters, build, where)
     legs = _legs(table["legs"], parameters, build, where)
     names = [leg.name for leg in legs]
     held = _held(table.get("held", {}), legs, where)
-    gait = table["gait"]
-    _known_keys(gait, _GAIT_KEYS, where, "key of [gait]")
     standing = table.get("standing", {})
     _known_keys(standing, _STANDING_KEYS, where, "key of [standing]")
-    groups = gait.get("tripods", [])
-    if not isinstance(groups, list):
-        raise RobotFileError(f"{where}: gait.tripods must be two lists of leg names")
-    tripods = tuple(_leg_list(group, names, f"{where}: gait.tripods") for group in groups)
     return RobotSpec(
         path=path,
         sources=sources,
@@ -253,9 +254,8 @@ def load_robot_file(path: Path) -> RobotSpec:
         zero_pose=str(robot.get("zero_pose", "")),
         parameters=parameters,
         legs=legs,
-        transfer_path=_text(gait, "transfer_path", where),
-        tripods=tripods,
-        standing_feet=_leg_list(standing.get("feet", names), names, f"{where}: standing.feet"),
+        gait=table.get("gait", {}),
+        standing_feet=leg_list(standing.get("feet", names), names, f"{where}: standing.feet"),
         held=held,
         assumed=_assumed(table.get("assumed", {}), where),
         actuator_table=table.get("actuators", {}),
@@ -282,8 +282,20 @@ def _merged(below: dict[str, Any], above: dict[str, Any]) -> dict[str, Any]:
     out = dict(below)
     for key, value in above.items():
         deep = key != "legs" and isinstance(value, dict) and isinstance(out.get(key), dict)
-        out[key] = _merged(out[key], value) if deep else value
+        merged = merged_gait if key == "gait" else _merged
+        out[key] = merged(out[key], value) if deep else value
     return out
+
+
+def merged_gait(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+    """One table ``[gait]`` over another: what the upper states counts.
+
+    A footfall is replaced as a whole, since a name does not go with another gait's phases; a duty
+    factor alone changes that of the footfall below.
+    """
+    new = any(key in above for key in FOOTFALLS)
+    kept = {k: v for k, v in below.items() if not (new and k in (*FOOTFALLS, "duty_factor"))}
+    return kept | dict(above)
 
 
 def _refuse_missing(table: Mapping[str, Any], where: str) -> None:
@@ -306,11 +318,12 @@ def _refuse_missing(table: Mapping[str, Any], where: str) -> None:
     for leg, entry in under("legs").items():
         if isinstance(entry, dict):
             missing += [f"legs.{leg}.{key}" for key in leg_keys if key not in entry]
-    missing += [] if "transfer_path" in under("gait") else ["gait.transfer_path"]
+    # A gait that states numbers of its own is asked for the rest when it walks.
+    own = set(under("gait")) - {"transfer_path", "tripods"}
     missing += [
         f"parameters.{name} [{si_unit(kind)}]"
         for name, kind in schema.items()
-        if name not in under("parameters")
+        if name not in under("parameters") and not (own and name in GAIT_NUMBERS)
     ]
     for name, entry in under("parameters").items():
         if isinstance(entry, dict):
@@ -336,7 +349,17 @@ def _text(table: Mapping[str, Any], key: str, where: str) -> str:
     return value
 
 
-def _leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
+def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
+    """A list of leg names, each known and named once.
+
+    Args:
+        value: As TOML gives it.
+        names: Of the robot's legs.
+        where: File and key, for messages.
+
+    Raises:
+        RobotFileError: It is something else.
+    """
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise RobotFileError(f"{where}: expected a list of leg names")
     for name in value:
@@ -488,15 +511,12 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
     Raises:
         RobotFileError: A mass, length or period that is not positive, or a contradiction.
     """
-    _positive(
-        parameters,
-        ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity"),
-        where,
-    )
+    sizes = ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity")
+    _positive(parameters, tuple(name for name in sizes if name in parameters), where)
     for name, value in parameters.items():
         if abs(value) > LARGEST:
             raise RobotFileError(f"{where}: parameters.{name} is beyond any robot; check its unit")
-    if parameters["foot_lift"] < 0:
+    if "foot_lift" in parameters and parameters["foot_lift"] < 0:
         raise RobotFileError(f"{where}: parameters.foot_lift must not be negative")
     if parameters["gravity"] > LARGEST_GRAVITY:
         raise RobotFileError(f"{where}: parameters.gravity is beyond any planet; check its unit")

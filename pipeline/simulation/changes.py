@@ -12,10 +12,13 @@ from actuators.loading.build import Catalog
 from actuators.parameters import ParameterSet
 from actuators.units import to_si
 from pipeline.errors import GaitError, RobotFileError
-from pipeline.motion.transfer_path import transfer_path
-from pipeline.robot.robot_file import RobotSpec, check_parameters
+from pipeline.motion.gait import gait_table
+from pipeline.motion.gait_table import changed_table, gait_keys
+from pipeline.robot.robot_file import RobotSpec, check_parameters, leg_list
 
-TRANSFER_PATH_KEY = "gait.transfer_path"
+#: What a change of the table ``[gait]`` begins with.
+GAIT = "gait."
+STANDING_FEET = "standing.feet"
 #: Between these a ratio looks like a slip by a prefix of the unit, the value itself a little off.
 _THOUSAND = (200.0, 5000.0)
 
@@ -64,15 +67,16 @@ def _one(
 ) -> tuple[RobotSpec | None, Catalog]:
     """One change; numbers in the unit their file writes."""
     place = f"--set {one_line(key)}={one_line(value)}"
-    if key == TRANSFER_PATH_KEY and spec is not None:
-        try:
-            return replace(spec, transfer_path=transfer_path(value).name), catalog
-        except GaitError as error:
-            raise RobotFileError(f"{place}: {error}") from None
+    if spec is not None and key.startswith(GAIT):
+        return _other_gait(spec, key.removeprefix(GAIT), value, place), catalog
+    if spec is not None and key == STANDING_FEET:
+        names = [leg.name for leg in spec.legs]
+        feet = names if value == "all" else [name.strip() for name in value.split(",")]
+        return replace(spec, standing_feet=leg_list(feet, names, place)), catalog
     references = [f"{component}.{p.name}" for component, p in catalog.rows()]
     numbers = spec.parameters if spec is not None else {}
     if key not in numbers and key not in references:
-        known = [*([TRANSFER_PATH_KEY] if spec else []), *numbers, *references]
+        known = [*([*gait_keys(), STANDING_FEET] if spec else []), *numbers, *references]
         raise RobotFileError(f"{place}: there is no such number; {_hint(key, known)}")
     try:
         if spec is not None and key in spec.parameters:
@@ -82,6 +86,16 @@ def _one(
         return spec, catalog.replaced(key, to_si(_number(place, value), unit))
     except ActuatorError as error:
         raise RobotFileError(f"{place}: {error}") from None
+
+
+def _other_gait(spec: RobotSpec, key: str, value: str, place: str) -> RobotSpec:
+    """The robot with one key of ``[gait]`` changed, its number with the unit in the text."""
+    new = replace(spec, gait=changed_table(spec.gait, key, value))
+    try:
+        gait_table(new)
+    except GaitError as error:
+        raise RobotFileError(f"{place}: {str(error).removeprefix(f'{spec.path}: ')}") from None
+    return new
 
 
 def _thousandfold(before: ParameterSet, after: ParameterSet, key: str) -> list[str]:

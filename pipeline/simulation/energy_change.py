@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pipeline.machine.drivetrains import Actuators
+from pipeline.motion.gait import gait_of
 from pipeline.robot.robot import Robot
 from pipeline.simulation.break_even import break_even
 from pipeline.simulation.edited import Effects
 from pipeline.simulation.walk_stand import Adjust, stand, walk
 
-#: Samples per segment of the gait: energies within 1 % and a fraction of a second.
+#: Samples per half period of the gait: energies within 1 % and a fraction of a second.
 SAMPLES = 151
 PAIR = ("reversible", "irreversible")
 
@@ -66,7 +67,7 @@ def energy_change(
     Raises:
         TippingError: With the effects a foot would have to pull.
     """
-    period = robot.spec.parameters["gait_period"]
+    period = gait_of(robot.spec).period
     before = _costs(robot, chains, None)
     if known is not None:
         before = _costs(known.robot, known.chains(chains), known.demand)

@@ -26,7 +26,7 @@ def needed(samples: int, joints: int, alternatives: int) -> int:
     """Memory of one walking cycle [bytes].
 
     Args:
-        samples: Per segment.
+        samples: Per half period.
         joints: Of the robot.
         alternatives: Actuators that are compared.
     """
@@ -59,7 +59,7 @@ def refuse_beyond_memory(samples: int, joints: int, alternatives: int) -> None:
     """Refuse a cycle that does not fit into memory, before anything is computed.
 
     Args:
-        samples: Per segment.
+        samples: Per half period.
         joints: Of the robot.
         alternatives: Actuators that are compared.
 

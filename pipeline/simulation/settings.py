@@ -12,6 +12,8 @@ from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.drivetrains import Actuators
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
+from pipeline.motion.gait_table import read_gait_file
+from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
@@ -33,7 +35,7 @@ class Settings:
         robot: Loaded and checked.
         catalog: Actuator components and alternatives.
         regeneration: Policy.
-        samples: Per segment of the gait.
+        samples: Per half period of the gait.
         quasi_static: Whether the links' inertial terms are left out.
         changes: What ``--set`` changed, as written.
         remarks: What a reader of the numbers should know of the robot and the changes.
@@ -41,6 +43,7 @@ class Settings:
         own: What single joints have of their own.
         effects: Of the model file; None without one.
         model: The model file; None without one.
+        gait: The gait file; None without one.
     """
 
     robot: Robot
@@ -54,6 +57,7 @@ class Settings:
     own: OwnActuators = field(default_factory=OwnActuators)
     effects: Effects | None = None
     model: Path | None = None
+    gait: Path | None = None
 
     def chains(self) -> Mapping[str, Actuators]:
         """Every alternative, with the model file's effects in it."""
@@ -75,6 +79,7 @@ def settings(
     *,
     robot: Path | None = None,
     model: Path | ModelFile | None = None,
+    gait: Path | None = None,
     changes: Sequence[str] = (),
     samples: int = SAMPLES,
     quasi_static: bool = False,
@@ -87,8 +92,9 @@ def settings(
     Args:
         robot: Robot file; the model file's or the hexapod by default.
         model: Model file with effects that `gap` found, or what it holds.
+        gait: File with a table ``[gait]`` to walk instead of the robot file's.
         changes: ``KEY=VALUE`` each, as ``--set`` takes them.
-        samples: Per segment of the gait.
+        samples: Per half period of the gait.
         quasi_static: Whether the links' inertial terms are left out.
         regeneration: ``none``, ``bus`` or a fraction of returned energy that is used again.
         actuators: Folder of actuator files; the project's catalogue by default.
@@ -102,11 +108,13 @@ def settings(
     path = model if isinstance(model, Path) else None
     file = read_model_file(model, actuators) if isinstance(model, Path) else model
     spec = load_robot_file(robot or (file.robot if file else DEFAULT_ROBOT))
+    if gait is not None:
+        spec = spec.with_gait(**read_gait_file(gait))
     actuators = actuators or actuator_folder(spec)
     catalog = load_catalog(actuators or CATALOG)
     if samples < LEAST_SAMPLES:
         raise GaitError(
-            f"--samples {samples}: at least {LEAST_SAMPLES} samples per segment are needed "
+            f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
             "for energies within 1 %"
         )
     spec, catalog, remarks = changed(spec, catalog, changes)
@@ -114,6 +122,7 @@ def settings(
     catalog = own.catalog(catalog)
     loaded = load_robot(spec)
     remarks += refuse_impossible(loaded)
+    loaded = with_payload(loaded)
     if walks:
         refuse_beyond_memory(samples, len(loaded.joints), len(catalog.alternatives))
     return Settings(
@@ -128,6 +137,7 @@ def settings(
         own=own,
         effects=_effects(file, path or Path("model.toml"), loaded, catalog, own) if file else None,
         model=path,
+        gait=gait,
     )
 
 

@@ -16,8 +16,9 @@ from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand, motion_demand, segment_demand
 from pipeline.dynamics.stability import stability_margins
 from pipeline.machine.drivetrains import Actuators
-from pipeline.motion.gait import standing_posture, tripod_gait
 from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.standing import standing_posture
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -128,7 +129,7 @@ def walking_demand(
     robot: Robot, *, samples: int, quasi_static: bool = False, adjust: Adjust | None = None
 ) -> tuple[Motion, MotionDemand]:
     """One cycle and what it demands of the joints; see `walk`."""
-    motion = tripod_gait(robot, samples=samples)
+    motion = walking_motion(robot, samples=samples)
     demand = motion_demand(robot, motion, quasi_static=quasi_static)
     if adjust is not None:
         pairs = zip(motion.segments, demand.segments, strict=True)
@@ -150,7 +151,7 @@ def walk(
     Args:
         robot: With a floating base.
         chains: By alternative.
-        samples: Per segment.
+        samples: Per half period.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy; none by default.
         adjust: Changes the demand on the actuators; see `pipeline.simulation.edited`.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from pipeline.motion.gait import gait_table
 from pipeline.paper.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
 from pipeline.paper.judgement.basis import Basis, Judged
 from pipeline.paper.judgement.readings import readings, verdict
@@ -287,10 +288,8 @@ def measure_next(ranked: Sequence[Index]) -> str:
 
 
 def _parameters(by: Basis, tables: Mapping[str, Table], given: Settings) -> Section:
-    path = (
-        f"The foot's path through the air is `{given.robot.spec.transfer_path}`; the paper does "
-        "not give it."
-    )
+    shape = gait_table(given.robot.spec).transfer_path
+    path = f"The foot's path through the air is `{shape}`; the paper does not give it."
     blocks: list[Text | Points | TableBlock] = []
     if by.results is None:
         blocks.append(Text(path))

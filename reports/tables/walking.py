@@ -236,7 +236,7 @@ def robot_energy(
                 "alternative": name,
                 "energy_per_cycle_J": energy,
                 "average_power_W": power,
-                "cost_of_transport": power / (weight * speed),
+                "cost_of_transport": power / (weight * speed) if speed else None,
                 "support_share": None if support is None else support / energy,
                 "transfer_share": None if support is None else 1 - support / energy,
                 "dumped_J": float(supply.dumped_energy.sum()),

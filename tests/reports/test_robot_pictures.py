@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.motion.gait import standing_posture
+from pipeline.motion.standing import standing_posture
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.errors import FigureError

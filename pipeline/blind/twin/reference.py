@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pipeline.blind.twin.plant import Plant
 from pipeline.blind.twin.setup import Setup
 from pipeline.dynamics.joint_demand import motion_demand
-from pipeline.motion.gait import tripod_gait
 from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -125,7 +125,7 @@ def reference(setup: Setup) -> Reference:
     """The nominal motion of a setup: its plan on a stand, one gait cycle where it walks."""
     robot = setup.plant.robot
     if robot.floating:
-        motion = tripod_gait(robot, samples=_SAMPLES)
+        motion = walking_motion(robot, samples=_SAMPLES)
         return Reference(setup, motion)
     plan = setup.plan
     every = round(5e-3 / plan.period)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.blind.twin.controller import Plan
 from pipeline.blind.twin.errors import TwinError
-from pipeline.motion.gait import tripod_gait
+from pipeline.motion.gait import gait_table
 from pipeline.motion.transfer_path import transfer_path
 from pipeline.robot.inverse_kinematics import solve_positions
 from pipeline.robot.robot import Robot
@@ -108,13 +108,6 @@ def phase_profile(cycles: float, period_of_cycle: float, period: float) -> Array
     return result
 
 
-def gait_table(robot: Robot) -> Array:
-    """One closed period of the robot's tripod gait, shape (N, J), last row like the first [rad]."""
-    segments = tripod_gait(robot, samples=751).segments
-    first, second = (s.configuration[:, robot.position_index] for s in segments)
-    return np.concatenate([first, second[1:]])
-
-
 def step_table(robot: Robot, samples: int = 751) -> Array:
     """One closed period of every leg stepping alike, support first, shape (N, J) [rad].
 
@@ -123,7 +116,7 @@ def step_table(robot: Robot, samples: int = 751) -> Array:
     spec = robot.spec
     stroke, lift = spec.parameters["foot_stroke"], spec.parameters["foot_lift"]
     phase = np.linspace(0.0, 1.0, samples)
-    path = transfer_path(spec.transfer_path)
+    path = transfer_path(gait_table(spec).transfer_path)
     along = np.concatenate([0.5 - phase, 2 * path.advance(phase)[0] - phase - 0.5])
     up = np.concatenate([np.zeros(samples), path.lift(phase)[0]])
     neutral = np.array([leg.neutral_foot for leg in spec.legs])

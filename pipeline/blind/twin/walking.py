@@ -9,8 +9,9 @@ from pipeline.blind.twin.controller import Plan
 from pipeline.blind.twin.errors import TwinError
 from pipeline.blind.twin.trajectories import CONTROL_PERIOD, at_phase, smooth_step
 from pipeline.dynamics.joint_demand import motion_demand, segment_demand
-from pipeline.motion.gait import standing_posture, tripod_gait
 from pipeline.motion.motion import Segment
+from pipeline.motion.standing import standing_posture
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_force_torques
 from pipeline.robot.robot import Robot
 
@@ -46,7 +47,7 @@ def walking_plan(
     if not robot.floating:
         raise TwinError(f"robot '{robot.spec.name}' has a fixed base and cannot walk")
     dt = CONTROL_PERIOD
-    motion = tripod_gait(robot, samples=_SAMPLES)
+    motion = walking_motion(robot, samples=_SAMPLES)
     demand = motion_demand(robot, motion, quasi_static=True)
     table = np.concatenate([demand.segments[0].position, demand.segments[1].position[1:]])
     first, second = (d.torque.copy() for d in demand.segments)

@@ -13,7 +13,8 @@ from pipeline.identification.selection.deciding_motion import RATE, Deciding, Ri
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
-from pipeline.motion.gait import standing_posture
+from pipeline.motion.gait import gait_of
+from pipeline.motion.standing import standing_posture
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
@@ -59,7 +60,7 @@ def decide(
         if motion is None:
             continue
         where = (
-            "the other tripod stands, the legs named above hang in the air and move"
+            "other legs stand, the legs named above hang in the air and move"
             if given.legged
             else "the robot on its stand"
         )
@@ -89,7 +90,7 @@ def _lifted(
     robot = given.robot
     assert robot is not None
     free = {leg.name for leg in robot.spec.legs if set(leg.joints) & set(joints)}
-    for stance in robot.spec.tripods:
+    for _, _, stance in gait_of(robot.spec).footfall.stances():
         if not free & set(stance):
             segment = standing_posture(robot, stance)
             posture = segment.configuration[0, robot.position_index]

@@ -29,6 +29,7 @@ from pipeline.logs.reading.table_file import sha256
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
+from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
@@ -105,6 +106,7 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
     else:
         robot = load_robot(parts.spec)
         refuse_impossible(robot)
+        robot = with_payload(robot)
         # Motor-side positions need a ratio whatever channel is compared.
         usual = alternative or own.usual or DEFAULT_ALTERNATIVE
         actuators = own.actuators(catalog, usual)

@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import Edit, apply_edits, edits_in
 from pipeline.effects.registry import effect_named
-from pipeline.errors import TippingError
+from pipeline.errors import GaitError, TippingError
 from pipeline.identification.compare.stages import Stage, noise_floor, overall
 from pipeline.identification.results import Found, Naming
 from pipeline.identification.selection.deciding_motion import Deciding
@@ -110,7 +110,7 @@ def cost(
         found: Effects.
         known: Whether those of the model file stand on both sides of the comparison.
     """
-    if not given.legged or not found or given.robot is None or not given.robot.spec.tripods:
+    if not given.legged or not found or given.robot is None:
         return None, ()
     edits = found_effects(given, found, known=known)
     start = found_effects(given, ()) if known and given.file.edits else None
@@ -119,6 +119,8 @@ def cost(
         return energy_change(given.robot, every, edits, start), edits.remarks
     except TippingError as error:
         return None, (f"With these effects {error}",)
+    except GaitError as error:
+        return None, (f"No energy of a gait cycle: {error}",)
 
 
 def most_improved(before: Stage, after: Stage, found: Sequence[int]) -> tuple[int, ...]:

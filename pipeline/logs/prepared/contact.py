@@ -10,8 +10,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.errors import GaitError
 from pipeline.logs.errors import PreparationError
 from pipeline.logs.reading.log import Log
+from pipeline.motion.gait import gait_of
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
@@ -82,25 +84,25 @@ def _standing_by_force(normal: Array) -> Mask:
 
 
 def scheduled_contact(robot: Robot, time: Array, *, start: float) -> Contact:
-    """Contact by the robot file's gait: the first tripod transfers in the second half of a period.
+    """Contact by the robot file's gait.
 
     Args:
-        robot: With two tripods.
+        robot: With a gait.
         time: Shape (N,) [s].
         start: Time at which a period begins [s].
 
     Raises:
         PreparationError: The robot file has no gait.
     """
-    if len(robot.spec.tripods) != 2:
-        raise PreparationError(
-            f"{robot.spec.name}: the robot file names no two tripods; log foot forces or contacts"
-        )
-    phase = ((time - start) / robot.spec.parameters["gait_period"]) % 1.0
-    first = phase < 0.5
-    standing = np.stack(
-        [first if leg in robot.spec.tripods[0] else ~first for leg in robot.leg_names], axis=1
-    )
+    try:
+        gait = gait_of(robot.spec)
+    except GaitError as error:
+        raise PreparationError(f"{error}; or log foot forces or contacts") from None
+    share = ((time - start) / gait.period) % 1.0
+    standing = np.zeros((time.size, len(robot.leg_names)), dtype=np.bool_)
+    for begin, end, stance in gait.footfall.stances():
+        rows = (share >= begin) & (share < end)
+        standing[rows] = [leg in stance for leg in robot.leg_names]
     return Contact(robot.leg_names, standing, "schedule")
 
 

@@ -27,8 +27,7 @@ def fingerprint(
         prior: What was known before.
     """
     out: Fingerprint = {f"robot.{name}": value for name, value in spec.parameters.items()}
-    out["gait.transfer_path"] = spec.transfer_path
-    out["gait.tripods"] = repr(spec.tripods)
+    out |= _gait(spec)
     out["standing.feet"] = repr(spec.standing_feet)
     out["legs"] = repr([(leg.name, leg.joints, leg.foot, leg.side) for leg in spec.legs])
     out |= {f"{component}.{p.name}": p.value for component, p in catalog.rows()}
@@ -40,6 +39,17 @@ def fingerprint(
     for free in prior.free:
         out[f"prior.{free.key}"] = repr((free.centre, free.interval, free.bounds, free.logarithmic))
     return out
+
+
+def _gait(spec: RobotSpec) -> Fingerprint:
+    """The table ``[gait]``, each key by name; lists as tuples."""
+    return {f"gait.{key}": _text(value) for key, value in sorted(spec.gait.items())}
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return repr(tuple(tuple(v) if isinstance(v, list) else v for v in value))
+    return value if isinstance(value, str) else repr(value)
 
 
 def differences(stored: Mapping[str, float | str], now: Mapping[str, float | str]) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ MIDDLE_LEGS = ("lm", "rm")
 PUBLISHED_LEG = "rm"
 #: Robot numbers solved from the reaction and the torques of Table III.
 POSTURE = ("trunk_com_left", "joint_2_lateral", "body_height")
-#: Samples per segment: within 0.2 % of the converged energies, see tests.
+#: Samples per half period: within 0.2 % of the converged energies, see tests.
 SAMPLES = 81
 ROBOT = "robot"
 _REMEMBERED = 16  # outcomes kept per robot: a derivative changes one actuator at a time
@@ -259,4 +259,4 @@ def _computed_outcome(part: RobotPart, chain: Chain) -> Outcome:
 
 def with_transfer_path(spec: RobotSpec, name: str) -> RobotSpec:
     """The robot with another path of the foot through the air."""
-    return replace(spec, transfer_path=name)
+    return spec.with_gait(transfer_path=name)

@@ -20,7 +20,7 @@ def totals(robot: Robot, catalog: Catalog, samples: int = SAMPLES) -> Totals:
     Args:
         robot: With a floating base.
         catalog: Actuator alternatives.
-        samples: Per segment of the gait.
+        samples: Per half period of the gait.
 
     Returns:
         Alternative to ``cycle_J``, ``stand_3_W``, ``stand_6_W``, ``pair_cycle_J`` and

@@ -71,7 +71,7 @@ def judge(
         results: The stored calibration, if it was made with these very numbers; else None, and
             everything that needs its sets is left out.
         standing_legs: Middle legs that Fig. 21 counts as loaded.
-        samples: Per segment.
+        samples: Per half period.
     """
     part = part_of(robot.spec, samples)
     actuators = actuator_part(part, catalog)

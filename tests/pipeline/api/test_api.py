@@ -47,6 +47,23 @@ def same(folder: Path, tables: Result, names: set[str]) -> None:
         )
 
 
+def test_a_gait_file_and_changes_of_the_gait_are_those_of_the_command_line(
+    root: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "wave.toml"
+    file.write_text('[gait]\nname = "wave"\npayload_mass = "2 kg"\n', encoding="utf-8")
+    robot = root / "urdf" / "hexapod.toml"
+    machine = lw.load(robot, gait=file, changes={"gait.slope_forward": "4 deg"})
+    walk = lw.walk(machine, samples=51)
+    command = ["walk", "--robot", str(robot), "--gait", str(file), "--samples", "51"]
+    command += ["--set", "gait.slope_forward=4 deg", "--out", str(tmp_path / "walk")]
+    assert exit_code(command) == 0
+    same(tmp_path / "walk", walk, {"walking_gait", "walking_base", "robot_energy"})
+    rise = walk.table("walking_base").frame()["base__z_m"]
+    assert rise.iloc[-1] > rise.iloc[0]
+    assert set(walk.table("walking_gait").frame()["duty_factor"].round(9)) == {round(5 / 6, 9)}
+
+
 def test_walk_and_stand_are_those_of_the_command_line(machine: lw.Machine, tmp_path: Path) -> None:
     walk = lw.walk(machine, samples=101)
     stand = lw.stand(machine)

@@ -22,7 +22,7 @@ ROBOT_FILES = {
     "wrong dimension": (r'unit = "kg"', 'unit = "mm"', r"'mm' is a unit of length, expected mass"),
     "two joints": (r', "rm_joint_3"', "", r"legs.rm: names 2 joints; a built leg has 3"),
     "unknown station": (r'"middle"', '"midle"', r"station = 'midle'; did you mean 'middle'"),
-    "sets of no legs": (r"^tripods = .*?$", "tripods = 2", r"gait.tripods must be two lists"),
+    "sets of no legs": (r"^tripods = .*?$", "tripods = 2", r"gait.tripods: must be two lists"),
     "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass is beyond any robot"),
     "unknown leg": (r'feet = \["lf"', 'feet = ["fl"', r"standing.feet: leg 'fl' is not known"),
     "unknown path": (
@@ -123,6 +123,46 @@ def refused(
     assert "Traceback" not in printed.err
     assert re.search(message, printed.err), printed.err
     assert not out.exists()
+
+
+GAITS = {
+    "too few feet": (["gait.duty_factor=0.4"], 2, r"only 0 feet stand .*raise gait.duty_factor"),
+    "always in the air": (["gait.duty_factor=0"], 2, r"--set gait.duty_factor=0: .* 0 it never"),
+    "never in the air": (["gait.duty_factor=1"], 2, r"at 1 it never steps"),
+    "gait of other legs": (["gait.name=crawl"], 2, r"for 4 legs, the robot has 6; for these: trip"),
+    "no such gait": (["gait.name=riple"], 2, r"--set gait.name=riple: .*did you mean 'ripple'"),
+    "no such key": (["gait.speeed=1 m/s"], 2, r"unknown key of \[gait\] 'speeed'; did you mean"),
+    "no unit": (["gait.speed=1"], 2, r"gait.speed = 1.0 has no unit; expected text such as"),
+    "contradiction": (
+        ["gait.speed=0.1 m/s", "gait.period=3 s", "gait.stroke=240 mm"],
+        2,
+        r"moves 0.15 m on the ground, but gait.stroke is 0.24 m; change one or leave one out",
+    ),
+    "no such margin": (
+        ["gait.sway=least", "gait.stability_margin=90 mm"],
+        2,
+        r"no sway of the body keeps a margin of 90.0 mm; .* is attainable: lower",
+    ),
+    "tips on the slope": (["gait.slope_forward=25 deg"], 1, r"the robot tips at t = "),
+    "tips under the load": (
+        ["gait.payload_mass=80 kg", "gait.payload_y=300 mm"],
+        1,
+        r"the robot tips at t = ",
+    ),
+    "stands on two feet": (["standing.feet=lf,rf"], 2, r"stands on 2 feet"),
+    "stands on no such foot": (["standing.feet=lf,rf,xx"], 2, r"leg 'xx' is not known"),
+}
+
+
+@pytest.mark.parametrize("what", GAITS)
+def test_gait(
+    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    changes, expected, message = GAITS[what]
+    options = [word for change in changes for word in ("--set", change)]
+    verb = "stand" if changes[0].startswith("standing") else "walk"
+    code = command(verb, tmp_path / "out", "--samples", "51", *options)
+    refused(capsys, tmp_path / "out", code, message, expected)
 
 
 @pytest.mark.parametrize("what", ROBOT_FILES)

@@ -97,7 +97,7 @@ def test_numbers_that_bind_each_other_change_together() -> None:
 
 @pytest.mark.parametrize("path", ["cubic", "harmonic", "quintic", "cycloid"])
 def test_transfer_paths_by_name(path: str) -> None:
-    assert with_changes(f"gait.transfer_path={path}").robot.spec.transfer_path == path
+    assert with_changes(f"gait.transfer_path={path}").robot.spec.gait["transfer_path"] == path
 
 
 def test_a_change_reaches_the_files(tmp_path: Path, command: Command, out: Path) -> None:

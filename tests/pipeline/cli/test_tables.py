@@ -37,6 +37,14 @@ TABLES = {
         ["time_s"] + [f"{leg}__force_{axis}_N" for leg in LEGS for axis in "xyz"],
         2 * 751,
     ),
+    "walking_gait": (["leg", "touch_down", "duty_factor", "stroke_m", "lift_m"], 6),
+    "walking_base": (
+        ["time_s", "segment"]
+        + [f"base__{q}" for q in ("x_m", "y_m", "z_m", "roll_rad", "pitch_rad", "yaw_rad")]
+        + [f"base__velocity_{axis}_m_s" for axis in "xyz"]
+        + [f"base__acceleration_{axis}_m_s2" for axis in "xyz"],
+        2 * 751,
+    ),
     "walking_stage_energy": (
         ["alternative", "joint", "stage", "stage_name", "forward_J", "reverse_J"],
         18 * (3 + 4 + 4 + 6),  # out, m, el; out, mt, m, el; out, wg, m, el; out, 2, ph, mp, m, el

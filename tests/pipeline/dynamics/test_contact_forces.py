@@ -8,10 +8,11 @@ from scipy.linalg import null_space
 
 from pipeline.dynamics.contact_forces import ContactForces, least_tangential_forces
 from pipeline.dynamics.joint_demand import contact_forces, inverse_dynamics, motion_demand
-from pipeline.dynamics.stability import stability_margins, support_margin
+from pipeline.dynamics.stability import stability_margins
 from pipeline.errors import TippingError
-from pipeline.motion.gait import tripod_gait
 from pipeline.motion.motion import Motion
+from pipeline.motion.support import support_margin
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 
 TRIPOD = np.array([[0.30, 0.25, -0.31], [-0.24, 0.26, -0.31], [0.02, -0.27, -0.31]])
@@ -142,6 +143,6 @@ def test_walking_needs_little_friction_and_stays_stable(hexapod: Robot, walk: Mo
 
 def test_a_robot_that_tips_says_where_and_when(hexapod: Robot) -> None:
     robot = load_robot(hexapod.spec.with_parameters({"hip_spacing": 0.20}))
-    motion = tripod_gait(robot, samples=51)
+    motion = walking_motion(robot, samples=51)
     with pytest.raises(TippingError, match=r"tips at t = .* leg '\w+' would have to pull"):
         motion_demand(robot, motion)

@@ -9,8 +9,8 @@ import pinocchio as pin
 import pytest
 
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
-from pipeline.motion.gait import tripod_gait
 from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_jacobians
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -35,7 +35,7 @@ def mechanical_energy(robot: Robot, segment: Segment) -> np.ndarray:
 def test_joint_power_is_rate_of_energy_minus_contact_power(robot: Robot) -> None:
     """sum(tau q_dot) = dE/dt - sum(f . v_foot) at every sample; dE/dt by differences of pin's E."""
     speed = robot.spec.parameters["walking_speed"]
-    for segment in tripod_gait(robot, samples=1501).segments:
+    for segment in walking_motion(robot, samples=1501).segments:
         demand, contacts = segment_demand(robot, segment)
         assert contacts is not None
         energy = mechanical_energy(robot, segment)
@@ -51,7 +51,7 @@ def test_joint_power_is_rate_of_energy_minus_contact_power(robot: Robot) -> None
 
 
 def test_over_a_cycle_the_joints_do_no_net_work(robot: Robot) -> None:
-    demand = motion_demand(robot, tripod_gait(robot))
+    demand = motion_demand(robot, walking_motion(robot))
     work = sum(
         np.trapezoid(part.torque * part.velocity, part.time, axis=0) for part in demand.segments
     )
@@ -104,9 +104,9 @@ def test_demand_agrees_with_a_loop_over_pinocchio(hexapod: Robot, walk: Motion) 
 def test_quasi_static_is_the_limit_of_slow_walking(hexapod: Robot) -> None:
     """At a hundredth of the speed full inverse dynamics comes down to gravity and contact."""
     slow = load_robot(hexapod.spec.with_parameters({"gait_period": 300.0, "walking_speed": 0.0016}))
-    motion = tripod_gait(slow, samples=101)
+    motion = walking_motion(slow, samples=101)
     full = motion_demand(slow, motion)
-    static = motion_demand(hexapod, tripod_gait(hexapod, samples=101), quasi_static=True)
+    static = motion_demand(hexapod, walking_motion(hexapod, samples=101), quasi_static=True)
     for a, b in zip(full.segments, static.segments, strict=True):
         np.testing.assert_allclose(a.torque, b.torque, atol=1e-3)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,8 @@ from pipeline.logs.prepared.stream import stream_prepared
 from pipeline.logs.reading.expected import Expected, expected_of_robot
 from pipeline.logs.reading.read import read_log
 from pipeline.motion.motion import Motion
-from pipeline.robot.robot import Robot
+from pipeline.motion.walking import walking_motion
+from pipeline.robot.robot import Robot, load_robot
 from tests.pipeline.logs.made import made_log, motion
 
 Array = NDArray[np.float64]
@@ -291,3 +293,20 @@ def test_contact_from_forces_columns_schedule_and_lowest_feet(hexapod: Robot, wa
     assert found is not None
     assert found.source == "forces"
     assert np.array_equal(found.standing, truth)
+
+
+@pytest.mark.parametrize("name", ["ripple", "tetrapod", "wave"])
+def test_the_schedule_of_any_gait_tells_contact(hexapod: Robot, name: str) -> None:
+    robot = load_robot(hexapod.spec.with_gait(name=name))
+    motion = walking_motion(robot, samples=51)
+    for segment in motion.segments:
+        inside = segment.time[1:-1] + 7.0  # the log's clock began before the period
+        planned = scheduled_contact(robot, inside, start=7.0 - 2 * 3.0)
+        for foot, stands in zip(planned.feet, planned.standing.T, strict=True):
+            assert np.all(stands == (foot in segment.stance))
+
+
+def test_a_robot_without_a_gait_has_no_schedule(hexapod: Robot) -> None:
+    robot = replace(hexapod, spec=hexapod.spec.with_gait(tripods=[]))
+    with pytest.raises(PreparationError, match=r"has no gait; state one; or log foot forces"):
+        scheduled_contact(robot, np.zeros(1), start=0.0)

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from pipeline.errors import GaitError, OutOfReachError
-from pipeline.motion.gait import standing_posture, tripod_gait
 from pipeline.motion.motion import Motion
+from pipeline.motion.standing import standing_posture
 from pipeline.motion.transfer_path import TRANSFER_PATHS, transfer_path
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.robot import Robot, load_robot
 
 
 def with_path(robot: Robot, name: str) -> Robot:
-    return load_robot(replace(robot.spec, transfer_path=name))
+    return load_robot(robot.spec.with_gait(transfer_path=name))
 
 
 @pytest.mark.parametrize("name", TRANSFER_PATHS)
@@ -57,7 +58,7 @@ def test_a_smooth_path_is_one_whose_acceleration_vanishes_at_both_ends(name: str
 
 @pytest.mark.parametrize("name", TRANSFER_PATHS)
 def test_joint_rates_are_finite_differences(hexapod: Robot, name: str) -> None:
-    motion = tripod_gait(with_path(hexapod, name), samples=3001)
+    motion = walking_motion(with_path(hexapod, name), samples=3001)
     for segment in motion.segments:
         dt = segment.time[1] - segment.time[0]
         joints = hexapod.position_index
@@ -117,7 +118,7 @@ def test_standing_lifts_the_other_feet(hexapod: Robot) -> None:
 def test_a_stroke_beyond_reach_is_refused(hexapod: Robot) -> None:
     spec = hexapod.spec.with_parameters({"foot_stroke": 1.2, "walking_speed": 0.8})
     with pytest.raises(OutOfReachError, match=r"leg '\w+' at t = .* beyond its reach"):
-        tripod_gait(load_robot(spec))
+        walking_motion(load_robot(spec))
 
 
 def test_stroke_and_speed_agree_within_a_millionth(hexapod: Robot) -> None:
@@ -125,10 +126,10 @@ def test_stroke_and_speed_agree_within_a_millionth(hexapod: Robot) -> None:
         spec = hexapod.spec.with_parameters({"walking_speed": 0.16 * (1 + share)})
         robot = load_robot(spec)
         if good:
-            tripod_gait(robot, samples=2)
+            walking_motion(robot, samples=2)
             continue
         with pytest.raises(GaitError, match="change one"):
-            tripod_gait(robot, samples=2)
+            walking_motion(robot, samples=2)
 
 
 @pytest.mark.parametrize(
@@ -143,14 +144,17 @@ def test_stroke_and_speed_agree_within_a_millionth(hexapod: Robot) -> None:
 def test_sets_that_do_not_part_the_legs_in_two_are_refused(
     hexapod: Robot, tripods: tuple[tuple[str, ...], ...]
 ) -> None:
-    robot = replace(hexapod, spec=replace(hexapod.spec, tripods=tripods))
+    robot = replace(hexapod, spec=hexapod.spec.with_gait(tripods=[list(t) for t in tripods]))
     with pytest.raises(GaitError, match="must part the legs .* in two sets"):
-        tripod_gait(robot)
+        walking_motion(robot)
 
 
 def test_the_first_set_supports_first_and_the_body_moves_on(hexapod: Robot, walk: Motion) -> None:
     speed = hexapod.spec.parameters["walking_speed"]
-    assert tuple(s.stance for s in walk.segments) == hexapod.spec.tripods
+    assert tuple(s.stance for s in walk.segments) == (
+        ("lf", "lr", "rm"),
+        ("rf", "rr", "lm"),
+    )
     for segment in walk.segments:
         base, rate = segment.configuration[:, :3], segment.velocity[:, :6]
         np.testing.assert_allclose(base[:, 0], speed * segment.time, atol=1e-12)
@@ -173,15 +177,15 @@ def test_standing_on_feet_of_ones_choice(hexapod: Robot) -> None:
 def test_numbers_that_contradict_each_other_are_refused(hexapod: Robot) -> None:
     spec = hexapod.spec.with_parameters({"walking_speed": 0.2})
     with pytest.raises(GaitError, match="foot_stroke is 0.24 m"):
-        tripod_gait(load_robot(spec))
+        walking_motion(load_robot(spec))
 
 
 @pytest.mark.parametrize("samples", [0, 1, -5])
 def test_too_few_samples_are_refused(hexapod: Robot, samples: int) -> None:
     with pytest.raises(GaitError, match="at least 2"):
-        tripod_gait(hexapod, samples=samples)
+        walking_motion(hexapod, samples=samples)
 
 
 def test_an_unknown_path_offers_the_closest(hexapod: Robot) -> None:
     with pytest.raises(GaitError, match="did you mean 'cycloid'"):
-        tripod_gait(with_path(hexapod, "cyclod"))
+        walking_motion(with_path(hexapod, "cyclod"))

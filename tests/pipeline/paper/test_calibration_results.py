@@ -177,7 +177,7 @@ def test_the_files_hold_the_nearest_point(results: dict[str, Any], robot_file: s
         assert entry.value == pytest.approx(value, rel=1e-6), key
         assert entry.basis == "calibrated"
         assert entry.interval is not None
-    assert spec.transfer_path == results["nearest"]["path"]
+    assert spec.gait["transfer_path"] == results["nearest"]["path"]
 
 
 def test_every_start_of_a_path_ends_in_the_same_point(results: dict[str, Any]) -> None:

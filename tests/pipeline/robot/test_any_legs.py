@@ -10,8 +10,8 @@ import pytest
 
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import RobotFileError, UrdfError
-from pipeline.motion.gait import standing_posture
 from pipeline.motion.motion import Segment
+from pipeline.motion.standing import standing_posture
 from pipeline.robot.kinematics import (
     foot_force_torques,
     foot_jacobian_rates,

@@ -12,8 +12,9 @@ import pytest
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.dynamics.stability import stability_margins
 from pipeline.errors import GaitError, OutOfReachError, UrdfError
-from pipeline.motion.gait import standing_posture, tripod_gait
 from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.standing import standing_posture
+from pipeline.motion.walking import walking_motion
 from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import leg_chains
@@ -127,7 +128,7 @@ def test_joints_stay_within_their_limits(hexapod: Robot, what: str) -> None:
 
     def make(robot: Robot) -> list[Segment]:
         if what == "walking":
-            return list(tripod_gait(robot, samples=51).segments)
+            return list(walking_motion(robot, samples=51).segments)
         return [standing_posture(robot)]
 
     reached = np.concatenate([s.configuration[:, hexapod.position_index] for s in make(hexapod)])

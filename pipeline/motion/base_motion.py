@@ -1,0 +1,119 @@
+"""Motion of the base over the ground, in the terms of Pinocchio's free flyer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from pipeline.motion.feet import Course, displaced, turned
+from pipeline.motion.gait import Gait
+from pipeline.motion.ground import Ground
+from pipeline.motion.motion import Segment
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BaseMotion:
+    """The base as Pinocchio's free flyer wants it.
+
+    Attributes:
+        position: In the world [m], shape (N, 3).
+        quaternion: From the base to the world, x y z w, shape (N, 4).
+        velocity: Linear and angular in the base's axes [m/s, rad/s], shape (N, 6).
+        acceleration: Time derivative of those components, shape (N, 6).
+    """
+
+    position: Array
+    quaternion: Array
+    velocity: Array
+    acceleration: Array
+
+
+def base_motion(gait: Gait, time: Array, shift: Course | None) -> BaseMotion:
+    """The base over a stretch of time.
+
+    Args:
+        gait: The gait; at t = 0 the unswayed base is at the origin and looks along x.
+        time: Shape (N,) [s].
+        shift: Sway in the axes of the unswayed body, shape (N, 3).
+    """
+    n = time.size
+    gone, angle = displaced(gait.twist, time)
+    place = np.zeros((n, 3))
+    place[:, :2] = gone
+    linear = np.zeros((n, 3))
+    linear[:, :2] = gait.twist[:2]
+    rate = np.zeros((n, 3))
+    spin = np.array([0.0, 0.0, gait.twist[2]])
+    if shift is not None:
+        place[:, :2] += turned(angle, shift.position[:, :2])
+        linear = linear + shift.velocity + np.cross(spin, shift.position)
+        # The components' own derivative: Pinocchio's acceleration, not the point's.
+        rate = shift.acceleration + np.cross(spin, shift.velocity)
+    velocity, acceleration = np.zeros((n, 6)), np.zeros((n, 6))
+    velocity[:, :3], velocity[:, 3:] = linear @ gait.body, spin @ gait.body
+    acceleration[:, :3] = rate @ gait.body
+    position = place if gait.ground.level else place @ gait.ground.rotation.T
+    return BaseMotion(
+        position, base_quaternions(gait.ground, gait.body, angle), velocity, acceleration
+    )
+
+
+def base_quaternions(ground: Ground, body: Array, heading: Array) -> Array:
+    """Orientation of the base in the world, x y z w, shape (N, 4).
+
+    Args:
+        ground: The plane it stands on.
+        body: Rotation from the base to the ground's axes at zero heading, shape (3, 3).
+        heading: Turn to the left about the ground's normal [rad], shape (N,).
+    """
+    if ground.level and np.array_equal(body, np.eye(3)) and not heading.any():
+        return np.tile([0.0, 0.0, 0.0, 1.0], (heading.size, 1))  # upright to the last bit
+    yaw = Rotation.from_rotvec(heading[:, None] * [0.0, 0.0, 1.0])
+    whole = Rotation.from_matrix(ground.rotation) * yaw * Rotation.from_matrix(body)
+    out = whole.as_quat()
+    # One sign along a motion: a quaternion and its negative are the same orientation.
+    flips = np.cumprod(np.where((out[1:] * out[:-1]).sum(axis=1) < 0, -1.0, 1.0))
+    out[1:] *= flips[:, None]
+    return np.asarray(out)
+
+
+@dataclass(frozen=True)
+class BaseSeries:
+    """The base's origin and attitude in the world over a segment.
+
+    Attributes:
+        position: Shape (N, 3) [m].
+        angles: Roll, pitch, yaw [rad], shape (N, 3): the rotation is Rz(yaw) Ry(pitch) Rx(roll);
+            yaw runs on beyond a half turn.
+        velocity: Of the origin, shape (N, 3) [m/s].
+        acceleration: Of the origin, shape (N, 3) [m/s^2].
+        angular_velocity: Shape (N, 3) [rad/s].
+    """
+
+    position: Array
+    angles: Array
+    velocity: Array
+    acceleration: Array
+    angular_velocity: Array
+
+
+def base_in_world(segment: Segment) -> BaseSeries:
+    """What Pinocchio's components in the base's axes mean in the world.
+
+    Args:
+        segment: Of a robot with a floating base.
+    """
+    turn = Rotation.from_quat(segment.configuration[:, 3:7])
+    v, w = segment.velocity[:, :3], segment.velocity[:, 3:6]
+    # The origin's acceleration has what the axes' own turning adds to the components' derivative.
+    a = segment.acceleration[:, :3] + np.cross(w, v)
+    angles = turn.as_euler("xyz")
+    angles[:, 2] = np.unwrap(angles[:, 2])
+    return BaseSeries(
+        segment.configuration[:, :3], angles, turn.apply(v), turn.apply(a), turn.apply(w)
+    )

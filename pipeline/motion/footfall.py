@@ -1,0 +1,182 @@
+"""Footfall: which legs stand when, from phase and duty factor, by name or as the user's own.
+
+A leg touches down at its phase and stands for its duty factor, both shares of the period. The wave
+gaits are those of Song and Waldron ("Machines That Walk", MIT Press 1989): a leg touches down when
+the one in front of it on its side lifts off, and the two sides are half a period apart.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from actuators.errors import closest
+from pipeline.errors import GaitError
+from pipeline.robot.robot_file import LegSpec
+
+LEAST_FEET = 3
+#: Shares of a period closer than this are one event.
+_SAME = 1e-9
+
+
+@dataclass(frozen=True)
+class Footfall:
+    """Phases and duty factors of all legs.
+
+    Attributes:
+        name: Of the gait.
+        phase: Leg to its touch-down as a share of the period, in [0, 1); legs that stand together
+            are told in this order.
+        duty: Leg to the share of the period for which it stands, between 0 and 1.
+    """
+
+    name: str
+    phase: Mapping[str, float]
+    duty: Mapping[str, float]
+
+    def since(self, leg: str, share: float, *, stood: bool) -> float:
+        """Share of the period since a leg's touch-down, or its lift-off where it did not stand."""
+        event = self.phase[leg] if stood else self.phase[leg] + self.duty[leg]
+        passed = (share - event) % 1.0
+        return 0.0 if passed > 1 - _SAME else passed
+
+    def stands(self, leg: str, share: float) -> bool:
+        """Whether a leg stands at a share of the period."""
+        return self.since(leg, share, stood=True) < self.duty[leg] - _SAME
+
+    def stances(self) -> list[tuple[float, float, tuple[str, ...]]]:
+        """Stretches of the period in which the same legs stand: start, end, legs.
+
+        The first starts at 0; the last ends at 1.
+
+        Raises:
+            GaitError: Fewer than three legs stand in one of them.
+        """
+        events = {0.0, 1.0}
+        for leg, phase in self.phase.items():
+            for event in (phase, phase + self.duty[leg]):
+                share = event % 1.0
+                if all(abs(share - known) > _SAME for known in events):
+                    events.add(share)
+        out: list[tuple[float, float, tuple[str, ...]]] = []
+        for start, end in pairwise(sorted(events)):
+            middle = (start + end) / 2
+            stance = tuple(leg for leg in self.phase if self.stands(leg, middle))
+            if len(stance) < LEAST_FEET:
+                raise GaitError(
+                    f"gait '{self.name}': from {100 * start:.4g} % to {100 * end:.4g} % of the "
+                    f"period only {len(stance)} feet stand ({', '.join(stance) or 'none'}); a "
+                    f"static gait needs {LEAST_FEET}; raise gait.duty_factor or change gait.phase"
+                )
+            if out and out[-1][2] == stance:
+                out[-1] = (out[-1][0], end, stance)
+            else:
+                out.append((start, end, stance))
+        return out
+
+
+def _sides(legs: Sequence[LegSpec]) -> tuple[list[str], list[str]]:
+    """Legs of the left and of the right side, front to rear."""
+    ordered = sorted(legs, key=lambda leg: -leg.neutral_foot[0])  # stable: file order where equal
+    left = [leg.name for leg in ordered if leg.side == "left"]
+    return left, [leg.name for leg in ordered if leg.side != "left"]
+
+
+def wave(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
+    """Phases of the wave gait: k duty on the left, 1/2 + k duty on the right, k from the front."""
+    left, right = _sides(legs)
+    phase = {leg: (k * duty) % 1.0 for k, leg in enumerate(left)}
+    return phase | {leg: (0.5 + k * duty) % 1.0 for k, leg in enumerate(right)}
+
+
+def _tripod(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
+    del duty
+    left, right = _sides(legs)
+    first, second = [*left[0::2], *right[1::2]], [*right[0::2], *left[1::2]]
+    return dict.fromkeys(first, 0.0) | dict.fromkeys(second, 0.5)
+
+
+def _tetrapod(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
+    """Pairs of legs swing in turn, a left one with the right one before it."""
+    del duty
+    left, right = _sides(legs)
+    n = len(left)
+    phase = {leg: (-k / n) % 1.0 for k, leg in enumerate(left)}
+    return phase | {leg: (-(k + 1) / n) % 1.0 for k, leg in enumerate(right)}
+
+
+@dataclass(frozen=True)
+class NamedGait:
+    """A gait known by name.
+
+    Attributes:
+        name: How robot file and command line call it.
+        legs: Number of legs it is defined for; None for any.
+        duty: Duty factor where none is stated, from the number of legs.
+        phase: Phases from the legs and the duty factor.
+        meaning: In words.
+    """
+
+    name: str
+    legs: int | None
+    duty: Callable[[int], float]
+    phase: Callable[[Sequence[LegSpec], float], dict[str, float]]
+    meaning: str
+
+
+GAITS: dict[str, NamedGait] = {
+    gait.name: gait
+    for gait in (
+        NamedGait("tripod", 6, lambda n: 1 / 2, _tripod, "two sets of three legs swing in turn"),
+        NamedGait("tetrapod", 6, lambda n: 2 / 3, _tetrapod, "three pairs of legs swing in turn"),
+        NamedGait("ripple", 6, lambda n: 2 / 3, wave, "waves on both sides overlap by half"),
+        NamedGait("crawl", 4, lambda n: 5 / 6, wave, "one leg swings, then all four stand"),
+        NamedGait("wave", None, lambda n: 1 - 1 / n, wave, "legs swing from the rear forward"),
+    )
+}
+
+
+def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
+    """A gait by name.
+
+    Args:
+        name: One of `GAITS`.
+        legs: Of the robot.
+        duty: Duty factor of every leg; the gait's own by default.
+
+    Raises:
+        GaitError: No gait of that name, or none for this number of legs.
+    """
+    if name not in GAITS:
+        raise GaitError(f"gait.name = {name}: {closest(name, list(GAITS))}")
+    gait = GAITS[name]
+    if gait.legs is not None and len(legs) != gait.legs:
+        fit = [g.name for g in GAITS.values() if g.legs in (None, len(legs))]
+        raise GaitError(
+            f"gait.name = '{name}' is for {gait.legs} legs, the robot has {len(legs)}; "
+            f"for these: {', '.join(fit)}, or phases of your own (gait.phase)"
+        )
+    share = gait.duty(len(legs)) if duty is None else duty
+    return Footfall(name, gait.phase(legs, share), {leg.name: share for leg in legs})
+
+
+def in_turn(sets: Sequence[Sequence[str]], duty: float | None, name: str) -> Footfall:
+    """Sets of legs that swing one after another, each for its share of the period.
+
+    Args:
+        sets: Every leg once; at least two sets. The first touches down at the period's start.
+        duty: Duty factor of every leg; by default one set is in the air at any time.
+        name: Of the gait.
+    """
+    n = len(sets)
+    share = 1 - 1 / n if duty is None else duty
+    phase = {leg: k / n for k, legs in enumerate(sets) for leg in legs}
+    return Footfall(name, phase, dict.fromkeys(phase, share))
+
+
+def own(phase: Mapping[str, float], duty: Mapping[str, float]) -> Footfall:
+    """The user's own phases (of any size: whole periods are dropped) and duty factors."""
+    return Footfall("own", {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, dict(duty))

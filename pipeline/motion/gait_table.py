@@ -1,0 +1,326 @@
+"""The table ``[gait]`` as written: of a robot file, a gait file, or ``--set gait.KEY=VALUE``.
+
+Dimensional numbers carry their unit in the text (``"240 mm"``), shares are bare numbers, and what a
+leg may have of its own is written either once for all or as a table by leg.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Mapping
+from pathlib import Path as FilePath
+from typing import Annotated, Any, Final, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from actuators.errors import UnitError, closest, one_line
+from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.units import quantity
+from pipeline.errors import GaitError
+from pipeline.motion.footfall import GAITS
+from pipeline.motion.transfer_path import transfer_path
+from pipeline.robot.robot_file import FOOTFALLS, merged_gait
+
+_HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -90.0}
+#: No walking robot is larger or steps further [m], none leans or climbs beyond [rad].
+_LONGEST, _STEEPEST = 10.0, math.radians(89.0)
+
+Check = Callable[[object], float]
+
+
+def _number(written: object, dimension: str) -> float:
+    try:
+        return quantity(written, dimension)
+    except UnitError as error:
+        raise ValueError(str(error)) from None
+
+
+def _size(dimension: str, low: float, high: float, words: str, *, low_too: bool = False) -> Check:
+    """A check of one number: of this dimension, within bounds."""
+
+    def check(written: object) -> float:
+        value = _number(written, dimension)
+        if not (low < value < high or (low_too and value == low)):
+            raise ValueError(f"{one_line(written)}: {words}")
+        return value
+
+    return check
+
+
+def _each(check: Check) -> Callable[[object], float | dict[str, float]]:
+    """The check for one number for all legs, or a table with one for each."""
+
+    def checked(written: object) -> float | dict[str, float]:
+        if not isinstance(written, dict):
+            return check(written)
+        out = {}
+        for leg, value in written.items():
+            try:
+                out[str(leg)] = check(value)
+            except ValueError as error:
+                raise ValueError(f"({one_line(leg)}) {error}") from None
+        return out
+
+    return checked
+
+
+def _direction(written: object) -> float:
+    if isinstance(written, str) and written in _HEADINGS:
+        return math.radians(_HEADINGS[written])
+    try:
+        return _number(written, "angle")
+    except ValueError:
+        words = ", ".join(_HEADINGS)
+        raise ValueError(
+            f"{one_line(written)}: expected {words}, or an angle to the left such as '30 deg'"
+        ) from None
+
+
+def _name(written: object) -> str:
+    if written not in GAITS:
+        raise ValueError(f"{one_line(written)}: {closest(one_line(written), list(GAITS))}")
+    return str(written)
+
+
+def _path(written: object) -> str:
+    try:
+        return transfer_path(str(written)).name
+    except GaitError as error:
+        raise ValueError(str(error)) from None
+
+
+_LENGTH = _size("length", 0, _LONGEST, "must lie above 0 and below 10 m")
+_HEIGHT = _size("length", 0, _LONGEST, "must not be negative, and below 10 m", low_too=True)
+_SHARE = _size(
+    "ratio",
+    0,
+    1,
+    "a foot stands for a share above 0 and below 1 of the period: at 0 it never carries, at 1 it "
+    "never steps; give a number such as 0.75",
+)
+_PHASE = _size("ratio", -math.inf, math.inf, "")
+Length = Annotated[float, BeforeValidator(_LENGTH)]
+Height = Annotated[float, BeforeValidator(_HEIGHT)]
+Offset = Annotated[
+    float, BeforeValidator(_size("length", -_LONGEST, _LONGEST, "must lie within 10 m"))
+]
+Time = Annotated[
+    float, BeforeValidator(_size("time", 1e-3, 1e6, "must lie above 1 ms and below 1e6 s"))
+]
+Speed = Annotated[
+    float,
+    BeforeValidator(
+        _size("velocity", 0, 100.0, "must not be negative, and below 100 m/s", low_too=True)
+    ),
+]
+Rate = Annotated[
+    float, BeforeValidator(_size("angular velocity", -100.0, 100.0, "must lie within 100 rad/s"))
+]
+Tilt = Annotated[
+    float, BeforeValidator(_size("angle", -_STEEPEST, _STEEPEST, "must lie within 89 deg"))
+]
+Mass = Annotated[
+    float, BeforeValidator(_size("mass", 0, 1e5, "must not be negative", low_too=True))
+]
+Lengths = Annotated[float | dict[str, float], BeforeValidator(_each(_LENGTH))]
+Heights = Annotated[float | dict[str, float], BeforeValidator(_each(_HEIGHT))]
+Shares = Annotated[float | dict[str, float], BeforeValidator(_each(_SHARE))]
+Phases = Annotated[dict[str, float], BeforeValidator(_each(_PHASE))]
+Direction = Annotated[float, BeforeValidator(_direction)]
+Path = Annotated[str, BeforeValidator(_path)]
+Name = Annotated[str, BeforeValidator(_name)]
+Legs = list[list[str]]
+
+
+class GaitTable(BaseModel):
+    """What a table ``[gait]`` may state; everything has a default or follows from the rest.
+
+    Attributes:
+        name: Of a known gait: `pipeline.motion.footfall.GAITS`.
+        sets: Sets of legs that swing in turn.
+        tripods: The same with two sets, half a period each.
+        phase: Touch-down of each leg as a share of the period.
+        duty_factor: Share of the period for which a foot stands, of all or by leg.
+        transfer_path: Of the foot through the air.
+        period: Of the gait [s].
+        speed: Of the body along `heading` [m/s].
+        heading: Where to, from the x axis to the left [rad].
+        yaw_rate: Of the body, to the left [rad/s].
+        stroke: Path of a foot relative to the body while it stands, of the longest or by leg [m].
+        lift: Height of a foot at the middle of its transfer, of all or by leg [m].
+        body_height: Of the base's origin over the ground [m].
+        body_x: Shift of the base over its feet, forward [m].
+        body_y: To the left [m].
+        body_roll: Of the base against the ground, right side down [rad].
+        body_pitch: Nose down [rad].
+        slope_forward: Angle by which the ground rises ahead [rad].
+        slope_left: By which it rises to the left [rad].
+        payload_mass: Of a load on the body [kg].
+        payload_x: Place of its centre of mass in the base's axes [m].
+        payload_y: Likewise.
+        payload_z: Likewise.
+        sway: Path of the body over its feet: ``none``, or the ``least`` that keeps the margin.
+        stability_margin: Distance that the sway keeps from every edge of the support [m].
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: Name | None = None
+    sets: Legs | None = None
+    tripods: Legs | None = None
+    phase: Phases | None = None
+    duty_factor: Shares | None = None
+    transfer_path: Path = "harmonic"
+    period: Time | None = None
+    speed: Speed | None = None
+    heading: Direction = 0.0
+    yaw_rate: Rate | None = None
+    stroke: Lengths | None = None
+    lift: Heights | None = None
+    body_height: Length | None = None
+    body_x: Offset = 0.0
+    body_y: Offset = 0.0
+    body_roll: Tilt = 0.0
+    body_pitch: Tilt = 0.0
+    slope_forward: Tilt = 0.0
+    slope_left: Tilt = 0.0
+    payload_mass: Mass = 0.0
+    payload_x: Offset = 0.0
+    payload_y: Offset = 0.0
+    payload_z: Offset = 0.0
+    sway: Literal["none", "least"] | None = None
+    stability_margin: Height | None = None
+
+
+#: Keys under which a leg may have a number of its own.
+BY_LEG: Final = ("phase", "duty_factor", "stroke", "lift")
+
+
+def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str) -> GaitTable:
+    """Check a table ``[gait]``.
+
+    Args:
+        table: As TOML gives it.
+        legs: Names of the robot's legs.
+        where: File, for messages.
+
+    Raises:
+        GaitError: An unknown key or leg, a value that is none, or two ways to say one thing; one
+            line with all of it.
+    """
+    try:
+        read = GaitTable.model_validate(dict(table))
+    except ValidationError as error:
+        raise GaitError(f"{where}: {'; '.join(_words(error))}") from None
+    ways = [key for key in FOOTFALLS if getattr(read, key) is not None]
+    if len(ways) > 1:
+        raise GaitError(
+            f"{where}: gait.{ways[0]} and gait.{ways[1]} both say which legs stand when; keep one"
+        )
+    for key in BY_LEG:
+        _refuse_other_legs(getattr(read, key), legs, f"{where}: gait.{key}")
+    for key in ("sets", "tripods"):
+        _refuse_other_sets(getattr(read, key), legs, f"{where}: gait.{key}")
+    return read
+
+
+def _words(error: ValidationError) -> list[str]:
+    """One part of the line for every key at fault."""
+    out: dict[str, str] = {}
+    for fault in error.errors():
+        key = str(fault["loc"][0])
+        if fault["type"] == "extra_forbidden":
+            known = sorted(GaitTable.model_fields)
+            words = f"unknown key of [gait] '{one_line(key)}'; {closest(key, known)}"
+        elif fault["type"] == "value_error":
+            words = f"gait.{key} = {fault['ctx']['error']}"
+        else:
+            words = f"gait.{key}: {_expected(key, fault['msg'])}"
+        out.setdefault(key, words)
+    return list(out.values())
+
+
+def _expected(key: str, message: str) -> str:
+    if key in ("sets", "tripods"):
+        return f"must be {'two ' if key == 'tripods' else ''}lists of leg names"
+    if key == "phase":
+        return "must be a table with a number for each leg"
+    return message[0].lower() + message[1:]
+
+
+def _refuse_other_legs(value: object, legs: tuple[str, ...], where: str) -> None:
+    if not isinstance(value, dict):
+        return
+    for name in value:
+        if name not in legs:
+            raise GaitError(f"{where}: leg '{one_line(name)}' is not known; {closest(name, legs)}")
+    missing = [leg for leg in legs if leg not in value]
+    if missing:
+        raise GaitError(f"{where}: says nothing of {', '.join(missing)}; give every leg a number")
+
+
+def _refuse_other_sets(sets: Legs | None, legs: tuple[str, ...], where: str) -> None:
+    if not sets:
+        return
+    for name in (name for group in sets for name in group):
+        if name not in legs:
+            raise GaitError(f"{where}: leg '{one_line(name)}' is not known; {closest(name, legs)}")
+    two = where.endswith("tripods")
+    wrong = len(sets) < 2 or (two and len(sets) != 2)
+    if wrong or sorted(name for group in sets for name in group) != sorted(legs):
+        parts = "two sets" if two else "two or more sets"
+        raise GaitError(f"{where} must part the legs {', '.join(legs)} in {parts}")
+
+
+def read_gait_file(path: FilePath) -> dict[str, Any]:
+    """The table ``[gait]`` of a file that holds nothing else.
+
+    Args:
+        path: TOML.
+
+    Raises:
+        GaitError: Missing, malformed, or without that table.
+    """
+    try:
+        whole = read_toml_file(path)
+    except UnreadableTextError as error:
+        raise GaitError(f"{path}: {error}") from None
+    others = [key for key in whole if key != "gait"]
+    table = whole.get("gait")
+    if others or not isinstance(table, dict):
+        what = f"holds '{one_line(others[0])}'" if others else "has none"
+        raise GaitError(f"{path}: {what}; a gait file holds one table, [gait]")
+    return table
+
+
+def changed_table(table: Mapping[str, Any], key: str, value: str) -> dict[str, Any]:
+    """The table with one key changed as ``--set gait.KEY=VALUE`` writes it.
+
+    Args:
+        table: Before.
+        key: Without ``gait.``; ``KEY.LEG`` for one leg of a number by leg.
+        value: As written; a bare number is a share.
+    """
+    first, _, leg = key.partition(".")
+    new: Any = value
+    with contextlib.suppress(ValueError):
+        new = float(value)
+    if not leg:
+        return merged_gait(table, {first: new})
+    known = table.get(first)
+    own = dict(known) if isinstance(known, dict) else {}
+    return dict(table) | {first: own | {leg: new}}
+
+
+def by_leg(value: float | Mapping[str, float], legs: tuple[str, ...]) -> np.ndarray:
+    """A number for all, or by leg, as an array, shape (L,)."""
+    if isinstance(value, Mapping):
+        return np.array([value[leg] for leg in legs])
+    return np.full(len(legs), float(value))
+
+
+def gait_keys() -> tuple[str, ...]:
+    """What ``--set`` may change, as it is written there."""
+    return tuple(f"gait.{key}" for key in GaitTable.model_fields)

@@ -1,0 +1,55 @@
+"""Where every inverse kinematics starts, and the limits that every posture keeps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import GaitError
+from pipeline.robot.inverse_kinematics import solve_positions
+from pipeline.robot.robot import Robot
+from pipeline.robot.start_posture import neutral_postures
+
+Array = NDArray[np.float64]
+
+
+def start_postures(robot: Robot, target: Array) -> Array:
+    """Joint positions with every foot at mid-support, each leg on its own branch [rad], (L, 3).
+
+    Args:
+        robot: With the neutral feet that name the branch.
+        target: Feet at mid-support in the base frame [m], shape (L, 3).
+
+    Raises:
+        OutOfReachError: A foot is not reached.
+        GaitError: Only on another branch than the robot file names.
+    """
+    start = neutral_postures(robot)
+    if np.array_equal(target, [leg.neutral_foot for leg in robot.spec.legs]):
+        return start
+    q: Array = solve_positions(robot.chains, target[None], start, np.zeros(1))[0]
+    return q
+
+
+def refuse_beyond_limits(robot: Robot, q: Array, time: Array) -> None:
+    """Refuse joint positions outside the URDF's limits.
+
+    Args:
+        robot: With limits.
+        q: Joint positions by leg [rad], shape (N, L, 3).
+        time: For messages [s], shape (N,).
+
+    Raises:
+        GaitError: One lies beyond; names joint, instant and limits.
+    """
+    flat = robot.joint_positions(q)
+    lower, upper = robot.limits
+    beyond = np.maximum(flat - upper, lower - flat)
+    if beyond.max() > 1e-9:
+        sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
+        raise GaitError(
+            f"joint '{robot.joints[joint]}' would have to reach "
+            f"{np.degrees(flat[sample, joint]):.1f} deg at t = {time[sample]:.4g} s, its "
+            f"limits are {np.degrees(lower[joint]):.1f} to {np.degrees(upper[joint]):.1f} deg; "
+            "change the stroke, the neutral foot or the limits"
+        )

@@ -1,0 +1,98 @@
+"""The support polygon: hull of the standing feet seen from above, and a point's margin in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+_ON_EDGE = 1e-12  # [m]
+
+
+@dataclass(frozen=True)
+class SupportEdges:
+    """Lines between any two feet, seen from above, and which of them bound the hull.
+
+    Attributes:
+        start: A point of each line [m], shape (N, E, 2).
+        edge: Along it, to the other foot [m], shape (N, E, 2).
+        length: Of that [m], shape (N, E).
+        used: Whether all feet lie on it or to its left, so that it bounds the hull, shape (N, E).
+    """
+
+    start: Array
+    edge: Array
+    length: Array
+    used: NDArray[np.bool_]
+
+    @property
+    def inward(self) -> Array:
+        """Unit vectors to the left of the lines, shape (N, E, 2)."""
+        left = np.stack([-self.edge[..., 1], self.edge[..., 0]], axis=-1)
+        return np.asarray(left / self.length[..., None])
+
+    def distance(self, point: Array) -> Array:
+        """How far points, shape (N, 2), lie to the left of every line [m], shape (N, E)."""
+        return _left_of(self.start, self.edge, self.length, point[:, None])
+
+
+def _left_of(start: Array, edge: Array, length: Array, point: Array) -> Array:
+    d = point - start
+    return np.asarray((edge[..., 0] * d[..., 1] - edge[..., 1] * d[..., 0]) / length)
+
+
+def support_edges(feet: Array) -> SupportEdges:
+    """The lines between any two feet.
+
+    Args:
+        feet: Foot points [m], shape (N, F, 2 or more), in any order around the hull.
+    """
+    xy = feet[..., :2]
+    n_feet = xy.shape[1]
+    pairs = np.array([(i, j) for i in range(n_feet) for j in range(n_feet) if i != j])
+    start = xy[:, pairs[:, 0]]
+    edge = xy[:, pairs[:, 1]] - start
+    length = np.hypot(edge[..., 0], edge[..., 1])
+    used = np.ones(length.shape, dtype=np.bool_)
+    for k in range(n_feet):
+        used &= _left_of(start, edge, length, xy[:, k, None]) >= -_ON_EDGE
+    return SupportEdges(start, edge, length, used)
+
+
+def support_margin(feet: Array, point: Array) -> Array:
+    """Distance of a point from the nearest edge of the feet's convex hull, seen from above.
+
+    Args:
+        feet: Foot points [m], shape (N, F, 3), the same order around the hull at every sample not
+            being required.
+        point: Projected point [m], shape (N, 2).
+
+    Returns:
+        Margin [m], shape (N,); negative outside the hull.
+    """
+    edges = support_edges(feet)
+    margin: Array = np.where(edges.used, edges.distance(point), np.inf).min(axis=1)
+    return margin
+
+
+def longitudinal_margin(feet: Array, point: Array) -> Array:
+    """Distance from a point to the support's edge straight ahead or straight behind.
+
+    The longitudinal stability margin of Song and Waldron (1989): along the x axis, the nearer one.
+
+    Args:
+        feet: Foot points [m], shape (N, F, 3), x along the heading.
+        point: Projected point [m], shape (N, 2).
+
+    Returns:
+        Margin [m], shape (N,); negative where the point lies outside along that line.
+    """
+    edges = support_edges(feet)
+    distance, along = edges.distance(point), edges.inward[..., 0]
+    # An edge parallel to the heading is never met; one that the point is beyond counts against it.
+    met = edges.used & (np.abs(along) > _ON_EDGE)
+    way = np.divide(distance, np.abs(along), out=np.full_like(distance, np.inf), where=met)
+    margin: Array = way.min(axis=1)
+    return margin

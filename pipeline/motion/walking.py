@@ -1,0 +1,118 @@
+"""One period of a gait as a motion: body over the ground, legs by inverse kinematics, segments.
+
+A segment ends at every lift-off and touch-down of any leg, so that the same feet stand all along.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import GaitError
+from pipeline.motion.base_motion import base_motion
+from pipeline.motion.feet import Course, support_course, transfer_course
+from pipeline.motion.gait import Gait, gait_of
+from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.postures import refuse_beyond_limits, start_postures
+from pipeline.motion.sway import Sway, least_sway
+from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
+from pipeline.robot.robot import Robot
+
+Array = NDArray[np.float64]
+DEFAULT_SAMPLES = 751  # per half period: one every 2 ms at the paper's period
+#: However short a segment is, its energy needs that many.
+FEWEST_SAMPLES = 25
+
+
+def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
+    """One period of the robot file's gait.
+
+    Args:
+        robot: With legs and a floating base.
+        samples: In half a period, ends included; a segment has its share of them, at least
+            `FEWEST_SAMPLES` where there are as many.
+
+    Returns:
+        Closed segments, one for every set of legs that stand, from t = 0.
+
+    Raises:
+        GaitError: The numbers contradict each other, too few feet stand, or no sway keeps the
+            margin.
+        OutOfReachError: A foot target lies outside a leg's reach.
+    """
+    if samples < 2:
+        raise GaitError(f"{samples} samples per half period; at least 2 are needed")
+    gait = gait_of(robot.spec)
+    start = start_postures(robot, gait.neutral @ gait.body)
+    sway = None
+    if gait.margin is not None:
+        sway = least_sway(
+            robot, gait, start, lambda s: _motion(robot, gait, start, SWAY_SAMPLES, s)
+        )
+    return _motion(robot, gait, start, samples, sway)
+
+
+#: In half a period, while the sway is sought.
+SWAY_SAMPLES = 121
+
+
+def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | None) -> Motion:
+    segments = []
+    for begin, end, stance in gait.footfall.stances():
+        n = max(round(2 * (end - begin) * (samples - 1)) + 1, min(samples, FEWEST_SAMPLES))
+        segments.append(_segment(robot, gait, start, begin, end, stance, n, sway))
+    return Motion(tuple(segments), gait.period)
+
+
+def _segment(
+    robot: Robot,
+    gait: Gait,
+    start: Array,
+    begin: float,
+    end: float,
+    stance: tuple[str, ...],
+    samples: int,
+    sway: Sway | None,
+) -> Segment:
+    """The motion between two shares of the period during which a stance is held."""
+    passed = np.linspace(0.0, 1.0, samples)
+    time = gait.period * begin + gait.period * (end - begin) * passed
+    shift = None if sway is None else sway.course(begin + (end - begin) * passed)
+    feet = _feet(gait, begin, end, passed, shift)
+    q = solve_positions(robot.chains, feet.position, start, time)
+    refuse_beyond_limits(robot, q, time)
+    q_dot, q_ddot = solve_rates(robot.chains, q, feet.velocity, feet.acceleration, time)
+    base = base_motion(gait, time, shift)
+    configuration = robot.configuration(robot.joint_positions(q), base.position)
+    configuration[:, 3:7] = base.quaternion
+    velocity = robot.tangent(robot.joint_rates(q_dot), base.velocity[:, :3])
+    acceleration = robot.tangent(robot.joint_rates(q_ddot), base.acceleration[:, :3])
+    velocity[:, 3:6] = base.velocity[:, 3:]
+    acceleration[:, 3:6] = base.acceleration[:, 3:]
+    return Segment(
+        name="support of " + ", ".join(stance),
+        time=time,
+        configuration=configuration,
+        velocity=velocity,
+        acceleration=acceleration,
+        stance=stance,
+        ground_normal=gait.ground.normal,
+    )
+
+
+def _feet(gait: Gait, begin: float, end: float, passed: Array, shift: Course | None) -> Course:
+    """All feet in the base frame over a segment, shape (N, L, 3)."""
+    courses = []
+    for leg, name in enumerate(gait.legs):
+        stood = gait.footfall.stands(name, (begin + end) / 2)
+        length = gait.footfall.duty[name] if stood else 1 - gait.footfall.duty[name]
+        since = gait.footfall.since(name, begin, stood=stood)
+        local = since / length + (end - begin) / length * passed
+        courses.append((support_course if stood else transfer_course)(gait, leg, local))
+    parts = []
+    for field in ("position", "velocity", "acceleration"):
+        value = np.stack([getattr(course, field) for course in courses], axis=1)
+        if shift is not None:
+            value -= getattr(shift, field)[:, None]
+        parts.append(value @ gait.body if not np.array_equal(gait.body, np.eye(3)) else value)
+    return Course(*parts)

@@ -1,0 +1,163 @@
+"""Any gait against its definition: feet fixed in the ground, rates against finite differences."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pipeline.motion.base_motion import base_in_world
+from pipeline.motion.gait import gait_of
+from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.standing import standing_posture
+from pipeline.motion.walking import walking_motion
+from pipeline.robot.kinematics import foot_positions
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+
+SLOPES = {"slope_forward": "6 deg", "slope_left": "-4 deg"}
+#: Robot, then what its table ``[gait]`` states on top of its file.
+GAITS: dict[str, tuple[str, dict[str, Any]]] = {
+    "ripple": ("hexapod", {"name": "ripple", "transfer_path": "cycloid"}),
+    "backward wave": ("hexapod", {"name": "wave", "heading": "backward"}),
+    "sideways tetrapod uphill": ("hexapod", {"name": "tetrapod", "heading": "left", **SLOPES}),
+    "tripod on the spot": ("hexapod", {"yaw_rate": "8 deg/s"}),
+    "ripple in a bend on a slope, tilted": (
+        "hexapod",
+        {"name": "ripple", "speed": "0.05 m/s", "yaw_rate": "-6 deg/s", "heading": "30 deg"}
+        | {"body_roll": "3 deg", "body_pitch": "-4 deg", "body_height": "280 mm", **SLOPES},
+    ),
+    "crawl with sway": ("solo12", {"stability_margin": "15 mm", "transfer_path": "cycloid"}),
+    "crawl with sway in a bend on a slope": (
+        "anymal_c",
+        {"speed": "0.06 m/s", "yaw_rate": "5 deg/s", "body_pitch": "3 deg", **SLOPES},
+    ),
+    "own phases, duty factors and lifts": (
+        "hexapod",
+        {"phase": dict(lf=0.0, rm=0.05, lr=0.1, rf=0.55, lm=0.5, rr=0.62)}
+        | {"duty_factor": dict(lf=0.7, rm=0.75, lr=0.8, rf=0.8, lm=0.75, rr=0.7)}
+        | {"lift": dict(lf="5 cm", rm="6 cm", lr="70 mm", rf="75 mm", lm="8 cm", rr="9 cm")}
+        | {"speed": "0.1 m/s", "period": "3 s"},
+    ),
+}
+
+
+def walker(root: Path, name: str, gait: Mapping[str, Any]) -> Robot:
+    return load_robot(load_robot_file(root / "urdf" / f"{name}.toml").with_gait(**gait))
+
+
+@pytest.fixture(scope="module", params=GAITS)
+def walked(request: pytest.FixtureRequest, root: Path) -> tuple[Robot, Motion]:
+    robot = walker(root, *GAITS[request.param])
+    return robot, walking_motion(robot, samples=301)
+
+
+def feet_in_world(robot: Robot, segment: Segment) -> np.ndarray:
+    q = segment.configuration
+    turn = robot.base_rotation(q)
+    feet = foot_positions(robot.chains, robot.leg_positions(q))
+    turn = np.broadcast_to(np.eye(3), (len(q), 3, 3)) if turn is None else turn
+    return np.einsum("nij,nfj->nfi", turn, feet) + q[:, None, :3]
+
+
+def test_rates_are_the_derivatives_of_the_configuration(walked: tuple[Robot, Motion]) -> None:
+    robot, motion = walked
+    for segment in motion.segments:
+        dt = segment.time[1] - segment.time[0]
+        q, v, a = segment.configuration, segment.velocity, segment.acceleration
+        steps = [pin.difference(robot.model, *pair) for pair in itertools.pairwise(q)]
+        # Euler-Maclaurin and Simpson, whose errors shrink with the fourth power of the step.
+        way = (v[:-1] + v[1:]) / 2 - dt * (a[1:] - a[:-1]) / 12
+        np.testing.assert_allclose(np.array(steps) / dt, way, atol=2e-5 * np.abs(v).max())
+        change = (a[:-2] + 4 * a[1:-1] + a[2:]) / 6
+        np.testing.assert_allclose(
+            (v[2:] - v[:-2]) / (2 * dt), change, atol=2e-5 * np.abs(a).max() + 1e-9
+        )
+
+
+def test_standing_feet_rest_in_the_ground_and_lifted_ones_do_not(
+    walked: tuple[Robot, Motion],
+) -> None:
+    robot, motion = walked
+    lift = gait_of(robot.spec).lift
+    lowest = np.inf
+    highest = np.full(len(robot.leg_names), -np.inf)
+    for segment in motion.segments:
+        feet = feet_in_world(robot, segment)
+        height = feet @ segment.ground_normal
+        stance = [robot.leg_names.index(leg) for leg in segment.stance]
+        np.testing.assert_allclose(np.ptp(feet[:, stance], axis=0), 0, atol=1e-8)
+        np.testing.assert_allclose(np.ptp(height[:, stance]), 0, atol=1e-8)
+        ground = height[:, stance].mean()
+        lowest = min(lowest, float((height - ground).min()))
+        highest = np.maximum(highest, (height - ground).max(axis=0))
+    assert lowest > -1e-8
+    np.testing.assert_allclose(highest, lift, atol=2e-4)  # of the sample next to the middle
+
+
+def test_segments_join_and_the_period_closes(walked: tuple[Robot, Motion]) -> None:
+    robot, motion = walked
+    joints = robot.position_index
+    for before, after in zip(motion.segments[:-1], motion.segments[1:], strict=True):
+        assert before.time[-1] == pytest.approx(after.time[0], abs=1e-12)
+        np.testing.assert_allclose(before.configuration[-1], after.configuration[0], atol=1e-8)
+        np.testing.assert_allclose(before.velocity[-1], after.velocity[0], atol=1e-7)
+    first, last = motion.segments[0], motion.segments[-1]
+    assert motion.period == pytest.approx(last.time[-1])
+    np.testing.assert_allclose(
+        last.configuration[-1, joints], first.configuration[0, joints], atol=1e-8
+    )
+    np.testing.assert_allclose(last.velocity[-1], first.velocity[0], atol=1e-7)
+    feet = feet_in_world(robot, last)[-1] - last.configuration[-1, :3]
+    start = feet_in_world(robot, first)[0] - first.configuration[0, :3]
+    np.testing.assert_allclose(np.linalg.norm(feet, axis=1), np.linalg.norm(start, axis=1))
+
+
+def test_the_base_in_the_world_moves_as_its_table_says(walked: tuple[Robot, Motion]) -> None:
+    _robot, motion = walked
+    for segment in motion.segments:
+        base = base_in_world(segment)
+        dt = segment.time[1] - segment.time[0]
+        slope = (base.position[2:] - base.position[:-2]) / (2 * dt)
+        np.testing.assert_allclose(slope, base.velocity[1:-1], atol=3e-4)
+        slope = (base.velocity[2:] - base.velocity[:-2]) / (2 * dt)
+        np.testing.assert_allclose(slope, base.acceleration[1:-1], atol=5e-3)
+
+
+def test_the_body_goes_where_the_gait_says(root: Path) -> None:
+    robot = walker(root, "hexapod", {"name": "ripple", "heading": "left", "slope_left": "10 deg"})
+    motion = walking_motion(robot, samples=51)
+    gait = gait_of(robot.spec)
+    way = motion.segments[-1].configuration[-1, :3] - motion.segments[0].configuration[0, :3]
+    stride = gait.speed * gait.period
+    np.testing.assert_allclose(
+        way, stride * np.array([0, np.cos(np.radians(10)), np.sin(np.radians(10))]), atol=1e-12
+    )
+
+
+def test_turning_on_the_spot_turns_by_the_rate_and_goes_nowhere(root: Path) -> None:
+    robot = walker(root, "hexapod", {"name": "ripple", "yaw_rate": "10 deg/s", "period": "2 s"})
+    motion = walking_motion(robot, samples=51)
+    last = base_in_world(motion.segments[-1])
+    np.testing.assert_allclose(last.position, 0, atol=1e-12)
+    assert np.degrees(last.angles[-1]) == pytest.approx([0, 0, 20])
+    strokes = gait_of(robot.spec).strokes
+    radii = [np.hypot(*leg.neutral_foot[:2]) for leg in robot.spec.legs]
+    np.testing.assert_allclose(strokes, np.radians(20) * 2 / 3 * np.array(radii))
+
+
+@pytest.mark.parametrize("tilt", [{}, {"body_pitch": "5 deg", "body_roll": "-3 deg"}])
+def test_standing_on_a_slope_has_the_feet_in_its_plane(root: Path, tilt: dict[str, str]) -> None:
+    robot = walker(root, "hexapod", {**SLOPES, **tilt, "body_height": "270 mm", "body_x": "2 cm"})
+    segment = standing_posture(robot, ("lf", "lm", "lr", "rf"))
+    feet = feet_in_world(robot, segment)[0]
+    height = (feet - segment.configuration[0, :3]) @ segment.ground_normal
+    np.testing.assert_allclose(height[:4], -0.27, atol=1e-9)
+    np.testing.assert_allclose(height[4:], -0.27 + 0.075, atol=1e-9)
+    rise = -segment.ground_normal[:2] / segment.ground_normal[2]
+    np.testing.assert_allclose(np.degrees(np.arctan(rise)), [6, -4])

@@ -1,0 +1,147 @@
+"""Gaits by name against what the literature says of them, above all their stability margin."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.errors import GaitError
+from pipeline.motion.feet import support_course
+from pipeline.motion.footfall import GAITS, Footfall, in_turn, named, own
+from pipeline.motion.gait import Gait
+from pipeline.motion.ground import Ground
+from pipeline.motion.support import longitudinal_margin, support_margin
+from pipeline.robot.robot_file import LegSpec
+
+PITCH, WIDTH, STROKE = 0.3, 0.5, 0.2  # [m]
+
+
+def pairs(count: int) -> tuple[LegSpec, ...]:
+    """Legs in pairs, one pitch apart from front to rear."""
+    legs = []
+    for side, y in (("left", WIDTH / 2), ("right", -WIDTH / 2)):
+        for k in range(count):
+            x = PITCH * ((count - 1) / 2 - k)
+            legs.append(LegSpec(f"{side[0]}{k}", (), "", side, "", (x, y, -0.3), ()))
+    return tuple(legs)
+
+
+def walked(legs: tuple[LegSpec, ...], footfall: Footfall, stroke: float = STROKE) -> Gait:
+    stride = stroke / max(footfall.duty.values())
+    return Gait(
+        legs=tuple(leg.name for leg in legs),
+        footfall=footfall,
+        period=2.0,
+        twist=np.array([stride / 2.0, 0.0, 0.0]),
+        stride=np.array([stride, 0.0, 0.0]),
+        lift=np.full(len(legs), 0.05),
+        neutral=np.array([leg.neutral_foot for leg in legs]),
+        ground=Ground(),
+        body=np.eye(3),
+        path="harmonic",
+        margin=None,
+        margin_stated=False,
+        source="test",
+    )
+
+
+def least_margin(gait: Gait) -> float:
+    """Over the period, of a centre of mass in the middle of the body."""
+    least = np.inf
+    for begin, end, stance in gait.footfall.stances():
+        feet = []
+        for name in stance:
+            since = gait.footfall.since(name, begin, stood=True)
+            local = (since + np.linspace(0, end - begin, 11)) / gait.footfall.duty[name]
+            feet.append(support_course(gait, gait.legs.index(name), local).position)
+        margin = longitudinal_margin(np.stack(feet, axis=1), np.zeros((11, 2)))
+        least = min(least, float(margin.min()))
+    return least
+
+
+@pytest.mark.parametrize(
+    ("count", "duty"),
+    [
+        *((2, duty) for duty in (0.76, 0.8, 5 / 6, 0.9, 0.97)),
+        *((3, duty) for duty in (0.5, 0.55, 0.6, 2 / 3, 0.75, 5 / 6, 0.95)),
+        *((4, duty) for duty in (0.5, 0.6, 0.75, 0.9)),
+        (5, 0.7),
+    ],
+)
+def test_wave_gaits_have_the_longitudinal_margin_of_song_and_waldron(
+    count: int, duty: float
+) -> None:
+    """S = (n/2 - 1) P + (duty - 3/4) stride, for n legs on a side P apart."""
+    legs = pairs(count)
+    expected = (count / 2 - 1) * PITCH + (duty - 0.75) * STROKE / duty
+    assert least_margin(walked(legs, named("wave", legs, duty))) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("stroke", [0.1, 0.2, 0.28])
+def test_the_tripods_margin_is_half_the_pitch_less_half_the_stroke(stroke: float) -> None:
+    legs = pairs(3)
+    for footfall in (named("tripod", legs, None), named("wave", legs, 0.5)):
+        margin = least_margin(walked(legs, footfall, stroke))
+        assert margin == pytest.approx((PITCH - stroke) / 2)
+
+
+def test_another_order_of_the_same_legs_has_less_margin_than_the_wave() -> None:
+    legs = pairs(3)
+    wave = named("wave", legs, 0.75)
+    forward = own({leg: -phase for leg, phase in wave.phase.items()}, wave.duty)
+    assert least_margin(walked(legs, forward)) < least_margin(walked(legs, wave)) - 0.01
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_a_named_gait_stands_on_its_number_of_feet(name: str) -> None:
+    count = (GAITS[name].legs or 8) // 2
+    feet = {len(stance) for _, _, stance in named(name, pairs(count), None).stances()}
+    assert (
+        feet
+        == {
+            "tripod": {3},
+            "tetrapod": {4},
+            "ripple": {4},
+            "crawl": {3, 4},
+            "wave": {7},
+        }[name]
+    )
+
+
+def test_the_tripods_two_sets_stand_in_turn() -> None:
+    stances = named("tripod", pairs(3), None).stances()
+    assert [(b, e, set(s)) for b, e, s in stances] == [
+        (0.0, 0.5, {"l0", "l2", "r1"}),
+        (0.5, 1.0, {"r0", "r2", "l1"}),
+    ]
+
+
+def test_sets_in_turn_swing_one_after_another() -> None:
+    stances = in_turn([["a", "d"], ["b", "e"], ["c", "f"]], None, "sets").stances()
+    swinging = [set("abcdef") - set(stance) for _, _, stance in stances]
+    assert swinging == [{"b", "e"}, {"c", "f"}, {"a", "d"}]
+    np.testing.assert_allclose([e - b for b, e, _ in stances], 1 / 3)
+
+
+def test_phases_beyond_a_period_are_the_same_gait() -> None:
+    duty = dict.fromkeys("abcd", 0.8)
+    phase = dict(a=0.0, b=0.5, c=0.8, d=0.3)
+    moved = {leg: value + k - 1 for k, (leg, value) in enumerate(phase.items())}
+    for one, other in zip(own(phase, duty).stances(), own(moved, duty).stances(), strict=True):
+        assert one[:2] == pytest.approx(other[:2])
+        assert one[2] == other[2]
+
+
+def test_too_few_feet_are_told_with_when_and_which() -> None:
+    with pytest.raises(GaitError, match=r"from 40 % to 50 % of the period only 0 feet stand"):
+        named("tripod", pairs(3), 0.4).stances()
+    with pytest.raises(GaitError, match=r"only 2 feet stand \(\w+, \w+\).*raise gait.duty_factor"):
+        named("wave", pairs(2), 0.7).stances()
+
+
+def test_the_longitudinal_margin_is_never_less_than_the_margin() -> None:
+    rng = np.random.default_rng(3)
+    feet, point = rng.normal(size=(200, 5, 3)), 0.2 * rng.normal(size=(200, 2))
+    inside = support_margin(feet, point) > 0
+    assert inside.any()
+    assert (longitudinal_margin(feet, point) >= support_margin(feet, point))[inside].all()

@@ -1,0 +1,158 @@
+"""What a table ``[gait]`` may say, what follows from it, and what is refused in one line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pipeline.errors import GaitError
+from pipeline.motion.gait import gait_of
+from pipeline.motion.gait_table import changed_table, read_gait_file, read_gait_table
+from pipeline.motion.payload import with_payload
+from pipeline.motion.standing import standing_posture
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import RobotSpec, load_robot_file, merged_gait
+
+LEGS = ("lf", "rf", "lr", "rr")
+
+
+@pytest.fixture(scope="module")
+def spec(root: Path) -> RobotSpec:
+    return load_robot_file(root / "urdf" / "hexapod.toml")
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"perod": "3 s"}, r"unknown key of \[gait\] 'perod'; did you mean 'period'\?"),
+        ({"period": 3}, r"gait\.period = 3 has no unit; expected text such as '1 s'"),
+        ({"period": "3 m"}, r"gait\.period = '3 m': expected a time in one of s, ms"),
+        ({"period": "0 s"}, r"gait\.period = 0 s: must lie above 1 ms"),
+        ({"period": "1e999 s"}, r"gait\.period = '1e999 s' is not finite"),
+        ({"speed": "1e9 m/s"}, r"gait\.speed = 1e9 m/s: must not be negative, and below"),
+        ({"yaw_rate": "1e9 rad/s"}, r"gait\.yaw_rate = 1e9 rad/s: must lie within"),
+        ({"stroke": "240 m"}, r"gait\.stroke = 240 m: must lie above 0 and below 10 m"),
+        ({"duty_factor": 0}, r"gait\.duty_factor = 0: .*at 0 it never carries"),
+        ({"duty_factor": 1.0}, r"gait\.duty_factor = 1\.0: .*at 1 it never steps"),
+        ({"duty_factor": {"lf": 1.2}}, r"gait\.duty_factor = \(lf\) 1\.2: "),
+        ({"duty_factor": {"lf": 0.8}}, r"says nothing of rf, lr, rr"),
+        ({"lift": {"lff": "1 cm"}}, r"gait\.lift: leg 'lff' is not known; did you mean 'lf'"),
+        ({"phase": 0.5}, r"gait\.phase: must be a table with a number for each leg"),
+        ({"phase": {"lf": "x"}}, r"gait\.phase = \(lf\) 'x' is no number"),
+        ({"name": "crowl"}, r"gait\.name = crowl: did you mean 'crawl'\?"),
+        ({"heading": "up"}, r"gait\.heading = up: expected forward, left"),
+        ({"sway": "most"}, r"gait\.sway: input should be 'none' or 'least'"),
+        ({"sets": ["lf"]}, r"gait\.sets: must be lists of leg names"),
+        ({"sets": [["lf", "rr"]]}, r"must part the legs .* in two or more sets"),
+        ({"name": "wave", "sets": [["lf"]]}, r"gait\.name and gait\.sets both say"),
+        ({"slope_left": "90 deg"}, r"gait\.slope_left = 90 deg: must lie within 89 deg"),
+        ({"payload_mass": "-1 kg"}, r"gait\.payload_mass = -1 kg: must not be negative"),
+        ({"period": "3 m", "speed": "x"}, r"gait\.period.*; gait\.speed"),
+    ],
+)
+def test_one_line_says_what_is_wrong_with_a_table(table: dict[str, Any], message: str) -> None:
+    with pytest.raises(GaitError, match=message) as refused:
+        read_gait_table(table, LEGS, "f.toml")
+    assert "\n" not in str(refused.value)
+    assert str(refused.value).startswith("f.toml: ")
+
+
+@pytest.mark.parametrize(
+    ("gait", "message"),
+    [
+        ({"name": "crawl"}, r"'crawl' is for 4 legs, the robot has 6; for these: tripod, "),
+        ({"duty_factor": 0.45}, r"only 0 feet stand .*raise gait\.duty_factor"),
+        ({"name": "wave", "duty_factor": 0.3}, r"only [012] feet stand"),
+        ({"speed": "0.2 m/s", "period": "3 s", "stroke": "240 mm"}, r"gait\.stroke is 0\.24 m"),
+        ({"speed": "0 m/s"}, r"gait\.speed and gait\.yaw_rate are both 0"),
+        ({"stability_margin": "1 cm"}, r"state gait\.sway = 'least', too"),
+        ({"phase": dict.fromkeys(("lf", "lm", "lr", "rf", "rm", "rr"), 0)}, r"duty_factor is miss"),
+    ],
+)
+def test_numbers_that_make_no_gait_are_refused(
+    spec: RobotSpec, gait: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(GaitError, match=message):
+        gait_of(spec.with_gait(**gait))
+
+
+@pytest.mark.parametrize(
+    ("stated", "speed", "period", "stroke"),
+    [
+        ({}, 0.16, 3.0, 0.24),
+        ({"speed": "0.12 m/s"}, 0.12, 4.0, 0.24),
+        ({"period": "6 s"}, 0.08, 6.0, 0.24),
+        ({"stroke": "120 mm"}, 0.08, 3.0, 0.12),
+        ({"speed": "0.1 m/s", "period": "2 s"}, 0.1, 2.0, 0.1),
+        ({"speed": "6 m/min", "stroke": "0.1 m"}, 0.1, 2.0, 0.1),
+        ({"speed": "0.1 m/s", "stroke": "0.1 m", "period": "2 s"}, 0.1, 2.0, 0.1),
+        ({"name": "wave"}, 0.096, 3.0, 0.24),
+    ],
+)
+def test_two_of_speed_period_and_stroke_give_the_third(
+    spec: RobotSpec, stated: dict[str, Any], speed: float, period: float, stroke: float
+) -> None:
+    gait = gait_of(spec.with_gait(**stated))
+    found = (gait.speed, gait.period, gait.strokes.max())
+    assert found == pytest.approx((speed, period, stroke))
+
+
+def test_strokes_by_leg_give_each_leg_its_duty_factor(spec: RobotSpec) -> None:
+    strokes = {"lf": "240 mm", "rm": "250 mm", "lr": "260 mm"}
+    strokes |= {"rf": "265 mm", "lm": "270 mm", "rr": "280 mm"}
+    phase = {"lf": 0, "rm": 0, "lr": 0, "rf": 0.5, "lm": 0.5, "rr": 0.5}
+    gait = gait_of(spec.with_gait(phase=phase, stroke=strokes, speed="0.16 m/s", period="3 s"))
+    np.testing.assert_allclose(gait.strokes, [0.24, 0.27, 0.26, 0.265, 0.25, 0.28])
+    assert gait.footfall.duty["rr"] == pytest.approx(0.28 / 0.48)
+
+
+def test_a_robot_file_without_a_gait_walks_the_usual_one(spec: RobotSpec, root: Path) -> None:
+    assert gait_of(replace(spec, gait={})).footfall.name == "tripod"
+    solo = load_robot_file(root / "urdf" / "solo12.toml")
+    assert gait_of(replace(solo, gait={})).footfall.name == "crawl"
+
+
+def test_a_footfall_of_a_higher_layer_replaces_the_lower_ones(spec: RobotSpec) -> None:
+    below = {"tripods": [["a"], ["b"]], "duty_factor": 0.6, "lift": "1 cm"}
+    assert merged_gait(below, {"name": "wave"}) == {"name": "wave", "lift": "1 cm"}
+    assert merged_gait(below, {"duty_factor": 0.7}) == below | {"duty_factor": 0.7}
+    assert changed_table(below, "name", "wave") == {"name": "wave", "lift": "1 cm"}
+    assert changed_table({"phase": {"a": 0.0, "b": 0.5}}, "phase.b", "0.25") == {
+        "phase": {"a": 0.0, "b": 0.25}
+    }
+
+
+def test_a_gait_file_holds_one_table(tmp_path: Path) -> None:
+    path = tmp_path / "g.toml"
+    path.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
+    assert read_gait_file(path) == {"name": "wave"}
+    for text, message in (
+        ('[robot]\nname = "x"\n', "holds 'robot'; a gait file holds one table"),
+        ("", r"has none; a gait file holds one table, \[gait\]"),
+        ("[gait\n", "g.toml"),
+    ):
+        path.write_text(text, encoding="utf-8")
+        with pytest.raises(GaitError, match=message):
+            read_gait_file(path)
+    with pytest.raises(GaitError, match="no such file"):
+        read_gait_file(tmp_path / "none.toml")
+
+
+def test_a_payload_counts_in_mass_and_shifts_the_centre(spec: RobotSpec) -> None:
+    plain = load_robot(spec)
+    loaded = with_payload(
+        load_robot(spec.with_gait(payload_mass="10 kg", payload_x="120 mm", payload_z="0.2 m"))
+    )
+    assert with_payload(plain) is plain
+    assert loaded.mass == pytest.approx(plain.mass + 10)
+    q = standing_posture(plain).configuration[0]
+    before = pin.centerOfMass(plain.model, plain.model.createData(), q)
+    after = pin.centerOfMass(loaded.model, loaded.model.createData(), q)
+    np.testing.assert_allclose(
+        after * loaded.mass, before * plain.mass + 10 * np.array([0.12, 0, 0.2])
+    )
