@@ -5,7 +5,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actuators.errors import UnitError
-from actuators.units import dimension, from_si, known_dimensions, known_units, si_unit, to_si
+from actuators.units import (
+    dimension,
+    from_si,
+    known_dimensions,
+    known_units,
+    quantity,
+    si_unit,
+    to_si,
+)
 
 
 @pytest.mark.parametrize(
@@ -68,3 +76,38 @@ def test_unknown_unit_offers_the_closest():
         to_si(1.0, "mN*m/a")
     with pytest.raises(UnitError, match="unknown dimension"):
         si_unit("torqe")
+
+
+@pytest.mark.parametrize(
+    ("written", "dim", "si"),
+    [
+        ("240 mm", "length", 0.24),
+        ("-5deg", "angle", -math.pi / 36),
+        (" 1.5e-3 s ", "time", 1.5e-3),
+        (0, "velocity", 0.0),
+        (0.75, "ratio", 0.75),
+        ("75 %", "ratio", 0.75),
+        ("0.75", "ratio", 0.75),
+    ],
+)
+def test_a_number_written_with_its_unit(written, dim, si):
+    assert quantity(written, dim) == pytest.approx(si)
+
+
+@pytest.mark.parametrize(
+    ("written", "dim", "message"),
+    [
+        (240, "length", "240 has no unit; expected text such as '1 m'"),
+        ("240", "length", "'240' has no unit; expected such as '1 m'"),
+        ("5 kg", "length", "'5 kg': expected a length in one of m, cm, mm"),
+        ("5 parsec", "length", "unknown unit 'parsec'"),
+        ("long", "length", "'long' is no number with a unit"),
+        ("1e999 m", "length", "'1e999 m' is not finite"),
+        (float("nan"), "ratio", "is no number with a unit"),
+        (True, "ratio", "True has no unit"),
+    ],
+)
+def test_what_is_no_number_with_a_unit_is_told(written, dim, message):
+    with pytest.raises(UnitError) as refused:
+        quantity(written, dim)
+    assert message in str(refused.value)
