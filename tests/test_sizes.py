@@ -22,7 +22,6 @@ LONGER = {
     "pipeline/logs/reading/read.py:assemble": 71,
     "pipeline/regression/preprocess.py:rows": 61,
     "pipeline/regression/reporting.py:Reporting._result": 80,
-    "pipeline/robot/robot_file.py:_legs": 65,
     "pipeline/robot/urdf_builder.py:_leg": 71,
     "reports/figures/gap/waterfall.py:gap_waterfall_figure": 62,
     "reports/pages/summary.py:_reproduction": 75,

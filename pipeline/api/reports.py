@@ -73,6 +73,14 @@ def reports(
     return write(given, "reports", Path(folder), decimal)
 
 
+def _refuse_stand(given: Settings) -> None:
+    if not given.robot.floating:
+        raise RobotFileError(
+            f"{given.robot.spec.path}: a robot on a stand neither stands nor walks; "
+            "give one with a floating base"
+        )
+
+
 def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple[str, ...]:
     """Compute what a verb asks for, then write it.
 
@@ -89,11 +97,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         PipelineError: Unusable input.
         ReportError: The folder cannot be written.
     """
-    if not given.robot.floating:
-        raise RobotFileError(
-            f"{given.robot.spec.path}: a robot on a stand neither stands nor walks; "
-            "give one with a floating base"
-        )
+    _refuse_stand(given)
     said: list[str] = []
     tables: list[Table] = []
     standing = walking = None

@@ -77,6 +77,7 @@ def _segment(
     """The motion between two shares of the period during which a stance is held."""
     passed = np.linspace(0.0, 1.0, samples)
     time = gait.period * begin + gait.period * (end - begin) * passed
+    time[-1] = gait.period * end  # the instant at which the next segment starts, to the last bit
     shift = None if sway is None else sway.course(begin + (end - begin) * passed)
     feet = _feet(gait, begin, end, passed, shift)
     q = solve_positions(robot.chains, feet.position, start, time)

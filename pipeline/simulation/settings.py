@@ -17,7 +17,7 @@ from pipeline.motion.gait_table import read_gait_file
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
 from pipeline.simulation.changes import changed
 from pipeline.simulation.edited import IDEAL, Effects, effects
 from pipeline.simulation.force_choice import ForceChoice
@@ -122,24 +122,14 @@ def settings(
         ActuatorError: A catalogue file or a changed parameter cannot be used.
         GapError: The model file cannot be used, or its effects do not fit the robot.
     """
+    _refuse_few(samples)
     path = model if isinstance(model, Path) else None
     file = read_model_file(model, actuators) if isinstance(model, Path) else model
-    spec = load_robot_file(robot or (file.robot if file else DEFAULT_ROBOT))
-    if gait is not None:
-        spec = spec.with_gait(**read_gait_file(gait))
+    spec = _spec(robot or (file.robot if file else DEFAULT_ROBOT), gait)
     actuators = actuators or actuator_folder(spec)
-    catalog = load_catalog(actuators or CATALOG)
-    if samples < LEAST_SAMPLES:
-        raise GaitError(
-            f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
-            "for energies within 1 %"
-        )
-    spec, catalog, remarks = changed(spec, catalog, changes)
-    own = own_actuators(spec, catalog)
-    catalog = own.catalog(catalog)
-    loaded = load_robot(spec)
-    remarks += refuse_impossible(loaded)
-    loaded = with_payload(loaded)
+    spec, catalog, remarks = changed(spec, load_catalog(actuators or CATALOG), changes)
+    catalog = (own := own_actuators(spec, catalog)).catalog(catalog)
+    loaded, warnings = _loaded(spec)
     if walks:
         refuse_beyond_memory(samples, len(loaded.joints), len(catalog.alternatives))
     return Settings(
@@ -149,7 +139,7 @@ def settings(
         samples=samples,
         quasi_static=quasi_static,
         changes=tuple(changes),
-        remarks=tuple(remarks),
+        remarks=(*remarks, *warnings),
         actuators=actuators,
         own=own,
         effects=_effects(file, path or Path("model.toml"), loaded, catalog, own) if file else None,
@@ -158,6 +148,25 @@ def settings(
         forces=forces.checked(catalog.alternatives),
         compare_forces=compare_forces,
     )
+
+
+def _spec(robot: Path, gait: Path | None) -> RobotSpec:
+    spec = load_robot_file(robot)
+    return spec if gait is None else spec.with_gait(**read_gait_file(gait))
+
+
+def _loaded(spec: RobotSpec) -> tuple[Robot, Sequence[str]]:
+    """The robot with its payload, and what of it a reader should know."""
+    bare = load_robot(spec)
+    return with_payload(bare), refuse_impossible(bare)
+
+
+def _refuse_few(samples: int) -> None:
+    if samples < LEAST_SAMPLES:
+        raise GaitError(
+            f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
+            "for energies within 1 %"
+        )
 
 
 def _effects(
