@@ -87,7 +87,7 @@ def tripod_gait(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
         time = k * half + half * phase
         q = solve_positions(robot.chains, position, start, time)
         _within_limits(robot, q, time)
-        q_dot, q_ddot = solve_rates(robot.chains, q, velocity, acceleration, time)
+        q_dot, q_ddot = solve_rates(robot.chains, q, velocity, acceleration, time, position)
         base = np.zeros((samples, 3))
         base[:, 0] = speed * time
         base_velocity = np.zeros((samples, 3))

@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import GaitError
-from pipeline.robot.inverse_kinematics import ACCEPTED, approach, beyond_reach
+from pipeline.robot.inverse.damped import approach
+from pipeline.robot.inverse.least_motion import freedoms
+from pipeline.robot.inverse_kinematics import ACCEPTED, beyond_reach, reach
 from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -36,7 +38,7 @@ def neutral_postures(robot: Robot) -> Array:
     """
     spec = robot.spec
     target = np.array([leg.neutral_foot for leg in spec.legs])[None]
-    q, miss = approach(robot.chains, target, robot.start_posture)
+    q, miss = reach(robot.chains, target, robot.start_posture)
     lower, upper = _limits(robot)
     inside = ((q[0] >= lower - ACCEPTED) & (q[0] <= upper + ACCEPTED)).all(axis=1)
     lost = np.flatnonzero((miss[0] > ACCEPTED) | ~inside)
@@ -122,9 +124,10 @@ def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float
     points = np.broadcast_to(target, (len(starts), 1, 3))
     # A start that never arrives keeps the damping of all up; those that come close go on alone.
     near, left = approach(chains, points, starts[:, None])
+    least = float(left.min()) if freedoms(chains)[0].lacks else 0.0
     found: list[Array] = []
-    for start in near[left[:, 0] < _NEAR]:
-        q, miss = approach(chains, target[None, None], start)
+    for start in near[left[:, 0] < least + _NEAR]:
+        q, miss = reach(chains, target[None, None], start)
         if miss[0, 0] > ACCEPTED:
             continue
         # Whole turns lead to the same posture; take the one inside the limits.
