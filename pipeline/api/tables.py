@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from actuators.loading.build import CATALOG
+from pipeline.robot.foot_tracking import foot_tracking
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking, walk
 from reports.table import Table
+from reports.tables import kinematics as kinematics_tables
 from reports.tables import parameters as parameter_tables
 from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
@@ -46,6 +48,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
         walking_tables.walking_joint_demand(walking.demand),
         walking_tables.walking_contact_forces(walking.demand),
         walking_tables.walking_stability(walking.demand, walking.margins),
+        *_foot_tracking(given, walking),
         walking_tables.walking_stage_energy(
             walking.results, {n: a.stage_names for n, a in given.catalog.alternatives.items()}
         ),
@@ -73,6 +76,18 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
             walking.demand, static.demand, walking.supplies, static.supplies, legs
         )
     return tables
+
+
+def _foot_tracking(given: Settings, walking: Walking) -> list[Table]:
+    """How well the legs follow, where the motion says where the feet should be."""
+    pieces = [
+        (segment.time, given.robot.leg_positions(segment.configuration), segment.foot_target)
+        for segment in walking.motion.segments
+        if segment.foot_target is not None
+    ]
+    if not pieces:
+        return []
+    return [kinematics_tables.foot_tracking(foot_tracking(given.robot.chains, pieces))]
 
 
 def table_of_parameters(given: Settings) -> Table:

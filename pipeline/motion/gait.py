@@ -100,6 +100,7 @@ def tripod_gait(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
                 velocity=robot.tangent(robot.joint_rates(q_dot), base_velocity),
                 acceleration=robot.tangent(robot.joint_rates(q_ddot)),
                 stance=stance,
+                foot_target=position,
             )
         )
     return Motion(tuple(segments), period)

@@ -26,6 +26,8 @@ class Segment:
         velocity: Pinocchio tangent velocity, shape (N, nv) [m/s, rad/s].
         acceleration: Its derivative, shape (N, nv) [m/s^2, rad/s^2].
         stance: Names of the legs whose feet carry load.
+        foot_target: Where the feet should be in the base frame, shape (N, L, 3) [m]; None where
+            the motion was not made from feet.
     """
 
     name: str
@@ -34,6 +36,7 @@ class Segment:
     velocity: Array
     acceleration: Array
     stance: tuple[str, ...]
+    foot_target: Array | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no later stage could compute with.

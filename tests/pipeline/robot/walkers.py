@@ -30,8 +30,8 @@ MIXED: tuple[Leg, ...] = (
 )
 
 
-def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1) -> str:
-    """A trunk on the legs given, with placements drawn at random; `arm` adds a joint on top."""
+def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1, turned: bool = True) -> str:
+    """A trunk on the legs given, placements drawn at random; `arm` adds a joint on top."""
     rng = np.random.default_rng(seed)
     parts = [f'<robot name="walker"><link name="base">{INERTIAL.format(mass=9)}</link>']
 
@@ -52,7 +52,11 @@ def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1) -> str:
             joint(f"leg{i}_{k}", kind, axis, parent, f"leg{i}_link{k}", place)
             parent = f"leg{i}_link{k}"
             x, y = rng.uniform(-0.05, 0.05, 2)
-            turn = " ".join(f"{a:.3f}" for a in rng.uniform(-0.3, 0.3, 3)) if k == 1 else "0 0 0"
+            turn = (
+                " ".join(f"{a:.3f}" for a in rng.uniform(-0.3, 0.3, 3))
+                if turned and k == 1
+                else "0 0 0"
+            )
             place = f'<origin xyz="{x:.3f} {y:.3f} {-0.6 / len(leg):.3f}" rpy="{turn}"/>'
         joint(f"leg{i}_tip", "fixed", "", parent, f"leg{i}_foot", place)
     if arm:
@@ -85,8 +89,11 @@ def robot_text(legs: Sequence[Leg], *, arm: bool = False) -> str:
     return "\n".join(lines)
 
 
-def walker(folder: Path, legs: Sequence[Leg], *, arm: bool = False, seed: int = 1) -> Robot:
+def walker(
+    folder: Path, legs: Sequence[Leg], *, arm: bool = False, seed: int = 1, turned: bool = True
+) -> Robot:
     """Write such a machine into a folder and load it."""
-    (folder / "walker.urdf").write_text(urdf_text(legs, arm=arm, seed=seed), encoding="utf-8")
+    urdf = urdf_text(legs, arm=arm, seed=seed, turned=turned)
+    (folder / "walker.urdf").write_text(urdf, encoding="utf-8")
     (folder / "walker.toml").write_text(robot_text(legs, arm=arm), encoding="utf-8")
     return load_robot(load_robot_file(folder / "walker.toml"))
