@@ -144,7 +144,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
     return [*out, Drawing("electrical_energy", figure)]
 
 
-def _scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Leg]]:
+def scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Leg]]:
     """The robot's visual primitives and legs in one posture."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, configuration)
@@ -166,7 +166,7 @@ def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawin
 
     def standing_robot() -> Figure:
         return robot_figure(
-            *_scene(robot, posture),
+            *scene(robot, posture),
             title=f"{robot.spec.name}, {standing.segment.name}",
             subtitle="the other feet are lifted to mid-transfer",
             mass_centre=pin.centerOfMass(robot.model, data, posture).copy(),
@@ -174,14 +174,14 @@ def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawin
 
     def zero_pose() -> Figure:
         return joint_directions_figure(
-            *_scene(robot, zero),
+            *scene(robot, zero),
             leg,
             title=f"{robot.spec.name}: zero pose and positive directions",
             zero_pose=robot.spec.zero_pose,
         )
 
     def gait() -> Figure:
-        scene, _ = _scene(robot, zero)
+        scene, _ = scene(robot, zero)
         trunk = next((p for p in scene if p.link == robot.spec.base_link), None)
         return gait_figure(
             robot.leg_names,

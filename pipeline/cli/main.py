@@ -45,6 +45,19 @@ def parser() -> argparse.ArgumentParser:
     check.add_argument("-v", "--verbose", action="store_true", help="list what passed, too")
     check.set_defaults(run=_run_check)
 
+    init = verbs.add_parser("init", help="write a robot file for a URDF or a robot's name")
+    init.add_argument("source", help="URDF, or a robot that example-robot-data ships, e.g. solo12")
+    init.add_argument("--out", type=named_path, help="robot file; NAME.toml here by default")
+    init.add_argument(
+        "--foot",
+        action="append",
+        default=[],
+        metavar="LINK",
+        help="a link at a foot, once for each leg; looked for by default",
+    )
+    init.add_argument("--base", metavar="LINK", help="the base's link; the root by default")
+    init.set_defaults(run=_run_init)
+
     urdf = verbs.add_parser("urdf", help="build the URDFs from their robot files")
     urdf.add_argument(
         "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
@@ -120,6 +133,12 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
     )
     add_decimal_option(sub)
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
+
+
+def _run_init(options: argparse.Namespace) -> int:
+    from pipeline.cli.init import run_init
+
+    return run_init(options.source, options.out, feet=options.foot, base=options.base)
 
 
 def _run_check(options: argparse.Namespace) -> int:

@@ -88,19 +88,25 @@ def _beyond(q: Array, lower: Array, upper: Array) -> Array:
     return out
 
 
-def _spread(joints: int) -> Array:
-    """Points that fill the unit cube evenly, shape (_TRIES, joints)."""
-    if joints <= 3:
-        shares = (np.arange(_STARTS) + 0.5) / _STARTS
-        return np.array(list(itertools.product(shares, repeat=3)))[:, :joints]
-    # More joints ask for points that do not stand in rows: Kronecker's sequence of the root of
-    # x^(joints + 1) = x + 1.
+def spread(count: int, joints: int) -> Array:
+    """Points that fill the unit cube evenly, shape (count, joints).
+
+    Kronecker's sequence of the root of x^(joints + 1) = x + 1: points do not stand in rows.
+    """
     root = 2.0
     for _ in range(30):
         root = (1 + root) ** (1 / (joints + 1))
     steps = root ** -np.arange(1, joints + 1)
-    points: Array = (0.5 + np.arange(1, _TRIES + 1)[:, None] * steps) % 1.0
+    points: Array = (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0
     return points
+
+
+def _starts(joints: int) -> Array:
+    """Shares of the limits to start from, shape (_TRIES, joints); in rows for few joints."""
+    if joints > 3:
+        return spread(_TRIES, joints)
+    shares = (np.arange(_STARTS) + 0.5) / _STARTS
+    return np.array(list(itertools.product(shares, repeat=3)))[:, :joints]
 
 
 def _written(q: Array) -> str:
@@ -119,7 +125,7 @@ def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float
     wide = ~np.isfinite(upper - lower) | (upper - lower > _UNLIMITED) | (upper <= lower)
     low, high = np.where(wide, -np.pi, lower), np.where(wide, np.pi, upper)
     starts = np.zeros((_TRIES, low.size))
-    starts[:, :count] = (low + (high - low) * _spread(low.size))[:, :count]
+    starts[:, :count] = (low + (high - low) * _starts(low.size))[:, :count]
     chains = robot.chains.of([leg])
     points = np.broadcast_to(target, (len(starts), 1, 3))
     # A start that never arrives keeps the damping of all up; those that come close go on alone.
