@@ -181,8 +181,8 @@ def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawin
         )
 
     def gait() -> Figure:
-        scene, _ = scene(robot, zero)
-        trunk = next((p for p in scene if p.link == robot.spec.base_link), None)
+        solids, _ = scene(robot, zero)
+        trunk = next((p for p in solids if p.link == robot.spec.base_link), None)
         return gait_figure(
             robot.leg_names,
             _gait_stretches(robot, walking),

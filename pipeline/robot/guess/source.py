@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
@@ -72,22 +73,39 @@ def standing_pose(source: Source) -> tuple[str, dict[str, float]] | None:
 
     Returns:
         None where there is no SRDF, or no pose in it that is called as poses for standing are.
+
+    Raises:
+        RobotFileError: The SRDF is malformed.
     """
     if source.srdf is None:
         return None
     try:
         root = ET.fromstring(source.srdf.read_bytes())
-    except ET.ParseError:
-        return None
+    except ET.ParseError as error:
+        line, _ = error.position
+        raise RobotFileError(
+            f"{source.srdf}: line {line}: malformed XML; correct it, or move it away and the "
+            "stance is sought"
+        ) from None
     poses: dict[str, dict[str, float]] = {}
     for state in root.findall("group_state"):
         values = {}
         for joint in state.findall("joint"):
             words = joint.get("value", "").split()
             if len(words) == 1:  # a floating base has seven
-                values[joint.get("name", "")] = float(words[0])
+                values[joint.get("name", "")] = _number(words[0], source.srdf)
         poses.setdefault(state.get("name", ""), {}).update(values)
     for name in (source.pose, *STANDING_POSES):
         if poses.get(name):
             return name, poses[name]
     return None
+
+
+def _number(word: str, where: Path) -> float:
+    try:
+        number = float(word)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise RobotFileError(f"{where}: joint value '{one_line(word)}', expected a finite number")
+    return number

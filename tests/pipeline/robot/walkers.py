@@ -30,6 +30,12 @@ MIXED: tuple[Leg, ...] = (
 )
 
 
+def _corner(leg: int, legs: int) -> tuple[int, float]:
+    """Left (1) or right (-1), and how far ahead from 1 to -1: pairs in rows."""
+    rows = (legs + 1) // 2
+    return (1 if leg % 2 == 0 else -1), 1 - 2 * (leg // 2) / (rows - 1)
+
+
 def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1, turned: bool = True) -> str:
     """A trunk on the legs given, placements drawn at random; `arm` adds a joint on top."""
     rng = np.random.default_rng(seed)
@@ -46,7 +52,7 @@ def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1, turned: 
         )
 
     for i, leg in enumerate(legs):
-        side, along = (1 if i % 2 == 0 else -1), (1 if i < len(legs) / 2 else -1)
+        side, along = _corner(i, len(legs))
         parent, place = "base", f'<origin xyz="{0.4 * along} {0.3 * side} 0"/>'
         for k, (kind, axis) in enumerate(leg):
             joint(f"leg{i}_{k}", kind, axis, parent, f"leg{i}_link{k}", place)
@@ -69,7 +75,7 @@ def robot_text(legs: Sequence[Leg], *, arm: bool = False) -> str:
     lines = ["[robot]", 'name = "walker"', 'urdf = "walker.urdf"', 'base_link = "base"']
     lines += ["[held]", "arm = 0.4"] if arm else []
     for i, leg in enumerate(legs):
-        side, along = (1 if i % 2 == 0 else -1), (1 if i < len(legs) / 2 else -1)
+        side, along = _corner(i, len(legs))
         lines += [
             f"[legs.leg{i}]",
             f"joints = {json.dumps([f'leg{i}_{k}' for k in range(len(leg))])}",
