@@ -38,6 +38,7 @@ from pipeline.simulation.walk_stand import joint_series
 from reports.tables.walking import walking_joint_demand
 from reports.writer import csv_bytes
 from tests.bench_gap import gap_costs
+from tests.bench_kinematics import inverse_kinematics
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = 3000  # of the whole cycle
@@ -247,6 +248,7 @@ def main() -> None:
     robot = load_robot(load_robot_file(ROOT / "urdf" / "hexapod.toml"))
     motion = tripod_gait(robot, samples=SAMPLES // 2)
     demand_ratios(robot, motion)
+    inverse_kinematics(ROOT, timed)
     csv_ratio(robot, motion)
     cold_run()
     gap_costs()

@@ -10,7 +10,7 @@ from pipeline.effects.model_file import ModelFile, read_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.model_writer import model_text
 from pipeline.robot.published import published_names
-from pipeline.robot.robot_file import DEFAULT_ROBOT
+from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
 from pipeline.simulation.settings import Settings, settings
 from reports.atomic import write_text
 
@@ -99,8 +99,7 @@ def load(
     if path.suffix.lower() == ".toml":
         machine.settings(samples=51, walks=False)
     elif not path.is_file():
-        hint = "name a robot file or URDF"
         if str(robot) in published_names():
-            hint = f"`python -m pipeline init {robot}` writes one for that robot"
-        raise RobotFileError(f"{path}: no such robot file; {hint}")
+            load_robot_file(path)  # says how to make one
+        raise RobotFileError(f"{path}: no such robot file; name a robot file or URDF")
     return machine

@@ -19,12 +19,15 @@ from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
 
 IDEAL = "ideal"
+HELD = "held joints"
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
 def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
-    """Each leg's joints."""
-    return {leg.name: leg.joints for leg in spec.legs}
+    """Each leg's joints, and those outside the legs together."""
+    legs = {leg.name: leg.joints for leg in spec.legs}
+    held = tuple(joint for joint, _ in spec.held)
+    return legs | {HELD: held} if held else legs
 
 
 def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:

@@ -41,7 +41,9 @@ def parser() -> argparse.ArgumentParser:
     verbs = root.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=_Parser)
 
     check = verbs.add_parser("check", help="judge a robot file or URDF for physical sense")
-    check.add_argument("file", type=named_path, help="robot file (.toml) or URDF")
+    check.add_argument(
+        "file", type=named_path, help="robot file (.toml), URDF, or a published name"
+    )
     check.add_argument("-v", "--verbose", action="store_true", help="list what passed, too")
     check.set_defaults(run=_run_check)
 

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from pipeline.errors import UnphysicalModelError
+from pipeline.robot.published import published_names, published_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 from pipeline.robot.urdf_check import MERGED, Finding, check_urdf
@@ -29,7 +30,7 @@ def check_file(path: Path) -> list[Finding]:
     """Check a robot file or a bare URDF.
 
     Args:
-        path: ``.toml`` robot file or URDF.
+        path: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``.
 
     Returns:
         Every check with its outcome.
@@ -39,6 +40,8 @@ def check_file(path: Path) -> list[Finding]:
     """
     if path.suffix.lower() == ".toml":
         return check_robot(load_robot(load_robot_file(path)))
+    if not path.exists() and str(path) in published_names():
+        return check_urdf(read_urdf(published_robot(str(path)).urdf), str(path))
     return check_urdf(read_urdf(path), str(path))
 
 
@@ -54,7 +57,17 @@ def check_robot(robot: Robot) -> list[Finding]:
             f"{len(robot.joints)} joints, {len(spec.legs)} feet",
         )
     )
-    return findings + _symmetry(robot, spec)
+    return findings + _sliding(robot) + _symmetry(robot, spec)
+
+
+def _sliding(robot: Robot) -> list[Finding]:
+    """Joints whose numbers are metres and newtons under headings for those that turn."""
+    detail = (
+        "it slides: where columns are called rad, rad_s and Nm its numbers are m, m/s and N, and "
+        "its actuator's ratio is turned radians per metre"
+    )
+    names = [joint for joint, slides in zip(robot.joints, robot.sliding, strict=True) if slides]
+    return [Finding(joint, "unit of the joint", True, detail, note=True) for joint in names]
 
 
 def source_of(robot: Robot) -> str:
@@ -95,7 +108,8 @@ def refuse_impossible(robot: Robot) -> tuple[str, ...]:
             unit, a joint without a drive of its own, or another mass than the stated one.
     """
     where = source_of(robot)
-    return refused([*check_urdf(robot.urdf, where), *_masses(robot)], where, str(robot.spec.path))
+    findings = [*check_urdf(robot.urdf, where), *_masses(robot), *_sliding(robot)]
+    return refused(findings, where, str(robot.spec.path))
 
 
 def refuse_urdf(text: str, where: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from actuators.parameters import REQUIRED_KEYS, ParameterSet, parameters_from_ta
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import si_unit
 from pipeline.errors import RobotFileError
-from pipeline.robot.published import urdf_path
+from pipeline.robot.published import published_names, urdf_path
 
 #: Numbers every walking robot needs, with their dimension.
 #: Of the project, from the folder it is run in.
@@ -214,7 +214,11 @@ def load_robot_file(path: Path) -> RobotSpec:
     if path.suffix.lower() in (".urdf", ".xml", ".xacro"):
         raise RobotFileError(
             f"{path}: a URDF says nothing of legs and gait; give a robot file (TOML) that names it "
-            "as robot.urdf, as urdf/hexapod.toml does"
+            f"as robot.urdf, as urdf/hexapod.toml does: `python -m pipeline init {path}` writes one"
+        )
+    if not path.exists() and str(path) in published_names():
+        raise RobotFileError(
+            f"{path}: no such file; `python -m pipeline init {path}` writes one for that robot"
         )
     table, sources = _extended(path, ())
     where = str(path)

@@ -66,11 +66,13 @@ def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array)
         if not good:
             best = min(found, key=lambda q: float(_beyond(q, low, high).max()))
             worst = int(_beyond(best, low, high).argmax())
+            slides = robot.chains.slides[worst, i]
+            scale, digits, unit = (1.0, 4, "m") if slides else (180 / np.pi, 1, "deg")
             return GaitError(
                 f"leg '{leg.name}': to stand on its neutral foot joint '{leg.joints[worst]}' would "
-                f"have to reach {np.degrees(best[worst]):.1f} deg, its limits are "
-                f"{np.degrees(lower[i, worst]):.1f} to {np.degrees(upper[i, worst]):.1f} deg; "
-                "change the stroke, the neutral foot or the limits"
+                f"have to reach {best[worst] * scale:.{digits}f} {unit}, its limits are "
+                f"{lower[i, worst] * scale:.{digits}f} to {upper[i, worst] * scale:.{digits}f} "
+                f"{unit}; change the stroke, the neutral foot or the limits"
             )
         shown = " or ".join(_written(q) for q in good[:_SHOWN])
         offers.append(f"legs.{leg.name}: {shown}")

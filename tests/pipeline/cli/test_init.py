@@ -53,6 +53,38 @@ def test_what_init_cannot_do_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_check_knows_published_robots_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "solo8"]) == 0
+    assert "solo8: 62 of 62 checks passed" in capsys.readouterr().out
+    assert main(["walk", "--robot", "solo8"]) == 2
+    assert "`python -m pipeline init solo8` writes one" in capsys.readouterr().err
+
+
 def test_a_robots_name_is_no_robot_file_but_init_makes_one() -> None:
     with pytest.raises(RobotFileError, match="`python -m pipeline init solo12` writes one"):
         lw.load("solo12")
+
+
+NECK = (
+    '<link name="head"><inertial><origin xyz="0.1 0 0"/><mass value="0.5"/>'
+    '<inertia ixx="0.001" iyy="0.001" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+    '<joint name="neck" type="revolute"><parent link="base_link"/><child link="head"/>'
+    '<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="9" velocity="9"/></joint></robot>'
+)
+
+
+def test_a_head_is_held_and_counts(root: Path, tmp_path: Path) -> None:
+    """Its torque is that of its weight, its energy the difference of the robot's and the legs'."""
+    text = (root / "urdf" / "hexapod.urdf").read_text(encoding="utf-8")
+    (tmp_path / "own.urdf").write_text(text.replace("</robot>", NECK), encoding="utf-8")
+    made = lw.init(tmp_path / "own.urdf", tmp_path / "own.toml")
+    assert [(joint, at) for joint, at, _ in made.guess.held] == [("neck", 0.0)]
+    walk = lw.walk(lw.load(made.path), "ideal", samples=51)
+    torque = walk.demand.frame()["neck__torque_Nm"]
+    assert torque.to_numpy() == pytest.approx(-0.5 * 9.81 * 0.1, rel=1e-9)
+    energy = walk.energy.frame().set_index("leg")["electrical_J"]
+    assert energy["held joints"] > 0
+    assert energy.drop("robot").sum() == pytest.approx(energy["robot"], rel=1e-12)
+    tracking = walk.table("foot_tracking").frame()
+    assert (tracking["directions"] == 3).all()
+    assert tracking["deviation_time_s"].isna().all()
