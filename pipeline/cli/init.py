@@ -20,7 +20,7 @@ def run_init(
         base: The base's link; the root by default.
 
     Returns:
-        The exit code.
+        The exit code: 1 where `check` fails or no stroke was found.
     """
     from pipeline.api.init import init
 
@@ -37,7 +37,10 @@ def run_init(
         print(f"  held: {', '.join(f'{joint} at {at:g}' for joint, at, _ in guess.held)}")
     print(f"  stance: {stance.reason}; static margin {1e3 * stance.margin:.0f} mm")
     if guess.pace is None:
-        print("  gait: no stroke is within reach and limits; change the stance")
+        print(
+            "  gait: no stroke along x, which is forward, is within reach and limits; change the "
+            "stance, or turn the URDF's root if its x does not point forward"
+        )
     else:
         pace = guess.pace
         print(
@@ -53,4 +56,4 @@ def run_init(
         print(f"FAIL {finding.subject}: {finding.check}: {finding.detail}")
     passed = len(done.findings) - len(failed)
     print(f"check: {passed} of {len(done.findings)} passed")
-    return _NEGATIVE if failed else _OK
+    return _NEGATIVE if failed or guess.pace is None else _OK

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pipeline.robot.guess.stance import Stance
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse_kinematics import ACCEPTED, reach
+from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import LegChains
 
 Array = NDArray[np.float64]
@@ -18,6 +19,8 @@ _SHRINK = 0.85
 _TRIES = 20
 _LIFT = 0.4  # over the stroke
 _SIDE = 0.25  # room to the sides, over the stroke: the body sways
+#: Over the stroke: how far the foot of a leg that lacks a direction may leave its path.
+_ASTRAY = 0.25
 _PERIOD = 2.0  # [s] of a robot whose hips are at _HEIGHT
 _HEIGHT = 0.3  # [m]
 
@@ -58,9 +61,11 @@ def find_pace(chains: LegChains, stance: Stance, lower: Array, upper: Array) -> 
         x, y, z = stroke / 2, _SIDE * stroke, lift
         steps = [(a * x, b * y, c * z) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (0, 1)]
         room = np.array(steps)[:, None, :] * np.where(follows[:, None], 1.0, [1.0, 0.0, 1.0])
-        q, miss = reach(about, stance.feet + room, stance.posture)
+        target = stance.feet + room
+        q, miss = reach(about, target, stance.posture)
         inside = (q >= lower) & (q <= upper) | ~chains.real
-        if miss.max() <= ACCEPTED and inside.all():
+        off = np.linalg.norm(foot_positions(about, q) - target, axis=-1)
+        if miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and inside.all():
             # Robots of one shape walk alike where the period goes with the root of their height.
             return Pace(stroke, lift, _rounded(_PERIOD * (height / _HEIGHT) ** 0.5))
     return None

@@ -9,6 +9,7 @@ import pytest
 import pipeline as lw
 from pipeline.cli.main import main
 from pipeline.errors import RobotFileError
+from tests.pipeline.robot.walkers import urdf_text
 
 
 def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
@@ -63,6 +64,18 @@ def test_check_knows_published_robots_by_name(capsys: pytest.CaptureFixture[str]
 def test_a_robots_name_is_no_robot_file_but_init_makes_one() -> None:
     with pytest.raises(RobotFileError, match="`python -m pipeline init solo12` writes one"):
         lw.load("solo12")
+
+
+def test_legs_that_cannot_step_forward_are_a_finding(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Two axes along x: the feet move sideways and up only."""
+    leg = (("revolute", "1 0 0"), ("revolute", "1 0 0"))
+    (tmp_path / "crab.urdf").write_text(urdf_text((leg,) * 4, turned=False), encoding="utf-8")
+    out = tmp_path / "crab.toml"
+    assert main(["init", str(tmp_path / "crab.urdf"), "--out", str(out)]) == 1
+    assert "no stroke along x, which is forward" in capsys.readouterr().out
+    assert "no stroke was found" in out.read_text(encoding="utf-8")
 
 
 NECK = (
