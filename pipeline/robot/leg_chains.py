@@ -164,6 +164,8 @@ def leg_chains(
 
 def _next_joint(model: pin.Model, leg: str, joint: str, parent: int) -> int:
     if not model.existJointName(joint):
+        if model.existFrame(joint, pin.FrameType.FIXED_JOINT):
+            raise UrdfError(f"leg '{leg}': joint '{joint}' is fixed; list those that move")
         raise UrdfError(
             f"leg '{leg}': joint '{joint}' is not in the URDF; "
             f"{closest(joint, list(model.names)[1:])}"

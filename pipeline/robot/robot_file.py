@@ -364,6 +364,8 @@ def _legs(
         joints = entry.get("joints")
         if not isinstance(joints, list) or not all(isinstance(j, str) for j in joints):
             raise RobotFileError(f"{place}: joints must be a list of names, base outward")
+        if not joints:
+            raise RobotFileError(f"{place}: joints is empty; a leg has at least one actuated joint")
         for joint in joints:
             _refuse_name(joint, f"{place}: joints")
         side = entry.get("side")
