@@ -23,6 +23,7 @@ def run_init(
         The exit code: 1 where `check` fails or no stroke was found.
     """
     from pipeline.api.init import init
+    from pipeline.robot.urdf_check import MERGED
 
     done = init(source, out, feet=feet, base=base)
     guess, stance = done.guess, done.guess.stance
@@ -52,8 +53,10 @@ def run_init(
         f"then at [assumed] in {done.path}, which says why each guess was made"
     )
     failed = [finding for finding in done.findings if not finding.passed]
-    for finding in failed:
-        print(f"FAIL {finding.subject}: {finding.check}: {finding.detail}")
+    for finding in done.findings:
+        if not finding.passed or (finding.note and finding.check != MERGED):
+            mark = "note" if finding.passed else "FAIL"
+            print(f"{mark} {finding.subject}: {finding.check}: {finding.detail}")
     passed = len(done.findings) - len(failed)
     print(f"check: {passed} of {len(done.findings)} passed")
     return _NEGATIVE if failed or guess.pace is None else _OK

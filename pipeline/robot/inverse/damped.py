@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from pipeline.robot.kinematics import cross, foot_positions, swept
 from pipeline.robot.leg_chains import LegChains
@@ -39,6 +38,8 @@ def approach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Arr
     n = target.shape[0]
     q = np.broadcast_to(start, (*target.shape[:2], chains.depth)).copy()
     if start.ndim == 2 and n > 4 * _STRIDE:
+        from scipy.interpolate import CubicSpline
+
         knots = np.unique(np.append(np.arange(0, n, _STRIDE), n - 1))
         q[knots] = _iterated(chains, target[knots], q[knots])[0]
         guess = CubicSpline(knots, q[knots])(np.arange(n))
