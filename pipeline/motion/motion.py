@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +10,11 @@ from numpy.typing import NDArray
 from pipeline.errors import InvalidMotionError
 
 Array = NDArray[np.float64]
+
+
+def level_ground() -> Array:
+    """The normal of level ground in the world frame, shape (3,)."""
+    return np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -26,6 +31,8 @@ class Segment:
         velocity: Pinocchio tangent velocity, shape (N, nv) [m/s, rad/s].
         acceleration: Its derivative, shape (N, nv) [m/s^2, rad/s^2].
         stance: Names of the legs whose feet carry load.
+        ground_normal: Unit vector in the world frame (z opposes gravity) that points out of the
+            ground, shape (3,); the standing feet rest on one plane with this normal.
     """
 
     name: str
@@ -34,14 +41,20 @@ class Segment:
     velocity: Array
     acceleration: Array
     stance: tuple[str, ...]
+    ground_normal: Array = field(default_factory=level_ground)
 
     def __post_init__(self) -> None:
         """Refuse what no later stage could compute with.
 
         Raises:
-            InvalidMotionError: No samples, times that do not increase, shapes that differ or values
-                that are not finite.
+            InvalidMotionError: No samples, times that do not increase, shapes that differ, values
+                that are not finite, or a ground whose normal is no upward unit vector.
         """
+        normal = self.ground_normal
+        if not (normal.shape == (3,) and abs(np.linalg.norm(normal) - 1) < 1e-9 and normal[2] > 0):
+            raise InvalidMotionError(
+                f"segment '{self.name}': ground_normal must be a unit vector that points up"
+            )
         n = self.time.shape[0]
         if n == 0:
             raise InvalidMotionError(f"segment '{self.name}' has no samples; at least 1 is needed")
