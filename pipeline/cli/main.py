@@ -18,7 +18,7 @@ from pipeline.cli.blind_options import add_blind_options, add_twin_options
 from pipeline.cli.decimal_option import add_decimal_option
 from pipeline.cli.gap.options import add_gap_options
 from pipeline.cli.named_path import named_path
-from pipeline.errors import PipelineError, TippingError
+from pipeline.errors import PipelineError, StanceError
 
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
 DEFAULT_ROBOT = Path("urdf/hexapod.toml")
@@ -219,7 +219,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         return run(options)
-    except TippingError as error:
+    except StanceError as error:
         print(error, file=sys.stderr)
         return EXIT_NEGATIVE
     except (PipelineError, ActuatorError, GapError, ReportError) as error:

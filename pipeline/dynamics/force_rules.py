@@ -1,0 +1,168 @@
+"""Rules by which the ground's forces are chosen among those that carry the robot.
+
+The paper's rule is the least sum of squared tangential forces (`contact_forces`). Others start from
+its forces and add internal forces to them, which change joint torques and leave the robot's motion
+as it is. They are given the standing legs' statics and answer with forces; a rule that knows
+actuators is made above this room and handed down.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.dynamics.internal_forces import bounded_minimum, internal_basis, out_of_bounds
+from pipeline.errors import GaitError
+from pipeline.motion.motion import Segment
+
+Array = NDArray[np.float64]
+LEAST_TANGENTIAL = "least_tangential"
+#: Weight of the distance from the least tangential forces beside a rule's own cost: it decides
+#: between forces that cost the same.
+_TIE = 1e-9
+
+
+@dataclass(frozen=True)
+class Stance:
+    """Standing legs over one segment, as a rule sees them.
+
+    Attributes:
+        segment: The motion.
+        joints: All joints.
+        position: Of all joints, shape (N, J) [rad].
+        velocity: Shape (N, J) [rad/s].
+        acceleration: Shape (N, J) [rad/s^2].
+        torque: Without the ground's forces, shape (N, J) [N*m].
+        columns: Of the standing legs' joints among all, shape (K, M).
+        unit_torque: Torque that a force of 1 N along each axis of the ground's frame puts into the
+            joints of its leg, shape (N, K, 3, M) [N*m/N].
+        feet: In a frame whose z axis is the ground's normal [m], shape (N, K, 3).
+        force: The least tangential forces in the same frame [N], shape (N, K, 3).
+        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
+    """
+
+    segment: Segment
+    joints: tuple[str, ...]
+    position: Array
+    velocity: Array
+    acceleration: Array
+    torque: Array
+    columns: NDArray[np.intp]
+    unit_torque: Array
+    feet: Array
+    force: Array
+    friction_coefficient: float | None
+
+    def demand(self, force: Array) -> Array:
+        """Torque of all joints with the ground's forces, shape (N, J) [N*m].
+
+        Args:
+            force: Shape (N, K, 3) [N].
+        """
+        torque = np.array(self.torque)
+        torque[:, self.columns] -= self.leg_torque(force)
+        return torque
+
+    def leg_torque(self, force: Array) -> Array:
+        """What forces on the feet put into their legs' joints, shape (N, K, M) [N*m]."""
+        return np.einsum("nkim,nki->nkm", self.unit_torque, force)
+
+
+class ForceRule(Protocol):
+    """Chooses the ground's forces of one segment."""
+
+    @property
+    def name(self) -> str:
+        """As options and tables call it."""
+
+    def forces(self, stance: Stance) -> Array:
+        """Forces on the standing feet in the ground's frame [N], shape (N, K, 3).
+
+        They carry the robot and stay within the bounds wherever `stance.force` does.
+        """
+
+
+@dataclass(frozen=True)
+class LeastTorque:
+    """The least sum of squared torques of the standing legs' joints."""
+
+    name: str = "least_torque"
+
+    def forces(self, stance: Stance) -> Array:
+        """One quadratic problem: exact."""
+        descent = Descent(stance)
+        torque = stance.demand(stance.force)[:, stance.columns]
+        return descent.step(stance.force, 2.0 * torque, np.full_like(torque, 2.0))
+
+
+class Descent:
+    """Steps of a cost of joint torques, in internal forces within the feet's bounds."""
+
+    def __init__(self, stance: Stance) -> None:
+        self._stance = stance
+        self._basis = internal_basis(stance.feet)
+        n, _, _, d = self._basis.shape
+        #: Change of joint torques with z, shape (N, K M, D).
+        self._effect = -np.einsum("nkim,nkid->nkmd", stance.unit_torque, self._basis).reshape(
+            n, -1, d
+        )
+        # Where the least tangential forces break a bound, no forces are within them.
+        self._fixed = out_of_bounds(stance.force, stance.friction_coefficient)
+
+    def step(self, force: Array, slope: Array, curvature: Array) -> Array:
+        """Forces that minimise a quadratic model of the cost.
+
+        Args:
+            force: At which the model was made [N], shape (N, K, 3).
+            slope: Derivative of the cost with each joint's torque, shape (N, K, M).
+            curvature: Second derivative, not negative, likewise.
+        """
+        n, _, d = self._effect.shape
+        stiff = self._effect * curvature.reshape(n, -1, 1)
+        metric = self._effect.transpose(0, 2, 1) @ stiff
+        tie = _TIE * np.maximum(np.trace(metric, axis1=1, axis2=2) / d, np.finfo(float).tiny)
+        metric += tie[:, None, None] * np.eye(d)
+        away = np.einsum("nki,nkid->nd", force - self._stance.force, self._basis)
+        gradient = np.einsum("nmd,nm->nd", self._effect, slope.reshape(n, -1)) + tie[:, None] * away
+        z = -np.linalg.solve(metric, gradient[..., None])[..., 0]
+        found = force + np.einsum("nkid,nd->nki", self._basis, z)
+        limit = self._stance.friction_coefficient
+        for row in np.flatnonzero(out_of_bounds(found, limit)):
+            bounded = bounded_minimum(
+                metric[row], gradient[row], force[row], self._basis[row], limit
+            )
+            found[row] = force[row] if bounded is None else bounded
+        found[self._fixed] = self._stance.force[self._fixed]
+        return found
+
+
+@dataclass(frozen=True)
+class GroundForces:
+    """How the ground's forces are chosen.
+
+    Attributes:
+        rule: None for the paper's, the least sum of squared tangential forces.
+        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
+
+    Raises:
+        GaitError: A friction coefficient that no ground has.
+    """
+
+    rule: ForceRule | None = None
+    friction_coefficient: float | None = None
+
+    def __post_init__(self) -> None:
+        mu = self.friction_coefficient
+        if mu is not None and not (0 < mu < np.inf):
+            raise GaitError(f"friction coefficient {mu:g}: expected a finite number above 0")
+
+    @property
+    def name(self) -> str:
+        """The rule's."""
+        return LEAST_TANGENTIAL if self.rule is None else self.rule.name
+
+
+PAPER = GroundForces()
