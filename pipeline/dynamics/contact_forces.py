@@ -122,8 +122,8 @@ def least_tangential_forces(
                 force[row] = pushing
     if friction_coefficient is not None:
         rows = np.flatnonzero(out_of_bounds(force, friction_coefficient))
-        bases = internal_basis(feet[rows])
-        for row, basis in zip(rows, bases, strict=True):
+        for row in rows:
+            basis = internal_basis(feet[row : row + 1])[0]
             held = held_by_friction(force[row], basis, friction_coefficient)
             if held is not None:
                 force[row] = held

@@ -94,8 +94,10 @@ class LeastTorque:
     def forces(self, stance: Stance) -> Array:
         """One quadratic problem: exact."""
         descent = Descent(stance)
-        torque = stance.demand(stance.force)[:, stance.columns]
-        return descent.step(stance.force, 2.0 * torque, np.full_like(torque, 2.0))
+        force, rows = np.array(stance.force), descent.free
+        torque = stance.demand(force)[rows][:, stance.columns]
+        force[rows] = descent.step(rows, force[rows], 2.0 * torque, np.full_like(torque, 2.0))
+        return force
 
 
 class Descent:
@@ -109,33 +111,38 @@ class Descent:
         self._effect = -np.einsum("nkim,nkid->nkmd", stance.unit_torque, self._basis).reshape(
             n, -1, d
         )
-        # Where the least tangential forces break a bound, no forces are within them.
-        self._fixed = out_of_bounds(stance.force, stance.friction_coefficient)
 
-    def step(self, force: Array, slope: Array, curvature: Array) -> Array:
+    @property
+    def free(self) -> NDArray[np.intp]:
+        """Samples at which there is a choice; where the start breaks a bound, all forces do."""
+        stance = self._stance
+        return np.flatnonzero(~out_of_bounds(stance.force, stance.friction_coefficient))
+
+    def step(self, rows: NDArray[np.intp], force: Array, slope: Array, curvature: Array) -> Array:
         """Forces that minimise a quadratic model of the cost.
 
         Args:
-            force: At which the model was made [N], shape (N, K, 3).
-            slope: Derivative of the cost with each joint's torque, shape (N, K, M).
+            rows: Samples, shape (n,).
+            force: At which the model was made, within bounds [N], shape (n, K, 3).
+            slope: Derivative of the cost with each joint's torque, shape (n, K, M).
             curvature: Second derivative, not negative, likewise.
+
+        Returns:
+            Forces within bounds [N], shape (n, K, 3).
         """
-        n, _, d = self._effect.shape
-        stiff = self._effect * curvature.reshape(n, -1, 1)
-        metric = self._effect.transpose(0, 2, 1) @ stiff
+        n, d = rows.size, self._basis.shape[-1]
+        effect, basis = self._effect[rows], self._basis[rows]
+        metric = effect.transpose(0, 2, 1) @ (effect * curvature.reshape(n, -1, 1))
         tie = _TIE * np.maximum(np.trace(metric, axis1=1, axis2=2) / d, np.finfo(float).tiny)
         metric += tie[:, None, None] * np.eye(d)
-        away = np.einsum("nki,nkid->nd", force - self._stance.force, self._basis)
-        gradient = np.einsum("nmd,nm->nd", self._effect, slope.reshape(n, -1)) + tie[:, None] * away
+        away = np.einsum("nki,nkid->nd", force - self._stance.force[rows], basis)
+        gradient = np.einsum("nmd,nm->nd", effect, slope.reshape(n, -1)) + tie[:, None] * away
         z = -np.linalg.solve(metric, gradient[..., None])[..., 0]
-        found = force + np.einsum("nkid,nd->nki", self._basis, z)
+        found = force + np.einsum("nkid,nd->nki", basis, z)
         limit = self._stance.friction_coefficient
         for row in np.flatnonzero(out_of_bounds(found, limit)):
-            bounded = bounded_minimum(
-                metric[row], gradient[row], force[row], self._basis[row], limit
-            )
+            bounded = bounded_minimum(metric[row], gradient[row], force[row], basis[row], limit)
             found[row] = force[row] if bounded is None else bounded
-        found[self._fixed] = self._stance.force[self._fixed]
         return found
 
 
