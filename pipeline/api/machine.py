@@ -10,7 +10,8 @@ from pipeline.effects.model_file import ModelFile, read_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.model_writer import model_text
 from pipeline.robot.robot_file import DEFAULT_ROBOT
-from pipeline.simulation.settings import Settings, settings
+from pipeline.simulation.force_choice import ForceChoice
+from pipeline.simulation.settings import PAPER_FORCES, Settings, settings
 from reports.atomic import write_text
 
 
@@ -36,6 +37,8 @@ class Machine:
         samples: int,
         quasi_static: bool = False,
         regeneration: str = "none",
+        forces: ForceChoice = PAPER_FORCES,
+        compare_forces: bool = False,
         walks: bool = True,
     ) -> Settings:
         """The machine ready to stand and walk; see `pipeline.simulation.settings.settings`."""
@@ -47,6 +50,8 @@ class Machine:
             quasi_static=quasi_static,
             regeneration=regeneration,
             actuators=self.actuators,
+            forces=forces,
+            compare_forces=compare_forces,
             walks=walks,
         )
 

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import hashlib
+import sys
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from tqdm import tqdm
+
 from actuators.loading.build import CATALOG
+from pipeline.machine.drivetrains import Actuators
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.settings import Settings
-from pipeline.simulation.walk_stand import Standing, Walking, walk
+from pipeline.simulation.force_choice import RULES
+from pipeline.simulation.settings import PAPER_FORCES, Settings
+from pipeline.simulation.walk_stand import Standing, Walking, compare_rules, walk
 from reports.table import Table
 from reports.tables import parameters as parameter_tables
 from reports.tables import standing as standing_tables
@@ -68,11 +74,30 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
             quasi_static=True,
             regeneration=given.regeneration,
             adjust=given.adjust,
+            forces=given.ground,
         )
         tables += walking_tables.quasi_static_difference(
             walking.demand, static.demand, walking.supplies, static.supplies, legs
         )
+    if given.compare_forces:
+        tables.append(_force_rules(given, walking, chains))
     return tables
+
+
+def _force_rules(given: Settings, walking: Walking, chains: Mapping[str, Actuators]) -> Table:
+    """What each rule of the ground's forces costs."""
+    costs = compare_rules(
+        given.machine,
+        chains,
+        walking.motion,
+        quasi_static=given.quasi_static,
+        regeneration=given.regeneration,
+        adjust=given.adjust,
+        friction_coefficient=given.forces.friction_coefficient,
+    )
+    count = len(chains) * len(RULES)
+    shown = tqdm(costs, "rules", count, leave=False, disable=not sys.stderr.isatty())
+    return walking_tables.force_rules(list(shown), given.forces.friction_coefficient)
 
 
 def table_of_parameters(given: Settings) -> Table:
@@ -107,12 +132,24 @@ def metadata(given: Settings) -> dict[str, Any]:
             "regeneration_fraction": given.regeneration.fraction,
             "transfer_path": spec.transfer_path,
             "effects": list(given.effects.names) if given.effects else [],
+            **_forces_options(given),
         },
         "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
         "joint's direction; electrical power positive from supply to motor",
         "zero_pose": spec.zero_pose,
         "warnings": [*given.remarks, *(given.effects.remarks if given.effects else ())],
     }
+
+
+def _forces_options(given: Settings) -> dict[str, Any]:
+    """What differs from the paper's rule on ground that holds."""
+    choice = given.forces
+    options = {
+        "forces": choice.rule if choice.rule != PAPER_FORCES.rule else None,
+        "power_of": choice.power_of,
+        "friction_coefficient": choice.friction_coefficient,
+    }
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def findings(walking: Walking) -> list[str]:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from pipeline.cli.blind_options import add_blind_options, add_twin_options
 from pipeline.cli.decimal_option import add_decimal_option
+from pipeline.cli.force_options import add_force_options
 from pipeline.cli.gap.options import add_gap_options
 from pipeline.cli.named_path import named_path
 from pipeline.errors import PipelineError, StanceError
@@ -118,6 +119,7 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
         metavar="POLICY",
         help="what becomes of returned electrical energy: none, bus, or a fraction such as 0.5",
     )
+    add_force_options(sub)
     add_decimal_option(sub)
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 

@@ -19,6 +19,8 @@ from pipeline.errors import GaitError
 from pipeline.motion.motion import Segment
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp] | slice
+ALL = slice(None)
 LEAST_TANGENTIAL = "least_tangential"
 #: Weight of the distance from the least tangential forces beside a rule's own cost: it decides
 #: between forces that cost the same.
@@ -36,7 +38,8 @@ class Stance:
         velocity: Shape (N, J) [rad/s].
         acceleration: Shape (N, J) [rad/s^2].
         torque: Without the ground's forces, shape (N, J) [N*m].
-        columns: Of the standing legs' joints among all, shape (K, M).
+        columns: Of the standing legs' joints among all, shape (K, M); see `robot.leg_columns`.
+        real: Which of them are a leg's own, shape (K, M), Q in all.
         unit_torque: Torque that a force of 1 N along each axis of the ground's frame puts into the
             joints of its leg, shape (N, K, 3, M) [N*m/N].
         feet: In a frame whose z axis is the ground's normal [m], shape (N, K, 3).
@@ -51,24 +54,35 @@ class Stance:
     acceleration: Array
     torque: Array
     columns: NDArray[np.intp]
+    real: NDArray[np.bool_]
     unit_torque: Array
     feet: Array
     force: Array
     friction_coefficient: float | None
 
-    def demand(self, force: Array) -> Array:
-        """Torque of all joints with the ground's forces, shape (N, J) [N*m].
+    @property
+    def loaded(self) -> NDArray[np.intp]:
+        """Columns of the standing legs' joints, shape (Q,)."""
+        return self.columns[self.real]
+
+    def leg_torque(self, force: Array, rows: Rows = ALL) -> Array:
+        """What forces on the feet put into their legs' joints, shape (n, K, M) [N*m].
 
         Args:
-            force: Shape (N, K, 3) [N].
+            force: At some samples, shape (n, K, 3) [N].
+            rows: Which.
         """
-        torque = np.array(self.torque)
-        torque[:, self.columns] -= self.leg_torque(force)
-        return torque
+        return np.einsum("nkim,nki->nkm", self.unit_torque[rows], force)
 
-    def leg_torque(self, force: Array) -> Array:
-        """What forces on the feet put into their legs' joints, shape (N, K, M) [N*m]."""
-        return np.einsum("nkim,nki->nkm", self.unit_torque, force)
+    def loaded_torque(self, force: Array, rows: Rows = ALL) -> Array:
+        """What the standing legs' joints must apply, shape (n, Q) [N*m].
+
+        Args:
+            force: At some samples, shape (n, K, 3) [N].
+            rows: Which.
+        """
+        from_ground = self.leg_torque(force, rows)[:, self.real]
+        return np.asarray(self.torque[rows][:, self.loaded] - from_ground)
 
 
 class ForceRule(Protocol):
@@ -95,7 +109,7 @@ class LeastTorque:
         """One quadratic problem: exact."""
         descent = Descent(stance)
         force, rows = np.array(stance.force), descent.free
-        torque = stance.demand(force)[rows][:, stance.columns]
+        torque = stance.loaded_torque(force[rows], rows)
         force[rows] = descent.step(rows, force[rows], 2.0 * torque, np.full_like(torque, 2.0))
         return force
 
@@ -107,10 +121,9 @@ class Descent:
         self._stance = stance
         self._basis = internal_basis(stance.feet)
         n, _, _, d = self._basis.shape
-        #: Change of joint torques with z, shape (N, K M, D).
-        self._effect = -np.einsum("nkim,nkid->nkmd", stance.unit_torque, self._basis).reshape(
-            n, -1, d
-        )
+        torque = -np.einsum("nkim,nkid->nkmd", stance.unit_torque, self._basis)
+        #: Change of joint torques with z, shape (N, Q, D).
+        self._effect = torque.reshape(n, -1, d)[:, stance.real.ravel()]
 
     @property
     def free(self) -> NDArray[np.intp]:
@@ -124,19 +137,19 @@ class Descent:
         Args:
             rows: Samples, shape (n,).
             force: At which the model was made, within bounds [N], shape (n, K, 3).
-            slope: Derivative of the cost with each joint's torque, shape (n, K, M).
+            slope: Derivative of the cost with each joint's torque, shape (n, Q).
             curvature: Second derivative, not negative, likewise.
 
         Returns:
             Forces within bounds [N], shape (n, K, 3).
         """
-        n, d = rows.size, self._basis.shape[-1]
+        d = self._basis.shape[-1]
         effect, basis = self._effect[rows], self._basis[rows]
-        metric = effect.transpose(0, 2, 1) @ (effect * curvature.reshape(n, -1, 1))
+        metric = effect.transpose(0, 2, 1) @ (effect * curvature[..., None])
         tie = _TIE * np.maximum(np.trace(metric, axis1=1, axis2=2) / d, np.finfo(float).tiny)
         metric += tie[:, None, None] * np.eye(d)
         away = np.einsum("nki,nkid->nd", force - self._stance.force[rows], basis)
-        gradient = np.einsum("nmd,nm->nd", effect, slope.reshape(n, -1)) + tie[:, None] * away
+        gradient = np.einsum("nqd,nq->nd", effect, slope) + tie[:, None] * away
         z = -np.linalg.solve(metric, gradient[..., None])[..., 0]
         found = force + np.einsum("nkid,nd->nki", basis, z)
         limit = self._stance.friction_coefficient

@@ -127,6 +127,7 @@ def _ground(
             segment,
             *_motion_and_torque(robot, segment, generalised),
             robot.leg_columns[stance],
+            robot.layout.real[stance],
             unit_torque,
             standing,
             in_ground,
@@ -205,9 +206,8 @@ def segment_demand(
         StanceError: A foot would have to pull or slide.
     """
     generalised = inverse_dynamics(robot, segment, quasi_static=quasi_static, threads=threads)
-    joints, position, velocity, acceleration, torque = _motion_and_torque(
-        robot, segment, generalised
-    )
+    bare = _motion_and_torque(robot, segment, generalised)
+    joints, position, velocity, acceleration, torque = bare
     contacts = None
     if robot.floating:
         contacts, from_ground = _ground(robot, segment, generalised, forces)
@@ -222,11 +222,19 @@ def segment_demand(
 
 @dataclass(frozen=True)
 class MotionDemand:
-    """Demand and contact forces of a whole motion, segment by segment."""
+    """Demand and contact forces of a whole motion, segment by segment.
+
+    Attributes:
+        segments: Demand at the joints.
+        contacts: Forces of the ground; None for a fixed base.
+        period: Of the motion [s]; None where it does not repeat.
+        forces: How the ground's forces were chosen.
+    """
 
     segments: tuple[JointDemand, ...]
     contacts: tuple[ContactForces | None, ...]
     period: float | None
+    forces: GroundForces = PAPER
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -251,4 +259,5 @@ def motion_demand(
         tuple(demand for demand, _ in parts),
         tuple(contacts for _, contacts in parts),
         motion.period,
+        forces,
     )

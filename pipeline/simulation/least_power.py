@@ -10,9 +10,9 @@ r being the share of returned power that is used again: 0 under ``none``, the fr
 where returns beyond what the other joints draw count as gain, too. Torque is where the forces come
 in, through friction that grows with load and through R I^2; P_j is convex in it but for a motor
 that brakes harder than gives most power back. The kinks of `power_law` (load that changes its
-direction, P_j = 0) are rounded, and the rounded cost goes down by Newton's steps, each the minimum of a convex
-quadratic model within the feet's bounds; then kinks are rounded less, until nothing is left of it.
-What is found is taken where the chain itself draws less.
+direction, P_j = 0) are rounded, and the rounded cost goes down by Newton's steps, each the minimum
+of a convex quadratic model within the feet's bounds; then kinks are rounded less, until nothing is
+left of it. What is found is taken where the chain itself draws less.
 """
 
 from __future__ import annotations
@@ -23,15 +23,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.chain import Chain
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.force_rules import Descent, Stance
 from pipeline.dynamics.joint_demand import JointDemand
+from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Segment
 from pipeline.simulation.power_law import PowerLaw, power_law
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
+#: From the demand of bodies and ground to that on the actuators.
+Adjust = Callable[[Segment, JointDemand], JointDemand]
 #: Widths of rounded kinks, as shares of the largest torque of the standing legs at that instant.
 _WIDTHS = (0.1, 0.02, 4e-3, 8e-4, 1.6e-4, 3e-5, 6e-6)
 _REACH = 4.0  # the same share of it within which kinks are looked for
@@ -55,24 +57,24 @@ class LeastPower:
         is found is then lower than the start, not the least.
     """
 
-    chain: Chain
+    chain: Actuators
     recovered: float = 0.0
-    adjust: Callable[[Segment, JointDemand], JointDemand] | None = None
+    adjust: Adjust | None = None
     name: str = "least_power"
 
     def forces(self, stance: Stance) -> Array:
         """Forces on the standing feet in the ground's frame [N], shape (N, K, 3)."""
         descent, power = Descent(stance), _Power(self, stance)
         force, free = np.array(stance.force), descent.free
-        largest = np.abs(power.legs(free, force[free])).max(axis=(1, 2), initial=0.0)
-        largest = np.maximum(largest, np.finfo(float).tiny)[:, None, None]
+        largest = np.abs(stance.loaded_torque(force[free], free)).max(axis=1, initial=0.0)
+        largest = np.maximum(largest, np.finfo(float).tiny)[:, None]
         law = power.law(free, _REACH * largest)
         for width in _WIDTHS:
             left = np.arange(free.size)
             for _ in range(_ROUNDS):
                 rows = free[left]
                 moved, better = _improved(
-                    descent, power, law.of(left), rows, force[rows], width * largest[left]
+                    descent, stance, law.of(left), rows, force[rows], width * largest[left]
                 )
                 force[rows] = moved
                 left = left[better]
@@ -84,12 +86,12 @@ class LeastPower:
 
 
 def _improved(
-    descent: Descent, power: _Power, law: PowerLaw, rows: Rows, force: Array, width: Array
+    descent: Descent, stance: Stance, law: PowerLaw, rows: Rows, force: Array, width: Array
 ) -> tuple[Array, NDArray[np.bool_]]:
     """One step at each of some samples: forces, and where the rounded cost went down."""
-    cost, slope, curvature = law.smoothed(power.legs(rows, force), width)
+    cost, slope, curvature = law.smoothed(stance.loaded_torque(force, rows), width)
     change = descent.step(rows, force, slope, np.maximum(curvature, 0.0)) - force
-    least, enough = cost.sum(axis=(1, 2)), _GAIN * np.abs(cost).sum(axis=(1, 2))
+    least, enough = cost.sum(axis=1), _GAIN * np.abs(cost).sum(axis=1)
     moved, better = np.array(force), np.zeros(rows.size, dtype=bool)
     for halving in range(_HALVINGS):
         left = np.flatnonzero(~better)
@@ -97,7 +99,7 @@ def _improved(
             break
         tried = force[left] + 0.5**halving * change[left]
         own = law if left.size == rows.size else law.of(left)
-        lower = own.smoothed(power.legs(rows[left], tried), width[left])[0].sum(axis=(1, 2))
+        lower = own.smoothed(stance.loaded_torque(tried, rows[left]), width[left])[0].sum(axis=1)
         taken = lower < least[left] - enough[left]
         moved[left[taken]] = tried[taken]
         better[left[taken]] = True
@@ -109,7 +111,7 @@ class _Power:
 
     def __init__(self, rule: LeastPower, stance: Stance) -> None:
         self._rule, self._stance = rule, stance
-        self.columns = stance.columns
+        self._loaded = stance.loaded
         self._series = ShaftSeries.at_joint(
             stance.joints,
             stance.segment.time,
@@ -131,29 +133,23 @@ class _Power:
             )
             self._beside = rule.adjust(stance.segment, demand).torque - stance.torque
 
-    def legs(self, rows: Rows, force: Array) -> Array:
-        """Torque of the standing legs' joints, shape (n, K, M) [N*m]."""
-        stance = self._stance
-        legs = np.einsum("nkim,nki->nkm", stance.unit_torque[rows], force)
-        return np.asarray(stance.torque[rows][:, self.columns] - legs)
-
     def total(self, rows: Rows, force: Array) -> Array:
         """Power out of the supply, shape (n,) [W]."""
-        _, electrical = self._asked(rows, self.legs(rows, force))
+        _, electrical = self._asked(rows, self._stance.loaded_torque(force, rows))
         share = self._rule.recovered
         out = np.maximum(electrical, 0.0) + share * np.minimum(electrical, 0.0)
-        return np.asarray(out.sum(axis=(1, 2)))
+        return np.asarray(out.sum(axis=1))
 
     def law(self, rows: Rows, reach: Array) -> PowerLaw:
         """Of the standing legs' joints."""
-        shape = (rows.size, *self.columns.shape)
+        shape = (rows.size, self._loaded.size)
         return power_law(lambda legs: self._asked(rows, legs), reach, shape, self._rule.recovered)
 
     def _asked(self, rows: Rows, legs: Array) -> tuple[Array, Array]:
         """The motors' torque and electrical power at the standing legs' joints."""
         s = self._series
         torque = self._stance.torque[rows] + self._beside[rows]
-        torque[:, self.columns] = legs + self._beside[rows][:, self.columns]
+        torque[:, self._loaded] = legs + self._beside[rows][:, self._loaded]
         side = ShaftSeries(
             s.joints,
             s.time[rows],
@@ -165,6 +161,6 @@ class _Power:
         )
         result = self._rule.chain.moving(side)
         return (
-            result.motor.torque[:, self.columns],
-            result.electrical_power[:, self.columns],
+            result.motor.torque[:, self._loaded],
+            result.electrical_power[:, self._loaded],
         )

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-#: From torques to the motor's torque and electrical power, all shaped (n, K, M).
+#: From torques to the motor's torque and electrical power, all shaped (n, Q).
 Asked = Callable[[Array], tuple[Array, Array]]
 _NODES = np.sinh(np.linspace(-7.0, 7.0, 33)) / np.sinh(7.0)
 _SAME_SLOPE = 1e-6  # share of the steepest
@@ -27,13 +27,13 @@ _SAME_SLOPE = 1e-6  # share of the steepest
 
 @dataclass(frozen=True)
 class PowerLaw:
-    """Power of many joints and instants, each with its own numbers, shape (n, K, M).
+    """Power of many joints and instants, each with its own numbers, shape (n, Q).
 
     Attributes:
         start: m_0 [N*m].
         slope: s, left of all kinks [1].
-        kink: b_i [N*m], shape (n, K, M, I).
-        bend: d_i [1], shape (n, K, M, I).
+        kink: b_i [N*m], shape (n, Q, I).
+        bend: d_i [1], shape (n, Q, I).
         quadratic: a [W/(N*m)^2].
         linear: b [W/(N*m)].
         recovered: Share of returned power that is used again.
@@ -66,8 +66,8 @@ class PowerLaw:
         most w / 2.
 
         Args:
-            torque: Shape (n, K, M) [N*m].
-            width: w of the kinks [N*m], shape (n, 1, 1).
+            torque: Shape (n, Q) [N*m].
+            width: w of the kinks [N*m], shape (n, 1).
         """
         ramp, step, peak = _rounded(torque[..., None] - self.kink, width[..., None])
         motor = self.start + self.slope * torque + (self.bend * ramp).sum(axis=-1)
@@ -80,7 +80,7 @@ class PowerLaw:
         lost = 1.0 - self.recovered
         if not lost:
             return power, power_1, power_2
-        scale = width * np.abs(power_1).max(axis=(1, 2), keepdims=True) + np.finfo(float).tiny
+        scale = width * np.abs(power_1).max(axis=1, keepdims=True) + np.finfo(float).tiny
         ramp, step, peak = _rounded(power, scale)
         share = self.recovered + lost * step
         return (
@@ -95,8 +95,8 @@ def power_law(asked: Asked, reach: Array, shape: tuple[int, ...], recovered: flo
 
     Args:
         asked: The chain.
-        reach: Largest torque of interest at each instant [N*m], shape (n, 1, 1).
-        shape: (n, K, M).
+        reach: Largest torque of interest at each instant [N*m], shape (n, 1).
+        shape: (n, Q).
         recovered: Share of returned power that is used again.
     """
     torque = [np.broadcast_to(node * reach, shape) for node in _NODES]

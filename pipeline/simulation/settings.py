@@ -8,6 +8,7 @@ from pathlib import Path
 
 from actuators.errors import CatalogError
 from actuators.loading.build import CATALOG, Catalog, load_catalog
+from pipeline.dynamics.force_rules import GroundForces
 from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.drivetrains import Actuators
@@ -17,12 +18,15 @@ from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
 from pipeline.simulation.changes import changed
 from pipeline.simulation.edited import IDEAL, Effects, effects
+from pipeline.simulation.force_choice import ForceChoice
+from pipeline.simulation.least_power import Adjust
 from pipeline.simulation.memory import refuse_beyond_memory
-from pipeline.simulation.walk_stand import Adjust, Regeneration
+from pipeline.simulation.walk_stand import Regeneration
 
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES = 51
 SAMPLES = 751
+PAPER_FORCES = ForceChoice()
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,8 @@ class Settings:
         own: What single joints have of their own.
         effects: Of the model file; None without one.
         model: The model file; None without one.
+        forces: How the ground's forces are chosen.
+        compare_forces: Whether the rules for them are to be compared.
     """
 
     robot: Robot
@@ -54,6 +60,8 @@ class Settings:
     own: OwnActuators = field(default_factory=OwnActuators)
     effects: Effects | None = None
     model: Path | None = None
+    forces: ForceChoice = PAPER_FORCES
+    compare_forces: bool = False
 
     def chains(self) -> Mapping[str, Actuators]:
         """Every alternative, with the model file's effects in it."""
@@ -70,6 +78,11 @@ class Settings:
         """What the model file's effects change in the demand on the actuators."""
         return None if self.effects is None else self.effects.demand
 
+    @property
+    def ground(self) -> GroundForces:
+        """Rule and friction of the ground's forces."""
+        return self.forces.ground(self.chains(), self.regeneration.recovered, self.adjust)
+
 
 def settings(
     *,
@@ -80,6 +93,8 @@ def settings(
     quasi_static: bool = False,
     regeneration: str = "none",
     actuators: Path | None = None,
+    forces: ForceChoice = PAPER_FORCES,
+    compare_forces: bool = False,
     walks: bool = True,
 ) -> Settings:
     """Load robot, actuators and effects, and apply changes; defaults are the command line's.
@@ -92,6 +107,8 @@ def settings(
         quasi_static: Whether the links' inertial terms are left out.
         regeneration: ``none``, ``bus`` or a fraction of returned energy that is used again.
         actuators: Folder of actuator files; the project's catalogue by default.
+        forces: Rule and friction of the ground's forces.
+        compare_forces: Whether what the rules cost is to be compared.
         walks: Whether a gait cycle will be computed, which must fit into memory.
 
     Raises:
@@ -128,6 +145,8 @@ def settings(
         own=own,
         effects=_effects(file, path or Path("model.toml"), loaded, catalog, own) if file else None,
         model=path,
+        forces=forces.checked(catalog.alternatives),
+        compare_forces=compare_forces,
     )
 
 
