@@ -28,7 +28,7 @@ from pipeline.dynamics.force_rules import Descent, Stance
 from pipeline.dynamics.joint_demand import JointDemand
 from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Segment
-from pipeline.simulation.power_law import PowerLaw, power_law
+from pipeline.simulation.power_law import NOTHING, PowerLaw, power_law
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
@@ -64,10 +64,10 @@ class LeastPower:
 
     def forces(self, stance: Stance) -> Array:
         """Forces on the standing feet in the ground's frame [N], shape (N, K, 3)."""
-        descent, power = Descent(stance), _Power(self, stance)
+        descent, power = Descent(stance), PowerOfJoints(self, stance)
         force, free = np.array(stance.force), descent.free
         largest = np.abs(stance.loaded_torque(force[free], free)).max(axis=1, initial=0.0)
-        largest = np.maximum(largest, np.finfo(float).tiny)[:, None]
+        largest = np.maximum(largest, NOTHING)[:, None]
         law = power.law(free, _REACH * largest)
         for width in _WIDTHS:
             left = np.arange(free.size)
@@ -106,7 +106,7 @@ def _improved(
     return moved, better
 
 
-class _Power:
+class PowerOfJoints:
     """What the supply gives to every joint at some samples of a segment, for any torque."""
 
     def __init__(self, rule: LeastPower, stance: Stance) -> None:
@@ -133,12 +133,15 @@ class _Power:
             )
             self._beside = rule.adjust(stance.segment, demand).torque - stance.torque
 
-    def total(self, rows: Rows, force: Array) -> Array:
-        """Power out of the supply, shape (n,) [W]."""
-        _, electrical = self._asked(rows, self._stance.loaded_torque(force, rows))
+    def at(self, rows: Rows, torque: Array) -> Array:
+        """Power out of the supply for torques of the standing legs' joints, shape (n, Q) [W]."""
+        _, electrical = self._asked(rows, torque)
         share = self._rule.recovered
-        out = np.maximum(electrical, 0.0) + share * np.minimum(electrical, 0.0)
-        return np.asarray(out.sum(axis=1))
+        return np.maximum(electrical, 0.0) + share * np.minimum(electrical, 0.0)
+
+    def total(self, rows: Rows, force: Array) -> Array:
+        """Power out of the supply for foot forces, shape (n,) [W]."""
+        return np.asarray(self.at(rows, self._stance.loaded_torque(force, rows)).sum(axis=1))
 
     def law(self, rows: Rows, reach: Array) -> PowerLaw:
         """Of the standing legs' joints."""

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 #: From torques to the motor's torque and electrical power, all shaped (n, Q).
 Asked = Callable[[Array], tuple[Array, Array]]
 _NODES = np.sinh(np.linspace(-7.0, 7.0, 33)) / np.sinh(7.0)
+NOTHING = 1e-30  # in place of a width of zero
 _SAME_SLOPE = 1e-6  # share of the steepest
 
 
@@ -59,7 +60,9 @@ class PowerLaw:
             self.recovered,
         )
 
-    def smoothed(self, torque: Array, width: Array) -> tuple[Array, Array, Array]:
+    def smoothed(
+        self, torque: Array, width: Array, width_of_power: Array | None = None
+    ) -> tuple[Array, Array, Array]:
         """Power out of the supply with kinks rounded, and its two derivatives.
 
         Each max(x, 0) becomes (x + sqrt(x^2 + w^2)) / 2, which is convex and lies above it by at
@@ -68,6 +71,8 @@ class PowerLaw:
         Args:
             torque: Shape (n, Q) [N*m].
             width: w of the kinks [N*m], shape (n, 1).
+            width_of_power: w where power changes its sign [W], shape (n, 1); that which the width
+                of the kinks makes of it by default.
         """
         ramp, step, peak = _rounded(torque[..., None] - self.kink, width[..., None])
         motor = self.start + self.slope * torque + (self.bend * ramp).sum(axis=-1)
@@ -80,8 +85,10 @@ class PowerLaw:
         lost = 1.0 - self.recovered
         if not lost:
             return power, power_1, power_2
-        scale = width * np.abs(power_1).max(axis=1, keepdims=True) + np.finfo(float).tiny
-        ramp, step, peak = _rounded(power, scale)
+        if width_of_power is None:
+            steepest = np.abs(power_1).max(axis=1, keepdims=True)
+            width_of_power = np.maximum(width * steepest, NOTHING)
+        ramp, step, peak = _rounded(power, width_of_power)
         share = self.recovered + lost * step
         return (
             self.recovered * power + lost * ramp,
