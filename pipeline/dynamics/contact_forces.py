@@ -28,6 +28,7 @@ from pipeline.dynamics.internal_forces import (
 from pipeline.motion.motion import level_ground
 
 Array = NDArray[np.float64]
+_UNLOADED = 1e-9  # share of the largest load below which a foot bears none
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,10 @@ class ContactForces:
         """
         normal = self.normal_force
         tangential = np.hypot(self._in_ground[..., 0], self._in_ground[..., 1])
-        needed = np.divide(tangential, normal, out=np.full(normal.shape, np.nan), where=normal > 0)
-        needed[(normal == 0) & (tangential > 0)] = np.inf
+        nothing = _UNLOADED * float(np.abs(normal).max())
+        loaded = normal > nothing
+        needed = np.divide(tangential, normal, out=np.full(normal.shape, np.nan), where=loaded)
+        needed[~loaded & (normal >= -nothing) & (tangential > nothing)] = np.inf
         return needed
 
 

@@ -127,7 +127,9 @@ def bounded_minimum(
         )
     else:
         return None
-    force[np.abs(force[:, 2]) < 2 * TOLERANCE, 2] = 0.0  # an unloaded foot bears nothing
+    unloaded = np.abs(force[:, 2]) < 2 * TOLERANCE
+    force[unloaded, 2] = 0.0
+    force[unloaded & (np.abs(force[:, :2]).max(axis=1) < 1e2 * TOLERANCE)] = 0.0
     return np.asarray(force * size)
 
 
