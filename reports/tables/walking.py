@@ -339,7 +339,7 @@ def force_rules(costs: Sequence[RuleCost], friction_coefficient: float | None) -
         {
             "alternative": cost.alternative,
             "rule": cost.rule,
-            "energy_J": cost.energy,
+            "electrical_J": cost.energy,
             "relative_difference": cost.energy / paper[cost.alternative] - 1
             if paper[cost.alternative]
             else None,
@@ -360,7 +360,7 @@ def force_rules(costs: Sequence[RuleCost], friction_coefficient: float | None) -
                 "every instant",
                 "",
             ),
-            "energy_J": ("electrical energy of the whole robot in one cycle", "J"),
+            "electrical_J": ("electrical energy of the whole robot in one cycle", "J"),
             "relative_difference": ("energy over that of least_tangential, less one", "1"),
             "rms_joint_torque_Nm": ("root mean square over all joints and samples", "N*m"),
             "greatest_friction_needed": ("largest tangential over normal force", "1"),
