@@ -9,13 +9,13 @@ import pytest
 from scipy.optimize import minimize
 
 from actuators.loading.build import load_catalog
-from pipeline.dynamics.force_rules import GroundForces
+from pipeline.dynamics.force_rules import GroundForces, LeastTorque
 from pipeline.dynamics.internal_forces import internal_basis
 from pipeline.dynamics.joint_demand import JointDemand, segment_demand
 from pipeline.motion.gait import standing_posture, tripod_gait
 from pipeline.motion.motion import Segment
 from pipeline.robot.robot import Robot
-from pipeline.simulation.force_choice import LEAST_POWER, RULES
+from pipeline.simulation.force_choice import LEAST_POWER, RULES, recovered_share
 from pipeline.simulation.least_power import LeastPower, PowerOfJoints
 from pipeline.simulation.walk_stand import Regeneration, compare_rules
 from tests.pipeline.dynamics.test_force_rules import shown, swinging
@@ -110,6 +110,18 @@ def test_of_all_rules_least_power_costs_the_least_energy(
     assert set(energy) == {(name, rule) for name in chains for rule in RULES}
     for name in chains:
         assert energy[name, LEAST_POWER] == min(energy[name, rule] for rule in RULES)
+
+
+def test_on_a_bus_without_friction_least_power_is_least_torque(
+    hexapod: Robot, step: Segment
+) -> None:
+    """sum(tau q_dot) is the motion's, whatever the forces are: what is left is R I^2."""
+    stance = shown(hexapod, step, None)
+    power = LeastPower(CHAINS["ideal"], recovered_share("bus", 0.0)).forces(stance)
+    torque = LeastTorque().forces(stance)
+    np.testing.assert_allclose(power, torque, atol=1e-3 * np.abs(torque).max())
+    of = [stance.loaded_torque(force) for force in (power, torque)]
+    np.testing.assert_allclose(*((part**2).sum(axis=1) for part in of), rtol=1e-7)
 
 
 @pytest.mark.parametrize("limit", [None, 0.6])
