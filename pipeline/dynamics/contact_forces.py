@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.dynamics.internal_forces import (
-    bounded_minimum,
+    Bounds,
     held_by_friction,
     internal_basis,
     out_of_bounds,
@@ -186,9 +186,8 @@ def _pushing(wrench: Array, feet: Array) -> Array | None:
     open_normals = np.linalg.qr(levers, mode="complete").Q[:, 3:]
     basis = np.zeros((*feet.shape, open_normals.shape[1]))
     basis[:, 2] = open_normals
-    within = bounded_minimum(
-        np.eye(open_normals.shape[1]), open_normals.T @ force[:, 2], force, basis, None
-    )
+    metric, gradient = np.eye(open_normals.shape[1]), open_normals.T @ force[:, 2]
+    within = Bounds(basis, None).minimum(metric, gradient, force)
     if within is None:
         return None
     loaded = within[:, 2] > 0

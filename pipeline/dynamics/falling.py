@@ -47,7 +47,7 @@ def refuse_falling(
         raise TippingError(
             f"the robot tips at t = {segment.time[sample]:.4g} s ({segment.name}): the foot of leg "
             f"'{segment.stance[foot]}' would have to pull with {-lowest:.1f} N, static margin "
-            f"{1e3 * margin:.1f} mm; widen the hip spacing or shorten the stroke"
+            f"{1e3 * margin:.1f} mm; spread the feet or shorten the stroke"
         )
     if friction_coefficient is None:
         return
@@ -62,8 +62,9 @@ def _slides(
 ) -> SlidingError:
     """Of the instants that slide, the one that asks for most."""
     most, worst = given, int(rows[0])
-    with np.errstate(divide="ignore"):
-        ratio = np.hypot(force[..., 0], force[..., 1]) / force[..., 2]
+    tangential, normal = np.hypot(force[..., 0], force[..., 1]), force[..., 2]
+    endless = np.where(tangential > 0, np.inf, 0.0)
+    ratio = np.divide(tangential, normal, out=endless, where=normal > 0)
     bases = internal_basis(feet[rows])
     for row, basis in zip(rows, bases, strict=True):
         if held_by_friction(force[row], basis, most) is None:

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.dynamics.internal_forces import bounded_minimum, internal_basis, out_of_bounds
+from pipeline.dynamics.internal_forces import Bounds, internal_basis, out_of_bounds
 from pipeline.errors import GaitError
 from pipeline.motion.motion import Segment
 
@@ -124,6 +124,7 @@ class Descent:
         torque = -np.einsum("nkim,nkid->nkmd", stance.unit_torque, self._basis)
         #: Change of joint torques with z, shape (N, Q, D).
         self._effect = torque.reshape(n, -1, d)[:, stance.real.ravel()]
+        self._bounds: dict[int, Bounds] = {}  # by sample
 
     @property
     def free(self) -> NDArray[np.intp]:
@@ -153,9 +154,10 @@ class Descent:
         z = -np.linalg.solve(metric, gradient[..., None])[..., 0]
         found = force + np.einsum("nkid,nd->nki", basis, z)
         limit = self._stance.friction_coefficient
-        for row in np.flatnonzero(out_of_bounds(found, limit)):
-            bounded = bounded_minimum(metric[row], gradient[row], force[row], basis[row], limit)
-            found[row] = force[row] if bounded is None else bounded
+        for i in np.flatnonzero(out_of_bounds(found, limit)):
+            bounds = self._bounds.setdefault(int(rows[i]), Bounds(basis[i], limit))
+            bounded = bounds.minimum(metric[i], gradient[i], force[i])
+            found[i] = force[i] if bounded is None else bounded
         return found
 
 

@@ -17,7 +17,10 @@ Array = NDArray[np.float64]
 NORMAL_WEIGHT = 1e-8
 #: Share of the largest force below which a violated bound is rounding.
 TOLERANCE = 1e-10
-_ROUNDS = 100  # of tangent planes; a handful is usual
+#: The same for a friction cone, where so much is left of a light foot's coefficient.
+_CONE_TOLERANCE = 1e-13
+_ROUNDS = 60  # of tangent planes; a handful is usual
+_ENOUGH = 6  # rounds after which `TOLERANCE` will do
 _HALVINGS = 40
 _MOST_FRICTION = 1e3  # beyond this no coefficient is looked for
 
@@ -75,62 +78,84 @@ def out_of_bounds(force: Array, friction_coefficient: float | None) -> NDArray[n
     return np.asarray(outside.any(axis=1))
 
 
-def bounded_minimum(
-    metric: Array, gradient: Array, start: Array, basis: Array, friction_coefficient: float | None
-) -> Array | None:
-    """Forces of one sample that minimise z' metric z / 2 + gradient' z within the feet's bounds.
+class Bounds:
+    """What the feet of one sample can do: press, and hold within their friction cones.
 
-    No foot pulls, and with a friction coefficient each force lies in its circular cone: planes
-    tangent to it at the force found are added until every force is inside, so that what comes out
-    is the minimum over the cone itself, and a sample for which there is none over the planes has
-    none over the cone.
+    Planes tangent to a cone at a force that was found outside it are added until every force is
+    inside, so that what comes out is the minimum over the cone itself, and a sample for which there
+    is none over the planes has none over the cone. They are kept for the next question.
 
     Args:
-        metric: Positive definite, shape (D, D).
-        gradient: At z = 0, shape (D,).
-        start: Force at z = 0 [N], shape (F, 3).
-        basis: Shape (F, 3, D).
+        basis: Of the internal forces, shape (F, 3, D).
         friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
-
-    Returns:
-        Force [N], shape (F, 3); None where no force is within the bounds.
     """
-    import qpsolvers  # a tenth of a second, for motions that need it
 
-    size = float(np.abs(start).max())
-    unit = float(np.trace(metric)) / metric.shape[0]
-    metric, gradient = metric / unit, gradient / (unit * size)
-    at_zero = start / size
-    # Rows of  G z <= h: first that no foot pulls, then tangent planes of the cones.
-    rows = [_cleaned(-basis[:, 2])]
-    limits = [at_zero[:, 2] + TOLERANCE / 2]
-    for _ in range(_ROUNDS):
-        z = qpsolvers.solve_qp(
-            metric, gradient, np.vstack(rows), np.concatenate(limits), solver="quadprog"
-        )
-        if z is None:
-            return None
-        force = at_zero + basis @ z
-        tangential = np.hypot(force[:, 0], force[:, 1])
-        if friction_coefficient is None:
-            break
-        outside = tangential > friction_coefficient * force[:, 2] + TOLERANCE
-        if not outside.any():
-            break
-        toward = force[outside, :2] / tangential[outside, None]
-        across = np.einsum("fi,fid->fd", toward, basis[outside, :2])
-        rows.append(_cleaned(across - friction_coefficient * basis[outside, 2]))
-        limits.append(
-            friction_coefficient * at_zero[outside, 2]
-            - np.einsum("fi,fi->f", toward, at_zero[outside, :2])
-            + TOLERANCE / 2
-        )
-    else:
+    def __init__(self, basis: Array, friction_coefficient: float | None) -> None:
+        self._basis, self._friction = basis, friction_coefficient
+        # Rows of  G z <= h: that no foot pulls, then tangent planes.
+        self._rows = _cleaned(-basis[:, 2])
+        self._feet = np.empty(0, dtype=np.intp)
+        self._toward = np.empty((0, 2))
+
+    def minimum(self, metric: Array, gradient: Array, start: Array) -> Array | None:
+        """Forces that minimise z' metric z / 2 + gradient' z.
+
+        Args:
+            metric: Positive definite, shape (D, D).
+            gradient: At z = 0, shape (D,).
+            start: Force at z = 0 [N], shape (F, 3).
+
+        Returns:
+            Force [N], shape (F, 3); None where no force is within the bounds.
+        """
+        import qpsolvers  # a tenth of a second, for motions that need it
+
+        size = float(np.abs(start).max())
+        unit = float(np.trace(metric)) / metric.shape[0]
+        metric, gradient, at_zero = metric / unit, gradient / (unit * size), start / size
+        for done in range(_ROUNDS):
+            z = qpsolvers.solve_qp(
+                metric, gradient, self._rows, self._limits(at_zero), solver="quadprog"
+            )
+            if z is None:
+                return None
+            force = at_zero + self._basis @ z
+            if not self._add_planes(force, _CONE_TOLERANCE if done < _ENOUGH else TOLERANCE):
+                return np.asarray(_without_residues(force) * size)
         return None
+
+    def _limits(self, at_zero: Array) -> Array:
+        """h, with what rounding needs."""
+        pressing = at_zero[:, 2] + TOLERANCE / 2
+        if self._friction is None:
+            return pressing
+        along = np.einsum("pi,pi->p", self._toward, at_zero[self._feet, :2])
+        inside = self._friction * at_zero[self._feet, 2] - along + _CONE_TOLERANCE / 2
+        return np.concatenate([pressing, inside])
+
+    def _add_planes(self, force: Array, slack: float) -> bool:
+        """Planes for the forces that are outside their cones; whether there are any."""
+        if self._friction is None:
+            return False
+        tangential = np.hypot(force[:, 0], force[:, 1])
+        feet = np.flatnonzero(tangential > self._friction * force[:, 2] + slack)
+        if not feet.size:
+            return False
+        toward = force[feet, :2] / tangential[feet, None]
+        across = np.einsum("pi,pid->pd", toward, self._basis[feet, :2])
+        rows = _cleaned(across - self._friction * self._basis[feet, 2])
+        self._rows = np.vstack([self._rows, rows])
+        self._feet = np.concatenate([self._feet, feet])
+        self._toward = np.vstack([self._toward, toward])
+        return True
+
+
+def _without_residues(force: Array) -> Array:
+    """An unloaded foot bears nothing."""
     unloaded = np.abs(force[:, 2]) < 2 * TOLERANCE
     force[unloaded, 2] = 0.0
     force[unloaded & (np.abs(force[:, :2]).max(axis=1) < 1e2 * TOLERANCE)] = 0.0
-    return np.asarray(force * size)
+    return force
 
 
 def _cleaned(rows: Array) -> Array:
@@ -149,7 +174,7 @@ def held_by_friction(start: Array, basis: Array, friction_coefficient: float) ->
     metric = tangential_metric(basis)
     weighted = start * np.array([1.0, 1.0, NORMAL_WEIGHT])
     gradient = np.einsum("fi,fid->d", weighted, basis)
-    return bounded_minimum(metric, gradient, start, basis, friction_coefficient)
+    return Bounds(basis, friction_coefficient).minimum(metric, gradient, start)
 
 
 def least_friction(start: Array, basis: Array, enough: float) -> float:

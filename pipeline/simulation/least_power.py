@@ -35,11 +35,11 @@ Rows = NDArray[np.intp]
 #: From the demand of bodies and ground to that on the actuators.
 Adjust = Callable[[Segment, JointDemand], JointDemand]
 #: Widths of rounded kinks, as shares of the largest torque of the standing legs at that instant.
-_WIDTHS = (0.1, 0.02, 4e-3, 8e-4, 1.6e-4, 3e-5, 6e-6)
+_WIDTHS = (0.1, 0.01, 1e-3, 1e-4, 1e-5)
 _REACH = 4.0  # the same share of it within which kinks are looked for
 _ROUNDS = 12  # at each width
 _HALVINGS = 8
-_GAIN = 1e-8  # of the power: less is no progress
+_GAIN = 1e-6  # of the power: less is no progress
 
 
 @dataclass(frozen=True)
