@@ -14,6 +14,7 @@ from pipeline.api.tables import (
     table_of_parameters,
     tables_of_standing,
     tables_of_walking,
+    walked,
 )
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import RobotFileError
@@ -146,15 +147,7 @@ def walk(
     )
     given = _legged(machine, made)
     chains = _chains(given, actuator)
-    result = walk_stand.walk(
-        given.machine,
-        chains,
-        samples=given.samples,
-        quasi_static=given.quasi_static,
-        regeneration=given.regeneration,
-        adjust=given.adjust,
-        forces=given.ground,
-    )
+    result = walked(given, chains)
     tables = [*tables_of_walking(given, result), table_of_parameters(given)]
     return Walk(by_name(tables), "walk", metadata(given), result)
 

@@ -13,12 +13,13 @@ from pipeline.api.tables import (
     table_of_parameters,
     tables_of_standing,
     tables_of_walking,
+    walked,
 )
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import RobotFileError
 from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
-from pipeline.simulation.walk_stand import stand, walk
+from pipeline.simulation.walk_stand import stand
 from reports.folder.staging import staged
 from reports.table import Table
 from reports.writer import write_table
@@ -107,15 +108,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         tables += tables_of_standing(given, standing)
     if verb in ("walk", "reports"):
         logger.info("walking one cycle, %d samples per segment", given.samples)
-        walking = walk(
-            given.machine,
-            given.chains(),
-            samples=given.samples,
-            quasi_static=given.quasi_static,
-            regeneration=given.regeneration,
-            adjust=given.adjust,
-            forces=given.ground,
-        )
+        walking = walked(given, given.chains())
         tables += tables_of_walking(given, walking)
     tables.append(table_of_parameters(given))
     judgement = None

@@ -50,6 +50,27 @@ def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:
     ]
 
 
+def walked(
+    given: Settings, chains: Mapping[str, Actuators], *, quasi_static: bool | None = None
+) -> Walking:
+    """One gait cycle as the settings say.
+
+    Args:
+        given: Robot, samples, ground and regeneration.
+        chains: By alternative.
+        quasi_static: Leave out the links' inertial terms; as the settings say by default.
+    """
+    return walk(
+        given.machine,
+        chains,
+        samples=given.samples,
+        quasi_static=given.quasi_static if quasi_static is None else quasi_static,
+        regeneration=given.regeneration,
+        adjust=given.adjust,
+        forces=given.ground,
+    )
+
+
 def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
     """The tables of one walking cycle."""
     legs = leg_joints(given.robot.spec)
@@ -77,15 +98,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
         walking_tables.motor_limits(walking.results),
     ]
     if not given.quasi_static:
-        static = walk(
-            given.machine,
-            chains,
-            samples=given.samples,
-            quasi_static=True,
-            regeneration=given.regeneration,
-            adjust=given.adjust,
-            forces=given.ground,
-        )
+        static = walked(given, chains, quasi_static=True)
         tables += walking_tables.quasi_static_difference(
             walking.demand, static.demand, walking.supplies, static.supplies, legs
         )
