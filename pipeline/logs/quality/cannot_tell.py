@@ -33,7 +33,7 @@ def cannot_tell(log: Log, velocity: Array, effort: Array, ok: NDArray[np.bool_])
         ok: Rows that count, shape (N, J).
     """
     out: list[str] = []
-    if log.motor_position is None:
+    if log.motor_position is None or not np.isfinite(log.motor_position).any():
         side = "motor" if log.position_source == "motor" else "joint"
         other = "joint" if side == "motor" else "motor"
         out.append(

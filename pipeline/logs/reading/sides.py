@@ -27,7 +27,7 @@ class Sides:
     Attributes:
         position: Of the joint where that was measured, else of the motor over the ratio, (N, J).
         motor: Of the motor over the ratio where both were measured, shape (N, J), NaN for joints
-            with one position; None where no joint has both.
+            with one position; None where the log has one kind of position.
         source: ``"motor"`` where every position is the motor's, else ``"joint"``.
         remarks: Joint to what a reader should know about its positions.
     """
@@ -88,7 +88,7 @@ def sides_of(
         divided[:, k] = motor[:, k] / (n or 1.0)
         if remark:
             remarks[name] = remark
-    mixed = has_own.any()
+    mixed = joint is not None  # by its columns: a piece of a log may hold no number of one
     for k, name in enumerate(expected.joints):
         if mixed and has_motor[k] and not has_own[k]:
             remarks[name] = (
@@ -97,7 +97,7 @@ def sides_of(
             )
     both = has_own & has_motor
     position = np.where(has_own, own, divided)
-    side = np.where(both, divided, np.nan) if both.any() else None
+    side = np.where(both, divided, np.nan) if mixed else None
     return Sides(position, side, "joint" if mixed else "motor", remarks)
 
 

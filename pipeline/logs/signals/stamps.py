@@ -35,6 +35,11 @@ def stamp_error(time: Array, q: Array, gap: float) -> tuple[float, float]:
     """
     if time.size < _LEAST_ROWS:
         return 0.0, 0.0
+    with np.errstate(all="ignore"):  # numbers no clock shows leave no finite row
+        return _told_by_all(time, q, gap)
+
+
+def _told_by_all(time: Array, q: Array, gap: float) -> tuple[float, float]:
     weights = _lagrange(time)
     scatter = 1.0 + (weights**2).sum(axis=0)
     close = np.diff(time) <= gap
