@@ -27,6 +27,8 @@ Mask = NDArray[np.bool_]
 _SAME: Final = 0.9
 #: ... and how far its factor may be from one.
 _FACTOR: Final = 0.3
+#: Standard deviations by which a difference has to exceed the noises to count as one.
+_SURE: Final = 4.0
 #: Lags are looked for up to this long [s].
 _LONGEST_LAG: Final = 0.1
 
@@ -106,10 +108,17 @@ def fuse_by_noise(
         offset[j] = seen.factor * float(np.mean((straight - rates[0][:, j])[good]))
         straight = straight - offset[j] / seen.factor
         theirs = np.array([h0, h1]) * noises[1][j] / seen.factor
+        # So much may the scatter of a stretch exceed the noise by chance, at `_SURE` deviations.
+        independent = max(2.0 * lowpass.cutoff * (longest.stop - longest.start) / lowpass.rate, 1.0)
+        sure = 1.0 + _SURE * float(np.sqrt(2.0 / independent))
+        inside = np.array(ok[longest, j])
+        inside[: lowpass.half] = inside[inside.size - lowpass.half :] = False
+        if not inside.any():
+            continue
         readings = lowpass.derivatives(straight[longest, None])[:2]
         for order in (0, 1):
-            differ = (readings[order][:, 0] - rates[order][longest, j])[ok[longest, j]]
-            excess = float(np.mean(differ**2)) - own[order, j] ** 2
+            differ = (readings[order][:, 0] - rates[order][longest, j])[inside]
+            excess = float(np.mean(differ**2)) - sure * own[order, j] ** 2
             both = max(theirs[order] ** 2, excess, 1e-300)
             weight[order, j] = own[order, j] ** 2 / (own[order, j] ** 2 + both)
             noise[order, j] = np.sqrt(weight[order, j] * both)
