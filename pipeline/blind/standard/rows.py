@@ -82,113 +82,102 @@ def _payload(hidden: Any, s: StandardScore) -> str:
 
 def rates(rows: Sequence[Row]) -> list[Rate]:
     """What the matrix is made for, from the rows of `blind_standard_trials.csv` alone."""
-
-    def rate(
-        name: str,
-        meaning: str,
-        aim: tuple[float, float] | None,
-        among: Callable[[Row], bool],
-        hit: Callable[[Row], bool],
-    ) -> Rate:
+    out = []
+    for name, (meaning, aim, among, hit) in _RATES.items():
         chosen = [row for row in rows if among(row)]
-        return Rate(name, meaning, sum(bool(hit(row)) for row in chosen), len(chosen), aim)
-
-    def known(row: Row) -> bool:
-        return bool(row["hidden"]) and bool(row["in_catalogue"])
-
-    def unknown(row: Row) -> bool:
-        return bool(row["hidden"]) and not row["in_catalogue"]
-
-    def answered(row: Row) -> bool:
-        return row["exit_code"] in (0, 1)
-
-    def silent(row: Row) -> bool:
-        return answered(row) and "wrong" not in several(row["named_right"])
-
-    def sides(row: Row) -> bool:
-        return row["hidden"] in TWO_SIDED and row["positions"] == "both"
-
-    named = [row for row in rows if known(row)]
+        out.append(Rate(name, meaning, sum(bool(hit(r)) for r in chosen), len(chosen), aim))
+    named = [row for row in rows if _known(row)]
     cover = sum(row["intervals_that_cover"] for row in named)
-    out = [
-        rate(
-            "right_and_written",
-            "one hidden effect the log can show: named first, at its place, and written",
-            (0.9, 1.0),
-            lambda r: single(r) and r["visible"],
-            lambda r: r["right_first"],
-        ),
-        rate(
-            "right_and_written_of_all",
-            "the same of every single hidden effect, visible or not",
-            None,
-            single,
-            lambda r: r["right_first"],
-        ),
-        rate(
-            "all_of_several",
-            "two or three hidden effects the log can show: all named and written",
-            None,
-            lambda r: known(r) and not single(r) and r["visible"],
-            lambda r: r["all_right"],
-        ),
-        rate(
-            "wrong_and_written",
-            "every trial: a wrong name written, whatever its level",
-            (0.0, 0.01),
-            lambda r: True,
-            lambda r: r["wrong_names"],
-        ),
-        rate(
-            "wrong_and_confirmed",
-            "every trial: a wrong name confirmed and written",
-            (0.0, 0.02),
-            lambda r: True,
-            lambda r: r["wrong_confirmed"],
-        ),
-        rate(
-            "empty_silent_and_explained",
-            "nothing hidden: nothing named beside what every machine has, and called explained",
-            (0.98, 1.0),
-            lambda r: not r["hidden"],
-            lambda r: silent(r) and r["exit_code"] == 0,
-        ),
-        rate(
-            "unknown_not_confirmed",
-            "an effect outside the catalogue: no other name confirmed for it",
-            (0.95, 1.0),
-            unknown,
-            lambda r: answered(r) and not r["wrong_confirmed"],
-        ),
-        Rate(
-            "intervals_that_cover",
-            "95 % intervals of right names that are written and hold the truth",
-            cover,
-            sum(row["intervals"] for row in named),
-            (0.9, 0.99),
-        ),
-        rate(
-            "payload_mass",
-            "payloads that were named: mass within 5 % or inside its interval",
-            None,
-            lambda r: r["payload_mass"] in ("right", "wrong"),
-            lambda r: r["payload_mass"] == "right",
-        ),
-        rate(
-            "two_sides",
-            "elasticity or play where the log holds both positions: right and written",
-            (0.8, 1.0),
-            sides,
-            lambda r: r["right_first"],
-        ),
-        rate("answered", "every trial: an answer was given", None, lambda r: True, answered),
-    ]
+    meaning = "95 % intervals of right names that are written and hold the truth"
+    count = sum(row["intervals"] for row in named)
+    out.append(Rate("intervals_that_cover", meaning, cover, count, (0.9, 0.99)))
     return out
+
+
+def _known(row: Row) -> bool:
+    return bool(row["hidden"]) and bool(row["in_catalogue"])
+
+
+def _unknown(row: Row) -> bool:
+    return bool(row["hidden"]) and not row["in_catalogue"]
+
+
+def _answered(row: Row) -> bool:
+    return row["exit_code"] in (0, 1)
+
+
+def _silent(row: Row) -> bool:
+    return row["exit_code"] == 0 and "wrong" not in several(row["named_right"])
+
+
+def _sides(row: Row) -> bool:
+    return row["hidden"] in TWO_SIDED and row["positions"] == "both"
 
 
 def single(row: Row) -> bool:
     """Whether one effect of the catalogue is hidden."""
     return bool(row["in_catalogue"]) and len(several(row["hidden"])) == 1
+
+
+Test = Callable[[Row], Any]
+#: Name to meaning, aim, which trials, and which of them are hits.
+_RATES: Final[dict[str, tuple[str, tuple[float, float] | None, Test, Test]]] = {
+    "right_and_written": (
+        "one hidden effect the log can show: named first, at its place, and written",
+        (0.9, 1.0),
+        lambda r: single(r) and r["visible"],
+        lambda r: r["right_first"],
+    ),
+    "right_and_written_of_all": (
+        "the same of every single hidden effect, visible or not",
+        None,
+        lambda r: single(r),
+        lambda r: r["right_first"],
+    ),
+    "all_of_several": (
+        "two or three hidden effects the log can show: all named and written",
+        None,
+        lambda r: _known(r) and not single(r) and r["visible"],
+        lambda r: r["all_right"],
+    ),
+    "wrong_and_written": (
+        "every trial: a wrong name written, whatever its level",
+        (0.0, 0.01),
+        lambda r: True,
+        lambda r: r["wrong_names"],
+    ),
+    "wrong_and_confirmed": (
+        "every trial: a wrong name confirmed and written",
+        (0.0, 0.02),
+        lambda r: True,
+        lambda r: r["wrong_confirmed"],
+    ),
+    "empty_silent_and_explained": (
+        "nothing hidden: nothing named beside what every machine has, and called explained",
+        (0.98, 1.0),
+        lambda r: not r["hidden"],
+        _silent,
+    ),
+    "unknown_not_confirmed": (
+        "an effect outside the catalogue: no other name confirmed for it",
+        (0.95, 1.0),
+        _unknown,
+        lambda r: _answered(r) and not r["wrong_confirmed"],
+    ),
+    "payload_mass": (
+        "payloads that were named: mass within 5 % or inside its interval",
+        None,
+        lambda r: r["payload_mass"] in ("right", "wrong"),
+        lambda r: r["payload_mass"] == "right",
+    ),
+    "two_sides": (
+        "elasticity or play where the log holds both positions: right and written",
+        (0.8, 1.0),
+        _sides,
+        lambda r: r["right_first"],
+    ),
+    "answered": ("every trial: an answer was given", None, lambda r: True, _answered),
+}
 
 
 def by_effect(rows: Sequence[Row]) -> list[Row]:

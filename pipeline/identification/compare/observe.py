@@ -104,19 +104,8 @@ def _observe(
         within[one.core] = np.asarray(one.motion_ok[one.core]).all(axis=1)
         known = known | (idle & within[:, None])
     standing, force = _contact(model, one)
-    takers = {
-        "no motion, or within the filter's reach of none": ~np.asarray(
-            one.motion_ok.all(axis=1, keepdims=True)
-        ),
-        "no effort, or within the filter's reach of none": ~known
-        | ~np.isfinite(effort).all(axis=2),
-        "within the filter's reach of standstill or reversal": _standing(one, rest),
-    }
-    if one.torque_off is not None:
-        takers["the drive is off"] = one.torque_off if idle is None else one.torque_off & ~idle
-    if standing is not None:
-        takers["within the filter's reach of a change of stance"] = one.near_event()[:, None]
-    mask, removed = _taken(takers, (len(one), len(one.joints)))
+    known = known & np.isfinite(effort).all(axis=2)
+    mask, removed = _counted(one, known, rest, idle, stepping=standing is not None)
     rows, pieces, step = _thinned(one)
     lowpass = LowPass(one.rate / step, one.cutoff)
 
@@ -154,12 +143,41 @@ def _observe(
         foot_force=kept(force),
         open_winding=_open_winding(one, rows) if idle is not None else None,
         temperature=kept(_temperature(one)),
-        unsure=sign_unsure(
-            one.v, one.fusion.noise[0], rest / REST_SIGMAS, one.pieces, one.settings.lowpass
-        )[rows],
+        unsure=_unsure(one, rest)[rows],
         removed=removed,
         sha256=one.log.sha256,
     )
+
+
+def _unsure(one: Prepared, rest: Array) -> Array:
+    """How unsure friction's sign is, shape (N, J)."""
+    noise = one.fusion.noise[0]
+    return sign_unsure(one.v, noise, rest / REST_SIGMAS, one.pieces, one.settings.lowpass)
+
+
+def _counted(
+    one: Prepared, known: Mask, rest: Array, idle: Mask | None, *, stepping: bool
+) -> tuple[Mask, tuple[tuple[str, float], ...]]:
+    """Rows that count, shape (N, J), and what took the others.
+
+    Args:
+        one: The log.
+        known: Where the effort is known, shape (N, J).
+        rest: Rest speed, shape (J,) [rad/s].
+        idle: Rows in which a drive that is off tells what flows, shape (N, J), or None.
+        stepping: Whether the robot walks.
+    """
+    moved = np.asarray(one.motion_ok.all(axis=1, keepdims=True))
+    takers = {
+        "no motion, or within the filter's reach of none": ~moved,
+        "no effort, or within the filter's reach of none": ~known,
+        "within the filter's reach of standstill or reversal": _standing(one, rest),
+    }
+    if one.torque_off is not None:
+        takers["the drive is off"] = one.torque_off if idle is None else one.torque_off & ~idle
+    if stepping:
+        takers["within the filter's reach of a change of stance"] = one.near_event()[:, None]
+    return _taken(takers, (len(one), len(one.joints)))
 
 
 def _taken(

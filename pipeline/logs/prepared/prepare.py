@@ -205,48 +205,25 @@ def prepare(
     grid = uniform_grid(log.time, settings.dt, origin, bridge=longest_gap)
     lowpass = settings.lowpass
     chosen = log.effort
-
-    q_raw = grid.resample(fill_gaps(log.time, log.position, position_ok))
-    effort_raw = grid.resample(fill_gaps(log.time, chosen.values, effort_ok))
-    no_motion = grid.flags(long_runs(log.time, ~position_ok, longest_gap))
-    no_effort = grid.flags(long_runs(log.time, ~effort_ok, longest_gap))
-
-    n, j = q_raw.shape
-    q, v, a, effort = (np.empty((n, j)) for _ in range(4))
-    motion_ok, effort_good = np.empty((n, j), dtype=np.bool_), np.empty((n, j), dtype=np.bool_)
+    series = _filtered(log, grid, settings, (position_ok, effort_ok))
     extras = _filtered_extras(log, grid, lowpass)
-    for piece in grid.pieces:
-        q[piece], v[piece], a[piece] = lowpass.derivatives(q_raw[piece])
-        effort[piece] = lowpass.smooth(effort_raw[piece])
-        motion_ok[piece] = lowpass.share(no_motion[piece]) <= TOLERATED_SHARE
-        effort_good[piece] = lowpass.share(no_effort[piece]) <= TOLERATED_SHARE
-    effort[no_effort] = np.nan
     other = _other(log, grid, chosen.channel)
     if known is None:
-        stretches = busiest(q_raw, grid.pieces)
-        floor = smoother_noise(effort_raw, effort_good, stretches, lowpass, in_band=True)
-        position_noise = smoother_noise(q_raw, motion_ok, stretches, lowpass, in_band=False)
-        fusion = _fusion(grid, other, (v, a), motion_ok, position_noise, lowpass)
-        stamps, error = stamp_error(*_masked(log, position_ok), GAP * settings.dt)
-        known = Calibration(floor, position_noise, fusion, stamps if stamps > 4 * error else 0.0)
-    _fuse(v, a, grid, other, known.fusion, lowpass, longest_gap)
+        known = _calibrated(log, grid, settings, series, other)
+    _fuse(series.v, series.a, grid, other, known.fusion, lowpass, longest_gap)
     contact = contact or log_contact(log)
     on_grid = contact.rows(grid.nearest) if contact is not None else None
-    rows = slice(0, n)
-    if core is not None:
-        inside = (grid.nearest >= core.start) & (grid.nearest < core.stop)
-        rows = slice(int(np.argmax(inside)), n - int(np.argmax(inside[::-1])))
     return Prepared(
         log=log,
         time=grid.time,
-        q=q,
-        v=v,
-        a=a,
-        effort=effort,
+        q=series.q,
+        v=series.v,
+        a=series.a,
+        effort=series.effort,
         channel=chosen.channel,
         unit=chosen.unit,
-        mask=effort_good & motion_ok.all(axis=1, keepdims=True),
-        motion_ok=motion_ok,
+        mask=series.effort_ok & series.motion_ok.all(axis=1, keepdims=True),
+        motion_ok=series.motion_ok,
         torque_off=None if log.torque_off is None else log.torque_off[grid.nearest],
         noise=known.noise,
         noise_basis="smoother",
@@ -264,15 +241,65 @@ def prepare(
         grid=grid,
         usable=(position_ok, effort_ok),
         log_contact=contact,
-        core=rows,
+        core=_core(grid, core),
         row=grid.nearest,
     )
 
 
-def _masked(log: Log, position_ok: Mask) -> tuple[Array, Array]:
-    """Time and positions of a bounded number of rows, NaN where they are not good."""
+@dataclass(frozen=True, eq=False)
+class _Series:
+    """Positions and efforts on the grid, before and after the filter, each (N, J)."""
+
+    q_raw: Array
+    effort_raw: Array
+    q: Array
+    v: Array
+    a: Array
+    effort: Array
+    motion_ok: Mask
+    effort_ok: Mask
+
+
+def _filtered(log: Log, grid: Grid, settings: Settings, usable: tuple[Mask, Mask]) -> _Series:
+    """Bridge short holes, resample, filter, and mark what the filter sees too little of."""
+    lowpass, longest = settings.lowpass, 1.0 / (4.0 * settings.cutoff)
+    position_ok, effort_ok = usable
+    q_raw = grid.resample(fill_gaps(log.time, log.position, position_ok))
+    effort_raw = grid.resample(fill_gaps(log.time, log.effort.values, effort_ok))
+    no_motion = grid.flags(long_runs(log.time, ~position_ok, longest))
+    no_effort = grid.flags(long_runs(log.time, ~effort_ok, longest))
+    q, v, a, effort = (np.empty_like(q_raw) for _ in range(4))
+    motion_good, effort_good = np.empty_like(no_motion), np.empty_like(no_motion)
+    for piece in grid.pieces:
+        q[piece], v[piece], a[piece] = lowpass.derivatives(q_raw[piece])
+        effort[piece] = lowpass.smooth(effort_raw[piece])
+        motion_good[piece] = lowpass.share(no_motion[piece]) <= TOLERATED_SHARE
+        effort_good[piece] = lowpass.share(no_effort[piece]) <= TOLERATED_SHARE
+    effort[no_effort] = np.nan
+    return _Series(q_raw, effort_raw, q, v, a, effort, motion_good, effort_good)
+
+
+def _calibrated(
+    log: Log, grid: Grid, settings: Settings, series: _Series, other: dict[str, Array]
+) -> Calibration:
+    """Noises, the say of velocity columns, and errors of time stamps."""
+    lowpass, stretches = settings.lowpass, busiest(series.q_raw, grid.pieces)
+    good = (series.effort_ok, series.motion_ok)
+    floor = smoother_noise(series.effort_raw, good[0], stretches, lowpass, in_band=True)
+    noise = smoother_noise(series.q_raw, good[1], stretches, lowpass, in_band=False)
+    fusion = _fusion(grid, other, (series.v, series.a), good[1], noise, lowpass)
     rows = slice(0, STAMP_ROWS)
-    return log.time[rows], np.where(position_ok[rows], log.position[rows], np.nan)
+    stamps, error = stamp_error(log.time[rows], log.position[rows], GAP * settings.dt)
+    return Calibration(floor, noise, fusion, stamps if stamps > 4 * error else 0.0)
+
+
+def _core(grid: Grid, core: slice | None) -> slice:
+    """Rows of the grid that lie in rows of the log."""
+    n = grid.time.size
+    if core is None:
+        return slice(0, n)
+    inside = (grid.nearest >= core.start) & (grid.nearest < core.stop)
+    return slice(int(np.argmax(inside)), n - int(np.argmax(inside[::-1])))
 
 
 def _fusion(

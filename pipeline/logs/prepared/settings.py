@@ -101,10 +101,9 @@ def choose_settings(
             np.isnan(table).all(axis=0), np.nan, np.nanmin(np.nan_to_num(table, nan=np.inf), axis=0)
         )
     slowest = int(np.nanargmin(per_joint))
-    value = float(per_joint[slowest])
+    value = min(float(per_joint[slowest]), max(held, smallest))
     reason = f"position spectrum of {logs[0].joints[slowest]} meets its noise"
-    if value > max(held, smallest):
-        value = max(held, smallest)
+    if value < per_joint[slowest]:
         reason = f"the slowest channel holds no more: one sample in {1e3 * OWN_SHARE / held:.3g} ms"
     return Settings(dt, value, reason, per_joint)
 

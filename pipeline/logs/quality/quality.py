@@ -218,81 +218,71 @@ def _efforts(log: Log, still: Mask, silent: Mask, found: Findings) -> Mask:
     """Quantisation, held values, saturation and missing cells of the compared effort."""
     effort = log.effort
     ok = log.valid & np.isfinite(effort.values) & ~silent
-    for j, joint in enumerate(log.joints):
-        column = column_name(joint, effort.channel)
+    for j in np.flatnonzero(~silent):
         x = effort.values[:, j]
-        if silent[j] or is_constant(x) or not np.isfinite(x).any():
-            continue
-        step, rounded = _channel(found, column, x, effort.unit)
-        drawn = _between(log, found, column, x, rounded)
-        ok[:, j] &= ~drawn
-        share, repeats = held(x, step)
-        if share > HELD:
-            ok[:, j] &= ~repeats
-            found.note(
-                column,
-                "held",
-                share,
-                "1",
-                "masked",
-                f"{100 * share:.0f} % of the rows repeat while it changes: about one new "
-                f"value in {1 / max(1 - share, 1e-3):.1f} rows; repeats are bridged "
-                f"({int(repeats.sum())} rows)",
-            )
-        stuck = np.zeros_like(repeats)
-        stuck[~drawn] = frozen(x[~drawn], ~still[~drawn, j])
-        if stuck.any():
-            ok[:, j] &= ~stuck
-            found.note(
-                column,
-                "frozen",
-                float(stuck.mean()),
-                "1",
-                "warning",
-                f"{int(stuck.sum())} rows hold one value while the joint moves, the first from "
-                f"{log.time[int(np.argmax(stuck))]:.6g} s: a sensor that stopped; left out",
-            )
-        jumps = glitches(x)
-        if jumps.any():
-            ok[:, j] &= ~jumps
-            _note_jumps(log, found, column, x, jumps, effort.unit)
-        fresh = ~repeats if share > HELD else np.ones_like(repeats)
-        limit = saturated(x, ~still[:, j] & fresh, step)
-        if limit.any():
-            # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
-            hard = effort.channel != "voltage"
-            if hard:
-                ok[:, j] &= ~limit
-            found.note(
-                column,
-                "saturated",
-                float(limit.mean()),
-                "1",
-                "masked" if hard else "warning",
-                f"{int(limit.sum())} rows stick at {np.nanmax(np.abs(x[limit])):.5g} {effort.unit}",
-            )
-        if log.torque_off is not None and log.torque_off[:, j].any():
-            rows = log.torque_off[:, j]
-            found.note(
-                column,
-                "torque_off",
-                float(rows.mean()),
-                "1",
-                "masked",
-                f"{int(rows.sum())} rows with the drive off; bridge "
-                f"{log.torque_off_bridge or 'not stated (open or shorted?)'}",
-            )
+        if not is_constant(x) and np.isfinite(x).any():
+            ok[:, j] &= _effort(log, int(j), still[:, j], found)
     if log.chosen_effort is None and len(log.channels) > 1:
-        found.note(
-            "",
-            "effort",
-            1,
-            "1",
-            "ok",
-            f"{effort.channel} is compared; also there: "
-            + ", ".join(c for c in EFFORTS if c in log.channels and c != effort.channel),
-        )
+        others = ", ".join(c for c in EFFORTS if c in log.channels and c != effort.channel)
+        detail = f"{effort.channel} is compared; also there: {others}"
+        found.note("", "effort", 1, "1", "ok", detail)
     return ok
+
+
+def _effort(log: Log, j: int, still: Mask, found: Findings) -> Mask:
+    """Rows of one joint's effort that may be used, shape (N,)."""
+    effort = log.effort
+    column, x = column_name(log.joints[j], effort.channel), effort.values[:, j]
+    step, rounded = _channel(found, column, x, effort.unit)
+    drawn = _between(log, found, column, x, rounded)
+    ok = ~drawn
+    share, repeats = held(x, step)
+    if share > HELD:
+        ok &= ~repeats
+        detail = (
+            f"{100 * share:.0f} % of the rows repeat while it changes: about one new value in "
+            f"{1 / max(1 - share, 1e-3):.1f} rows; repeats are bridged ({int(repeats.sum())} rows)"
+        )
+        found.note(column, "held", share, "1", "masked", detail)
+    stuck = np.zeros_like(repeats)
+    stuck[~drawn] = frozen(x[~drawn], ~still[~drawn])
+    if stuck.any():
+        ok &= ~stuck
+        detail = (
+            f"{int(stuck.sum())} rows hold one value while the joint moves, the first from "
+            f"{log.time[int(np.argmax(stuck))]:.6g} s: a sensor that stopped; left out"
+        )
+        found.note(column, "frozen", float(stuck.mean()), "1", "warning", detail)
+    jumps = glitches(x)
+    if jumps.any():
+        ok &= ~jumps
+        _note_jumps(log, found, column, x, jumps, effort.unit)
+    fresh = ~repeats if share > HELD else np.ones_like(repeats)
+    ok &= ~_at_limit(log, column, x, saturated(x, ~still & fresh, step), found)
+    _note_drive_off(log, column, j, found)
+    return ok
+
+
+def _at_limit(log: Log, column: str, x: Array, limit: Mask, found: Findings) -> Mask:
+    """Rows at a limit that tell nothing, shape (N,)."""
+    if not limit.any():
+        return limit
+    # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
+    hard = log.effort.channel != "voltage"
+    top = np.nanmax(np.abs(x[limit]))
+    detail = f"{int(limit.sum())} rows stick at {top:.5g} {log.effort.unit}"
+    verdict = "masked" if hard else "warning"
+    found.note(column, "saturated", float(limit.mean()), "1", verdict, detail)
+    return limit if hard else np.zeros_like(limit)
+
+
+def _note_drive_off(log: Log, column: str, j: int, found: Findings) -> None:
+    if log.torque_off is None or not log.torque_off[:, j].any():
+        return
+    rows = log.torque_off[:, j]
+    bridge = log.torque_off_bridge or "not stated (open or shorted?)"
+    detail = f"{int(rows.sum())} rows with the drive off; bridge {bridge}"
+    found.note(column, "torque_off", float(rows.mean()), "1", "masked", detail)
 
 
 def _between(log: Log, found: Findings, column: str, x: Array, rounded: float) -> Mask:

@@ -88,36 +88,7 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
     """
     where, expected, mapping = plan.table.where, plan.expected, plan.mapping
     n = next(iter(data.values())).size
-    arrays: dict[str, Any] = {}
-    force: dict[tuple[str, str], Array] = {}
-    by_joint: dict[str, dict[str, Array]] = {}
-    for target, source in plan.sources.items():
-        values = data[source.column]
-        _check_values(values, source.column, where, first_row)
-        if (source.factor, source.offset) != (1.0, 0.0):
-            values = source.factor * values + source.offset
-            _check_values(values, source.column, f"{where} through {mapping.where}", first_row)
-        if target.kind == "joint":
-            by_joint.setdefault(target.quantity, {})[target.owner] = values
-        elif target.kind == "foot":
-            force[target.owner, target.quantity] = values
-        else:
-            arrays[target.quantity] = values
-    for key, value in plan.rule.constants.items():
-        constant = parse_column(key, expected, mapping.where)
-        if constant is None or constant in plan.sources:
-            continue
-        column = np.full(n, from_si(value, constant.unit))
-        if constant.kind == "joint":
-            by_joint.setdefault(constant.quantity, {})[constant.owner] = column
-        elif constant.kind == "base":
-            arrays[constant.quantity] = column
-    for quantity, columns in by_joint.items():
-        block = np.full((n, len(expected.joints)), np.nan)
-        for j, joint in enumerate(expected.joints):
-            if joint in columns:
-                block[:, j] = columns[joint]
-        arrays[quantity] = block
+    arrays, force = _arrays(plan, data, n, first_row)
     if mapping.sample_rate is not None:
         arrays["time"] = (first_row + np.arange(n)) / mapping.sample_rate
     fresh = _check_time(arrays["time"], where, first_row)
@@ -154,6 +125,48 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
         **arrays,
     )
     return log if fresh.all() else log.rows(fresh)
+
+
+def _arrays(
+    plan: ReadingPlan, data: dict[str, Array], n: int, first_row: int
+) -> tuple[dict[str, Any], dict[tuple[str, str], Array]]:
+    """Attributes of the log by name, and forces and contacts by foot and quantity.
+
+    Raises:
+        LogContentError: Values that no robot measures.
+    """
+    where, expected, mapping = plan.table.where, plan.expected, plan.mapping
+    arrays: dict[str, Any] = {}
+    force: dict[tuple[str, str], Array] = {}
+    by_joint: dict[str, dict[str, Array]] = {}
+    for target, source in plan.sources.items():
+        values = data[source.column]
+        _check_values(values, source.column, where, first_row)
+        if (source.factor, source.offset) != (1.0, 0.0):
+            values = source.factor * values + source.offset
+            _check_values(values, source.column, f"{where} through {mapping.where}", first_row)
+        if target.kind == "joint":
+            by_joint.setdefault(target.quantity, {})[target.owner] = values
+        elif target.kind == "foot":
+            force[target.owner, target.quantity] = values
+        else:
+            arrays[target.quantity] = values
+    for key, value in plan.rule.constants.items():
+        constant = parse_column(key, expected, mapping.where)
+        if constant is None or constant in plan.sources:
+            continue
+        column = np.full(n, from_si(value, constant.unit))
+        if constant.kind == "joint":
+            by_joint.setdefault(constant.quantity, {})[constant.owner] = column
+        elif constant.kind == "base":
+            arrays[constant.quantity] = column
+    for quantity, columns in by_joint.items():
+        block = np.full((n, len(expected.joints)), np.nan)
+        for j, joint in enumerate(expected.joints):
+            if joint in columns:
+                block[:, j] = columns[joint]
+        arrays[quantity] = block
+    return arrays, force
 
 
 def _stand_still(

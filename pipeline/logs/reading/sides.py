@@ -20,6 +20,12 @@ _CONTRADICTS: Final = 0.05
 _LEAST_MOTION: Final = 0.05
 
 
+_ALONE: Final = (
+    "has a motor-side position alone, other joints have a joint-side one: what its gear winds up "
+    "or plays is taken for the joint's motion"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Sides:
     """Positions brought to the joint's side.
@@ -89,12 +95,7 @@ def sides_of(
         if remark:
             remarks[name] = remark
     mixed = joint is not None  # by its columns: a piece of a log may hold no number of one
-    for k, name in enumerate(expected.joints):
-        if mixed and has_motor[k] and not has_own[k]:
-            remarks[name] = (
-                "has a motor-side position alone, other joints have a joint-side one: what its "
-                "gear winds up or plays is taken for the joint's motion"
-            )
+    remarks |= {expected.joints[k]: _ALONE for k in np.flatnonzero(mixed & has_motor & ~has_own)}
     both = has_own & has_motor
     position = np.where(has_own, own, divided)
     side = np.where(both, divided, np.nan) if mixed else None
