@@ -253,6 +253,40 @@ def force_rules(out: Path) -> str:
     )
 
 
+def blind_standard(out: Path) -> str:
+    """Rates of the standard matrix, from the stored run."""
+    lines = [
+        (
+            r["meaning"],
+            f"{share(r['hits'], r['trials'])}, {percentage(r['share'])} %",
+            f"{percentage(r['low'])} to {percentage(r['high'])} %",
+            aim(r) if r["aim_low"] else "",
+        )
+        for r in rows(PICTURES, "blind_standard_rates")
+        if r["trials"] != "0"
+    ]
+    count = len(rows(PICTURES, "blind_standard_trials"))
+    return table((f"{count} trials", "reached", "95 % interval", "aim"), lines)
+
+
+def blind_standard_effects(out: Path) -> str:
+    """How each effect of the standard matrix fared that was hidden alone, from the stored run."""
+    lines = []
+    for r in rows(PICTURES, "blind_standard_by_effect"):
+        known = r["in_catalogue"] == "true"
+        lines.append(
+            (
+                f"`{r['effect']}`" if known else f"`{r['effect']}` (no name)",
+                share(r["right_and_written"], r["visible"]) if known else "",
+                share(r["right_and_written_of_all"], r["trials"]) if known else "",
+                share(r["called_unexplained"], r["trials"]),
+                r["wrong"],
+            )
+        )
+    header = ("hidden alone", "right and written", "of all trials", "called unexplained", "wrong")
+    return table(header, lines)
+
+
 #: Block -> the page it stands on, and what makes it; some need a run, some the code alone.
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
@@ -263,13 +297,23 @@ BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "effects": ("pipeline/effects/README.md", effects),
     "blind": ("pipeline/blind/README.md", blind),
     "blind effects": ("pipeline/blind/README.md", blind_effects),
+    "blind standard": ("pipeline/blind/README.md", blind_standard),
+    "blind standard effects": ("pipeline/blind/README.md", blind_standard_effects),
 }
 OF_BLIND = ("blind", "blind effects")
+<<<<<<< HEAD
 WITHOUT_RUN = {"agreement", "effects", "force rules", *OF_BLIND}
+=======
+WITHOUT_RUN = {"agreement", "effects", *OF_BLIND, "blind standard", "blind standard effects"}
 PAGES = tuple(dict.fromkeys(page for page, _ in BLOCKS.values()))
 #: What a run of `make blind` leaves that its page shows.
 BLIND = ("blind_trials.csv", "blind_rates.csv", "blind_by_effect.csv", "blind_confusion.csv")
 BLIND_PICTURE = "blind_confusion.png"
+#: The same of its standard matrix.
+STANDARD = tuple(
+    f"blind_standard_{name}.csv" for name in ("trials", "rates", "by_effect", "reliability")
+)
+OF_STANDARD = ("blind standard", "blind standard effects")
 
 
 def renewed(page: str, text: str, out: Path, names: Collection[str] = tuple(BLOCKS)) -> str:
@@ -311,9 +355,10 @@ def store_blind(folder: Path) -> int:
     Args:
         folder: Of that run.
     """
-    for name in (*BLIND, BLIND_PICTURE):
+    standard = (folder / STANDARD[0]).exists()
+    for name in STANDARD if standard else (*BLIND, BLIND_PICTURE):
         shutil.copyfile(folder / name, PICTURES / name)
-    renew(folder, OF_BLIND)
+    renew(folder, OF_STANDARD if standard else OF_BLIND)
     return 0
 
 

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -35,6 +36,8 @@ class Named:
         gap_after: The same with it.
         noise_floor: Of the joints it acts on.
         written: Whether the model file holds it.
+        level: ``"confirmed"``, ``"approximate"`` or ``"suspected"``.
+        share: How often the name wins on redrawn blocks; NaN where the answer states none.
     """
 
     effect: str
@@ -46,6 +49,8 @@ class Named:
     gap_after: float
     noise_floor: float
     written: bool = True
+    level: str = ""
+    share: float = float("nan")
 
     @property
     def confident(self) -> bool:
@@ -70,20 +75,22 @@ class Answer:
     message: str = ""
 
 
-def ask(folder: str, robot: str, out: str) -> dict[str, Any]:
+def ask(folder: str, robot: str, out: str, more: Sequence[str] = ()) -> dict[str, Any]:
     """Run `gap name` in a folder that holds nothing but log, robot and actuators.
 
     Args:
         folder: Of the trial.
         robot: Robot file, relative to the folder.
         out: Where `gap` writes; outside of the folder.
+        more: Further options; by default the folder's actuators.
 
     Returns:
         What `read_answer` needs beside the files.
     """
     shutil.rmtree(out, ignore_errors=True)  # an older answer is none
     command = [sys.executable, "-P", "-m", "pipeline", "gap", "name", "log.csv"]
-    command += ["--robot", robot, "--actuators", "actuators", "--out", str(Path(out).resolve())]
+    command += ["--robot", robot, "--out", str(Path(out).resolve())]
+    command += more or ("--actuators", "actuators")
     environment = {k: v for k, v in os.environ.items() if k in ("PATH", "HOME", "LANG")}
     environment |= {"PYTHONPATH": str(_ROOT), "MPLBACKEND": "Agg"}
     environment |= dict.fromkeys(
@@ -151,6 +158,8 @@ def read_answer(run: dict[str, Any], out: Path) -> Answer:
                 gap_after=_number(first["gap_after"]),
                 noise_floor=_number(first["noise_floor"]),
                 written=first["written"] == "true",
+                level=first.get("level") or ("suspected" if first["doubt"] else "confirmed"),
+                share=_number(first.get("share", "")),
             )
         )
     return Answer(run["code"], run["seconds"], tuple(named))

@@ -10,11 +10,8 @@ from __future__ import annotations
 import argparse
 import hashlib
 import json
-import shutil
-import sys
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -33,6 +30,8 @@ from pipeline.blind.summary import Scored, by_effect, confusion, rates, trial_ro
 from pipeline.blind.truth import hidden_truths
 from pipeline.blind.twin.matrix import TrialSpec, trial_matrix
 from pipeline.blind.twin.trial import ROBOT_FILES
+from pipeline.cli.blind_standard import run_standard
+from pipeline.cli.blind_steps import clear, hash_of, pool, progress, together
 from pipeline.logs.errors import GapError
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.paper.calibration.checkpoint import Checkpoint
@@ -40,7 +39,6 @@ from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.folder.staging import staged
 
-_ROOT: Final = Path(__file__).parents[2]
 #: What a trial is made of, and what an answer hangs on beside it.
 _OF_TRIALS: Final = (
     "urdf/*.toml",
@@ -83,11 +81,14 @@ def run_blind(options: argparse.Namespace) -> int:
         raise GapError(f"--trials {options.trials}: give a number from 1")
     if not 1 <= options.workers <= 64:
         raise GapError(f"--workers {options.workers}: give a number from 1 to 64")
+    if options.matrix == "standard":
+        return run_standard(options)
     specs = trial_matrix(options.seed)[: options.trials]
     if out.exists() and not options.resume:
-        _clear(out)
+        clear(out)
     sealed = seal(specs, out, options.seed, options.workers)
-    print(f"{len(sealed)} truths sealed; sha256 of their hashes {_together(sealed)}", flush=True)
+    hashes = together({s.spec.number: s.sha256 for s in sealed})
+    print(f"{len(sealed)} truths sealed; sha256 of their hashes {hashes}", flush=True)
     runs = answer(sealed, out, options.workers)
     trials = open_and_score(sealed, runs, out)
     return write(trials, out, options.seed, [run["seconds"] for run in runs])
@@ -95,17 +96,17 @@ def run_blind(options: argparse.Namespace) -> int:
 
 def seal(specs: Sequence[TrialSpec], out: Path, seed: int, workers: int) -> list[Sealed]:
     """Make every trial and print the hash of what was hidden in it."""
-    point = Checkpoint(out / "sealed.jsonl", _hash(seed, *_OF_TRIALS, *_OF_TRIALS_TOO))
+    point = Checkpoint(out / "sealed.jsonl", hash_of(seed, *_OF_TRIALS, *_OF_TRIALS_TOO))
     tasks = [
         (str(s.number), (str(out), s.number, s.seed, list(s.effects), s.motion, s.noise))
         for s in specs
     ]
     # One simulation at a time per process: libraries' own threads would only get in the way.
     with (
-        _pool(ProcessPoolExecutor(workers)) as pool,
-        _progress("making trials", len(tasks)) as tick,
+        pool(ProcessPoolExecutor(workers)) as processes,
+        progress("making trials", len(tasks)) as tick,
     ):
-        made = point.run(pool, make, tasks, tick)
+        made = point.run(processes, make, tasks, tick)
     sealed = [Sealed(spec, m["sha256"], m["robot"]) for spec, m in zip(specs, made, strict=True)]
     for s in sorted(sealed, key=lambda s: s.spec.number):
         print(f"trial {s.spec.number:04d} sha256 {s.sha256}")
@@ -114,14 +115,20 @@ def seal(specs: Sequence[TrialSpec], out: Path, seed: int, workers: int) -> list
 
 def answer(sealed: Sequence[Sealed], out: Path, workers: int) -> list[dict[str, Any]]:
     """Let `gap` answer every trial."""
-    point = Checkpoint(out / "answers.jsonl", _hash(_together(sealed), *_OF_ANSWERS))
+    point = Checkpoint(
+        out / "answers.jsonl",
+        hash_of(together({s.spec.number: s.sha256 for s in sealed}), *_OF_ANSWERS),
+    )
     tasks = []
     for s in sealed:
         folder = trial_folder(out, s.spec.number)
         to = answer_folder(out, s.spec.number)
         tasks.append((str(s.spec.number), (str(folder), s.robot, str(to))))
-    with _pool(ThreadPoolExecutor(workers)) as pool, _progress("asking gap", len(tasks)) as tick:
-        return point.run(pool, ask, tasks, tick)
+    with (
+        pool(ThreadPoolExecutor(workers)) as threads,
+        progress("asking gap", len(tasks)) as tick,
+    ):
+        return point.run(threads, ask, tasks, tick)
 
 
 def open_and_score(
@@ -200,53 +207,3 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
     usual = sorted(seconds)[len(seconds) // 2]
     print(f"{len(trials)} trials; an answer takes {usual:.1f} s of computing (median)")
     return 0 if all(r.reached for r in reached if r.trials) else 1
-
-
-def _together(sealed: Sequence[Sealed]) -> str:
-    lines = sorted(f"{s.spec.number} {s.sha256}\n" for s in sealed)
-    return hashlib.sha256("".join(lines).encode()).hexdigest()
-
-
-def _hash(*parts: object) -> str:
-    """Hash of values, and of the project's files by the patterns among them."""
-    total = hashlib.sha256()
-    for part in parts:
-        if isinstance(part, str) and "*" in part:
-            for path in sorted(_ROOT.glob(part)):
-                total.update(path.relative_to(_ROOT).as_posix().encode() + path.read_bytes())
-        else:
-            total.update(str(part).encode())
-    return total.hexdigest()
-
-
-def _clear(out: Path) -> None:
-    """Remove an earlier run's trials; its tables stay until there are new ones."""
-    # What says that trials are done goes before them: a kill in between must not be gone on from.
-    for name in ("sealed.jsonl", "answers.jsonl"):
-        (out / name).unlink(missing_ok=True)
-    for name in ("trials", "sealed", "answers"):
-        shutil.rmtree(out / name, ignore_errors=True)
-
-
-@contextmanager
-def _pool(pool: Executor) -> Iterator[Executor]:
-    """A pool that drops what has not begun when it is interrupted."""
-    try:
-        yield pool
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        raise
-    pool.shutdown()
-
-
-@contextmanager
-def _progress(title: str, total: int) -> Iterator[Callable[[int], None]]:
-    """A progress bar on a terminal, nothing elsewhere."""
-    from tqdm import tqdm
-
-    with tqdm(total=total, desc=title, disable=not sys.stderr.isatty()) as bar:
-
-        def tick(count: int) -> None:
-            bar.update(count)
-
-        yield tick

@@ -26,6 +26,13 @@ def add_blind_options(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--trials", type=int, help="only the first so many of the matrix, a fair sample of it"
     )
+    sub.add_argument(
+        "--matrix",
+        choices=["bench", "standard"],
+        default="bench",
+        help="bench: the paper's leg and hexapod with their actuators; standard: bare URDFs with "
+        "friction, wrong bodies and coloured noise beside what is hidden, scored straight",
+    )
     sub.add_argument("--seed", type=int, default=1, help="of the matrix")
     sub.add_argument("--workers", type=int, default=2, help="processes")
     sub.add_argument("--resume", action="store_true", help="go on where a run was stopped")

@@ -71,6 +71,92 @@ BY_EFFECT = {
 }
 
 
+STANDARD_TRIALS = {
+    "trial": ("number in the matrix", "1"),
+    "seed": ("of everything drawn", "1"),
+    "machine": ("pendulum, leg or arm on a fixed base", ""),
+    "background": (
+        "machine: friction everywhere, bodies off by 10 to 20 %; weighed: 3 %; bare",
+        "",
+    ),
+    "positions": ("measured at joints, motors or both", ""),
+    "hidden": ("effects hidden, empty for none; several by semicolons", ""),
+    "hidden_place": ("where", ""),
+    "hidden_values": ("parameters in SI units", ""),
+    "in_catalogue": ("whether the workflow has names for all of them", ""),
+    "misfit": ("what the background alone leaves of the weakest", "sd"),
+    "visible": ("whether the log could show all that is hidden", ""),
+    "sealed_sha256": ("hash of the sealed truth", ""),
+    "exit_code": ("of gap: 0 explained, 1 a part unexplained; 2 refused, -1 no answer", "1"),
+    "named": ("effects found, in order", ""),
+    "named_place": ("where", ""),
+    "named_level": ("confirmed, approximate or suspected", ""),
+    "named_written": ("whether the model file holds it", ""),
+    "named_share": ("how often the name wins on redrawn blocks; nan where not stated", ""),
+    "named_right": ("right, wrong, or background: what every machine has", ""),
+    "right_first": ("the first name that counts is hidden, at its place, and written", ""),
+    "all_right": ("every hidden effect is named at its place and written", ""),
+    "wrong_names": ("written and neither hidden nor background", ""),
+    "wrong_confirmed": ("of them, those that are confirmed", ""),
+    "intervals": ("parameters of right names that are written", "1"),
+    "intervals_that_cover": ("of them, those whose interval holds the truth", "1"),
+    "payload_mass": ("right within 5 % or its interval; wrong; not named; empty: no payload", ""),
+    "message": ("of gap, where it gave no answer", ""),
+}
+STANDARD_BY_EFFECT = {
+    "effect": ("hidden alone", ""),
+    "in_catalogue": ("whether the workflow has a name for it", ""),
+    "trials": ("with it alone", "1"),
+    "visible": ("of them, those whose log could show it", "1"),
+    "right_and_written": ("of the visible: named first, at its place, and written", "1"),
+    "right_and_written_of_all": ("the same of all trials", "1"),
+    "called_unexplained": ("of all trials", "1"),
+    "wrong": ("of all trials, those with a wrong name written", "1"),
+    "wrong_confirmed": ("of all trials, those with a wrong name confirmed", "1"),
+}
+RELIABILITY = {
+    "stated_as": ("level, or share of redrawn blocks on which the name wins", ""),
+    "band": ("the level, or the range of shares", ""),
+    "stated": ("mean of the stated shares; empty where none is stated", "1"),
+    "names": ("so stated that count", "1"),
+    "right": ("of them, those that are right", "1"),
+    "actual": ("right over names", "1"),
+    "low": ("lower end of Wilson's 95 % interval", "1"),
+    "high": ("upper end", "1"),
+}
+
+
+def standard_trials(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One row per trial of the standard matrix."""
+    return table_from_rows(
+        "blind_standard_trials",
+        rows,
+        STANDARD_TRIALS,
+        "Every trial of the standard matrix, judged.",
+    )
+
+
+def standard_rates(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One row per rate of the standard matrix."""
+    return table_from_rows(
+        "blind_standard_rates", rows, RATES, "Standard matrix: rates, with Wilson's intervals."
+    )
+
+
+def standard_by_effect(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One row per effect of the standard matrix."""
+    return table_from_rows(
+        "blind_standard_by_effect", rows, STANDARD_BY_EFFECT, "How each effect fared alone."
+    )
+
+
+def standard_reliability(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One row per level and per range of stated shares."""
+    return table_from_rows(
+        "blind_standard_reliability", rows, RELIABILITY, "How sure names are, stated and actual."
+    )
+
+
 def blind_trials(rows: Sequence[Mapping[str, Any]]) -> Table:
     """One row per trial."""
     return table_from_rows("blind_trials", rows, TRIALS, "Every blind trial, judged.")

@@ -41,6 +41,8 @@ from reports.writer import write_table, write_text
 
 logger = logging.getLogger("legwatt")
 EXPLAINED, UNEXPLAINED = 0, 1
+#: What is no remark on the data, and what their owner wants to know.
+READ_OFF = ("elasticity", "play", "ripple", "cannot_tell")
 #: Remarks on the data that the terminal shows.
 SAID = 5
 
@@ -163,9 +165,11 @@ def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None
 
 def _say_findings(findings: Sequence[Finding]) -> None:
     odd = [finding for finding in findings if finding.verdict != "ok"]
-    for finding in odd:
+    told = [f for f in findings if f.check in READ_OFF]
+    for finding in (*odd, *told):
         place = f" {finding.column}" if finding.column else ""
-        print(f"{finding.log}{place}: {finding.verdict}: {finding.detail}")
+        word = finding.check if finding in told else finding.verdict
+        print(f"{finding.log}{place}: {word.replace('_', ' ')}: {finding.detail}")
     print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
 
 

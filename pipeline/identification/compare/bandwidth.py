@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.identification.compare.observe import observe_all
+from pipeline.logs.prepared.cycles import with_repeated_noise
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.prepared.prepare import LONGEST_KERNEL, TOLERATED_SHARE, Prepared, Settings
-from pipeline.logs.signals.derivatives import LowPass
+from pipeline.logs.prepared.prepare import Prepared
+from pipeline.logs.prepared.settings import LONGEST_KERNEL, Settings
 from pipeline.logs.signals.noise import smoother_noise
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
@@ -66,16 +67,13 @@ def encoder_noise(model: MachineModel, one: Prepared, m: Measurement) -> Array:
     kernel) and of other joints.
     """
     base = Simulator(m).predict(model)
-    raw = np.nan_to_num(one.position_noise)
     total = np.zeros(base.effort.shape[1:])
     for order, jolt in ((1, replace(m, v=m.v + 0.1)), (2, replace(m, a=m.a + 1.0))):
         size = 0.1 if order == 1 else 1.0
         # In motion alone: the step of friction at a reversal is no noise.
         change = np.abs(Simulator(jolt).predict(model).effort - base.effort) / size
         slope = np.median(change, axis=0)
-        kernel = one.settings.lowpass.kernels[order]
-        noise = raw * float(np.sqrt((kernel**2).sum()))
-        total += (slope * noise[:, None]) ** 2
+        total += (slope * one.fusion.noise[order - 1][:, None]) ** 2
     total += _force_noise(model, one, m, base) ** 2
     return np.asarray(np.sqrt(total))
 
@@ -102,56 +100,18 @@ def _force_noise(model: MachineModel, one: Prepared, m: Measurement, base: Predi
 
 
 def lowered(prepared: Sequence[Prepared], cutoff: float) -> tuple[Prepared, ...]:
-    """Prepared logs at a lower cut-off.
+    """The same logs at a lower cut-off, masks and noise rebuilt for it from what was read.
 
     Args:
         prepared: At one cut-off.
         cutoff: At most that one [Hz].
     """
-    if cutoff >= prepared[0].cutoff * (1 - 1e-9):
+    old = prepared[0].settings
+    if cutoff >= old.cutoff * (1 - 1e-9):
         return tuple(prepared)
-    return tuple(_lowered(one, cutoff) for one in prepared)
-
-
-def _lowered(one: Prepared, cutoff: float) -> Prepared:
-    old = one.settings
     reason = (
         f"lowered from {old.cutoff:.3g} Hz ({old.reason}): above it the encoder's noise in the "
         "prediction outweighs the effort's"
     )
     settings = Settings(old.dt, cutoff, reason, old.per_joint)
-    lowpass = settings.lowpass
-
-    def smooth(x: Array | None) -> Array | None:
-        if x is None:
-            return None
-        out = np.empty_like(x)
-        for piece in one.pieces:
-            out[piece] = lowpass.smooth(x[piece])
-        return out
-
-    gap = ~np.isfinite(one.effort)
-    effort = smooth(np.where(gap, 0.0, one.effort))
-    q, v, a = smooth(one.q), smooth(one.v), smooth(one.a)
-    assert effort is not None and q is not None and v is not None and a is not None  # noqa: PT018
-    mask, motion = one.mask.copy(), one.motion_ok.copy()
-    for piece in one.pieces:
-        mask[piece] &= lowpass.share(gap[piece]) <= TOLERATED_SHARE
-        mask[piece] &= lowpass.share(~one.mask[piece]) <= 0.5
-        motion[piece] &= lowpass.share(~one.motion_ok[piece]) <= 0.5
-    effort[gap] = np.nan
-    shrink = lowpass.noise_gain / LowPass(one.rate, old.cutoff).noise_gain
-    return replace(
-        one,
-        q=q,
-        v=v,
-        a=a,
-        effort=effort,
-        mask=mask,
-        motion_ok=motion,
-        noise=one.noise * shrink,
-        settings=settings,
-        foot_force=smooth(one.foot_force),
-        base_roll=smooth(one.base_roll),
-        base_pitch=smooth(one.base_pitch),
-    )
+    return tuple(with_repeated_noise([one.at(settings) for one in prepared]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,10 @@ from pipeline.identification.compare.long import LongLogs
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.contact import Contact
 from pipeline.logs.prepared.cycles import period, with_repeated_noise
-from pipeline.logs.prepared.prepare import Prepared, Settings, choose_settings, prepare
+from pipeline.logs.prepared.prepare import Prepared, prepare
+from pipeline.logs.prepared.read_off import signal_findings
+from pipeline.logs.prepared.settings import Settings, choose_settings
+from pipeline.logs.quality.cannot_tell import cannot_tell
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.unit_check import column_name
@@ -33,13 +36,25 @@ class Intake:
         prepared: One per log, in the order given.
         findings: Rows of `quality.csv`.
         settings: Common to all.
+        of_logs: Of the findings those that no bandwidth changes.
         long: The logs chunk by chunk where `prepared` holds but stretches of them, else None.
     """
 
     prepared: tuple[Prepared, ...]
     findings: tuple[Finding, ...]
     settings: Settings
+    of_logs: tuple[Finding, ...] = ()
     long: LongLogs | None = None
+
+    def at(self, prepared: Sequence[Prepared]) -> Intake:
+        """The same logs at another bandwidth, with what is found at it."""
+        found = [f for one in prepared for f in filter_findings(one)]
+        return replace(
+            self,
+            prepared=tuple(prepared),
+            settings=prepared[0].settings,
+            findings=(*self.of_logs, *found),
+        )
 
 
 def take_in(
@@ -100,13 +115,11 @@ def prepare_logs(
         for log, q in zip(logs, qualities, strict=True)
     ]
     prepared = with_repeated_noise(prepared)
-    findings = [finding for quality in qualities for finding in quality.findings]
-    for one in prepared:
-        findings += _filter_findings(one)
-    return Intake(tuple(prepared), tuple(findings), settings)
+    found = tuple(finding for quality in qualities for finding in quality.findings)
+    return Intake((), (), settings, found).at(prepared)
 
 
-def _filter_findings(one: Prepared) -> list[Finding]:
+def filter_findings(one: Prepared) -> list[Finding]:
     """Bandwidth, usable share and noise floor of one prepared log."""
     name = one.log.name
     out = [Finding(name, "", "cutoff", one.cutoff, "Hz", "ok", one.settings.reason)]
@@ -126,4 +139,4 @@ def _filter_findings(one: Prepared) -> list[Finding]:
         if np.isfinite(floor):
             detail = f"within the bandwidth, from {one.noise_basis}"
             out.append(Finding(name, column, "noise_floor", floor, one.unit, "ok", detail))
-    return out
+    return [*out, *signal_findings(one), *cannot_tell(one.log, one.v, one.effort, one.mask)]

@@ -19,7 +19,8 @@ from pipeline.identification.compare.observe import observe_chunk
 from pipeline.logs.prepared.contact import Contact
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, UNUSED, Measurement
 from pipeline.logs.prepared.parts import Parts
-from pipeline.logs.prepared.prepare import Prepared, Settings
+from pipeline.logs.prepared.prepare import Prepared
+from pipeline.logs.prepared.settings import Settings
 from pipeline.logs.prepared.stream import CHUNK_ROWS, Stream, Survey, prepared_chunks
 from pipeline.logs.quality.finding import VERDICTS, Finding, Quality
 from pipeline.logs.reading.log import Log
@@ -122,11 +123,10 @@ class LongLogs:
 
     def _chunks(self, k: int) -> Iterator[tuple[Quality, Prepared]]:
         ready = self.prepared[k]
-        noise = (ready.noise, ready.position_noise)
         chunks = prepared_chunks(
             self.streams[k],
             self.settings,
-            noise,
+            ready.calibration,
             rows=self.rows,
             largest=self.largest,
             contact=self.contact,

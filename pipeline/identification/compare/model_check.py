@@ -6,6 +6,7 @@ robot. A real gap, however large an effect is missing, must pass.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 from typing import Final
@@ -13,7 +14,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.identification.compare.circumstances import FEWEST_ROWS, gap_of
 from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.quality.drift import Course, friction_drift
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.quality.skew import skew
 from pipeline.logs.quality.unit_check import DEG, WRONG, column_name, nearest
@@ -54,12 +58,16 @@ def against_model(
         prediction: By the model as given.
         ratio: Gear ratios, shape (J,).
     """
+    left = rows_left(m)
+    if any(f.verdict == "refused" for f in left):
+        return left
     predicted = m.smooth(prediction.effort)[..., 0]
     turned = _positions_in_degrees(m, prediction, predicted)
     if turned:
         return turned
     dt = 1.0 / m.rate
     out = [
+        *left,
         *_exchanged(m, predicted),
         *compare_with_prediction(
             m, m.effort[..., 0], predicted, m.mask, dt, m.channels[0], ratio=ratio
@@ -67,6 +75,56 @@ def against_model(
     ]
     weak = any(f.check == "correlation" for f in out)
     return [*out, *(_of_another_motion(m, predicted) if weak else ())]
+
+
+def rows_left(m: Measurement) -> list[Finding]:
+    """How many rows are compared, and what removed the others; refused where hardly any is left."""
+    share = float(m.mask.mean())
+    taken = "; ".join(f"{100 * part:.0f} % {why}" for why, part in m.removed if part >= 0.005)
+    detail = f"{100 * share:.0f} % of all joints' rows are compared" + (
+        f"; not those with {taken}" if taken else ""
+    )
+    alive = m.mask.sum(axis=0) >= FEWEST_ROWS
+    if not alive.any():
+        detail = f"near zero rows left ({int(m.mask.sum())} of {m.mask.size}): {taken}"
+        return [Finding(m.name, "", "rows_left", share, "1", "refused", detail)]
+    out = [Finding(m.name, "", "rows_left", share, "1", "ok", detail)]
+    for j in np.flatnonzero(~alive):
+        detail = f"{int(m.mask[:, j].sum())} rows left to compare: the joint is left out"
+        column = column_name(m.joints[j], m.channels[0])
+        out.append(Finding(m.name, column, "rows_left", 0.0, "1", "warning", detail))
+    return out
+
+
+def drifts(measurements: Sequence[Measurement], predictions: Sequence[Prediction]) -> list[Finding]:
+    """Joints whose friction changes from the first log to the last, in the order given."""
+    out = []
+    first, channel = measurements[0], measurements[0].channels[0]
+    for j, joint in enumerate(first.joints):
+        drift = friction_drift(
+            [_course(m, p, j) for m, p in zip(measurements, predictions, strict=True)]
+        )
+        if drift is None or not drift.seen:
+            continue
+        unit = CHANNEL_UNITS[channel]
+        falls = abs(drift.last) < abs(drift.first)
+        detail = (
+            f"friction {'falls' if falls else 'rises'} from {abs(drift.first):.3g} to "
+            f"{abs(drift.last):.3g} {unit} (standard error {drift.error:.1g}) from beginning to "
+            f"end: {'the machine warms' if falls else 'it wears, cools or is loaded otherwise'}; "
+            "one level for all logs is a mean"
+        )
+        change = drift.last - drift.first
+        column = column_name(joint, channel)
+        out.append(Finding(first.name, column, "drift", change, unit, "warning", detail))
+    return out
+
+
+def _course(m: Measurement, prediction: Prediction, j: int) -> Course:
+    rest = gap_of(m, prediction)[:, j]
+    rows = np.isfinite(rest)
+    simulated = prediction.effort[rows, j, 0]
+    return Course(m.time[rows], rest[rows], simulated, m.q[rows, j], m.v[rows, j], m.a[rows, j])
 
 
 def _of_another_motion(m: Measurement, predicted: Array) -> list[Finding]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -14,6 +14,7 @@ from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.signals.derivatives import LowPass
 from pipeline.logs.signals.noise import smoother_noise
+from pipeline.logs.signals.reversal import sign_unsure
 from pipeline.machine.machine import MachineModel
 
 Array = NDArray[np.float64]
@@ -102,12 +103,9 @@ def _observe(
         within = np.zeros(len(one), dtype=np.bool_)
         within[one.core] = np.asarray(one.motion_ok[one.core]).all(axis=1)
         known = known | (idle & within[:, None])
-    mask = known & np.isfinite(effort).all(axis=2) & ~_standing(one, rest)
-    if one.torque_off is not None:
-        mask &= ~one.torque_off if idle is None else ~one.torque_off | idle
     standing, force = _contact(model, one)
-    if standing is not None:
-        mask &= ~one.near_event()[:, None]
+    known = known & np.isfinite(effort).all(axis=2)
+    mask, removed = _counted(one, known, rest, idle, stepping=standing is not None)
     rows, pieces, step = _thinned(one)
     lowpass = LowPass(one.rate / step, one.cutoff)
 
@@ -145,8 +143,54 @@ def _observe(
         foot_force=kept(force),
         open_winding=_open_winding(one, rows) if idle is not None else None,
         temperature=kept(_temperature(one)),
+        unsure=_unsure(one, rest)[rows],
+        removed=removed,
         sha256=one.log.sha256,
     )
+
+
+def _unsure(one: Prepared, rest: Array) -> Array:
+    """How unsure friction's sign is, shape (N, J)."""
+    noise = one.fusion.noise[0]
+    return sign_unsure(one.v, noise, rest / REST_SIGMAS, one.pieces, one.settings.lowpass)
+
+
+def _counted(
+    one: Prepared, known: Mask, rest: Array, idle: Mask | None, *, stepping: bool
+) -> tuple[Mask, tuple[tuple[str, float], ...]]:
+    """Rows that count, shape (N, J), and what took the others.
+
+    Args:
+        one: The log.
+        known: Where the effort is known, shape (N, J).
+        rest: Rest speed, shape (J,) [rad/s].
+        idle: Rows in which a drive that is off tells what flows, shape (N, J), or None.
+        stepping: Whether the robot walks.
+    """
+    moved = np.asarray(one.motion_ok.all(axis=1, keepdims=True))
+    takers = {
+        "no motion, or within the filter's reach of none": ~moved,
+        "no effort, or within the filter's reach of none": ~known,
+        "within the filter's reach of standstill or reversal": _standing(one, rest),
+    }
+    if one.torque_off is not None:
+        takers["the drive is off"] = one.torque_off if idle is None else one.torque_off & ~idle
+    if stepping:
+        takers["within the filter's reach of a change of stance"] = one.near_event()[:, None]
+    return _taken(takers, (len(one), len(one.joints)))
+
+
+def _taken(
+    takers: Mapping[str, Mask], shape: tuple[int, int]
+) -> tuple[Mask, tuple[tuple[str, float], ...]]:
+    """Rows that are left, and what each reason took of all joints' rows, shape (N, J)."""
+    left, removed = np.ones(shape, dtype=np.bool_), []
+    for why, taken in takers.items():
+        lost = left & taken
+        if lost.any():
+            removed.append((why, float(lost.mean())))
+            left &= ~lost
+    return left, tuple(removed)
 
 
 def _idle(one: Prepared, channels: tuple[str, ...]) -> Mask | None:
@@ -212,10 +256,8 @@ def _channels(model: MachineModel, one: Prepared) -> tuple[tuple[str, ...], Arra
 def _rest_speed(prepared: Sequence[Prepared]) -> Array:
     """Shape (J,) [rad/s]."""
     fast = np.max([np.quantile(np.abs(one.v), 0.95, axis=0) for one in prepared], axis=0)
-    slope = prepared[0].settings.lowpass.kernels[1]
-    gain = float(np.sqrt((slope**2).sum()))
-    noise = gain * np.nanmax([one.position_noise for one in prepared], axis=0)
-    return np.maximum(np.maximum(REST_SHARE * fast, REST_SIGMAS * np.nan_to_num(noise)), 1e-6)
+    noise = np.max([one.fusion.noise[0] for one in prepared], axis=0)
+    return np.maximum(np.maximum(REST_SHARE * fast, REST_SIGMAS * noise), 1e-6)
 
 
 def _standing(one: Prepared, rest: Array) -> Mask:

@@ -12,7 +12,7 @@ from pipeline.identification.compare.bandwidth import with_encoder_noise
 from pipeline.identification.compare.circumstances import Tally, Where, edges_of, where
 from pipeline.identification.compare.intake import Intake
 from pipeline.identification.compare.long import LongLogs
-from pipeline.identification.compare.model_check import against_model
+from pipeline.identification.compare.model_check import against_model, drifts
 from pipeline.identification.compare.observe import observe
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.prepared.measurement import Measurement
@@ -102,6 +102,7 @@ def find_where(
         for finding in against_model(m, prediction, given.expected.ratio)
     ]
     refuse(findings)
+    findings += drifts(measurements, predictions)
     if intake.long is None:
         rows = where(measurements, predictions, legs_of(given))
     else:

@@ -24,7 +24,7 @@ from pipeline.logs.quality.repeats import refuse_repeats
 from pipeline.logs.reading.expected import Expected, expected_of_model, expected_of_robot
 from pipeline.logs.reading.log import EFFORTS, Log
 from pipeline.logs.reading.mapping import load_mapping
-from pipeline.logs.reading.read import plan_reading
+from pipeline.logs.reading.plan import plan_reading
 from pipeline.logs.reading.table_file import sha256
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
@@ -290,8 +290,7 @@ def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
     )
     if options.cutoff is None and options.step != "read":
         cutoff = naming_cutoff(given.model, intake.prepared)
-        prepared = lowered(intake.prepared, cutoff)
-        intake = replace(intake, prepared=prepared, settings=prepared[0].settings)
+        intake = intake.at(lowered(intake.prepared, cutoff))
     prepared = intake.prepared
     last = None if surveys else options.prove_last
     parts = split(prepared[:count], holdout=prepared[count:], prove_last=last)

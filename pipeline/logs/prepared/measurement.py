@@ -89,6 +89,10 @@ class Measurement:
         open_winding: Rows in which a drive is off and its winding open, (N, J), or None: no current
             flows, and a voltage that is compared has no part from the speed.
         temperature: Of the motors' sensors, shape (N, J) [degC], or None.
+        unsure: How unsure the sign of friction is, 0 to 1, shape (N, J); see
+            `pipeline.logs.signals.reversal`.
+        removed: What took rows from the comparison, and the share of all joints' rows it took; a
+            row counts with the first that took it.
         sha256: Of the log.
     """
 
@@ -116,6 +120,8 @@ class Measurement:
     foot_force: Array | None = None
     open_winding: Mask | None = None
     temperature: Array | None = None
+    unsure: Array | None = None
+    removed: tuple[tuple[str, float], ...] = ()
     sha256: str = ""
 
     def __len__(self) -> int:

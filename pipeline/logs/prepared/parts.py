@@ -120,8 +120,10 @@ def split(
         if rows < 20:
             duration = sum(float(one.time[-1] - one.time[0]) for one in every)
             raise PreparationError(
-                f"{every[0].log.name}: {duration:.3g} s at a cut-off of {every[0].cutoff:.3g} Hz "
-                f"leave {rows} rows to {name}; log longer, or raise the cut-off"
+                f"{every[0].log.name}: {duration:.3g} s in {sum(len(o.pieces) for o in every)} "
+                f"pieces without a gap, at a cut-off of {every[0].cutoff:.3g} Hz with guards of "
+                f"{guard:.2g} s between parts, leave {rows} rows to {name}; log longer, or raise "
+                "the cut-off"
             )
     return Parts(tuple(part), tuple(block), guard, rule, warning)
 

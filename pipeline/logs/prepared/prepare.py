@@ -2,49 +2,45 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs.errors import PreparationError
 from pipeline.logs.prepared.contact import Contact, Stance, log_contact, stances
+from pipeline.logs.prepared.settings import Settings, choose_settings, finite
 from pipeline.logs.reading.log import Log
-from pipeline.logs.signals.derivatives import LARGEST_SHARE, LowPass, choose_cutoff
-from pipeline.logs.signals.grid import Grid, busiest, fill_gaps, long_runs, uniform_grid
+from pipeline.logs.signals.derivatives import LowPass
+from pipeline.logs.signals.fusion import Fusion, fuse_by_noise, position_alone
+from pipeline.logs.signals.grid import GAP, Grid, busiest, fill_gaps, long_runs, uniform_grid
 from pipeline.logs.signals.noise import smoother_noise
+from pipeline.logs.signals.stamps import stamp_error
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 #: Share of the kernel's weight that may fall on missing samples before the output is masked.
 TOLERATED_SHARE: Final = 0.05
-#: The kernel may not be longer than this share of the log.
-LONGEST_KERNEL: Final = 0.1
+#: Rows from which the error of time stamps is told.
+STAMP_ROWS: Final = 50_000
 
 
-@dataclass(frozen=True)
-class Settings:
-    """How logs are brought to one grid and bandwidth; the same for all logs that are compared.
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What is estimated from a whole log and holds for its chunks.
 
     Attributes:
-        dt: Step of the uniform grid [s].
-        cutoff: Of the low-pass [Hz].
-        reason: How the cut-off was chosen, in words.
-        per_joint: Cut-off each joint alone would have asked for, shape (J,) [Hz].
+        noise: Standard deviation of the effort's noise within the bandwidth, shape (J,).
+        position_noise: Standard deviation of a position's noise before filtering, (J,) [rad].
+        fusion: How velocity columns enter.
+        stamp_error: Standard deviation of the time stamps' errors [s].
     """
 
-    dt: float
-    cutoff: float
-    reason: str
-    per_joint: Array = field(default_factory=lambda: np.empty(0))
-
-    @property
-    def lowpass(self) -> LowPass:
-        """The filter."""
-        return LowPass(1.0 / self.dt, self.cutoff)
+    noise: Array
+    position_noise: Array
+    fusion: Fusion
+    stamp_error: float
 
 
 @dataclass(frozen=True)
@@ -78,8 +74,14 @@ class Prepared:
         base_roll: Filtered, shape (N,) [rad], or None.
         base_pitch: Filtered, shape (N,) [rad], or None.
         other: Further series interpolated on the grid and not filtered: ``velocity``,
+            ``motor_position``,
             ``goal_position``, ``temperature`` and the efforts that are not compared, each (N, J);
             ``supply``, (N,).
+        fusion: How velocity columns entered `v` and `a`, and the noise of both in the bandwidth.
+        stamp_error: Standard deviation of the time stamps' errors [s].
+        grid: How the log's rows lie on this grid.
+        usable: Positions and efforts of the log that are good, each (rows of the log, J).
+        log_contact: Which feet stand, at the log's rows; or None.
         core: Rows that count; less than all only for a chunk of a longer log.
         row: Nearest row of the log, shape (N,).
     """
@@ -106,6 +108,11 @@ class Prepared:
     base_roll: Array | None
     base_pitch: Array | None
     other: dict[str, Array]
+    fusion: Fusion
+    stamp_error: float
+    grid: Grid
+    usable: tuple[Mask, Mask]
+    log_contact: Contact | None
     core: slice
     row: NDArray[np.intp]
 
@@ -148,67 +155,23 @@ class Prepared:
                 near[max(0, after.rows.start - half) : after.rows.start + half] = True
         return near
 
+    @property
+    def calibration(self) -> Calibration:
+        """What chunks of the same log take over."""
+        return Calibration(self.noise, self.position_noise, self.fusion, self.stamp_error)
+
+    def unfiltered_effort(self) -> Array:
+        """The compared effort on the grid at the log's full bandwidth, shape (N, J)."""
+        values = self.log.effort.values
+        return self.grid.resample(fill_gaps(self.log.time, values, self.usable[1]))
+
+    def at(self, settings: Settings) -> Prepared:
+        """The same log on another grid or at another cut-off, from what was read."""
+        return prepare(self.log, settings, usable=self.usable, contact=self.log_contact)
+
     def with_noise(self, noise: Array, basis: str) -> Prepared:
         """The same with another noise floor, e.g. from repeated logs."""
         return replace(self, noise=noise, noise_basis=basis)
-
-
-def choose_settings(
-    logs: Sequence[Log],
-    usable: Sequence[tuple[Mask, Mask]] | None = None,
-    *,
-    cutoff: float | None = None,
-) -> Settings:
-    """Choose one grid and one cut-off for several logs.
-
-    The cut-off is the lowest any moving joint asks for (`choose_cutoff`), so that no joint's
-    accelerations are mostly noise; the torque of every joint depends on those of the others.
-
-    Args:
-        logs: One or several.
-        usable: Per log which positions and efforts are good, each shape (N, J).
-        cutoff: Set by the user instead [Hz].
-
-    Raises:
-        PreparationError: The user's cut-off does not fit the rate or the length.
-    """
-    steps = [float(np.median(np.diff(log.time))) for log in logs]
-    # The slowest log decides: its band holds nothing above.
-    dt = max(steps)
-    rate = 1.0 / dt
-    longest = max(float(log.time[-1] - log.time[0]) for log in logs)
-    smallest = 2.0 * 2.0 / (LONGEST_KERNEL * longest)
-    if smallest > LARGEST_SHARE * rate:
-        raise PreparationError(
-            f"{logs[0].name}: {longest:.3g} s at {rate:.4g} Hz are too short to be filtered; "
-            "log longer or faster"
-        )
-    if cutoff is not None:
-        if not smallest <= cutoff <= LARGEST_SHARE * rate:
-            raise PreparationError(
-                f"cut-off {cutoff:g} Hz; logs of {longest:.3g} s at {rate:.4g} Hz allow "
-                f"{smallest:.3g} to {LARGEST_SHARE * rate:.4g} Hz"
-            )
-        return Settings(dt, float(cutoff), "set by the user")
-    asked = []
-    for k, log in enumerate(logs):
-        position_ok = usable[k][0] if usable is not None else np.isfinite(log.position)
-        grid = uniform_grid(log.time, dt)
-        q = grid.resample(fill_gaps(log.time, log.position, position_ok))
-        stretches = [q[part] for part in busiest(q, grid.pieces) if part.stop - part.start >= 64]
-        if stretches:
-            asked.append(choose_cutoff(stretches, rate, smallest=smallest))
-    table = np.array(asked) if asked else np.full((1, len(logs[0].joints)), np.nan)
-    if np.isnan(table).all():
-        raise PreparationError(f"{logs[0].name}: no joint moves; nothing can be compared")
-    with np.errstate(all="ignore"):
-        per_joint = np.where(
-            np.isnan(table).all(axis=0), np.nan, np.nanmin(np.nan_to_num(table, nan=np.inf), axis=0)
-        )
-    slowest = int(np.nanargmin(per_joint))
-    value = float(per_joint[slowest])
-    reason = f"position spectrum of {logs[0].joints[slowest]} meets its noise"
-    return Settings(dt, value, reason, per_joint)
 
 
 def prepare(
@@ -219,7 +182,7 @@ def prepare(
     contact: Contact | None = None,
     core: slice | None = None,
     origin: float | None = None,
-    noise: tuple[Array, Array] | None = None,
+    known: Calibration | None = None,
 ) -> Prepared:
     """Bring a log to one grid and bandwidth.
 
@@ -231,61 +194,40 @@ def prepare(
         contact: Which feet stand at the log's rows; from its forces or contact columns by default.
         core: Rows of the log that count, for a chunk.
         origin: A time on the uniform grid [s], for a chunk; the first by default.
-        noise: Noise of effort and position from the whole log, for a chunk.
+        known: Noises and fusion of the whole log, for a chunk.
 
     Raises:
         PreparationError: No joint moves, or the log is too short for the filter.
     """
-    position_ok, effort_ok = usable if usable is not None else _finite(log)
+    position_ok, effort_ok = usable if usable is not None else finite(log)
     settings = settings or choose_settings([log], [(position_ok, effort_ok)])
-    grid = uniform_grid(log.time, settings.dt, origin)
+    longest_gap = 1.0 / (4.0 * settings.cutoff)
+    grid = uniform_grid(log.time, settings.dt, origin, bridge=longest_gap)
     lowpass = settings.lowpass
     chosen = log.effort
-    longest_gap = 1.0 / (4.0 * settings.cutoff)
-
-    q_raw = grid.resample(fill_gaps(log.time, log.position, position_ok))
-    effort_raw = grid.resample(fill_gaps(log.time, chosen.values, effort_ok))
-    no_motion = grid.flags(long_runs(log.time, ~position_ok, longest_gap))
-    no_effort = grid.flags(long_runs(log.time, ~effort_ok, longest_gap))
-
-    n, j = q_raw.shape
-    q, v, a, effort = (np.empty((n, j)) for _ in range(4))
-    motion_ok, effort_good = np.empty((n, j), dtype=np.bool_), np.empty((n, j), dtype=np.bool_)
+    series = _filtered(log, grid, settings, (position_ok, effort_ok))
     extras = _filtered_extras(log, grid, lowpass)
-    for piece in grid.pieces:
-        q[piece], v[piece], a[piece] = lowpass.derivatives(q_raw[piece])
-        effort[piece] = lowpass.smooth(effort_raw[piece])
-        motion_ok[piece] = lowpass.share(no_motion[piece]) <= TOLERATED_SHARE
-        effort_good[piece] = lowpass.share(no_effort[piece]) <= TOLERATED_SHARE
-    effort[no_effort] = np.nan
-    if noise is None:
-        stretches = busiest(q_raw, grid.pieces)
-        noise = (
-            smoother_noise(effort_raw, effort_good, stretches, lowpass, in_band=True),
-            smoother_noise(q_raw, motion_ok, stretches, lowpass, in_band=False),
-        )
-    floor, position_noise = noise
+    other = _other(log, grid, chosen.channel)
+    if known is None:
+        known = _calibrated(log, grid, settings, series, other)
+    _fuse(series.v, series.a, grid, other, known.fusion, lowpass, longest_gap)
     contact = contact or log_contact(log)
     on_grid = contact.rows(grid.nearest) if contact is not None else None
-    rows = slice(0, n)
-    if core is not None:
-        inside = (grid.nearest >= core.start) & (grid.nearest < core.stop)
-        rows = slice(int(np.argmax(inside)), n - int(np.argmax(inside[::-1])))
     return Prepared(
         log=log,
         time=grid.time,
-        q=q,
-        v=v,
-        a=a,
-        effort=effort,
+        q=series.q,
+        v=series.v,
+        a=series.a,
+        effort=series.effort,
         channel=chosen.channel,
         unit=chosen.unit,
-        mask=effort_good & motion_ok.all(axis=1, keepdims=True),
-        motion_ok=motion_ok,
+        mask=series.effort_ok & series.motion_ok.all(axis=1, keepdims=True),
+        motion_ok=series.motion_ok,
         torque_off=None if log.torque_off is None else log.torque_off[grid.nearest],
-        noise=floor,
+        noise=known.noise,
         noise_basis="smoother",
-        position_noise=position_noise,
+        position_noise=known.position_noise,
         settings=settings,
         pieces=grid.pieces,
         contact=on_grid,
@@ -293,14 +235,116 @@ def prepare(
         foot_force=extras.pop("foot_force", None),
         base_roll=extras.pop("base_roll", None),
         base_pitch=extras.pop("base_pitch", None),
-        other=_other(log, grid, chosen.channel),
-        core=rows,
+        other=other,
+        fusion=known.fusion,
+        stamp_error=known.stamp_error,
+        grid=grid,
+        usable=(position_ok, effort_ok),
+        log_contact=contact,
+        core=_core(grid, core),
         row=grid.nearest,
     )
 
 
-def _finite(log: Log) -> tuple[Mask, Mask]:
-    return np.isfinite(log.position), log.valid & np.isfinite(log.effort.values)
+@dataclass(frozen=True, eq=False)
+class _Series:
+    """Positions and efforts on the grid, before and after the filter, each (N, J)."""
+
+    q_raw: Array
+    effort_raw: Array
+    q: Array
+    v: Array
+    a: Array
+    effort: Array
+    motion_ok: Mask
+    effort_ok: Mask
+
+
+def _filtered(log: Log, grid: Grid, settings: Settings, usable: tuple[Mask, Mask]) -> _Series:
+    """Bridge short holes, resample, filter, and mark what the filter sees too little of."""
+    lowpass, longest = settings.lowpass, 1.0 / (4.0 * settings.cutoff)
+    position_ok, effort_ok = usable
+    q_raw = grid.resample(fill_gaps(log.time, log.position, position_ok))
+    effort_raw = grid.resample(fill_gaps(log.time, log.effort.values, effort_ok))
+    no_motion = grid.flags(long_runs(log.time, ~position_ok, longest))
+    no_effort = grid.flags(long_runs(log.time, ~effort_ok, longest))
+    q, v, a, effort = (np.empty_like(q_raw) for _ in range(4))
+    motion_good, effort_good = np.empty_like(no_motion), np.empty_like(no_motion)
+    for piece in grid.pieces:
+        q[piece], v[piece], a[piece] = lowpass.derivatives(q_raw[piece])
+        effort[piece] = lowpass.smooth(effort_raw[piece])
+        motion_good[piece] = lowpass.share(no_motion[piece]) <= TOLERATED_SHARE
+        effort_good[piece] = lowpass.share(no_effort[piece]) <= TOLERATED_SHARE
+    effort[no_effort] = np.nan
+    return _Series(q_raw, effort_raw, q, v, a, effort, motion_good, effort_good)
+
+
+def _calibrated(
+    log: Log, grid: Grid, settings: Settings, series: _Series, other: dict[str, Array]
+) -> Calibration:
+    """Noises, the say of velocity columns, and errors of time stamps."""
+    lowpass, stretches = settings.lowpass, busiest(series.q_raw, grid.pieces)
+    good = (series.effort_ok, series.motion_ok)
+    floor = smoother_noise(series.effort_raw, good[0], stretches, lowpass, in_band=True)
+    noise = smoother_noise(series.q_raw, good[1], stretches, lowpass, in_band=False)
+    fusion = _fusion(grid, other, (series.v, series.a), good[1], noise, lowpass)
+    rows = slice(0, STAMP_ROWS)
+    stamps, error = stamp_error(log.time[rows], log.position[rows], GAP * settings.dt)
+    return Calibration(floor, noise, fusion, stamps if stamps > 4 * error else 0.0)
+
+
+def _core(grid: Grid, core: slice | None) -> slice:
+    """Rows of the grid that lie in rows of the log."""
+    n = grid.time.size
+    if core is None:
+        return slice(0, n)
+    inside = (grid.nearest >= core.start) & (grid.nearest < core.stop)
+    return slice(int(np.argmax(inside)), n - int(np.argmax(inside[::-1])))
+
+
+def _fusion(
+    grid: Grid,
+    other: dict[str, Array],
+    rates: tuple[Array, Array],
+    ok: Mask,
+    position_noise: Array,
+    lowpass: LowPass,
+) -> Fusion:
+    """How the log's velocity columns are to be weighed, where it has some."""
+    column = other.get("velocity")
+    if column is None:
+        return position_alone(position_noise, lowpass)
+    good = np.isfinite(column)
+    filled = np.where(good, column, 0.0)
+    noise = smoother_noise(filled, good, busiest(filled, grid.pieces), lowpass, in_band=False)
+    noises = (position_noise, noise)
+    return fuse_by_noise(grid.time, column, ok, rates, noises, grid.pieces, lowpass)
+
+
+def _fuse(
+    v: Array,
+    a: Array,
+    grid: Grid,
+    other: dict[str, Array],
+    fusion: Fusion,
+    lowpass: LowPass,
+    longest_gap: float,
+) -> None:
+    """Average speeds and accelerations, in place, with what the velocity columns say."""
+    column = other.get("velocity")
+    if column is None:
+        return
+    missing = long_runs(grid.time, ~np.isfinite(column), longest_gap)
+    for j in np.flatnonzero(fusion.weight.any(axis=0)):
+        if not np.isfinite(column[:, j]).any():
+            continue
+        straight = fusion.aligned(grid.time, column[:, j], int(j))
+        for piece in grid.pieces:
+            speed, rate = lowpass.derivatives(straight[piece, None])[:2]
+            seen = lowpass.share(missing[piece, j, None])[:, 0] <= TOLERATED_SHARE
+            for into, reading, order in ((v, speed, 0), (a, rate, 1)):
+                w = np.where(seen, fusion.weight[order, j], 0.0)
+                into[piece, j] += w * (reading[:, 0] - into[piece, j])
 
 
 def _filtered_extras(log: Log, grid: Grid, lowpass: LowPass) -> dict[str, Any]:
@@ -319,7 +363,16 @@ def _filtered_extras(log: Log, grid: Grid, lowpass: LowPass) -> dict[str, Any]:
 
 
 def _other(log: Log, grid: Grid, channel: str) -> dict[str, Array]:
-    wanted = ("velocity", "torque", "current", "voltage", "power", "goal_position", "temperature")
+    wanted = (
+        "velocity",
+        "motor_position",
+        "torque",
+        "current",
+        "voltage",
+        "power",
+        "goal_position",
+        "temperature",
+    )
     out = {}
     known = {f.name for f in fields(log)}
     for name in (*wanted, "supply"):

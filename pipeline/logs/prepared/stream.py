@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.contact import Contact
 from pipeline.logs.prepared.informative import STRETCH, Scan, choose, scan
-from pipeline.logs.prepared.prepare import Prepared, Settings, choose_settings, prepare
+from pipeline.logs.prepared.prepare import Calibration, Prepared, prepare
+from pipeline.logs.prepared.settings import Settings, choose_settings
 from pipeline.logs.quality.finding import Quality
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.expected import Expected
@@ -179,14 +180,13 @@ def stream_prepared(
     quality.refuse()
     settings = settings or choose_settings([seen], [quality.usable])
     ready = prepare(seen, settings, usable=quality.usable)
-    noise = (ready.noise, ready.position_noise)
-    yield from prepared_chunks(stream, settings, noise, rows=rows, largest=largest)
+    yield from prepared_chunks(stream, settings, ready.calibration, rows=rows, largest=largest)
 
 
 def prepared_chunks(
     stream: Stream,
     settings: Settings,
-    noise: tuple[Array, Array],
+    known: Calibration,
     *,
     rows: int = CHUNK_ROWS,
     largest: Mapping[str, Array] | None = None,
@@ -202,7 +202,7 @@ def prepared_chunks(
     Args:
         stream: The log.
         settings: Grid and cut-off.
-        noise: Of effort and position, each shape (J,).
+        known: Noises and fusion of the whole log.
         rows: Per chunk.
         largest: As for `judge`.
         contact: How to tell which feet stand; by the log's own forces or columns by default.
@@ -216,7 +216,7 @@ def prepared_chunks(
     before = 0  # rows at the start of `kept` that were given out already
 
     def chunk(log: Log, core: slice, origin: float) -> tuple[Quality, Prepared]:
-        quality = judge(log, stream.expected, largest=largest)
+        quality = judge(log, stream.expected, largest=largest, whole=False)
         quality.refuse(overlooked=FINE_IN_A_CHUNK)
         ready = prepare(
             log,
@@ -225,7 +225,7 @@ def prepared_chunks(
             contact=contact(log) if contact else None,
             core=core,
             origin=origin,
-            noise=noise,
+            known=known,
         )
         return quality, ready
 

@@ -71,6 +71,25 @@ class Quality:
         refuse([f for f in self.findings if f.check not in overlooked])
 
 
+class Findings(list[Finding]):
+    """A list of one log's findings that fills in its name."""
+
+    def __init__(self, log: str) -> None:
+        """Begin.
+
+        Args:
+            log: Its name.
+        """
+        super().__init__()
+        self._log = log
+
+    def note(
+        self, column: str, check: str, value: float, unit: str, verdict: str, detail: str
+    ) -> None:
+        """Add one."""
+        self.append(Finding(self._log, column, check, float(value), unit, verdict, detail))
+
+
 def refuse(findings: Sequence[Finding]) -> None:
     """Stop where a finding refuses its log.
 

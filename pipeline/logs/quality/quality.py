@@ -8,8 +8,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs.quality.finding import Finding, Quality
+from pipeline.logs.quality.carried import feet_carry, torque_on_time
+from pipeline.logs.quality.finding import Findings, Quality
 from pipeline.logs.quality.glitches import glitches
+from pipeline.logs.quality.presence import frozen, is_constant, presence
 from pipeline.logs.quality.sampling import clock, held, quantum, saturated, standstill
 from pipeline.logs.quality.unit_check import (
     column_name,
@@ -19,6 +21,7 @@ from pipeline.logs.quality.unit_check import (
 )
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import EFFORTS, Log
+from pipeline.logs.signals.spacing import interpolated, own_spacing
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,24 +30,19 @@ Mask = NDArray[np.bool_]
 FEWEST_ROWS: Final = 100
 #: Slower logs show no dynamics [Hz].
 SLOWEST: Final = 5.0
+#: Share of values on a lattice from which a channel is a rounded sensor's own.
+_ROUNDED: Final = 0.8
 #: Share of repeats from which a channel counts as held.
 HELD: Final = 0.1
 
 
-class _Findings(list[Finding]):
-    """A list that fills in the log's name."""
-
-    def __init__(self, log: Log) -> None:
-        super().__init__()
-        self._log = log.name
-
-    def note(
-        self, column: str, check: str, value: float, unit: str, verdict: str, detail: str
-    ) -> None:
-        self.append(Finding(self._log, column, check, float(value), unit, verdict, detail))
-
-
-def judge(log: Log, expected: Expected, *, largest: Mapping[str, Array] | None = None) -> Quality:
+def judge(
+    log: Log,
+    expected: Expected,
+    *,
+    largest: Mapping[str, Array] | None = None,
+    whole: bool = True,
+) -> Quality:
     """Judge a log; see `Quality.refuse` for turning refusals into an error.
 
     Args:
@@ -52,8 +50,9 @@ def judge(log: Log, expected: Expected, *, largest: Mapping[str, Array] | None =
         expected: The robot's limits.
         largest: Channel to the largest magnitude the drive can give, shape (J,); torque from the
             joints' effort limits by default.
+        whole: Whether this is a whole log and no piece of one.
     """
-    found = _Findings(log)
+    found = Findings(log.name)
     position_ok = np.isfinite(log.position)
     n = len(log)
     found.note(
@@ -69,16 +68,23 @@ def judge(log: Log, expected: Expected, *, largest: Mapping[str, Array] | None =
         return Quality(tuple(found), position_ok, effort_ok)
     beat = _rate(log, found)
     still = standstill(_bridged(log.position), beat)
-    dead = _presence(log, still, found)
+    dead, silent = presence(log, still, found, whole=whole)
     stale = _positions(log, position_ok, still, found)
     position_ok = position_ok & ~stale & ~_jumps(log, found)
-    effort_ok = _efforts(log, still, found)
+    effort_ok = _efforts(log, still, silent, found)
     _repeated_rows(log, still, found)
     if not dead:
         found += position_units(log, expected, position_ok)
         found += velocity_units(log, expected, position_ok, beat)
     found += effort_units(log, {"torque": expected.effort_limit, **(largest or {})})
+    torque_on_time(log, beat, found)
     _feet(log, found)
+    feet_carry(log, expected.weight, found)
+    for column, remark in log.remarks.items():
+        found.note(column, "side", 1, "1", "warning", remark)
+    if log.repeated_times:
+        detail = f"{log.repeated_times} rows with the time of the row before were dropped"
+        found.note("time_s", "repeated_times", log.repeated_times, "1", "warning", detail)
     for column, meant in log.misspelt.items():
         detail = f"is ignored: no column of the log format; did you mean '{meant}'?"
         found.note(column, "misspelt", 1, "1", "warning", detail)
@@ -89,7 +95,7 @@ def judge(log: Log, expected: Expected, *, largest: Mapping[str, Array] | None =
     return Quality(tuple(found), position_ok, effort_ok)
 
 
-def _feet(log: Log, found: _Findings) -> None:
+def _feet(log: Log, found: Findings) -> None:
     """What the feet's sensors tell, and what not."""
     if log.foot_force is None:
         return
@@ -126,7 +132,7 @@ def _unit(rate: float) -> str:
     return "no time, name the column under [time]"
 
 
-def _rate(log: Log, found: _Findings) -> float:
+def _rate(log: Log, found: Findings) -> float:
     beat = clock(log.time)
     rate = 1.0 / beat.dt
     slow = rate < SLOWEST
@@ -160,85 +166,18 @@ def _rate(log: Log, found: _Findings) -> float:
     return beat.dt
 
 
-def _presence(log: Log, still: Mask, found: _Findings) -> bool:
-    """Empty and constant columns. Returns whether positions are beyond further checks."""
-    dead = False
-    effort = log.effort
-    quantity = "motor_position" if log.position_source == "motor" else "position"
-    constant = [_is_constant(log.position[:, j]) for j in range(len(log.joints))]
-    for j, joint in enumerate(log.joints):
-        column = column_name(joint, quantity)
-        finite = np.isfinite(log.position[:, j])
-        good = np.isfinite(effort.values[:, j])
-        if not finite.any():
-            found.note(column, "empty", 1, "1", "refused", "holds no number at all")
-            dead = True
-        elif joint in log.locked:
-            found.note(column, "locked", 1, "1", "masked", "locked by the mapping; left out")
-        elif not good.any():
-            found.note(
-                column_name(joint, effort.channel),
-                "empty",
-                1,
-                "1",
-                "refused",
-                "holds no number at all",
-            )
-        elif constant[j] and not _is_constant(effort.values[:, j]):
-            found.note(
-                column,
-                "constant",
-                1,
-                "1",
-                "refused",
-                f"never changes from {log.position[finite, j][0]:.6g} rad while its "
-                f"{effort.channel} does; a dead sensor? If the joint stood still on "
-                "purpose, list it under locked in a mapping file",
-            )
-        elif _is_constant(effort.values[:, j]) and not constant[j]:
-            found.note(
-                column_name(joint, effort.channel),
-                "constant",
-                1,
-                "1",
-                "refused",
-                f"never changes from {effort.values[good, j][0]:.6g} {effort.unit} while "
-                "the joint moves; a dead sensor? Map another effort channel, or list the "
-                "joint under locked in a mapping file",
-            )
-        elif constant[j]:
-            found.note(
-                column,
-                "constant",
-                1,
-                "1",
-                "masked",
-                "position and effort never change: the joint is left out",
-            )
-        share = float(still[:, j].mean())
-        found.note(column, "standstill_share", share, "1", "ok", f"{100 * share:.1f} % at rest")
-    if all(constant):
-        found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
-    return dead
-
-
-def _is_constant(x: Array) -> bool:
-    if not np.isfinite(x[0]) or not np.isfinite(x[-1]):
-        x = x[np.isfinite(x)]
-    return x.size > 0 and not np.any(np.isfinite(x) & (x != x[0]))
-
-
-def _positions(log: Log, ok: Mask, still: Mask, found: _Findings) -> Mask:
+def _positions(log: Log, ok: Mask, still: Mask, found: Findings) -> Mask:
     """Quantisation, held values and missing cells of the positions. Returns stale samples."""
     quantity = "motor_position" if log.position_source == "motor" else "position"
     stale = np.zeros_like(ok)
     for j, joint in enumerate(log.joints):
         column = column_name(joint, quantity)
         x = log.position[:, j]
-        step = _channel(found, column, x, "rad")
+        step, rounded = _channel(found, column, x, "rad")
+        stale[:, j] = _between(log, found, column, x, rounded)
         share, repeats = held(x, step)
         if share > HELD:
-            stale[:, j] = repeats
+            stale[:, j] |= repeats
             found.note(
                 column,
                 "held",
@@ -252,7 +191,7 @@ def _positions(log: Log, ok: Mask, still: Mask, found: _Findings) -> Mask:
     return stale
 
 
-def _jumps(log: Log, found: _Findings) -> Mask:
+def _jumps(log: Log, found: Findings) -> Mask:
     """Positions that jump away and back. Returns the samples."""
     quantity = "motor_position" if log.position_source == "motor" else "position"
     out = np.zeros(log.position.shape, dtype=np.bool_)
@@ -264,7 +203,7 @@ def _jumps(log: Log, found: _Findings) -> Mask:
     return out
 
 
-def _note_jumps(log: Log, found: _Findings, column: str, x: Array, rows: Mask, unit: str) -> None:
+def _note_jumps(log: Log, found: Findings, column: str, x: Array, rows: Mask, unit: str) -> None:
     count = int(rows.sum())
     first = int(np.argmax(rows))
     many = f"{count} rows jump away and back, the first" if count > 1 else "one row jumps away"
@@ -275,78 +214,95 @@ def _note_jumps(log: Log, found: _Findings, column: str, x: Array, rows: Mask, u
     found.note(column, "glitches", count, "1", "warning", detail)
 
 
-def _efforts(log: Log, still: Mask, found: _Findings) -> Mask:
+def _efforts(log: Log, still: Mask, silent: Mask, found: Findings) -> Mask:
     """Quantisation, held values, saturation and missing cells of the compared effort."""
     effort = log.effort
-    ok = log.valid & np.isfinite(effort.values)
-    for j, joint in enumerate(log.joints):
-        column = column_name(joint, effort.channel)
+    ok = log.valid & np.isfinite(effort.values) & ~silent
+    for j in np.flatnonzero(~silent):
         x = effort.values[:, j]
-        off = _is_constant(log.position[:, j]) and _is_constant(x)
-        if joint in log.locked or off:
-            ok[:, j] = False
-            continue
-        if _is_constant(x) or not np.isfinite(x).any():
-            continue
-        step = _channel(found, column, x, effort.unit)
-        share, repeats = held(x, step)
-        if share > HELD:
-            ok[:, j] &= ~repeats
-            found.note(
-                column,
-                "held",
-                share,
-                "1",
-                "masked",
-                f"{100 * share:.0f} % of the rows repeat while it changes: about one new "
-                f"value in {1 / max(1 - share, 1e-3):.1f} rows; repeats are bridged "
-                f"({int(repeats.sum())} rows)",
-            )
-        jumps = glitches(x)
-        if jumps.any():
-            ok[:, j] &= ~jumps
-            _note_jumps(log, found, column, x, jumps, effort.unit)
-        fresh = ~repeats if share > HELD else np.ones_like(repeats)
-        limit = saturated(x, ~still[:, j] & fresh, step)
-        if limit.any():
-            # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
-            hard = effort.channel != "voltage"
-            if hard:
-                ok[:, j] &= ~limit
-            found.note(
-                column,
-                "saturated",
-                float(limit.mean()),
-                "1",
-                "masked" if hard else "warning",
-                f"{int(limit.sum())} rows stick at {np.nanmax(np.abs(x[limit])):.5g} {effort.unit}",
-            )
-        if log.torque_off is not None and log.torque_off[:, j].any():
-            rows = log.torque_off[:, j]
-            found.note(
-                column,
-                "torque_off",
-                float(rows.mean()),
-                "1",
-                "masked",
-                f"{int(rows.sum())} rows with the drive off; bridge "
-                f"{log.torque_off_bridge or 'not stated (open or shorted?)'}",
-            )
+        if not is_constant(x) and np.isfinite(x).any():
+            ok[:, j] &= _effort(log, int(j), still[:, j], found)
     if log.chosen_effort is None and len(log.channels) > 1:
-        found.note(
-            "",
-            "effort",
-            1,
-            "1",
-            "ok",
-            f"{effort.channel} is compared; also there: "
-            + ", ".join(c for c in EFFORTS if c in log.channels and c != effort.channel),
-        )
+        others = ", ".join(c for c in EFFORTS if c in log.channels and c != effort.channel)
+        detail = f"{effort.channel} is compared; also there: {others}"
+        found.note("", "effort", 1, "1", "ok", detail)
     return ok
 
 
-def _channel(found: _Findings, column: str, x: Array, unit: str) -> float:
-    """Missing cells and quantum of one column. Returns the quantum."""
+def _effort(log: Log, j: int, still: Mask, found: Findings) -> Mask:
+    """Rows of one joint's effort that may be used, shape (N,)."""
+    effort = log.effort
+    column, x = column_name(log.joints[j], effort.channel), effort.values[:, j]
+    step, rounded = _channel(found, column, x, effort.unit)
+    drawn = _between(log, found, column, x, rounded)
+    ok = ~drawn
+    share, repeats = held(x, step)
+    if share > HELD:
+        ok &= ~repeats
+        detail = (
+            f"{100 * share:.0f} % of the rows repeat while it changes: about one new value in "
+            f"{1 / max(1 - share, 1e-3):.1f} rows; repeats are bridged ({int(repeats.sum())} rows)"
+        )
+        found.note(column, "held", share, "1", "masked", detail)
+    stuck = np.zeros_like(repeats)
+    stuck[~drawn] = frozen(x[~drawn], ~still[~drawn])
+    if stuck.any():
+        ok &= ~stuck
+        detail = (
+            f"{int(stuck.sum())} rows hold one value while the joint moves, the first from "
+            f"{log.time[int(np.argmax(stuck))]:.6g} s: a sensor that stopped; left out"
+        )
+        found.note(column, "frozen", float(stuck.mean()), "1", "warning", detail)
+    jumps = glitches(x)
+    if jumps.any():
+        ok &= ~jumps
+        _note_jumps(log, found, column, x, jumps, effort.unit)
+    fresh = ~repeats if share > HELD else np.ones_like(repeats)
+    ok &= ~_at_limit(log, column, x, saturated(x, ~still & fresh, step), found)
+    _note_drive_off(log, column, j, found)
+    return ok
+
+
+def _at_limit(log: Log, column: str, x: Array, limit: Mask, found: Findings) -> Mask:
+    """Rows at a limit that tell nothing, shape (N,)."""
+    if not limit.any():
+        return limit
+    # A voltage at the supply is still the voltage; a sensor at its end tells nothing.
+    hard = log.effort.channel != "voltage"
+    top = np.nanmax(np.abs(x[limit]))
+    detail = f"{int(limit.sum())} rows stick at {top:.5g} {log.effort.unit}"
+    verdict = "masked" if hard else "warning"
+    found.note(column, "saturated", float(limit.mean()), "1", verdict, detail)
+    return limit if hard else np.zeros_like(limit)
+
+
+def _note_drive_off(log: Log, column: str, j: int, found: Findings) -> None:
+    if log.torque_off is None or not log.torque_off[:, j].any():
+        return
+    rows = log.torque_off[:, j]
+    bridge = log.torque_off_bridge or "not stated (open or shorted?)"
+    detail = f"{int(rows.sum())} rows with the drive off; bridge {bridge}"
+    found.note(column, "torque_off", float(rows.mean()), "1", "masked", detail)
+
+
+def _between(log: Log, found: Findings, column: str, x: Array, rounded: float) -> Mask:
+    """Rows of a column that were interpolated between samples after sampling, shape (N,)."""
+    if rounded > _ROUNDED:  # steps of a rounded sensor make straight lines, too
+        return np.zeros(x.size, dtype=np.bool_)
+    rows = interpolated(log.time, x)
+    if rows.any():
+        share = float(rows.mean())
+        detail = (
+            f"{100 * share:.0f} % of the rows lie on straight lines between others: interpolated "
+            f"from about one sample in {1e3 * own_spacing(log.time, ~rows):.3g} ms, which is what "
+            "counts"
+        )
+        found.note(column, "interpolated", share, "1", "masked", detail)
+    return rows
+
+
+def _channel(found: Findings, column: str, x: Array, unit: str) -> tuple[float, float]:
+    """Missing cells of one column. Returns its quantum and the share of values on it."""
     missing = int((~np.isfinite(x)).sum())
     if 0 < missing < x.size:
         found.note(column, "missing", missing / x.size, "1", "masked", f"{missing} empty cells")
@@ -360,10 +316,10 @@ def _channel(found: _Findings, column: str, x: Array, unit: str) -> float:
             "ok",
             f"{100 * whole:.0f} % of the values lie on it",
         )
-    return step
+    return step, whole
 
 
-def _repeated_rows(log: Log, still: Mask, found: _Findings) -> None:
+def _repeated_rows(log: Log, still: Mask, found: Findings) -> None:
     """Rows that repeat the one before in every channel while something moves."""
     same = np.ones(len(log) - 1, dtype=np.bool_)
     for block in (log.position, log.velocity, *(getattr(log, c) for c in log.channels)):

@@ -83,7 +83,8 @@ def held(x: Array, step: float) -> tuple[float, Mask]:
     """Repeats that quantisation does not explain: sample-and-hold.
 
     Where a channel changes by more than two of its quanta per row on average, every row should
-    differ from the one before.
+    differ from the one before, but for those that rounding makes alike: no more rows than differ by
+    one smallest step.
 
     Args:
         x: Shape (N,).
@@ -103,7 +104,20 @@ def held(x: Array, step: float) -> tuple[float, Mask]:
     fast = change > max(2.0 * step, 0.1 * float(np.quantile(change, 0.95)), 1e-12)
     if fast.sum() < 50:
         return 0.0, np.zeros(n, dtype=np.bool_)
+    by_chance = _one_step(x, fast)
+    count = int(repeats[fast].sum())
+    if count <= 1.5 * by_chance + 4.0 * np.sqrt(count):
+        return 0.0, np.zeros(n, dtype=np.bool_)
     return float(repeats[fast].mean()), repeats & fast
+
+
+def _one_step(x: Array, rows: Mask) -> int:
+    """How often a channel (N,) changes by the smallest step it knows, either way."""
+    change = np.abs(np.diff(x, prepend=x[0]))
+    steps = change[rows & (change > 0)]
+    if steps.size == 0:
+        return 0
+    return int((steps < 1.5 * float(np.quantile(steps, 0.01))).sum())
 
 
 def saturated(x: Array, moving: Mask, step: float) -> Mask:

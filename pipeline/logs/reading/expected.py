@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pinocchio as pin
@@ -30,6 +30,7 @@ class Expected:
         feet: Names of legs in order.
         foot_alias: Other names of the same feet (their frames) to the leg's name.
         ratio: Motor angle per joint angle, signed, shape (J,); None where it is not known.
+        weight: What the feet carry [N]; None for a robot that does not stand on its feet.
     """
 
     robot: str
@@ -41,6 +42,7 @@ class Expected:
     feet: tuple[str, ...] = ()
     foot_alias: Mapping[str, str] = field(default_factory=dict)
     ratio: Array | None = None
+    weight: float | None = None
 
 
 def _limits(values: Array, *, missing_at_zero: bool) -> Array:
@@ -105,7 +107,7 @@ def expected_of_model(
 
 def expected_of_robot(robot: Robot, *, ratio: Array | None = None) -> Expected:
     """Names and limits of a robot file; a foot goes by its leg's or its frame's name."""
-    return expected_of_model(
+    expected = expected_of_model(
         robot.model,
         robot.spec.name,
         joints=robot.joints,
@@ -113,3 +115,7 @@ def expected_of_robot(robot: Robot, *, ratio: Array | None = None) -> Expected:
         feet=robot.leg_names,
         foot_alias={leg.foot: leg.name for leg in robot.spec.legs},
     )
+    if not robot.floating:
+        return expected
+    gravity = float(np.linalg.norm(robot.model.gravity.linear))
+    return replace(expected, weight=gravity * float(pin.computeTotalMass(robot.model)))

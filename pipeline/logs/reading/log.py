@@ -49,6 +49,7 @@ class Log:
         position: Joint side, shape (N, J) [rad].
         position_source: ``"joint"`` or ``"motor"``: which side of the gear the encoder sits on;
             motor angles are divided by the ratio.
+        motor_position: Of the motor over the ratio where both sides were measured, (N, J) [rad].
         velocity: As measured, shape (N, J) [rad/s].
         torque: At the joint side, shape (N, J) [N*m].
         current: Of the motor, shape (N, J) [A].
@@ -74,6 +75,9 @@ class Log:
         misspelt: Columns that were not used though they are nearly ones of the log format, and
             those.
         chosen_effort: Channel to compare, overriding the order of `EFFORTS`.
+        left_out: Joints that cannot be compared, and why.
+        remarks: Columns about which a reader should know something, and that.
+        repeated_times: Rows that were dropped because their time stood in the row before.
         derived: Channels that were computed from others by the mapping, with the formula.
         sha256: Of the file.
         source: The file's name.
@@ -84,6 +88,7 @@ class Log:
     joints: tuple[str, ...]
     position: Array
     position_source: str
+    motor_position: Array | None = None
     velocity: Array | None = None
     torque: Array | None = None
     current: Array | None = None
@@ -108,6 +113,9 @@ class Log:
     ignored: tuple[str, ...] = ()
     misspelt: Mapping[str, str] = field(default_factory=dict)
     chosen_effort: str | None = None
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    remarks: Mapping[str, str] = field(default_factory=dict)
+    repeated_times: int = 0
     derived: Mapping[str, str] = field(default_factory=dict)
     sha256: str = ""
     source: Path = Path()
@@ -118,7 +126,9 @@ class Log:
             object.__setattr__(self, "valid", np.isfinite(self.position))
         shapes = {"time": (n,), "valid": (n, j), "torque_off": (n, j)}
         shapes |= dict.fromkeys(("base_roll", "base_pitch", "supply"), (n,))
-        shapes |= dict.fromkeys(("velocity", *EFFORTS, "goal_position", "temperature"), (n, j))
+        shapes |= dict.fromkeys(
+            ("velocity", *EFFORTS, "goal_position", "temperature", "motor_position"), (n, j)
+        )
         for key, shape in shapes.items():
             value = getattr(self, key)
             if value is not None and value.shape != shape:

@@ -24,6 +24,9 @@ All tables are optional::
     [joints]                                # the log's name of a joint = the robot's name
     shoulder = "joint_1"
 
+    [gear_ratio]                            # motor turns per joint turn, signed
+    joint_1 = 100
+
     [torque_enabled]                        # column that is zero where the drive is off
     joint_1 = "torque_on"
 
@@ -137,6 +140,7 @@ class Mapping:
     constants: MappingType[str, float] = field(default_factory=dict)
     keep: tuple[str, ...] = ()
     logs: tuple[LogRule, ...] = ()
+    ratio: MappingType[str, float] = field(default_factory=dict)
 
     def rule_for(self, log_name: str) -> LogRule:
         """What holds for one log: its file's stem is matched against every `[[logs]]`."""
@@ -194,6 +198,7 @@ def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
             LogRule(log.match, log.gain_per_rad, log.condition, _constants(log.constants))
             for log in read.logs
         ),
+        ratio=read.gear_ratio,
     )
 
 

@@ -190,6 +190,7 @@ class MappingTable(Table):
     columns: dict[str, ColumnTable] = Field(default_factory=dict)
     joints: dict[str, str] = Field(default_factory=dict)
     torque_enabled: dict[str, str] = Field(default_factory=dict)
+    gear_ratio: dict[str, Factor] = Field(default_factory=dict)
     controller: ControllerTable = ControllerTable()
     supply: SupplyTable = SupplyTable()
     constants: Constants = Field(default_factory=dict)

@@ -3,86 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.errors import UnitError, closest, one_line
-from actuators.units import dimension, from_si
-from pipeline.logs.errors import GapError, LogContentError, LogFormatError, WrongRobotError
+from actuators.errors import one_line
+from actuators.units import from_si
+from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import EFFORTS, Log
-from pipeline.logs.reading.log_format import (
-    JOINT_COLUMNS,
-    TIME,
-    Target,
-    misspelt,
-    parse_column,
-    suggest_column,
-)
-from pipeline.logs.reading.mapping import ColumnRule, LogRule, Mapping
-from pipeline.logs.reading.table_file import (
-    TableFile,
-    open_table,
-    read_columns,
-    sha256,
-    stream_columns,
-)
+from pipeline.logs.reading.log_format import TIME, parse_column
+from pipeline.logs.reading.mapping import ColumnRule, Mapping
+from pipeline.logs.reading.plan import ReadingPlan, derives_voltage, plan_reading
+from pipeline.logs.reading.sides import sides_of
+from pipeline.logs.reading.table_file import read_columns, sha256, stream_columns
 
 Array = NDArray[np.float64]
-_IDENTITY: Final = ColumnRule("", "")
 _LARGEST: Final = 1e9  # nothing a robot measures is larger in the log's units
-
-
-@dataclass(frozen=True)
-class _Source:
-    """A column of the file and the affine map that brings it into the log's unit."""
-
-    column: str
-    factor: float
-    offset: float
-
-
-@dataclass(frozen=True)
-class ReadingPlan:
-    """Which column of a file goes where; made from its header alone.
-
-    Attributes:
-        table: The open file.
-        expected: The robot's names and limits.
-        mapping: The mapping.
-        rule: What holds for this log.
-        sources: Target to column.
-        ignored: Columns that mean nothing to the log format.
-        misspelt: Those among them that are nearly one of it, and that one.
-    """
-
-    table: TableFile
-    expected: Expected
-    mapping: Mapping
-    rule: LogRule
-    sources: dict[Target, _Source]
-    ignored: tuple[str, ...]
-    misspelt: dict[str, str]
-
-    @property
-    def channel(self) -> str:
-        """The effort channel that is compared, as far as mapping and header say."""
-        have = {t.quantity for t in self.sources}
-        return self.mapping.effort or next((c for c in EFFORTS if c in have), "voltage")
-
-    @property
-    def columns(self) -> list[str]:
-        """Columns to read from the file."""
-        wanted = [source.column for source in self.sources.values()]
-        wanted += self.mapping.torque_enabled.values()
-        wanted += self.mapping.keep
-        if self.mapping.supply_column:
-            wanted.append(self.mapping.supply_column)
-        return list(dict.fromkeys(wanted))
 
 
 def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> Log:
@@ -135,215 +74,6 @@ def stream_log(
         yield log
 
 
-def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:
-    """Decide from the header which column goes where.
-
-    Raises:
-        GapError: Columns are missing, occur twice after mapping, or belong to another robot.
-    """
-    mapping = mapping or Mapping()
-    table = open_table(path, mapping.dialect)
-    sources: dict[Target, _Source] = {}
-    ignored: dict[str, str] = {}
-    used_rules: set[ColumnRule] = set()
-    for column in table.header:
-        rule, name = _resolve(column, mapping)
-        used_rules.add(rule)
-        target = parse_column(name, expected, table.where)
-        if target is None:
-            if rule is not _IDENTITY:
-                raise GapError(
-                    f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', "
-                    f"which the log format does not know; "
-                    f"{closest(name, _known_columns(expected))}"
-                )
-            ignored[column] = name
-            continue
-        if target in sources:
-            raise LogFormatError(
-                f"{table.where}: '{one_line(column)}' and '{one_line(sources[target].column)}' "
-                "both give the same channel; keep one"
-            )
-        _check_unit(rule, target, mapping.where)
-        sources[target] = _Source(column, *rule.affine(target.unit))
-    for rule in mapping.columns:
-        if rule not in used_rules:
-            raise GapError(
-                f"{mapping.where}: no column of {table.where} matches '{one_line(rule.pattern)}'; "
-                f"{suggest_column(rule.pattern, table.header)}"
-            )
-    near = {
-        column: meant
-        for column, name in ignored.items()
-        if column not in mapping.keep and (meant := misspelt(name, expected))
-    }
-    plan = ReadingPlan(
-        table, expected, mapping, mapping.rule_for(path.stem), sources, tuple(ignored), near
-    )
-    _check_misspelt(plan)
-    _check_columns(plan)
-    return plan
-
-
-def _check_misspelt(plan: ReadingPlan) -> None:
-    """Refuse a slip of the pen that costs a channel: it would be left out without a word."""
-    for column, meant in plan.misspelt.items():
-        if parse_column(meant, plan.expected, plan.table.where) in plan.sources:
-            continue
-        raise LogFormatError(
-            f"{plan.table.where}: column '{one_line(column)}' is none of the log format and would "
-            f"be ignored; did you mean '{meant}'? Rename it, or list it under keep in a mapping "
-            "file"
-        )
-
-
-def _known_columns(expected: Expected) -> list[str]:
-    return [TIME, *(f"{j}__{suffix}" for j in expected.joints for suffix in JOINT_COLUMNS)]
-
-
-def _resolve(column: str, mapping: Mapping) -> tuple[ColumnRule, str]:
-    """The rule for a column and its name in the log format."""
-    if mapping.time_column == column:
-        return ColumnRule(column, TIME, mapping.time_unit), TIME
-    found, name = _IDENTITY, column
-    for rule in mapping.columns:
-        target = rule.matched(column)
-        # A rule for one column outranks a pattern.
-        if target is not None and (found is _IDENTITY or "*" not in rule.pattern):
-            found, name = rule, target
-    if name == TIME and found is _IDENTITY and mapping.time_unit != "s":
-        found = ColumnRule(column, TIME, mapping.time_unit)
-    owner, separator, quantity = name.rpartition("__")
-    if separator and owner in mapping.joints:
-        name = f"{mapping.joints[owner]}__{quantity}"
-    return found, name
-
-
-def _check_unit(rule: ColumnRule, target: Target, where: str) -> None:
-    if rule.unit in (None, "1"):
-        return
-    try:
-        found, wanted = dimension(str(rule.unit)), dimension(target.unit)
-    except UnitError as error:
-        raise GapError(f"{where}: {one_line(error)}") from None
-    if found != wanted:
-        raise GapError(
-            f"{where}: columns '{one_line(rule.pattern)}': '{rule.unit}' is a unit of {found}, "
-            f"{target.quantity} needs one of {wanted}"
-        )
-
-
-def _check_columns(plan: ReadingPlan) -> None:
-    table, expected, mapping = plan.table, plan.expected, plan.mapping
-    where = table.where
-    have = {(t.owner, t.quantity) for t in plan.sources}
-    if ("", "time") not in have and mapping.sample_rate is None:
-        raise LogFormatError(
-            f"{where}: no column {TIME}; {suggest_column(TIME, table.header)}; or give "
-            "sample_rate in a mapping file"
-        )
-    if ("", "time") in have and mapping.sample_rate is not None:
-        raise LogFormatError(
-            f"{mapping.where}: sample_rate is given and {where} has a column {TIME}; drop one"
-        )
-    with_position = [j for j in expected.joints if _position_quantity(have, j)]
-    if not with_position:
-        owners = {c.rpartition("__")[0] for c in table.header if "__position" in c}
-        seen = one_line(", ".join(sorted(owners)) or ", ".join(table.header))
-        raise WrongRobotError(
-            f"{where}: none of the {len(expected.joints)} joints of {expected.robot} "
-            f"('{expected.joints[0]}', ...) has a position; the log of another robot? "
-            f"It has: {seen}"
-        )
-    for joint in expected.joints:
-        if joint not in with_position:
-            wanted = f"{joint}__position_rad"
-            raise WrongRobotError(
-                f"{where}: joint '{joint}' has no column '{wanted}'; "
-                f"{suggest_column(wanted, table.header)}"
-            )
-        if {(joint, "position"), (joint, "motor_position")} <= have:
-            raise LogFormatError(
-                f"{where}: joint '{joint}' has a joint-side and a motor-side position; map one away"
-            )
-    sides = {_position_quantity(have, joint) for joint in expected.joints}
-    if len(sides) > 1:
-        raise LogFormatError(
-            f"{where}: some joints have joint-side, some motor-side positions; give one kind"
-        )
-    if sides == {"motor_position"} and expected.ratio is None:
-        raise LogFormatError(
-            f"{where}: motor-side positions need the gear ratios; give actuators with --model, or "
-            "scale the columns in a mapping file"
-        )
-    _check_efforts(plan, have)
-    for what, column in (
-        *((f"torque_enabled.{j}", c) for j, c in mapping.torque_enabled.items()),
-        *(("keep", c) for c in mapping.keep),
-        *((("supply", mapping.supply_column),) if mapping.supply_column else ()),
-    ):
-        if column not in table.header:
-            raise GapError(
-                f"{mapping.where}: {what}: column '{one_line(column)}' is not in {where}; "
-                f"{suggest_column(column, table.header)}"
-            )
-    for joint in (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values()):
-        if joint not in expected.joints:
-            raise GapError(
-                f"{mapping.where}: '{one_line(joint)}' is no joint of {expected.robot}; "
-                f"{closest(joint, expected.joints)}"
-            )
-
-
-def _position_quantity(have: set[tuple[str, str]], joint: str) -> str | None:
-    for quantity in ("position", "motor_position"):
-        if (joint, quantity) in have:
-            return quantity
-    return None
-
-
-def _check_efforts(plan: ReadingPlan, have: set[tuple[str, str]]) -> None:
-    """At least one effort channel, and each for all joints or none."""
-    where, joints, mapping = plan.table.where, plan.expected.joints, plan.mapping
-    found = [c for c in EFFORTS if any((j, c) in have for j in joints if j not in mapping.locked)]
-    for channel in found:
-        for joint in joints:
-            if (joint, channel) not in have and joint not in mapping.locked:
-                column = next(
-                    f"{joint}__{s}" for s, (q, _) in JOINT_COLUMNS.items() if q == channel
-                )
-                raise WrongRobotError(
-                    f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; log "
-                    "it, or list the joint under locked in a mapping file"
-                )
-    if not found and _derives_voltage(plan, have):
-        found = ["voltage"]
-    if not found:
-        columns = [
-            f"{joints[0]}__{suffix}"
-            for suffix, (name, _) in JOINT_COLUMNS.items()
-            if name in EFFORTS
-        ]
-        raise LogFormatError(
-            f"{where}: no effort channel; at least one of {', '.join(columns)} must be there"
-        )
-    if mapping.effort is not None and mapping.effort not in found:
-        raise LogFormatError(
-            f"{mapping.where}: effort = '{mapping.effort}' is not in {where}; "
-            f"{closest(mapping.effort, found)}"
-        )
-
-
-def _derives_voltage(plan: ReadingPlan, have: set[tuple[str, str]]) -> bool:
-    mapping = plan.mapping
-    return (
-        mapping.law == "duty"
-        and plan.rule.gain is not None
-        and (mapping.supply_column is not None or mapping.supply_voltage is not None)
-        and all((joint, "goal_position") in have for joint in plan.expected.joints)
-    )
-
-
 def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, digest: str) -> Log:
     """Put columns in their places.
 
@@ -358,6 +88,54 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
     """
     where, expected, mapping = plan.table.where, plan.expected, plan.mapping
     n = next(iter(data.values())).size
+    arrays, force = _arrays(plan, data, n, first_row)
+    if mapping.sample_rate is not None:
+        arrays["time"] = (first_row + np.arange(n)) / mapping.sample_rate
+    fresh = _check_time(arrays["time"], where, first_row)
+    sides = sides_of(
+        arrays.pop("position", None),
+        arrays.pop("motor_position", None),
+        expected,
+        mapping.ratio,
+        where,
+    )
+    position, left_out = _stand_still(sides.position, arrays, plan)
+    arrays |= {"position": position, "motor_position": sides.motor}
+    unused = _feet(arrays, force, expected)
+    ignored = [s.column for t, s in plan.sources.items() if (t.owner, t.quantity) in unused]
+    _drive(plan, data, arrays, n)
+    log = Log(
+        name=plan.table.path.stem,
+        joints=expected.joints,
+        position_source=sides.source,
+        left_out=left_out,
+        remarks={f"{j}__motor_position_rad": text for j, text in sides.remarks.items()},
+        repeated_times=int((~fresh).sum()),
+        gain=plan.rule.gain,
+        torque_off_bridge=mapping.torque_off_bridge,
+        constants=dict(plan.rule.constants),
+        condition=dict(plan.rule.condition),
+        locked=tuple(mapping.locked),
+        extra={column: data[column] for column in mapping.keep},
+        ignored=(*plan.ignored, *ignored),
+        misspelt=dict(plan.misspelt),
+        chosen_effort=mapping.effort,
+        sha256=digest,
+        source=plan.table.path,
+        **arrays,
+    )
+    return log if fresh.all() else log.rows(fresh)
+
+
+def _arrays(
+    plan: ReadingPlan, data: dict[str, Array], n: int, first_row: int
+) -> tuple[dict[str, Any], dict[tuple[str, str], Array]]:
+    """Attributes of the log by name, and forces and contacts by foot and quantity.
+
+    Raises:
+        LogContentError: Values that no robot measures.
+    """
+    where, expected, mapping = plan.table.where, plan.expected, plan.mapping
     arrays: dict[str, Any] = {}
     force: dict[tuple[str, str], Array] = {}
     by_joint: dict[str, dict[str, Array]] = {}
@@ -388,33 +166,32 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
             if joint in columns:
                 block[:, j] = columns[joint]
         arrays[quantity] = block
-    if mapping.sample_rate is not None:
-        arrays["time"] = (first_row + np.arange(n)) / mapping.sample_rate
-    _check_time(arrays["time"], where, first_row)
-    side = "joint"
-    if "motor_position" in arrays:
-        side = "motor"
-        arrays["position"] = arrays.pop("motor_position") / expected.ratio
-    unused = _feet(arrays, force, expected)
-    ignored = [s.column for t, s in plan.sources.items() if (t.owner, t.quantity) in unused]
-    _drive(plan, data, arrays, n)
-    return Log(
-        name=plan.table.path.stem,
-        joints=expected.joints,
-        position_source=side,
-        gain=plan.rule.gain,
-        torque_off_bridge=mapping.torque_off_bridge,
-        constants=dict(plan.rule.constants),
-        condition=dict(plan.rule.condition),
-        locked=tuple(mapping.locked),
-        extra={column: data[column] for column in mapping.keep},
-        ignored=(*plan.ignored, *ignored),
-        misspelt=dict(plan.misspelt),
-        chosen_effort=mapping.effort,
-        sha256=digest,
-        source=plan.table.path,
-        **arrays,
-    )
+    return arrays, force
+
+
+def _stand_still(
+    position: Array, arrays: dict[str, Any], plan: ReadingPlan
+) -> tuple[Array, dict[str, str]]:
+    """Give joints that the log does not know a place to stand.
+
+    Returns:
+        Positions, shape (N, J), and joints that cannot be compared, with the reason.
+    """
+    expected, mapping = plan.expected, plan.mapping
+    out, why = position.copy(), {}
+    efforts = [arrays[c] for c in EFFORTS if c in arrays]
+    derived = mapping.law == "duty" and "goal_position" in arrays
+    for k, joint in enumerate(expected.joints):
+        compared = derived or any(np.isfinite(e[:, k]).any() for e in efforts)
+        if not compared and not np.isfinite(position[:, k]).any():
+            out[:, k] = np.clip(0.0, expected.lower[k], expected.upper[k])
+            why[joint] = (
+                f"nothing tells where it stood: taken as still at {out[0, k]:.4g} rad; a mapping "
+                f"file can state {joint}__position_rad under [constants]"
+            )
+        elif not compared and joint not in mapping.locked:
+            why[joint] = "nothing tells its effort: its motion is used, it is not compared"
+    return out, why
 
 
 def _check_values(values: Array, column: str, where: str, first_row: int) -> None:
@@ -427,19 +204,22 @@ def _check_values(values: Array, column: str, where: str, first_row: int) -> Non
         )
 
 
-def _check_time(time: Array, where: str, first_row: int) -> None:
+def _check_time(time: Array, where: str, first_row: int) -> NDArray[np.bool_]:
+    """Refuse time that is missing or runs backward; returns the rows whose time is new, (N,)."""
     bad = ~np.isfinite(time)
     if bad.any():
         row = first_row + int(np.argmax(bad)) + 2
         raise LogContentError(f"{where}: row {row}: time is empty or not finite; drop the row")
     step = np.diff(time)
-    if (step <= 0).any():
-        k = int(np.argmax(step <= 0))
-        fact = "repeats" if step[k] == 0 else f"comes after {time[k]:.9g} s"
+    if (step < 0).any():
+        k = int(np.argmax(step < 0))
         raise LogContentError(
-            f"{where}: row {first_row + k + 3}: time {time[k + 1]:.9g} s {fact}; "
-            "sort the rows by time and drop repeats"
+            f"{where}: row {first_row + k + 3}: time {time[k + 1]:.9g} s comes after "
+            f"{time[k]:.9g} s; sort the rows by time"
         )
+    if time.size > 1 and not (step > 0).any():
+        raise LogContentError(f"{where}: time never changes from {time[0]:.9g} s")
+    return np.concatenate([[True], step > 0])
 
 
 def _feet(
@@ -484,7 +264,7 @@ def _drive(plan: ReadingPlan, data: dict[str, Array], arrays: dict[str, Any], n:
             off[:, joints.index(joint)] = ~(data[column] > 0.5)
         arrays["torque_off"] = off
     have = {(t.owner, t.quantity) for t in plan.sources}
-    if "voltage" not in arrays and _derives_voltage(plan, have):
+    if "voltage" not in arrays and derives_voltage(plan, have):
         # U = U_supply * clip(k (goal - position), -1, 1): the servo's duty, averaged over its PWM.
         duty = np.clip(plan.rule.gain * (arrays["goal_position"] - arrays["position"]), -1.0, 1.0)
         arrays["voltage"] = arrays["supply"][:, None] * duty

@@ -65,26 +65,29 @@ class Grid:
         return np.asarray(flag[self.left] | (flag[right] & used))
 
 
-def split_at_gaps(time: Array, dt: float) -> list[slice]:
-    """Stretches of rows without a step longer than `GAP` usual ones."""
-    cuts = np.flatnonzero(np.diff(time) > GAP * dt) + 1
+def split_at_gaps(time: Array, dt: float, bridge: float = 0.0) -> list[slice]:
+    """Stretches of rows without a step longer than `GAP` usual ones and than `bridge` [s]."""
+    cuts = np.flatnonzero(np.diff(time) > max(GAP * dt, bridge)) + 1
     edges = [0, *cuts.tolist(), time.size]
     return [slice(a, b) for a, b in pairwise(edges)]
 
 
-def uniform_grid(time: Array, dt: float, origin: float | None = None) -> Grid:
+def uniform_grid(
+    time: Array, dt: float, origin: float | None = None, *, bridge: float = 0.0
+) -> Grid:
     """Lay a uniform grid under a log.
 
     Args:
         time: Strictly increasing, shape (N,) [s].
         dt: Step [s].
         origin: A time on the grid; the log's first by default.
+        bridge: Steps up to this long are interpolated across [s].
 
     Returns:
         The log's own rows where each piece is uniform to within `JITTER_IGNORED` steps, else a grid
         to interpolate on.
     """
-    pieces = split_at_gaps(time, dt)
+    pieces = split_at_gaps(time, dt, bridge)
     if all(_is_uniform(time[piece], dt) for piece in pieces):
         return Grid(time, tuple(pieces), np.arange(time.size, dtype=np.intp))
     start = time[0] if origin is None else origin

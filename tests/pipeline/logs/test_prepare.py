@@ -16,7 +16,8 @@ from pipeline.logs.errors import GapError, PreparationError
 from pipeline.logs.prepared.contact import log_contact, lowest_feet, scheduled_contact
 from pipeline.logs.prepared.cycles import cycle_noise, period, repeat_noise
 from pipeline.logs.prepared.parts import CHOOSE, FIT, PROVE, split
-from pipeline.logs.prepared.prepare import Settings, choose_settings, prepare
+from pipeline.logs.prepared.prepare import prepare
+from pipeline.logs.prepared.settings import Settings, choose_settings
 from pipeline.logs.prepared.stream import stream_prepared
 from pipeline.logs.reading.expected import Expected, expected_of_robot
 from pipeline.logs.reading.read import read_log

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -57,28 +59,79 @@ def test_ten_rows_are_refused(two_joints: Expected) -> None:
     assert "10 rows" in refused(made_log(q[:10], e[:10]), two_joints)
 
 
-def test_all_nan_is_refused_and_the_column_named(two_joints: Expected) -> None:
+def test_a_position_without_a_number_is_refused_and_the_column_named(
+    two_joints: Expected,
+) -> None:
     q, _, e = good()
-    e[:, 1] = np.nan
-    assert "b__torque_Nm" in refused(made_log(q, e), two_joints)
     q[:] = np.nan
     assert "a__position_rad" in refused(made_log(q, e), two_joints)
 
 
-def test_constant_channels_are_refused_unless_locked(two_joints: Expected) -> None:
+def dead_effort(q: Array, e: Array) -> None:
+    e[:, 0] = 1.5
+
+
+def empty_effort(q: Array, e: Array) -> None:
+    e[:, 0] = np.nan
+
+
+def nearly_dead_effort(q: Array, e: Array) -> None:
+    e[:, 0] = np.sign(e[:, 0])
+
+
+def frozen_effort(q: Array, e: Array) -> None:
+    e[500:900, 0] = e[500, 0]
+
+
+def still_joint(q: Array, e: Array) -> None:
+    q[:, 0] = 0.3
+
+
+@pytest.mark.parametrize(
+    ("spoil", "column", "check", "left"),
+    [
+        (dead_effort, "a__torque_Nm", "constant", 0.0),
+        (empty_effort, "a__torque_Nm", "empty", 0.0),
+        (nearly_dead_effort, "a__torque_Nm", "nearly_dead", 0.0),
+        (frozen_effort, "a__torque_Nm", "frozen", 0.9),
+        (still_joint, "a__position_rad", "still", 1.0),
+    ],
+)
+def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
+    two_joints: Expected,
+    spoil: Callable[[Array, Array], None],
+    column: str,
+    check: str,
+    left: float,
+) -> None:
     q, _, e = good()
-    dead_effort = e.copy()
-    dead_effort[:, 0] = 1.5
-    message = refused(made_log(q, dead_effort), two_joints)
-    assert "a__torque_Nm" in message
-    assert "locked" in message
-    dead_position = q.copy()
-    dead_position[:, 1] = 0.3
-    assert "b__position_rad" in refused(made_log(dead_position, e), two_joints)
-    quality = judge(made_log(dead_position, e, locked=("b",)), two_joints)
+    spoil(q, e)
+    quality = judge(made_log(q, e), two_joints)
     quality.refuse()
+    assert checks(quality, "warning") == {(column, check)}
+    assert quality.effort_ok[:, 0].mean() == pytest.approx(left, abs=0.02)
+    assert quality.effort_ok[:, 1].all()
+
+
+def test_a_log_without_a_live_effort_is_refused(two_joints: Expected) -> None:
+    q, _, e = good()
+    assert "no joint that moves has a live torque" in refused(made_log(q, 0 * e + 1.5), two_joints)
+
+
+def test_a_locked_joint_is_left_out_without_a_warning(two_joints: Expected) -> None:
+    q, _, e = good()
+    q[:, 1] = 0.3
+    quality = judge(made_log(q, e, locked=("b",)), two_joints)
+    assert not checks(quality, "warning")
     assert not quality.effort_ok[:, 1].any()
     assert quality.effort_ok[:, 0].all()
+
+
+def test_repeats_that_rounding_makes_by_chance_are_not_held_values(two_joints: Expected) -> None:
+    q, _, e = good()
+    e = np.round((e + np.random.default_rng(1).normal(0, 0.1, e.shape)) / 0.04) * 0.04
+    assert (np.diff(e[:, 0]) == 0).mean() > 0.08
+    assert not [f for f in judge(made_log(q, e), two_joints).findings if f.check == "held"]
 
 
 def test_a_log_in_which_nothing_moves_is_refused(two_joints: Expected) -> None:

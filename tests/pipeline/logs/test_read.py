@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pipeline.logs.errors import GapError
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.mapping import parse_mapping
 from pipeline.logs.reading.read import read_log, stream_log
 from pipeline.logs.reading.table_file import open_table, row_count
 
@@ -129,8 +130,8 @@ def unsorted(c: Columns) -> Columns:
     return c
 
 
-def repeated(c: Columns) -> Columns:
-    c["time_s"][51] = c["time_s"][50]
+def stopped(c: Columns) -> Columns:
+    c["time_s"][:] = 1.0
     return c
 
 
@@ -138,8 +139,8 @@ def no_time(c: Columns) -> Columns:
     return {k: v for k, v in c.items() if k != "time_s"}
 
 
-def one_joint_missing(c: Columns) -> Columns:
-    return {k: v for k, v in c.items() if not k.startswith("b__")}
+def renamed_joint(c: Columns) -> Columns:
+    return {k.replace("b__", "c__"): v for k, v in c.items()}
 
 
 def misspelt_joint(c: Columns) -> Columns:
@@ -158,12 +159,8 @@ def no_effort(c: Columns) -> Columns:
     return {k: v for k, v in c.items() if "torque" not in k}
 
 
-def effort_of_one(c: Columns) -> Columns:
-    return {k: v for k, v in c.items() if k != "b__torque_Nm"}
-
-
-def both_sides(c: Columns) -> Columns:
-    return c | {"a__motor_position_rad": c["a__position_rad"]}
+def renamed_effort(c: Columns) -> Columns:
+    return {k.replace("b__torque", "c__torque"): v for k, v in c.items()}
 
 
 def huge(c: Columns) -> Columns:
@@ -180,15 +177,14 @@ def infinite_time(c: Columns) -> Columns:
     ("spoil", "words"),
     [
         (unsorted, ("row 53", "sort")),
-        (repeated, ("row 53", "repeats")),
         (no_time, ("time_s",)),
-        (one_joint_missing, ("'b'", "b__position_rad")),
+        (stopped, ("time never changes",)),
+        (renamed_joint, ("'b'", "b__position_rad", "c__position_rad")),
         (misspelt_joint, ("b__postion_rad", "did you mean 'b__position_rad'")),
         (another_robot, ("another robot", "wheel_1")),
         (other_unit, ("a__position_deg", "a__position_rad", "mapping")),
         (no_effort, ("no effort", "a__torque_Nm")),
-        (effort_of_one, ("'b'", "torque")),
-        (both_sides, ("'a'", "motor-side")),
+        (renamed_effort, ("'b'", "torque")),
         (huge, ("row 5", "a__torque_Nm", "1e+300")),
         (infinite_time, ("row 2001", "time")),
     ],
@@ -208,6 +204,52 @@ def test_bad_columns_give_one_clear_line(
     assert message.startswith("log.csv")
     for word in words:
         assert word in message, message
+
+
+def test_rows_that_repeat_a_time_are_dropped_and_counted(
+    two_joints: Expected, columns: Columns, write: Write
+) -> None:
+    whole = read_log(write(columns), two_joints)
+    columns["time_s"][51] = columns["time_s"][50]
+    log = read_log(write(columns), two_joints)
+    assert log.repeated_times == 1
+    assert np.array_equal(log.position, np.delete(whole.position, 51, axis=0))
+
+
+def test_a_joint_the_log_does_not_know_stands_still_and_is_left_out(
+    two_joints: Expected, columns: Columns, write: Write
+) -> None:
+    known = {k: v for k, v in columns.items() if not k.startswith("b__")}
+    log = read_log(write(known), two_joints)
+    assert np.all(log.position[:, 1] == 0.0)
+    assert "taken as still at 0 rad" in log.left_out["b"]
+    empty = columns | {k: np.full(2000, np.nan) for k in columns if k.startswith("b__")}
+    assert read_log(write(empty), two_joints).left_out == log.left_out
+    stated = parse_mapping(
+        {"constants": {"b__position_rad": {"value": 0.4, "unit": "rad"}}}, "mapping"
+    )
+    log = read_log(write(known), two_joints, stated)
+    assert np.all(log.position[:, 1] == 0.4)
+    assert "not compared" in log.left_out["b"]
+
+
+def test_a_joint_without_an_effort_keeps_its_motion(
+    two_joints: Expected, columns: Columns, write: Write
+) -> None:
+    del columns["b__torque_Nm"]
+    log = read_log(write(columns), two_joints)
+    assert np.array_equal(log.position[:, 1], columns["b__position_rad"])
+    assert not log.valid[:, 1].any()
+    assert "not compared" in log.left_out["b"]
+
+
+def test_columns_a_star_catches_beside_the_robots_joints_are_ignored(
+    two_joints: Expected, columns: Columns, write: Write
+) -> None:
+    foreign = {k.replace("__position_rad", " q"): v for k, v in columns.items()}
+    foreign |= {"gripper q": foreign["a q"]}
+    mapping = parse_mapping({"columns": {"* q": {"as": "*__position_rad"}}}, "mapping")
+    assert "gripper q" in read_log(write(foreign), two_joints, mapping).ignored
 
 
 HEAD = b"time_s,a__position_rad,b__position_rad,a__torque_Nm,b__torque_Nm\n"

@@ -1,0 +1,1 @@
+"""The standard matrix of blind trials: made, asked, scored straight."""

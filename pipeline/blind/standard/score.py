@@ -1,0 +1,148 @@
+"""An answer against the truth, scored straight: what is named first, where, and what is written.
+
+Every machine of the matrix has friction and bodies of its own beside what is hidden: naming those
+is neither right nor wrong. All other names count. *Right* is a hidden effect that is the first of
+them, at its place, and stands in the model file. *Wrong* is any other that stands there, whatever
+its level: a class of effects that look alike excuses nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pipeline.blind.answer import Answer, Named
+from pipeline.blind.twin.fixed.visible import THRESHOLD
+
+#: Names for what every machine has: friction of some law, and bodies that are not the URDF's.
+FRICTION: Final = frozenset(
+    {
+        *("coulomb_friction", "viscous_friction", "stribeck_friction", "load_dependent_friction"),
+        *("direction_dependent_friction", "backdrive_loss", "friction_curve", "joint_friction"),
+    }
+)
+BODIES: Final = frozenset(
+    {"rigid_body_parameters", "link_mass", "center_of_mass_offset", "link_inertia"}
+)
+#: One effect by definition, and the two halves at the same joint that name it, too.
+HALVES: Final[Mapping[str, frozenset[str]]] = {
+    "direction_dependent_friction": frozenset({"coulomb_friction", "effort_offset"}),
+}
+#: Parameters that are compared only up to conventions, or depend on what is beside them.
+NOT_COVERED: Final = frozenset({"phase", "rest", "velocity", "x", "y", "z"})
+CONFIRMED: Final = "confirmed"
+
+
+@dataclass(frozen=True)
+class StandardScore:
+    """One trial, judged.
+
+    Attributes:
+        truth: As sealed.
+        answer: Of the workflow.
+        counted: Names that count, in the order given.
+        right: Hidden effects that were named at their place and written.
+        first: Whether the first name that counts is a hidden one at its place, and written.
+        wrong: Written names that count and are not hidden.
+        intervals: Parameters of written right names with an interval.
+        covered: Of them, those that hold the truth.
+    """
+
+    truth: Mapping[str, Any]
+    answer: Answer
+    counted: tuple[Named, ...]
+    right: tuple[str, ...]
+    first: bool
+    wrong: tuple[Named, ...]
+    intervals: int
+    covered: int
+
+    @property
+    def hidden(self) -> list[Mapping[str, Any]]:
+        """What was hidden."""
+        return list(self.truth["hidden"])
+
+    @property
+    def visible(self) -> bool:
+        """Whether the log could show all of it."""
+        return bool(self.hidden) and all(h["misfit"] >= THRESHOLD for h in self.hidden)
+
+    @property
+    def in_catalogue(self) -> bool:
+        """Whether the workflow has names for all of it."""
+        return all(h["in_catalogue"] for h in self.hidden)
+
+
+def score_straight(truth: Mapping[str, Any], answer: Answer) -> StandardScore:
+    """Judge one answer.
+
+    Args:
+        truth: As sealed.
+        answer: Of the workflow.
+    """
+    hidden = truth["hidden"]
+    counted = tuple(n for n in answer.named if not _background(n, truth))
+    halves = _halves(hidden, answer.named)
+    right = tuple(
+        h["effect"]
+        for h in hidden
+        if h["effect"] in halves or any(_is(n, h) and n.written for n in counted)
+    )
+    first = bool(counted) and counted[0].written and any(_is(counted[0], h) for h in hidden)
+    wrong = tuple(
+        n
+        for n in counted
+        if n.written
+        and not any(_is(n, h) for h in hidden)
+        and not any(n.effect in HALVES[e] for e in halves)
+    )
+    intervals, covered = _coverage(hidden, counted)
+    return StandardScore(
+        truth, answer, counted, right, first or bool(halves), wrong, intervals, covered
+    )
+
+
+def _is(named: Named, hidden: Mapping[str, Any]) -> bool:
+    return named.effect == hidden["effect"] and list(named.place) == list(hidden["place"])
+
+
+def _background(named: Named, truth: Mapping[str, Any]) -> bool:
+    """Whether a name is for what the machine has beside what is hidden."""
+    hidden = truth["hidden"]
+    if named.effect in FRICTION:
+        # Where a joint's friction is what is hidden, its law has to be right.
+        own = {p for h in hidden if h["effect"] in FRICTION for p in h["place"]}
+        return bool(truth["friction"]) and not own & set(named.place)
+    if named.effect in BODIES:
+        return not any(h["effect"] in BODIES for h in hidden) or named.effect != "link_mass"
+    return (
+        named.effect == "time_delay"
+        and any(d > 0 for d in truth["delays_s"])
+        and not any(h["effect"] == "time_delay" for h in hidden)
+    )
+
+
+def _halves(hidden: Sequence[Mapping[str, Any]], named: Sequence[Named]) -> set[str]:
+    """Hidden effects that two written names say together."""
+    out = set()
+    for h in hidden:
+        halves = HALVES.get(h["effect"], frozenset())
+        place = list(h["place"])
+        given = {n.effect for n in named if n.written and list(n.place) == place}
+        if halves and halves <= given:
+            out.add(h["effect"])
+    return out
+
+
+def _coverage(hidden: Sequence[Mapping[str, Any]], counted: Sequence[Named]) -> tuple[int, int]:
+    count = covered = 0
+    for n in counted:
+        truth = next((h["values"] for h in hidden if _is(n, h)), None)
+        if truth is None or not n.written:
+            continue
+        for parameter, (_, low, high) in n.intervals.items():
+            if parameter in truth and parameter not in NOT_COVERED and low < high:
+                count += 1
+                covered += low <= truth[parameter] <= high
+    return count, covered

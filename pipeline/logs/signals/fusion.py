@@ -1,0 +1,130 @@
+"""Speed and acceleration from a position and a velocity column, weighed by their noises.
+
+A differentiated position and a measured velocity are two readings of one thing. Within the
+bandwidth each has a noise: of the position s_q |h'| and s_q |h''|, of the velocity s_v |h| and
+s_v |h'|, with the norms of the low-pass's kernel and its derivatives. The readings are averaged by
+inverse variance, speed and acceleration each for itself. The position is the reference: the
+velocity column is first brought to its factor, zero and time, and what the two still differ by
+beyond their noises counts as noise of the velocity (a drive's own filter, the other side of a soft
+gear).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.quality.skew import skew
+from pipeline.logs.signals.derivatives import LowPass
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Correlation with the position's rate below which a velocity column is another thing ...
+_SAME: Final = 0.9
+#: ... and how far its factor may be from one.
+_FACTOR: Final = 0.3
+#: Standard deviations by which a difference has to exceed the noises to count as one.
+_SURE: Final = 4.0
+#: Lags are looked for up to this long [s].
+_LONGEST_LAG: Final = 0.1
+
+
+@dataclass(frozen=True)
+class Fusion:
+    """How a log's velocity columns enter its speeds.
+
+    Attributes:
+        factor: Of the column to the position's rate, shape (J,); NaN where it is not used.
+        offset: Of the column, shape (J,) [rad/s].
+        lag: Positive where the column is late, shape (J,) [s].
+        weight: Of the column in speed and in acceleration, shape (2, J), 0 to 1.
+        noise: Of speed [rad/s] and acceleration [rad/s^2] within the bandwidth, shape (2, J).
+    """
+
+    factor: Array
+    offset: Array
+    lag: Array
+    weight: Array
+    noise: Array
+
+    def aligned(self, time: Array, column: Array, j: int) -> Array:
+        """A joint's column (N,) at the position's factor, zero and time."""
+        good = np.isfinite(column)
+        shifted = np.interp(time + self.lag[j], time[good], column[good])
+        return np.asarray((shifted - self.offset[j]) / self.factor[j])
+
+
+def position_alone(position_noise: Array, lowpass: LowPass) -> Fusion:
+    """The fusion that takes nothing from a velocity column."""
+    none = np.full(position_noise.size, np.nan)
+    noise = _norms(lowpass)[1:, None] * np.nan_to_num(position_noise)
+    return Fusion(none, none, none, np.zeros((2, none.size)), noise)
+
+
+def fuse_by_noise(
+    time: Array,
+    column: Array,
+    ok: Mask,
+    rates: tuple[Array, Array],
+    noises: tuple[Array, Array],
+    pieces: tuple[slice, ...],
+    lowpass: LowPass,
+) -> Fusion:
+    """Weigh velocity columns against differentiated positions.
+
+    Args:
+        time: Uniform within each piece, shape (N,) [s].
+        column: Velocity as measured, shape (N, J) [rad/s]; NaN where it was not.
+        ok: Where the position's rate is good, shape (N, J).
+        rates: First and second derivative of the filtered position, each (N, J).
+        noises: Standard deviation of a sample of position [rad] and velocity [rad/s], each (J,).
+        pieces: Stretches without a gap.
+        lowpass: The filter.
+    """
+    joints = column.shape[1]
+    h0, h1, h2 = _norms(lowpass)
+    own = np.stack([h1, h2])[:, None] * np.nan_to_num(noises[0])
+    factor, offset, lag = (np.full(joints, np.nan) for _ in range(3))
+    weight, noise = np.zeros((2, joints)), own.copy()
+    longest = max(pieces, key=lambda p: p.stop - p.start)
+    for j in range(joints):
+        good = ok[:, j] & np.isfinite(column[:, j])
+        if not np.isfinite(noises[1][j]) or good.mean() < 0.5:
+            continue
+        filled = np.interp(time, time[good], column[good, j])
+        smooth = lowpass.smooth(filled[longest, None])[:, 0]
+        rate = np.where(ok[longest, j], rates[0][longest, j], np.nan)
+        seen = skew(smooth, rate, 1.0 / lowpass.rate, longest=_LONGEST_LAG)
+        if seen is None or seen.correlation < _SAME or abs(seen.factor - 1.0) > _FACTOR:
+            continue
+        late = seen.lag if abs(seen.lag) > 4.0 * seen.lag_error else 0.0
+        factor[j], lag[j], offset[j] = seen.factor, late, 0.0
+        fusion = Fusion(factor, offset, lag, weight, noise)
+        straight = fusion.aligned(time, filled, j)
+        offset[j] = seen.factor * float(np.mean((straight - rates[0][:, j])[good]))
+        straight = straight - offset[j] / seen.factor
+        theirs = np.array([h0, h1]) * noises[1][j] / seen.factor
+        # So much may the scatter of a stretch exceed the noise by chance, at `_SURE` deviations.
+        independent = max(2.0 * lowpass.cutoff * (longest.stop - longest.start) / lowpass.rate, 1.0)
+        sure = 1.0 + _SURE * float(np.sqrt(2.0 / independent))
+        inside = np.array(ok[longest, j])
+        inside[: lowpass.half] = inside[inside.size - lowpass.half :] = False
+        if not inside.any():
+            continue
+        readings = lowpass.derivatives(straight[longest, None])[:2]
+        for order in (0, 1):
+            differ = (readings[order][:, 0] - rates[order][longest, j])[inside]
+            excess = float(np.mean(differ**2)) - sure * own[order, j] ** 2
+            both = max(theirs[order] ** 2, excess, 1e-300)
+            weight[order, j] = own[order, j] ** 2 / (own[order, j] ** 2 + both)
+            noise[order, j] = np.sqrt(weight[order, j] * both)
+    return Fusion(factor, offset, lag, weight, noise)
+
+
+def _norms(lowpass: LowPass) -> Array:
+    """Noise of filtered value, first and second derivative per noise of a sample, shape (3,)."""
+    return np.array([np.sqrt((kernel**2).sum()) for kernel in lowpass.kernels])

@@ -1,0 +1,73 @@
+"""Rows that are compared, what removed the others, and a log that keeps near zero of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.identification.compare.model_check import rows_left
+from pipeline.identification.workflow.locate import find_where
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup, take_in
+from pipeline.logs.errors import LogContentError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.logs.quality.finding import Finding
+
+PENDULUM = """<robot name="p"><link name="base"/>
+<joint name="a" type="revolute"><parent link="base"/><child link="l"/><axis xyz="0 1 0"/>
+<limit lower="-3" upper="3" effort="100" velocity="50"/></joint>
+<link name="l"><inertial><origin xyz="0 0 -0.2"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link></robot>
+"""
+
+
+def measured(mask: np.ndarray) -> Measurement:
+    n, joints = mask.shape
+    zero, one = np.zeros((n, joints)), np.ones(joints)
+    return Measurement(
+        "made", np.arange(n) / 100, tuple("ab"[:joints]), zero, zero, zero, ("torque",),
+        zero[..., None], one[:, None], mask, np.zeros(n, np.int8), np.zeros(n, np.intp),
+        (slice(0, n),), removed=(("the drive is off", 0.7), ("no effort", 0.3)),
+    )  # fmt: skip
+
+
+def told(mask: np.ndarray) -> list[Finding]:
+    return rows_left(measured(mask))
+
+
+def test_rows_left_name_what_took_the_others() -> None:
+    mask = np.zeros((400, 2), dtype=np.bool_)
+    mask[:100] = True
+    (seen,) = told(mask)
+    assert seen.verdict == "ok"
+    assert "25 % of all joints' rows are compared" in seen.detail
+    assert "70 % the drive is off" in seen.detail
+
+
+def test_a_joint_without_rows_is_left_out_and_a_log_without_is_refused() -> None:
+    mask = np.zeros((400, 2), dtype=np.bool_)
+    mask[:100, 0] = True
+    assert [(f.column, f.verdict) for f in told(mask)] == [
+        ("", "ok"),
+        ("b__torque_Nm", "warning"),
+    ]
+    (seen,) = told(np.zeros((400, 2), dtype=np.bool_))
+    assert seen.verdict == "refused"
+    assert seen.detail.startswith("near zero rows left (0 of 800): 70 % the drive is off; 30 % no")
+
+
+def test_a_joint_that_shivers_is_refused_for_its_reversals(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    t = np.arange(3000) / 100
+    q = 0.02 * np.sin(2 * np.pi * 4.0 * t) + rng.normal(0, 1e-5, t.size)
+    table = np.stack([t, q, 2 * np.sin(q) + rng.normal(0, 0.05, t.size)], axis=1)
+    log, robot = tmp_path / "log.csv", tmp_path / "p.urdf"
+    header = "time_s,a__position_rad,a__torque_Nm"
+    np.savetxt(log, table, delimiter=",", header=header, comments="")
+    robot.write_text(PENDULUM, encoding="utf-8")
+    options = Options((log,), robot=robot, step="where")
+    given = setup(options)
+    with pytest.raises(LogContentError, match=r"near zero rows left .* standstill or reversal"):
+        find_where(given, given.model, *take_in(given, options))
