@@ -26,7 +26,8 @@ from reports.figures.energy.stage_energy import energy_limits, stage_energy_figu
 from reports.figures.robot.gait_view import GaitStretch, gait_figure
 from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.robot_view import Leg, legs_of, robot_figure
-from reports.figures.robot.visuals import Primitive, joint_marks, primitives
+from reports.figures.robot.solids import Primitive, Solid
+from reports.figures.robot.visuals import joint_marks, read_shapes
 from reports.figures.several import Drawing, save_figures
 from reports.pages.names import leg_words, short_titles, shown_leg
 
@@ -145,7 +146,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
     return [*out, Drawing("electrical_energy", figure)]
 
 
-def _scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Leg]]:
+def _scene(robot: Robot, configuration: Array) -> tuple[list[Solid], list[Leg]]:
     """The robot's visual primitives and legs in one posture."""
     data = robot.model.createData()
     pin.framesForwardKinematics(robot.model, data, configuration)
@@ -156,7 +157,7 @@ def _scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Le
     }
     marks = joint_marks(robot.urdf, links)
     legs = {leg.name: (leg.joints, leg.foot) for leg in robot.spec.legs}
-    return primitives(robot.urdf, links), legs_of(legs, marks, links)
+    return read_shapes(robot.urdf, robot.spec.urdf.parent).at(links), legs_of(legs, marks, links)
 
 
 def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
@@ -183,7 +184,8 @@ def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawin
 
     def gait() -> Figure:
         scene, _ = _scene(robot, zero)
-        trunk = next((p for p in scene if p.link == robot.spec.base_link), None)
+        boxes = [p for p in scene if isinstance(p, Primitive)]
+        trunk = next((p for p in boxes if p.link == robot.spec.base_link), None)
         return gait_figure(
             robot.leg_names,
             _gait_stretches(robot, walking),

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.figures.robot.projection import View
-from reports.figures.robot.visuals import JointMark
+from reports.figures.robot.solids import JointMark
 from reports.figures.style import INK
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from reports.errors import FigureError
 from reports.figures.marks import axis_line, rotation_arrow
 from reports.figures.robot.projection import FRONT, OBLIQUE, SIDE, TOP, View, draw_scene, extent
 from reports.figures.robot.robot_view import Leg, frame_arrows
+from reports.figures.robot.solids import Solid
 from reports.figures.robot.sticks import with_sticks
-from reports.figures.robot.visuals import Primitive
 from reports.figures.style import BLUE, GREEN, QUIET, VERMILION, headline, new_figure, styled
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ JOINT_COLORS = (GREEN, BLUE, VERMILION)
 
 @styled
 def joint_directions_figure(
-    scene: Sequence[Primitive],
+    scene: Sequence[Solid],
     legs: Sequence[Leg],
     shown: str,
     *,
@@ -35,7 +35,7 @@ def joint_directions_figure(
     """Circular arrows show how each joint turns when its coordinate grows.
 
     Args:
-        scene: Visual primitives in the zero pose.
+        scene: Everything visible in the zero pose.
         legs: All legs in the zero pose.
         shown: Name of the leg that is shown obliquely, with its joints' names.
         title: First line.
@@ -69,7 +69,7 @@ def joint_directions_figure(
     return figure
 
 
-def _panel(axes: Axes, view: View, scene: Sequence[Primitive], title: str) -> None:
+def _panel(axes: Axes, view: View, scene: Sequence[Solid], title: str) -> None:
     close_up = view is OBLIQUE
     draw_scene(axes, view, scene, fade=0.45, pixels=700 if close_up else 450)
     axes.set_axis_off()

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from reports.errors import FigureError
 from reports.figures.marks import dimension
 from reports.figures.robot.projection import FRONT, OBLIQUE, SIDE, TOP, View, draw_scene, extent
+from reports.figures.robot.solids import JointMark, Primitive, Solid
 from reports.figures.robot.sticks import with_sticks
-from reports.figures.robot.visuals import JointMark, Primitive
 from reports.figures.style import BLUE, GREEN, INK, QUIET, VERMILION, headline, new_figure, styled
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def legs_of(
 
 @styled
 def robot_figure(
-    scene: Sequence[Primitive],
+    scene: Sequence[Solid],
     legs: Sequence[Leg],
     *,
     title: str,
@@ -76,7 +76,7 @@ def robot_figure(
     """Four views of the robot with the dimensions measured in the picture itself.
 
     Args:
-        scene: Visual primitives in the world, z up.
+        scene: Everything visible in the world, z up.
         legs: For labels and dimensions; the feet that stand are the lowest.
         title: First line.
         subtitle: Second line.
@@ -168,11 +168,12 @@ def _in_plane(leg: Leg, view: View) -> bool:
     return float(np.ptp(depth)) < 0.02
 
 
-def _side_dimensions(axes: Axes, scene: Sequence[Primitive], legs: Sequence[Leg]) -> None:
+def _side_dimensions(axes: Axes, scene: Sequence[Solid], legs: Sequence[Leg]) -> None:
     """Length of the trunk and distances of the hips; the trunk is a box that carries them all."""
     hips = sorted({round(float(leg.joints[0].position[0]), 6) for leg in legs})
     top = max(float(leg.joints[0].position[2]) for leg in legs)
-    trunks = [p for p in scene if not p.sphere and p.size[0] >= hips[-1] - hips[0] > 0]
+    boxes = [p for p in scene if isinstance(p, Primitive) and not p.sphere]
+    trunks = [p for p in boxes if p.size[0] >= hips[-1] - hips[0] > 0]
     if trunks:
         trunk = max(trunks, key=lambda p: float(np.prod(p.size)))
         half = trunk.placement[:3, :3] @ np.array([trunk.size[0] / 2, 0, trunk.size[2] / 2])

@@ -1,4 +1,4 @@
-"""Legs as sticks from joint to joint, for robots whose URDF shows meshes alone."""
+"""Legs as sticks from joint to joint, where a URDF shows nothing of them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.robot.visuals import Primitive
+from reports.figures.robot.solids import Primitive, Solid
 
 if TYPE_CHECKING:
     from reports.figures.robot.robot_view import Leg
@@ -17,31 +17,32 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 _GREY = (0.6, 0.6, 0.6)
 _SLENDER = 0.03  # thickness over the leg's length
-#: Words for a picture with sticks in it.
-REMARK = "the URDF shows no boxes: legs are drawn as sticks between their joints"
 
 
-def with_sticks(scene: Sequence[Primitive], legs: Sequence[Leg]) -> tuple[list[Primitive], str]:
-    """The scene, with sticks for the legs where it has no box.
+def with_sticks(scene: Sequence[Solid], legs: Sequence[Leg]) -> tuple[list[Solid], str]:
+    """The scene, with sticks for every leg of whose moving links none has a shape but spheres.
 
     Args:
-        scene: Visual primitives in the world.
+        scene: What the URDF shows, in the world.
         legs: In the same posture.
 
     Returns:
-        The primitives, and `REMARK` where sticks were added.
+        The solids, and words for the picture; empty where no stick was added.
     """
-    if any(not primitive.sphere for primitive in scene):
+    shown = {s.link for s in scene if not (isinstance(s, Primitive) and s.sphere)}
+    bare = [leg for leg in legs if not any(shown & joint.links for joint in leg.joints)]
+    if not bare:
         return list(scene), ""
     sticks = []
     centre = np.mean([leg.joints[0].position for leg in legs], axis=0)
-    for leg in legs:
+    for leg in bare:
         points = [centre, *(joint.position for joint in leg.joints), leg.foot]
         length = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
         for a, b in pairwise(points):
             if np.linalg.norm(b - a) > 1e-9:
                 sticks.append(_stick(a, b, _SLENDER * length))
-    return [*scene, *sticks], REMARK
+    which = "legs" if len(bare) == len(legs) else f"legs {', '.join(leg.name for leg in bare)}"
+    return [*scene, *sticks], f"{which} without shapes in the URDF: sticks between their joints"
 
 
 def _stick(a: Array, b: Array, thickness: float) -> Primitive:
