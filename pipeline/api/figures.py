@@ -25,8 +25,8 @@ from reports.figures.energy.motor_limits import common_scale, motor_limits_figur
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.robot.gait_view import GaitStretch, gait_figure
 from reports.figures.robot.joint_directions import joint_directions_figure
-from reports.figures.robot.robot_view import Leg, legs_of, robot_figure
-from reports.figures.robot.solids import Primitive, Solid
+from reports.figures.robot.robot_view import robot_figure
+from reports.figures.robot.solids import Leg, Primitive, Solid, legs_of
 from reports.figures.robot.visuals import joint_marks, read_shapes
 from reports.figures.several import Drawing, save_figures
 from reports.pages.names import leg_words, short_titles, shown_leg

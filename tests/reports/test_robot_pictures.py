@@ -15,8 +15,8 @@ from pipeline.robot.robot_file import load_robot_file
 from reports.errors import FigureError
 from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.projection import FRONT, OBLIQUE, SIDE, TOP, draw_scene, extent
-from reports.figures.robot.robot_view import Leg, legs_of, robot_figure
-from reports.figures.robot.solids import Mesh, Primitive, Solid
+from reports.figures.robot.robot_view import robot_figure
+from reports.figures.robot.solids import Leg, Mesh, Primitive, Solid, legs_of
 from reports.figures.robot.visuals import joint_marks, read_shapes
 from reports.figures.style import new_figure
 
@@ -95,7 +95,7 @@ def test_joint_directions_names_the_joints(hexapod: Robot) -> None:
     scene, legs = standing(hexapod)
     figure = joint_directions_figure(scene, legs, "rm", title="t", zero_pose="straight")
     words = texts(figure)
-    for expected in ("rm_joint_1", "rm_joint_2", "rm_joint_3"):
+    for expected in ("1 rm_joint_1", "2 rm_joint_2", "3 rm_joint_3"):
         assert expected in words
     assert any("Zero pose: straight" in word for word in words)
     with pytest.raises(FigureError, match="'xx'"):

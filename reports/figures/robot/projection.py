@@ -56,6 +56,7 @@ FRONT = camera("from ahead", (1, 0, 0))
 SIDE = camera("from the right", (0, -1, 0))
 TOP = camera("from above", (0, 0, 1), up=(0, 1, 0))
 OBLIQUE = camera("oblique", (1.0, -1.35, 0.85))
+OBLIQUE_LEFT = camera("oblique, from the left", (1.0, 1.35, 0.85))
 
 
 def extent(view: View, scene: Sequence[Solid]) -> tuple[Array, Array]:

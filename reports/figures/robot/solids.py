@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+
+from reports.errors import FigureError
 
 Array = NDArray[np.float64]
 _CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
@@ -74,3 +77,49 @@ class JointMark:
     axis: Array
     links: frozenset[str] = frozenset()
     slides: bool = False
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One leg in one posture.
+
+    Attributes:
+        name: Shown at the foot.
+        joints: From the base outward.
+        foot: Contact point in the world, shape (3,) [m].
+    """
+
+    name: str
+    joints: tuple[JointMark, ...]
+    foot: Array
+
+
+def legs_of(
+    names: Mapping[str, tuple[Sequence[str], str]],
+    marks: Sequence[JointMark],
+    links: Mapping[str, Array],
+) -> list[Leg]:
+    """Gather legs from joint marks and link placements.
+
+    Args:
+        names: Leg to (its joints' names from the base outward, its foot link).
+        marks: From `visuals.joint_marks`.
+        links: Link name to placement, shape (4, 4) [m].
+
+    Raises:
+        FigureError: A joint or foot that is not there.
+    """
+    by_name = {mark.name: mark for mark in marks}
+    legs = []
+    for leg, (joints, foot) in names.items():
+        lacking = [joint for joint in joints if joint not in by_name]
+        if lacking or foot not in links:
+            raise FigureError(f"leg '{leg}': '{(lacking or [foot])[0]}' is not placed")
+        legs.append(Leg(leg, tuple(by_name[j] for j in joints), links[foot][:3, 3]))
+    return legs
+
+
+def reach(scene: Sequence[Solid]) -> float:
+    """Size of a robot: the longest edge of the box around it [m]."""
+    points = np.concatenate([solid.points for solid in scene])
+    return float(np.ptp(points, axis=0).max())

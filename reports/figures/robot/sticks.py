@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.robot.solids import Primitive, Solid
-
-if TYPE_CHECKING:
-    from reports.figures.robot.robot_view import Leg
+from reports.figures.robot.solids import Leg, Primitive, Solid
 
 Array = NDArray[np.float64]
 _GREY = (0.6, 0.6, 0.6)
