@@ -7,27 +7,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.energy.energy import stage_energies
-from pipeline.motion.gait import gait_of
+from pipeline.api.pictures.gait import gait_steps_of, gait_stretches
+from pipeline.api.pictures.scene import Scenery, mass_centre
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
-from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
+from reports.atomic import write_text
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
 from reports.figures.energy.joint_demand import joint_demand_figure, stretches
 from reports.figures.energy.motor_limits import common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
-from reports.figures.robot.gait_view import GaitStretch, gait_figure
+from reports.figures.robot.gait_steps import gait_steps
+from reports.figures.robot.gait_view import gait_figure
 from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.robot_view import robot_figure
-from reports.figures.robot.solids import Leg, Primitive, Solid, legs_of
-from reports.figures.robot.visuals import joint_marks, read_shapes
 from reports.figures.several import Drawing, save_figures
 from reports.pages.names import leg_words, short_titles, shown_leg
 
@@ -49,7 +48,12 @@ def write_figures(given: Settings, standing: Standing, walking: Walking, out: Pa
     Returns:
         How many.
     """
-    return save_figures(drawings(given, standing, walking), out)
+    robot = given.robot
+    steps = gait_steps_of(Scenery(robot), walking)
+    write_text(
+        out / "gait_steps.svg", gait_steps(steps, title=f"{robot.spec.name}: {gait_of(robot.spec).title}")
+    )
+    return 1 + save_figures(drawings(given, standing, walking), out)
 
 
 def drawings(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
@@ -146,51 +150,34 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
     return [*out, Drawing("electrical_energy", figure)]
 
 
-def _scene(robot: Robot, configuration: Array) -> tuple[list[Solid], list[Leg]]:
-    """The robot's visual primitives and legs in one posture."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, configuration)
-    links = {
-        frame.name: data.oMf[i].homogeneous.copy()
-        for i, frame in enumerate(robot.model.frames)
-        if frame.type == pin.FrameType.BODY
-    }
-    marks = joint_marks(robot.urdf, links)
-    legs = {leg.name: (leg.joints, leg.foot) for leg in robot.spec.legs}
-    return read_shapes(robot.urdf, robot.spec.urdf.parent).at(links), legs_of(legs, marks, links)
-
-
 def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
     robot, leg = given.robot, shown_leg(given.robot)
+    scenery = Scenery(robot)
     posture = standing.segment.configuration[0]
-    zero = robot.configuration(np.zeros((1, len(robot.joints))), np.zeros((1, 3)))[0]
-    data = robot.model.createData()
+    lifted = len(standing.segment.stance) < len(robot.leg_names)
 
     def standing_robot() -> Figure:
         return robot_figure(
-            *_scene(robot, posture),
+            *scenery.at(posture),
             title=f"{robot.spec.name}, {standing.segment.name}",
-            subtitle="the other feet are lifted to mid-transfer",
-            mass_centre=pin.centerOfMass(robot.model, data, posture).copy(),
+            subtitle="the other feet are lifted to mid-transfer" if lifted else "",
+            mass_centre=mass_centre(robot, posture[None])[0],
         )
 
     def zero_pose() -> Figure:
         return joint_directions_figure(
-            *_scene(robot, zero),
+            *scenery.at(scenery.zero),
             leg,
             title=f"{robot.spec.name}: zero pose and positive directions",
             zero_pose=robot.spec.zero_pose,
         )
 
     def gait() -> Figure:
-        scene, _ = _scene(robot, zero)
-        boxes = [p for p in scene if isinstance(p, Primitive)]
-        trunk = next((p for p in boxes if p.link == robot.spec.base_link), None)
         return gait_figure(
             robot.leg_names,
-            _gait_stretches(robot, walking),
+            gait_stretches(robot, walking),
             shown=leg,
-            body=(0.0, 0.0) if trunk is None else (float(trunk.size[0]), float(trunk.size[1])),
+            body=scenery.trunk_outline(),
             title=f"{robot.spec.name}: {gait_of(robot.spec).title}",
             subtitle=f"transfer path '{gait_of(robot.spec).path}'",
         )
@@ -200,31 +187,6 @@ def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawin
         Drawing("robot", standing_robot),
         Drawing("zero_pose", zero_pose),
     ]
-
-
-def _gait_stretches(robot: Robot, walking: Walking) -> list[GaitStretch]:
-    data = robot.model.createData()
-    out = []
-    for segment, contacts, margin in zip(
-        walking.motion.segments, walking.demand.contacts, walking.margins, strict=True
-    ):
-        assert contacts is not None
-        # As many as a picture can show, both ends and the middle among them.
-        rows = np.unique(np.linspace(0, segment.time.size - 1, 101).round().astype(int))
-        centres = [
-            pin.centerOfMass(robot.model, data, row).copy() - row[:3]
-            for row in segment.configuration[rows]
-        ]
-        out.append(
-            GaitStretch(
-                segment.time[rows],
-                contacts.position[rows],
-                segment.stance,
-                np.array(centres),
-                margin[rows],
-            )
-        )
-    return out
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:

@@ -13,13 +13,14 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from reports.figures.robot.outline import outline
 from reports.figures.robot.projection import OBLIQUE, TOP, View
 from reports.figures.style import BLUE, FAINT, GREEN, INK, QUIET, SHADE, VERMILION, number
 
 Array = NDArray[np.float64]
 _WIDTH, _HEIGHT = 950.0, 560.0
 #: Left, top, width and height of the panels [px]: the robot, support from above, footfall.
-_ROBOT, _ABOVE = (10.0, 62.0, 560.0, 340.0), (590.0, 62.0, 350.0, 340.0)
+_ROBOT, _ABOVE = (10.0, 62.0, 590.0, 336.0), (625.0, 62.0, 305.0, 336.0)
 _FALL = (70.0, 432.0, 860.0, 96.0)
 _GREY, _LIGHT = "#8a929a", "#b9c0c7"
 #: A cycle is shown in its own time within these bounds [s].
@@ -86,7 +87,10 @@ def gait_steps(steps: Steps, *, title: str, subtitle: str = "") -> str:
     """
     shown_in = float(np.clip(steps.period, _SHORTEST, _LONGEST))
     count = steps.time.size
-    robot, above = _fitted(OBLIQUE, _robot_points(steps), _ROBOT), _fitted(TOP, _flat(steps), _ABOVE)
+    robot, above = (
+        _fitted(OBLIQUE, _robot_points(steps), _ROBOT),
+        _fitted(TOP, _flat(steps), _ABOVE),
+    )
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH:g} {_HEIGHT:g}" '
         f'width="{_WIDTH:g}" height="{_HEIGHT:g}" font-family="DejaVu Sans, Arial, sans-serif" '
@@ -100,7 +104,9 @@ def gait_steps(steps: Steps, *, title: str, subtitle: str = "") -> str:
     ]
     for k in range(count):
         delay = shown_in * k / count - (shown_in if k else 0.0)
-        lines.append(f'<g class="{"k first" if k == 0 else "k"}" style="animation-delay:{delay:.3f}s">')
+        lines.append(
+            f'<g class="{"k first" if k == 0 else "k"}" style="animation-delay:{delay:.3f}s">'
+        )
         lines += [*_ground(steps, k, robot), *_robot(steps, k, robot), *_support(steps, k, above)]
         lines += [_cursor(steps, k), "</g>"]
     return "\n".join([*lines, "</svg>", ""])
@@ -226,20 +232,18 @@ def _ground(steps: Steps, k: int, fit: _Fit) -> Iterable[str]:
     spacing = distance / max(1, round(distance / (0.25 * size)))
     moved = float((steps.origin[k] - steps.origin[0]) @ along)
     middle = steps.feet[:, :, :].reshape(-1, 3).mean(axis=0)
-    half = 0.75 * size
+    half = 0.6 * size
     yield f'<g stroke="{FAINT}" stroke-width="1">'
     for j in range(int(np.ceil((moved - half) / spacing)), int((moved + half) / spacing) + 1):
         away = j * spacing - moved
         centre = np.array([middle[0], middle[1], 0.0]) + away * along
         centre[2] = _level(steps, k, centre, height, rise, along)
-        a, b = fit(np.array([centre - 0.5 * size * across, centre + 0.5 * size * across]))
+        a, b = fit(np.array([centre - 0.4 * size * across, centre + 0.4 * size * across]))
         yield f'<path d="M{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}"/>'
     yield "</g>"
 
 
-def _level(
-    steps: Steps, k: int, at: Array, height: float, rise: float, along: Array
-) -> float:
+def _level(steps: Steps, k: int, at: Array, height: float, rise: float, along: Array) -> float:
     """Height of the ground at a place: the lowest foot's, or the slope's through a standing one."""
     if abs(rise) < 1e-6:
         return height
@@ -265,21 +269,26 @@ def _support(steps: Steps, k: int, fit: _Fit) -> Iterable[str]:
         f'<path d="M{x - 5.5:.1f} {y:.1f}h11M{x:.1f} {y - 5.5:.1f}v11" stroke="{INK}"/>'
     )
     yield _text(
-        _ABOVE[0],
-        _ABOVE[1] + _ABOVE[3] + 16,
+        _ABOVE[0] + _ABOVE[2],
+        _ABOVE[1] + _ABOVE[3] + 18,
         f"t = {steps.time[k]:.2f} s, stability margin {number(1e3 * float(steps.margin[k]))} mm",
+        anchor="end",
         fill=QUIET,
     )
 
 
 def _key(steps: Steps) -> Iterable[str]:
-    x, y = _ROBOT[0] + 2, _ROBOT[1] + _ROBOT[3] + 16
+    x, y = _ROBOT[0] + 2, _ROBOT[1] + _ROBOT[3] + 18
     force = number(float(np.linalg.norm(steps.force, axis=-1).max()))
     torque = number(float(np.abs(steps.torque).max()))
-    yield _text(x, y, "standing", fill=BLUE, weight="bold")
-    yield _text(x + 78, y, "in the air", fill=VERMILION, weight="bold")
-    yield _text(x + 160, y, f"ground force, at most {force} N", fill=GREEN, weight="bold")
-    yield _text(x + 380, y, f"disc: torque, at most {torque} N·m", fill=QUIET, weight="bold")
+    words = (
+        ("standing", BLUE),
+        ("in the air", VERMILION),
+        (f"ground force up to {force} N", GREEN),
+    )
+    for text, color in (*words, (f"disc: torque up to {torque} N·m", QUIET)):
+        yield _text(x, y, text, size=11, fill=color, weight="bold")
+        x += 7.2 * len(text) + 12
 
 
 def _footfall(steps: Steps) -> Iterable[str]:
@@ -312,27 +321,6 @@ def _cursor(steps: Steps, k: int) -> str:
     left, top, width, height = _FALL
     x = left + width * (k + 0.5) / steps.time.size
     return f'<path d="M{x:.1f} {top - 4:.1f}v{height + 8:.1f}" stroke="{INK}" stroke-width="1.5"/>'
-
-
-def outline(points: Array) -> Array:
-    """Corners of the convex hull of points in a plane, counter-clockwise, shape (P, 2)."""
-    order = sorted(map(tuple, np.round(points, 6).tolist()))
-    if len(order) < 3:
-        return np.array(order)
-
-    def chain(points: Iterable[tuple[float, ...]]) -> list[tuple[float, ...]]:
-        kept: list[tuple[float, ...]] = []
-        for p in points:
-            while len(kept) > 1 and _turn(kept[-2], kept[-1], p) <= 0:
-                kept.pop()
-            kept.append(p)
-        return kept[:-1]
-
-    return np.array(chain(order) + chain(order[::-1]))
-
-
-def _turn(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 def _polygon(points: Array, fill: str, more: str = "") -> str:

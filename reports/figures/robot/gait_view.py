@@ -177,9 +177,9 @@ def _paths_from_above(
             fontweight="bold",
         )
     axes.set_title("foot paths relative to the body, from above", color=QUIET)
-    key = {"ha": "right", "fontweight": "bold"}
-    axes.text(0, 0.04 * unit, "support", color=BLUE, va="bottom", **key)
-    axes.text(0, -0.04 * unit, "transfer", color=VERMILION, va="top", **key)
+    bold = "bold"
+    axes.text(0, 0.04 * unit, "support", color=BLUE, ha="right", va="bottom", fontweight=bold)
+    axes.text(0, -0.04 * unit, "transfer", color=VERMILION, ha="right", va="top", fontweight=bold)
     axes.margins(0.04, 0.12)
 
 
@@ -233,8 +233,8 @@ def _phase_words(axes: Axes, at: Array, tail: Array, stands: bool, size: float) 
     color = BLUE if stands else VERMILION
     axes.annotate(
         "",
-        at,
-        tail,
+        tuple(at),
+        tuple(tail),
         arrowprops={"arrowstyle": "-|>,head_width=0.3,head_length=0.6", "color": color},
         zorder=4,
     )

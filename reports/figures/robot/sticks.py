@@ -16,7 +16,7 @@ _SLENDER = 0.03  # thickness over the leg's length
 
 
 def with_sticks(scene: Sequence[Solid], legs: Sequence[Leg]) -> tuple[list[Solid], str]:
-    """The scene, with sticks for every leg of whose moving links none has a shape but spheres.
+    """The scene, with sticks for every leg of which it shows nothing.
 
     Args:
         scene: What the URDF shows, in the world.
@@ -25,20 +25,34 @@ def with_sticks(scene: Sequence[Solid], legs: Sequence[Leg]) -> tuple[list[Solid
     Returns:
         The solids, and words for the picture; empty where no stick was added.
     """
-    shown = {s.link for s in scene if not (isinstance(s, Primitive) and s.sphere)}
-    bare = [leg for leg in legs if not any(shown & joint.links for joint in leg.joints)]
+    bare = bare_legs(scene, legs)
     if not bare:
         return list(scene), ""
-    sticks = []
-    centre = np.mean([leg.joints[0].position for leg in legs], axis=0)
-    for leg in bare:
-        points = [centre, *(joint.position for joint in leg.joints), leg.foot]
-        length = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
-        for a, b in pairwise(points):
-            if np.linalg.norm(b - a) > 1e-9:
-                sticks.append(_stick(a, b, _SLENDER * length))
-    which = "legs" if len(bare) == len(legs) else f"legs {', '.join(leg.name for leg in bare)}"
+    centre = trunk_centre(legs)
+    sticks = [s for leg in legs if leg.name in bare for s in leg_sticks(leg, centre)]
+    which = "legs" if len(bare) == len(legs) else f"legs {', '.join(bare)}"
     return [*scene, *sticks], f"{which} without shapes in the URDF: sticks between their joints"
+
+
+def bare_legs(scene: Sequence[Solid], legs: Sequence[Leg]) -> list[str]:
+    """Names of the legs of whose moving links none has a shape but spheres."""
+    shown = {s.link for s in scene if not (isinstance(s, Primitive) and s.sphere)}
+    return [leg.name for leg in legs if not any(shown & joint.links for joint in leg.joints)]
+
+
+def trunk_centre(legs: Sequence[Leg]) -> Array:
+    """Where the legs' first joints are on average, shape (3,) [m]."""
+    centre: Array = np.mean([leg.joints[0].position for leg in legs], axis=0)
+    return centre
+
+
+def leg_sticks(leg: Leg, centre: Array) -> list[Primitive]:
+    """Sticks from the trunk's centre through a leg's joints to its foot."""
+    points = [centre, *(joint.position for joint in leg.joints), leg.foot]
+    length = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
+    return [
+        _stick(a, b, _SLENDER * length) for a, b in pairwise(points) if np.linalg.norm(b - a) > 1e-9
+    ]
 
 
 def _stick(a: Array, b: Array, thickness: float) -> Primitive:
