@@ -4,34 +4,25 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuators.energy.energy import stage_energies
-from pipeline.api.pictures.gait import gait_steps_of, gait_stretches
-from pipeline.api.pictures.scene import Scenery, mass_centre
+from pipeline.api.pictures.robot import robot_drawings, write_gait_steps
+from pipeline.api.pictures.scene import Scenery
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
-from reports.atomic import write_text
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
 from reports.figures.energy.joint_demand import joint_demand_figure, stretches
 from reports.figures.energy.motor_limits import common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
-from reports.figures.robot.gait_steps import gait_steps
-from reports.figures.robot.gait_view import gait_figure
-from reports.figures.robot.joint_directions import joint_directions_figure
-from reports.figures.robot.robot_view import robot_figure
 from reports.figures.several import Drawing, save_figures
 from reports.pages.names import leg_words, short_titles, shown_leg
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 #: File name of each subject's Fig. 21.
@@ -48,18 +39,17 @@ def write_figures(given: Settings, standing: Standing, walking: Walking, out: Pa
     Returns:
         How many.
     """
-    robot = given.robot
-    steps = gait_steps_of(Scenery(robot), walking)
-    write_text(
-        out / "gait_steps.svg", gait_steps(steps, title=f"{robot.spec.name}: {gait_of(robot.spec).title}")
-    )
-    return 1 + save_figures(drawings(given, standing, walking), out)
+    scenery = Scenery(given.robot)
+    write_gait_steps(scenery, walking, out)
+    return 1 + save_figures(drawings(given, standing, walking, scenery), out)
 
 
-def drawings(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
+def drawings(
+    given: Settings, standing: Standing, walking: Walking, scenery: Scenery | None = None
+) -> list[Drawing]:
     """Every figure of a run, the longest first, so that two processes end together."""
     return [
-        *_robot(given, standing, walking),
+        *robot_drawings(scenery or Scenery(given.robot), standing, walking),
         *_energy(given, walking),
         *_demand(given, walking),
     ]
@@ -148,45 +138,6 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
         subtitle=subtitle,
     )
     return [*out, Drawing("electrical_energy", figure)]
-
-
-def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
-    robot, leg = given.robot, shown_leg(given.robot)
-    scenery = Scenery(robot)
-    posture = standing.segment.configuration[0]
-    lifted = len(standing.segment.stance) < len(robot.leg_names)
-
-    def standing_robot() -> Figure:
-        return robot_figure(
-            *scenery.at(posture),
-            title=f"{robot.spec.name}, {standing.segment.name}",
-            subtitle="the other feet are lifted to mid-transfer" if lifted else "",
-            mass_centre=mass_centre(robot, posture[None])[0],
-        )
-
-    def zero_pose() -> Figure:
-        return joint_directions_figure(
-            *scenery.at(scenery.zero),
-            leg,
-            title=f"{robot.spec.name}: zero pose and positive directions",
-            zero_pose=robot.spec.zero_pose,
-        )
-
-    def gait() -> Figure:
-        return gait_figure(
-            robot.leg_names,
-            gait_stretches(robot, walking),
-            shown=leg,
-            body=scenery.trunk_outline(),
-            title=f"{robot.spec.name}: {gait_of(robot.spec).title}",
-            subtitle=f"transfer path '{gait_of(robot.spec).path}'",
-        )
-
-    return [
-        Drawing("gait", gait),
-        Drawing("robot", standing_robot),
-        Drawing("zero_pose", zero_pose),
-    ]
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:
