@@ -9,17 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.energy.energy import stage_energies
+from pipeline.api.pictures.gait import legs_stretches
 from pipeline.api.pictures.robot import robot_drawings, write_gait_steps
 from pipeline.api.pictures.scene import Scenery
+from pipeline.motion.gait import gait_of
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
+from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
 from reports.figures.energy.joint_demand import joint_demand_figure, stretches
-from reports.figures.energy.motor_limits import common_scale, motor_limits_figure
+from reports.figures.energy.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.several import Drawing, save_figures
 from reports.pages.names import leg_words, short_titles, shown_leg
@@ -33,26 +36,40 @@ SUBJECT_TITLES = {
 }
 
 
-def write_figures(given: Settings, standing: Standing, walking: Walking, out: Path) -> int:
+def write_figures(
+    given: Settings, standing: Standing, walking: Walking, out: Path, *, paper: bool = False
+) -> int:
     """Draw and save every figure of a run.
+
+    Args:
+        given: The run.
+        standing: Its result.
+        walking: Its result.
+        out: Folder.
+        paper: Whether the run is held against the paper, whose figures are then named.
 
     Returns:
         How many.
     """
-    scenery = Scenery(given.robot)
-    write_gait_steps(scenery, walking, out)
-    return 1 + save_figures(drawings(given, standing, walking, scenery), out)
+    write_gait_steps(Scenery(given.robot), walking, out)
+    return 1 + save_figures(drawings(given, standing, walking, paper=paper), out)
 
 
 def drawings(
-    given: Settings, standing: Standing, walking: Walking, scenery: Scenery | None = None
+    given: Settings, standing: Standing, walking: Walking, *, paper: bool = False
 ) -> list[Drawing]:
     """Every figure of a run, the longest first, so that two processes end together."""
     return [
-        *robot_drawings(scenery or Scenery(given.robot), standing, walking),
+        *robot_drawings(Scenery(given.robot), standing, walking),
         *_energy(given, walking),
-        *_demand(given, walking),
+        *_all_legs(given, walking),
+        *_demand(given, walking, paper),
     ]
+
+
+def _name(given: Settings) -> str:
+    """Robot and gait, which every figure names."""
+    return f"{given.robot.spec.name}, {gait_of(given.robot.spec).title}"
 
 
 def _joints(given: Settings) -> tuple[str, dict[str, str]]:
@@ -62,8 +79,9 @@ def _joints(given: Settings) -> tuple[str, dict[str, str]]:
     return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
 
 
-def _demand(given: Settings, walking: Walking) -> list[Drawing]:
+def _demand(given: Settings, walking: Walking, paper: bool) -> list[Drawing]:
     leg, joints = _joints(given)
+    sliding = dict(zip(given.robot.joints, given.robot.sliding, strict=True))
     return [
         Drawing(
             f"joint_demand_{joint}",
@@ -72,10 +90,44 @@ def _demand(given: Settings, walking: Walking) -> list[Drawing]:
                 joint,
                 stretches(walking.demand, joint, leg),
                 title=f"{label.capitalize()} of the {leg_words(leg)}: velocity and torque",
-                subtitle=f"demand over one gait cycle, as in Fig. {number} of the paper",
+                subtitle=f"{_name(given)}: demand over one cycle"
+                + (f", as in Fig. {number} of the paper" if paper else ""),
+                slides=bool(sliding[joint]),
             ),
         )
         for number, (joint, label) in enumerate(joints.items(), start=2)
+    ]
+
+
+def _all_legs(given: Settings, walking: Walking) -> list[Drawing]:
+    robot = given.robot
+    parts = legs_stretches(robot, walking)
+    slide = [name for name, one in zip(robot.joints, robot.sliding, strict=True) if one]
+    legs = {leg.name: leg.joints for leg in robot.spec.legs}
+    words = "a line is thin while its leg is in the air"
+    return [
+        Drawing(
+            "joint_torques",
+            partial(
+                joint_torques_figure,
+                parts,
+                walking.demand.joints,
+                legs,
+                sliding=slide,
+                title="Torque of every joint over one cycle",
+                subtitle=f"{_name(given)}; {words}",
+            ),
+        ),
+        Drawing(
+            "ground_forces",
+            partial(
+                ground_forces_figure,
+                parts,
+                robot.leg_names,
+                title="Ground forces and static stability over one cycle",
+                subtitle=_name(given),
+            ),
+        ),
     ]
 
 
@@ -105,6 +157,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                     labels,
                     support,
                     title=f"{title}: its motors, {leg_words(leg)}",
+                    subtitle=f"{_name(given)}: {SUBTITLE}",
                     scale=scale,
                 ),
             ),
@@ -116,8 +169,8 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                     labels,
                     places=given.catalog.alternatives[name].stage_names,
                     title=title,
-                    subtitle=f"energy per cycle through each stage, {leg_words(leg)}; "
-                    "one scale for all alternatives",
+                    subtitle=f"{_name(given)}: energy per cycle through each stage, "
+                    f"{leg_words(leg)}; one scale for all alternatives",
                     limits=limits,
                 ),
             ),
@@ -135,7 +188,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
         electrical,
         reference=titles.get(IDEAL),
         title=f"Electrical energy per cycle, {leg_words(leg)}",
-        subtitle=subtitle,
+        subtitle=f"{_name(given)}; {subtitle}",
     )
     return [*out, Drawing("electrical_energy", figure)]
 

@@ -119,7 +119,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
             assert standing is not None
             assert walking is not None
             logger.info("drawing figures")
-            files += write_figures(given, standing, walking, out)
+            files += write_figures(given, standing, walking, out, paper=judgement is not None)
             if judgement is not None:
                 files += judging.pages(given, judgement, tables, out)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")

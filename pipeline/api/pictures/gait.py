@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pipeline.api.pictures.scene import Scenery, mass_centre
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking
+from reports.figures.energy.all_legs import LegsStretch
 from reports.figures.robot.gait_steps import Body, Steps
 from reports.figures.robot.gait_view import GaitStretch
 from reports.figures.robot.outline import hull_points
@@ -135,4 +136,30 @@ def _stick_bodies(
             for parts in zip(*steps, strict=True):
                 points = np.array([part.points for part in parts])
                 out.append(Body(leg.name, points - follow[:, None]))
+    return out
+
+
+def legs_stretches(robot: Robot, walking: Walking) -> list[LegsStretch]:
+    """What the figures of all legs show of every segment."""
+    out = []
+    for segment, demand, contacts, margin in zip(
+        walking.motion.segments,
+        walking.demand.segments,
+        walking.demand.contacts,
+        walking.margins,
+        strict=True,
+    ):
+        assert contacts is not None
+        rows = np.unique(np.linspace(0, segment.time.size - 1, 101).round().astype(int))
+        stands = [leg in contacts.stance for leg in robot.leg_names]
+        out.append(
+            LegsStretch(
+                segment.time[rows],
+                segment.stance,
+                demand.torque[rows],
+                np.where(stands, contacts.force_world[rows] @ segment.ground_normal, 0.0),
+                contacts.friction_needed[rows],
+                margin[rows],
+            )
+        )
     return out

@@ -40,6 +40,8 @@ _RPM = 60 / (2 * np.pi)
 _CONTINUOUS = "#dff3ec"
 #: From here on torques are written in N·m.
 _STRONG = 10.0  # [N*m]
+#: Joints side by side.
+_IN_ROW = 4
 #: Of a piece of the path; more than a picture can show.
 _POINTS = 201
 #: Least length of a piece of the path that gets an arrow, as a share of the panel.
@@ -122,9 +124,15 @@ def motor_limits_figure(
     scale = scale or common_scale([(series, motors)], joints)
     rms = rms_over_time(series.time, series.torque[:, columns])
     unit, factor = ("N·m", 1.0) if scale.torque >= _STRONG else ("mN·m", 1e3)
-    figure = new_figure(4.6)
+    rows = -(-len(joints) // _IN_ROW)
+    across = -(-len(joints) // rows)
+    figure = new_figure(1.2 + 3.4 * rows)
     headline(figure, title, subtitle)
-    whole, *panels = figure.subplots(1, 1 + len(joints), width_ratios=[0.8] + [1.0] * len(joints))
+    grid = figure.subplots(rows, 1 + across, width_ratios=[0.8] + [1.0] * across, squeeze=False)
+    whole, panels = grid[0, 0], [axes for row in grid for axes in row[1:]]
+    for axes in (*grid[1:, 0], *panels[len(joints) :]):
+        axes.set_visible(False)
+    del panels[len(joints) :]
     _whole(whole, motors[columns[0]], columns[0], scale, factor)
     whole.set_ylabel(f"motor torque [{unit}]")
     whole.set_title("whole region\n", loc="center", fontweight="bold")
@@ -138,7 +146,7 @@ def motor_limits_figure(
         words = f"rms {number(float(value) * factor)}{share} {unit}"
         look = {"ha": "center", "va": "bottom", "color": QUIET, "fontsize": 8}
         axes.text(0.5, 1.015, words, transform=axes.transAxes, **look)
-        if axes is not panels[0]:
+        if axes is not panels[0] and axes not in grid[1:, 1]:
             axes.tick_params(labelleft=False)
     for axes in (whole, *panels):
         axes.set_xlabel("motor speed [1000 rpm]")

@@ -241,7 +241,7 @@ def _phase_words(axes: Axes, at: Array, tail: Array, stands: bool, size: float) 
     axes.text(
         at[0],
         at[1] + (-0.046 if stands else 0.046) * size,
-        "support: the foot rests on the ground" if stands else "transfer",
+        "support" if stands else "transfer",
         color=color,
         ha="center",
         va="top" if stands else "bottom",

@@ -72,13 +72,16 @@ def robot_figure(
         low, high = extent(view, scene)
         ends = [low[0] - 0.08 * unit, high[0] + 0.08 * unit]
         axes.plot(ends, [ground, ground], color=QUIET, linewidth=1.0)
+    outlines = OBLIQUE.project(np.concatenate([solid.points for solid in scene]))[:, :2]
     for leg in legs:
-        # The trunk may hide a far foot from this side, but not the knee above it.
-        far = leg.foot[1] > 0
-        at = OBLIQUE.project(leg.joints[-1].position if far else leg.foot)[:2]
-        _write(oblique, leg.name.upper(), at + [0, (0.1 if far else -0.06) * unit])
+        at = OBLIQUE.project(leg.foot)[:2] - [0, 0.06 * unit]
+        if leg.foot[1] > 0:  # the trunk may hide a far foot, but not what lies above it
+            x = float(OBLIQUE.project(leg.joints[-1].position)[0])
+            column = outlines[np.abs(outlines[:, 0] - x) < 0.08 * unit, 1]
+            at = np.array([x, float(column.max(initial=at[1])) + 0.05 * unit])
+        _write(oblique, leg.name.upper(), at)
         widest = max(abs(float(leg.foot[1])), abs(float(leg.joints[-1].position[1])))
-        x, y = leg.foot[0], (widest + 0.07 * unit) * (np.sign(leg.foot[1]) or 1.0)
+        x, y = float(leg.foot[0]), (widest + 0.07 * unit) * (np.sign(leg.foot[1]) or 1.0)
         _write(above, leg.name.upper(), np.array([x, y]))
     seen = link_dimensions(ahead, FRONT, legs, unit)
     if not seen:
