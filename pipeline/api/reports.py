@@ -103,7 +103,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         by = basis(given)
         if isinstance(by, str):
             said.append(f"not held against the paper: {by}")
-        else:
+        elif by is not None:
             logger.info("holding the run against the paper")
             judgement, more = judging.judged(given, by)
             tables += more
@@ -115,6 +115,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         files = len(tables)
         if verb == "reports":
             from pipeline.api.figures import write_figures
+            from reports.pages.robot_page import write_robot_page
 
             assert standing is not None
             assert walking is not None
@@ -122,6 +123,8 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
             files += write_figures(given, standing, walking, out, paper=judgement is not None)
             if judgement is not None:
                 files += judging.pages(given, judgement, tables, out)
+            else:
+                files += write_robot_page(given, tables, out, [*said, *given.remarks])
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
     remarks = given.effects.remarks if given.effects else ()
     return (*said, *given.remarks, *remarks, *(findings(walking) if walking else ()))

@@ -16,7 +16,7 @@ from reports.table import Table, table_from_rows
 from reports.wide import Quantity, wide_series
 
 Array = NDArray[np.float64]
-ALTERNATIVE = ("actuator alternative of section III", "")
+ALTERNATIVE = ("actuator alternative", "")
 
 
 def walking_joint_demand(demand: MotionDemand) -> Table:

@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pipeline.api.pictures.scene import Scenery, mass_centre
+from pipeline.motion.motion import Segment
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking
 from reports.figures.energy.all_legs import LegsStretch
@@ -21,6 +22,8 @@ from reports.figures.robot.sticks import bare_legs, leg_sticks, trunk_centre
 Array = NDArray[np.float64]
 #: Steps of a cycle that the moving picture shows.
 STEPS = 24
+#: Samples of a cycle that a picture can show, and the least of one segment.
+_MOST, _LEAST = 200, 21
 #: Corners of a body nearer than this share of the robot's size are drawn as one.
 _CELL = 0.012
 
@@ -32,8 +35,7 @@ def gait_stretches(robot: Robot, walking: Walking) -> list[GaitStretch]:
         walking.motion.segments, walking.demand.contacts, walking.margins, strict=True
     ):
         assert contacts is not None
-        # As many as a picture can show, both ends and the middle among them.
-        rows = np.unique(np.linspace(0, segment.time.size - 1, 101).round().astype(int))
+        rows = _shown(segment, walking)
         configuration = segment.configuration[rows]
         centre = mass_centre(robot, configuration) - configuration[:, :3]
         rotation = robot.base_rotation(configuration)
@@ -49,6 +51,13 @@ def gait_stretches(robot: Robot, walking: Walking) -> list[GaitStretch]:
             )
         )
     return out
+
+
+def _shown(segment: Segment, walking: Walking) -> NDArray[np.intp]:
+    """Samples of a segment for a picture: no more than it can show, the ends and the middle too."""
+    count = max(_LEAST, 1 + 2 * (_MOST // (2 * len(walking.motion.segments))))
+    rows: NDArray[np.intp] = np.unique(np.linspace(0, segment.time.size - 1, count).round())
+    return rows.astype(np.intp)
 
 
 def gait_steps_of(scenery: Scenery, walking: Walking, count: int = STEPS) -> Steps:
@@ -150,7 +159,7 @@ def legs_stretches(robot: Robot, walking: Walking) -> list[LegsStretch]:
         strict=True,
     ):
         assert contacts is not None
-        rows = np.unique(np.linspace(0, segment.time.size - 1, 101).round().astype(int))
+        rows = _shown(segment, walking)
         stands = [leg in contacts.stance for leg in robot.leg_names]
         out.append(
             LegsStretch(

@@ -42,8 +42,8 @@ _CONTINUOUS = "#dff3ec"
 _STRONG = 10.0  # [N*m]
 #: Joints side by side.
 _IN_ROW = 4
-#: Of a piece of the path; more than a picture can show.
-_POINTS = 201
+#: Of half the path, more than a picture can show; the least of a piece of it.
+_POINTS, _LEAST = 201, 31
 #: Least length of a piece of the path that gets an arrow, as a share of the panel.
 _ARROW = 0.06
 
@@ -259,8 +259,9 @@ def _path(
     points = np.column_stack([series.velocity[:, column] * _RPM, series.torque[:, column] * factor])
     breaks = np.flatnonzero(np.diff(series.time) <= 0) + 1
     blocks = [b for b in np.split(np.arange(series.time.size), breaks) if b.size > 1]
+    most = max(_LEAST, 2 * _POINTS // max(2, len(blocks)))
     for block, following in zip(blocks, [*blocks[1:], blocks[0]], strict=True):
-        shown = block[np.unique(np.linspace(0, block.size - 1, _POINTS).round().astype(int))]
+        shown = block[np.unique(np.linspace(0, block.size - 1, most).round().astype(int))]
         middle = 0.5 * float(series.time[block[0]] + series.time[block[-1]])
         stands = any(start <= middle <= end for start, end in support)
         color = BLUE if stands else VERMILION
