@@ -69,13 +69,9 @@ def gait_steps_of(scenery: Scenery, walking: Walking, count: int = STEPS) -> Ste
         count: How many steps.
     """
     robot, motion = scenery.robot, walking.motion
-    start, end = float(motion.segments[0].time[0]), float(motion.segments[-1].time[-1])
-    period = motion.period or end - start
-    times = start + (end - start) * np.arange(count) / count
-    found = [_row(walking, t) for t in times]
-    q = np.array([motion.segments[i].configuration[k] for i, k in found])
+    found, q = rows_of_steps(walking, count)
     contacts = [walking.demand.contacts[i] for i, _ in found]
-    legs = robot.leg_names
+    legs, period = robot.leg_names, motion.period or _duration(walking)
     force = np.array([c.force_world[k] for c, (_, k) in zip(contacts, found, strict=True) if c])
     stands = np.array([[leg in c.stance for leg in legs] for c in contacts if c])
     follow = q[:, :3] - [0.0, 0.0, q[0, 2]]
@@ -86,7 +82,7 @@ def gait_steps_of(scenery: Scenery, walking: Walking, count: int = STEPS) -> Ste
     torque = np.array([walking.demand.segments[i].torque[k, columns] for i, k in found])
     return Steps(
         legs=legs,
-        time=times - start,
+        time=period * np.arange(count) / count,
         period=period,
         bodies=(*_bodies(scenery, q, follow), *_stick_bodies(scenery, q[0], posed, follow)),
         feet=feet - follow[:, None],
@@ -98,6 +94,23 @@ def gait_steps_of(scenery: Scenery, walking: Walking, count: int = STEPS) -> Ste
         margin=np.array([walking.margins[i][k] for i, k in found]),
         origin=follow,
     )
+
+
+def rows_of_steps(walking: Walking, count: int) -> tuple[list[tuple[int, int]], Array]:
+    """Where steps of equal time lie in a cycle.
+
+    Returns:
+        Segment and sample of each step, and configurations, shape (count, nq).
+    """
+    segments = walking.motion.segments
+    start = float(segments[0].time[0])
+    found = [_row(walking, start + _duration(walking) * k / count) for k in range(count)]
+    return found, np.array([segments[i].configuration[k] for i, k in found])
+
+
+def _duration(walking: Walking) -> float:
+    segments = walking.motion.segments
+    return float(segments[-1].time[-1] - segments[0].time[0])
 
 
 def _row(walking: Walking, time: float) -> tuple[int, int]:
@@ -143,7 +156,7 @@ def _stick_bodies(
         if leg.name in bare:
             steps = [leg_sticks(pose[i], trunk_centre(pose)) for pose in posed]
             for parts in zip(*steps, strict=True):
-                points = np.array([part.points for part in parts])
+                points = np.array([part.points for _, part in parts])
                 out.append(Body(leg.name, points - follow[:, None]))
     return out
 

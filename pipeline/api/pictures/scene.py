@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pipeline.robot.robot import Robot
 from reports.figures.robot.outline import outline
 from reports.figures.robot.solids import Leg, Solid, legs_of
+from reports.figures.robot.sticks import leg_sticks, trunk_centre
 from reports.figures.robot.visuals import Shapes, joint_marks, read_shapes
 
 Array = NDArray[np.float64]
@@ -76,6 +77,11 @@ class Scenery:
         """Surfaces and legs in one configuration, shape (nq,)."""
         placed = self.placements(configuration)
         return self.shapes.at(placed), self.legs_at(placed)
+
+    def sticks(self, leg: Leg, legs: Sequence[Leg]) -> list[tuple[int, Solid]]:
+        """Sticks of a leg of which the URDF shows nothing, each with the body that carries it."""
+        carriers = [1, *(int(self.robot.model.getJointId(joint.name)) for joint in leg.joints)]
+        return [(carriers[k], stick) for k, stick in leg_sticks(leg, trunk_centre(legs))]
 
     def trunk_outline(self) -> Array:
         """The trunk from above in its own frame, counter-clockwise, shape (P, 2) [m].

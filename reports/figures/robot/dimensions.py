@@ -107,13 +107,12 @@ def _apart(values: Sequence[float], least: float) -> list[float]:
     return kept
 
 
-def top_dimensions(axes: Axes, legs: Sequence[Leg], unit: float) -> None:
+def top_dimensions(axes: Axes, scene: Sequence[Solid], legs: Sequence[Leg], unit: float) -> None:
     """Half the distance between the hips, from the mid-plane."""
     left = [leg for leg in legs if hip_of(leg)[1] > 0.02 * unit]
     if not left:
         return
     hip = TOP.project(hip_of(max(left, key=lambda one: hip_of(one)[0])))[:2]
     middle = np.array([hip[0], 0.0])
-    edge = max(float(leg.foot[0]) for leg in legs)
-    x = max(0.22 * unit, edge + 0.12 * unit - float(hip[0]))
+    x = float(extent(TOP, scene)[1][0]) + 0.14 * unit - float(hip[0])
     dimension(axes, middle, hip, (x, 0), _millimetres(middle, hip))

@@ -99,6 +99,9 @@ def gait_steps(steps: Steps, *, title: str, subtitle: str = "") -> str:
         f'<rect width="{_WIDTH:g}" height="{_HEIGHT:g}" fill="white"/>',
         _text(12, 22, title, size=16, weight="bold"),
         _text(12, 42, "; ".join(w for w in (subtitle, _speed(steps, shown_in)) if w), fill=QUIET),
+        '<clipPath id="panel"><rect x="{}" y="{}" width="{}" height="{}"/></clipPath>'.format(
+            *_ROBOT
+        ),
         *_key(steps),
         *_footfall(steps),
     ]
@@ -233,7 +236,7 @@ def _ground(steps: Steps, k: int, fit: _Fit) -> Iterable[str]:
     moved = float((steps.origin[k] - steps.origin[0]) @ along)
     middle = steps.feet[:, :, :].reshape(-1, 3).mean(axis=0)
     half = 0.6 * size
-    yield f'<g stroke="{FAINT}" stroke-width="1">'
+    yield f'<g stroke="{FAINT}" stroke-width="1" clip-path="url(#panel)">'
     for j in range(int(np.ceil((moved - half) / spacing)), int((moved + half) / spacing) + 1):
         away = j * spacing - moved
         centre = np.array([middle[0], middle[1], 0.0]) + away * along

@@ -88,7 +88,7 @@ def robot_figure(
         link_dimensions(beside, SIDE, legs, unit)
     front_dimensions(ahead, legs, ground, unit)
     side_dimensions(beside, scene, legs, unit)
-    top_dimensions(above, legs, unit)
+    top_dimensions(above, scene, legs, unit)
     if mass_centre is not None:
         for axes, view in ((above, TOP), (ahead, FRONT), (beside, SIDE)):
             _mass_centre(axes, view.project(mass_centre))

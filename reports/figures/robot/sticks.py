@@ -29,7 +29,7 @@ def with_sticks(scene: Sequence[Solid], legs: Sequence[Leg]) -> tuple[list[Solid
     if not bare:
         return list(scene), ""
     centre = trunk_centre(legs)
-    sticks = [s for leg in legs if leg.name in bare for s in leg_sticks(leg, centre)]
+    sticks = [s for leg in legs if leg.name in bare for _, s in leg_sticks(leg, centre)]
     which = "legs" if len(bare) == len(legs) else f"legs {', '.join(bare)}"
     return [*scene, *sticks], f"{which} without shapes in the URDF: sticks between their joints"
 
@@ -46,12 +46,18 @@ def trunk_centre(legs: Sequence[Leg]) -> Array:
     return centre
 
 
-def leg_sticks(leg: Leg, centre: Array) -> list[Primitive]:
-    """Sticks from the trunk's centre through a leg's joints to its foot."""
+def leg_sticks(leg: Leg, centre: Array) -> list[tuple[int, Primitive]]:
+    """Sticks from the trunk's centre through a leg's joints to its foot.
+
+    Returns:
+        Each with how many of the leg's joints carry it: 0 for the one fixed to the trunk.
+    """
     points = [centre, *(joint.position for joint in leg.joints), leg.foot]
     length = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
     return [
-        _stick(a, b, _SLENDER * length) for a, b in pairwise(points) if np.linalg.norm(b - a) > 1e-9
+        (k, _stick(a, b, _SLENDER * length))
+        for k, (a, b) in enumerate(pairwise(points))
+        if np.linalg.norm(b - a) > 1e-9
     ]
 
 

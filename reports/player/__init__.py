@@ -1,0 +1,1 @@
+"""A cycle of the gait in 3D, in a browser."""
