@@ -98,6 +98,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
     judgement = None
     if verb == "reports":
         from pipeline.api import judgement as judging
+        from pipeline.api.pictures.scene import Scenery
         from pipeline.paper.judgement.basis import basis
 
         by = basis(given)
@@ -109,6 +110,8 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
             tables += more
             if by.word:
                 said.append(by.word)
+        remark = Scenery(given.robot).shapes.remark
+        said += [remark] if remark else []
     with staged(folder, verb, inputs=inputs_of(given)) as out:
         for table in tables:
             write_table(table, out, meta=metadata(given), decimal=decimal)

@@ -28,7 +28,8 @@ def robot_drawings(scenery: Scenery, standing: Standing, walking: Walking) -> li
     lifted = len(standing.segment.stance) < len(robot.leg_names)
     words = ["the other feet are lifted to mid-transfer"] if lifted else []
     if scenery.shapes.missing:
-        words.append(f"{len(scenery.shapes.missing)} meshes are missing")
+        count = len(scenery.shapes.missing)
+        words.append(f"{count} {'mesh is' if count == 1 else 'meshes are'} missing")
 
     def standing_robot() -> Figure:
         return robot_figure(

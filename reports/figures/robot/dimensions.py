@@ -42,27 +42,29 @@ def _millimetres(a: Array, b: Array) -> str:
     return f"{1e3 * float(np.linalg.norm(b - a)):.0f} mm"
 
 
-def link_dimensions(axes: Axes, view: View, legs: Sequence[Leg], unit: float) -> bool:
-    """Lengths of the links of the leg at the image's left; False where none shows true length."""
-    flat = [leg for leg in legs if _in_plane(leg, view)]
-    if not flat:
-        return False
+def link_dimensions(axes: Axes, view: View, legs: Sequence[Leg], unit: float) -> None:
+    """Lengths of the links that show it, of the leg that shows most, at the image's left."""
+    most = max(len(flat_links(leg, view)) for leg in legs)
+    able = [leg for leg in legs if len(flat_links(leg, view)) == most]
     leg = min(
-        flat, key=lambda one: (round(float(view.project(one.foot)[0] / unit), 2), one.foot[1])
+        able, key=lambda one: (round(float(view.project(one.foot)[0] / unit), 2), one.foot[1])
     )
-    middle = np.mean([view.project(end)[:2] for link in links_of(leg) for end in link], axis=0)
-    for start, end in links_of(leg):
+    links = flat_links(leg, view)
+    middle = np.mean([view.project(end)[:2] for link in links for end in link], axis=0)
+    for start, end in links:
         a, b = view.project(start)[:2], view.project(end)[:2]
         normal = np.array([-(b - a)[1], (b - a)[0]]) / np.linalg.norm(b - a)
         normal *= np.sign(normal @ ((a + b) / 2 - middle)) or 1.0  # outside of the knee
-        dimension(axes, a, b, tuple(0.14 * unit * normal), _millimetres(a, b))
-    return True
+        dimension(axes, a, b, tuple(0.14 * unit * normal), _millimetres(start, end))
 
 
-def _in_plane(leg: Leg, view: View) -> bool:
-    """Whether the long links show in nearly their length."""
-    links = [view.project(b - a) for a, b in links_of(leg)]
-    return bool(links) and all(np.hypot(*v[:2]) > _FLAT * np.linalg.norm(v) for v in links)
+def flat_links(leg: Leg, view: View) -> list[tuple[Array, Array]]:
+    """Those links of a leg that a view shows in nearly their length."""
+    return [
+        (a, b)
+        for a, b in links_of(leg)
+        if np.hypot(*view.project(b - a)[:2]) > _FLAT * np.linalg.norm(b - a)
+    ]
 
 
 def front_dimensions(axes: Axes, legs: Sequence[Leg], ground: float, unit: float) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from reports.errors import FigureError
 from reports.figures.robot.dimensions import (
+    flat_links,
     front_dimensions,
     link_dimensions,
     side_dimensions,
@@ -83,9 +84,9 @@ def robot_figure(
         widest = max(abs(float(leg.foot[1])), abs(float(leg.joints[-1].position[1])))
         x, y = float(leg.foot[0]), (widest + 0.07 * unit) * (np.sign(leg.foot[1]) or 1.0)
         _write(above, leg.name.upper(), np.array([x, y]))
-    seen = link_dimensions(ahead, FRONT, legs, unit)
-    if not seen:
-        link_dimensions(beside, SIDE, legs, unit)
+    both = ((ahead, FRONT), (beside, SIDE))
+    shown = [max(len(flat_links(leg, view)) for leg in legs) for _, view in both]
+    link_dimensions(*both[int(np.argmax(shown))], legs, unit)
     front_dimensions(ahead, legs, ground, unit)
     side_dimensions(beside, scene, legs, unit)
     top_dimensions(above, scene, legs, unit)
