@@ -17,14 +17,18 @@ from reports.tables import parameters as parameter_tables
 from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
 from reports.tables.gait import walking_base, walking_gait
+from reports.tables.walking import OUTSIDE
 
 IDEAL = "ideal"
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
 def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
-    """Each leg's joints."""
-    return {leg.name: leg.joints for leg in spec.legs}
+    """Each leg's joints, and under `OUTSIDE` those outside the legs where there are any."""
+    legs = {leg.name: leg.joints for leg in spec.legs}
+    placed = {joint for own in legs.values() for joint in own}
+    outside = tuple(joint for joint in spec.joints if joint not in placed)
+    return legs | ({OUTSIDE: outside} if outside else {})
 
 
 def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:

@@ -17,6 +17,8 @@ from reports.wide import Quantity, wide_series
 
 Array = NDArray[np.float64]
 ALTERNATIVE = ("actuator alternative", "")
+#: What tables by leg call the joints outside the legs, which are held.
+OUTSIDE = "outside_legs"
 
 
 def walking_joint_demand(demand: MotionDemand) -> Table:
@@ -230,6 +232,7 @@ def robot_energy(
     for name, supply in supplies.items():
         energy = float(supply.supplied_energy.sum())
         support = _support_energy(demand, supply, legs)
+        held = leg_energies(supply, legs).get(OUTSIDE, 0.0)
         power = energy / demand.period
         rows.append(
             {
@@ -238,7 +241,7 @@ def robot_energy(
                 "average_power_W": power,
                 "cost_of_transport": power / (weight * speed) if speed else None,
                 "support_share": None if support is None else support / energy,
-                "transfer_share": None if support is None else 1 - support / energy,
+                "transfer_share": None if support is None else 1 - support / energy - held / energy,
                 "dumped_J": float(supply.dumped_energy.sum()),
             }
         )

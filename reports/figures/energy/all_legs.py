@@ -23,6 +23,7 @@ from reports.figures.style import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -99,9 +100,7 @@ def joint_torques_figure(
         _line(panels[-1], stretches, _columns(stretches, joints, joint), "", i, dashed=True)
     if others:
         _label(panels[-1], "outside legs", [joint in sliding for joint in others])
-        words = [f"{joint} (outside the legs)" for joint in others]
-        figure.legend(handles=_handles(words, dashed=True), loc="outside lower right", ncols=1)
-    _finish(figure, list(panels), stretches, list(legs))
+    _finish(figure, list(panels), stretches, list(legs), others)
     return figure
 
 
@@ -175,7 +174,7 @@ def _label(axes: Axes, place: str, sliding: Sequence[bool]) -> None:
     zero_line(axes)
 
 
-def _handles(words: Sequence[str], dashed: bool = False) -> list[object]:
+def _handles(words: Sequence[str], dashed: bool = False) -> list[Artist]:
     from matplotlib.lines import Line2D
 
     return [
@@ -185,7 +184,11 @@ def _handles(words: Sequence[str], dashed: bool = False) -> list[object]:
 
 
 def _finish(
-    figure: Figure, panels: Sequence[Axes], stretches: Sequence[LegsStretch], legs: Sequence[str]
+    figure: Figure,
+    panels: Sequence[Axes],
+    stretches: Sequence[LegsStretch],
+    legs: Sequence[str],
+    others: Sequence[str] = (),
 ) -> None:
     for axes in panels:
         horizontal_grid(axes)
@@ -193,6 +196,5 @@ def _finish(
     panels[-1].set_xlim(float(stretches[0].time[0]), float(stretches[-1].time[-1]))
     panels[-1].set_xlabel("time [s]")
     figure.align_ylabels(list(panels))
-    figure.legend(
-        handles=_handles([leg.upper() for leg in legs]), loc="outside lower center", ncols=8
-    )
+    handles = _handles([leg.upper() for leg in legs]) + _handles(others, dashed=True)
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(8, len(handles)))
