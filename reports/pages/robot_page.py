@@ -98,7 +98,7 @@ def _answer(
         what,
         f"**What it costs** to drive all joints, on average over one cycle: {costs}.",
         _stability(tables["walking_stability"]),
-        _breaches(tables["motor_limits"], titles),
+        breaches_text(tables["motor_limits"], titles),
         *(f"**Note:** {remark}." for remark in remarks),
     )
 
@@ -122,7 +122,13 @@ def _stability(table: Table) -> str:
     )
 
 
-def _breaches(table: Table, titles: Mapping[str, str]) -> str:
+def breaches_text(table: Table, titles: Mapping[str, str]) -> str:
+    """Which motors leave their data sheet, the worst of each alternative.
+
+    Args:
+        table: ``motor_limits``.
+        titles: Alternative to its title.
+    """
     c = table.columns
     over = [i for i, breach in enumerate(c["breach"]) if breach]
     if not over:
