@@ -38,7 +38,7 @@ def run_view(options: argparse.Namespace) -> int:
         PipelineError: Unusable input.
         ReportError: The package viser is not installed.
     """
-    from reports.player.viser_player import viser_module
+    from pipeline.api.pictures.player import viser_module
 
     viser_module()  # before anything is computed
     from pipeline.api.pictures.view import player

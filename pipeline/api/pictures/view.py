@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from pipeline.api.pictures.cycle import Cycle, MovingBody
 from pipeline.api.pictures.gait import gait_steps_of, rows_of_steps
 from pipeline.api.pictures.scene import Scenery
 from pipeline.motion.gait import gait_of
@@ -15,10 +16,9 @@ from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Walking, walk
 from reports.figures.robot.solids import Solid
 from reports.figures.robot.sticks import bare_legs
-from reports.player.cycle import Cycle, MovingBody
 
 if TYPE_CHECKING:
-    from reports.player.viser_player import Player
+    from pipeline.api.pictures.player import Player
 
 Array = NDArray[np.float64]
 #: Steps of a cycle.
@@ -37,7 +37,7 @@ def player(given: Settings, *, host: str = "127.0.0.1", port: int = 8080) -> Pla
         ReportError: The package viser is not installed.
         TippingError: A foot would have to pull.
     """
-    from reports.player.viser_player import Player, viser_module
+    from pipeline.api.pictures.player import Player, viser_module
 
     viser_module()  # said before anything is computed
     walking = walk(

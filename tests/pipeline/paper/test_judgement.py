@@ -135,7 +135,7 @@ def test_another_robot_under_the_same_file_name_is_not_held_against_the_paper(
 ) -> None:
     text = (root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")
     other = tmp_path / "hexapod.toml"
-    other.write_text(text.replace("rm", "mr").replace("noimr", "norm"), encoding="utf-8")
+    other.write_text(text.replace('"rm"', '"mr"').replace("legs.rm", "legs.mr"), encoding="utf-8")
     assert basis(given(root, robot=other)) is None
 
 

@@ -12,13 +12,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pipeline.api.pictures.cycle import Cycle, arrow, quaternions, towards, triangles
+from pipeline.api.pictures.player import Player, viser_module
 from pipeline.api.pictures.scene import Scenery
 from pipeline.api.pictures.view import cycle
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking, walk
 from reports.errors import ReportError
-from reports.player.cycle import Cycle, arrow, quaternions, towards, triangles
-from reports.player.viser_player import Player, viser_module
 from tests.command_line import exit_code
 
 COUNT = 8

@@ -119,7 +119,7 @@ def test_energy_figures_hold_up_to_seven_joints(joints: int) -> None:
     motor = DCMotor("motor", 0.03, 0.3, 1000.0, 24.0, 5.0, 70.0)
     figures = (
         stage_energy_figure(stages, labels, places=places, title="t"),
-        motor_limits_figure(series, motor, labels, [(0.0, 0.5)], title="t"),
+        motor_limits_figure(series, [motor] * joints, labels, [(0.0, 0.5)], title="t"),
         electrical_energy_figure(
             list(labels.values()), {"a": np.arange(1.0, joints + 1)}, reference=None, title="t"
         ),

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.api.pictures.cycle import Cycle, arrow, quaternions, towards, triangles
 from reports.errors import ReportError
-from reports.player.cycle import Cycle, arrow, quaternions, towards, triangles
 
 Array = NDArray[np.float64]
 _GREEN, _PLUS, _MINUS = (0, 158, 115), (0, 114, 178), (230, 159, 0)

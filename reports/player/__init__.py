@@ -1,1 +1,0 @@
-"""A cycle of the gait in 3D, in a browser."""
