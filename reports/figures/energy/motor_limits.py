@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,15 +124,9 @@ def motor_limits_figure(
     scale = scale or common_scale([(series, motors)], joints)
     rms = rms_over_time(series.time, series.torque[:, columns])
     unit, factor = ("N·m", 1.0) if scale.torque >= _STRONG else ("mN·m", 1e3)
-    rows = -(-len(joints) // _IN_ROW)
-    across = -(-len(joints) // rows)
-    figure = new_figure(1.2 + 3.4 * rows)
+    figure, whole, rows = _panels(len(joints))
     headline(figure, title, subtitle)
-    grid = figure.subplots(rows, 1 + across, width_ratios=[0.8] + [1.0] * across, squeeze=False)
-    whole, panels = grid[0, 0], [axes for row in grid for axes in row[1:]]
-    for axes in (*grid[1:, 0], *panels[len(joints) :]):
-        axes.set_visible(False)
-    del panels[len(joints) :]
+    panels = [axes for row in rows for axes in row]
     _whole(whole, motors[columns[0]], columns[0], scale, factor)
     whole.set_ylabel(f"motor torque [{unit}]")
     whole.set_title("whole region\n", loc="center", fontweight="bold")
@@ -144,15 +138,28 @@ def motor_limits_figure(
         share = f" of {number(allowed * factor)}" if np.isfinite(allowed) else ""
         axes.set_title(f"{label}\n", loc="center", fontweight="bold")
         words = f"rms {number(float(value) * factor)}{share} {unit}"
-        look = {"ha": "center", "va": "bottom", "color": QUIET, "fontsize": 8}
+        look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": QUIET, "fontsize": 8}
         axes.text(0.5, 1.015, words, transform=axes.transAxes, **look)
-        if axes is not panels[0] and axes not in grid[1:, 1]:
+        if all(axes is not row[0] for row in rows):
             axes.tick_params(labelleft=False)
     for axes in (whole, *panels):
         axes.set_xlabel("motor speed [1000 rpm]")
     key = _common(key, [motors[column] for column in columns])
     figure.legend(handles=key, loc="outside lower center", ncols=4, fontsize=8, handlelength=2.2)
     return figure
+
+
+def _panels(joints: int) -> tuple[Figure, Axes, list[list[Axes]]]:
+    """A figure, its panel of the whole region, and rows of panels, one for each joint."""
+    rows = -(-joints // _IN_ROW)
+    across = -(-joints // rows)
+    figure = new_figure(1.2 + 3.4 * rows)
+    grid = figure.subplots(rows, 1 + across, width_ratios=[0.8] + [1.0] * across, squeeze=False)
+    for axes in (*grid[1:, 0], *grid[:, 1:].ravel()[joints:]):
+        axes.set_visible(False)
+    shown = [list(row[1:]) for row in grid]
+    shown[-1] = shown[-1][: joints - across * (rows - 1)]
+    return figure, grid[0, 0], shown
 
 
 def _common(key: list[Artist], motors: Sequence[DCMotor]) -> list[Artist]:

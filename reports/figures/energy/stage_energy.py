@@ -79,19 +79,7 @@ def stage_energy_figure(
     for j, (axes, joint) in enumerate(zip(panels, joints.values(), strict=True)):
         _bars(axes, forward[:, j], reverse[:, j])
         axes.set_title(joint, loc="center", fontweight="bold")
-        axes.set_xticks(np.arange(len(stages)), [symbol for symbol, _ in names.values()])
-        for x, (_, words) in enumerate(names.values()):
-            axes.annotate(
-                "" if " " in words else words,
-                (x, 0),
-                xycoords=axes.get_xaxis_transform(),
-                xytext=(0, -18),
-                textcoords="offset points",
-                ha="center",
-                va="top",
-                color=QUIET,
-                fontsize=7.5,
-            )
+        _name_stages(axes, list(names.values()))
     room = 0.075 * (top + bottom)  # for the values at the ends of the bars
     panels[0].set_ylim(-bottom - room, top + room)
     for axes in grid[:, 0]:
@@ -99,6 +87,23 @@ def stage_energy_figure(
     panels[0].yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
     _key(figure, long)
     return figure
+
+
+def _name_stages(axes: Axes, names: Sequence[tuple[str, str]]) -> None:
+    """Symbols below the bars, and below those the words that are short enough."""
+    axes.set_xticks(np.arange(len(names)), [symbol for symbol, _ in names])
+    for x, (_, words) in enumerate(names):
+        axes.annotate(
+            "" if " " in words else words,
+            (x, 0),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=(0, -18),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            color=QUIET,
+            fontsize=7.5,
+        )
 
 
 def energy_limits(

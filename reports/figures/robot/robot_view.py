@@ -73,17 +73,7 @@ def robot_figure(
         low, high = extent(view, scene)
         ends = [low[0] - 0.08 * unit, high[0] + 0.08 * unit]
         axes.plot(ends, [ground, ground], color=QUIET, linewidth=1.0)
-    outlines = OBLIQUE.project(np.concatenate([solid.points for solid in scene]))[:, :2]
-    for leg in legs:
-        at = OBLIQUE.project(leg.foot)[:2] - [0, 0.06 * unit]
-        if leg.foot[1] > 0:  # the trunk may hide a far foot, but not what lies above it
-            x = float(OBLIQUE.project(leg.joints[-1].position)[0])
-            column = outlines[np.abs(outlines[:, 0] - x) < 0.08 * unit, 1]
-            at = np.array([x, float(column.max(initial=at[1])) + 0.05 * unit])
-        _write(oblique, leg.name.upper(), at)
-        widest = max(abs(float(leg.foot[1])), abs(float(leg.joints[-1].position[1])))
-        x, y = float(leg.foot[0]), (widest + 0.07 * unit) * (np.sign(leg.foot[1]) or 1.0)
-        _write(above, leg.name.upper(), np.array([x, y]))
+    _name_legs(oblique, above, scene, legs, unit)
     both = ((ahead, FRONT), (beside, SIDE))
     shown = [max(len(flat_links(leg, view)) for leg in legs) for _, view in both]
     link_dimensions(*both[int(np.argmax(shown))], legs, unit)
@@ -103,6 +93,23 @@ _ROOM = {
     FRONT.name: (0.27, 0.17, 0.27, 0.20),
     SIDE.name: (0.20, 0.10, 0.15, 0.30),
 }
+
+
+def _name_legs(
+    oblique: Axes, above: Axes, scene: Sequence[Solid], legs: Sequence[Leg], unit: float
+) -> None:
+    """Names at the feet; of far legs above all that may hide them."""
+    outlines = OBLIQUE.project(np.concatenate([solid.points for solid in scene]))[:, :2]
+    for leg in legs:
+        at = OBLIQUE.project(leg.foot)[:2] - [0, 0.06 * unit]
+        if leg.foot[1] > 0:  # the trunk may hide a far foot, but not what lies above it
+            x = float(OBLIQUE.project(leg.joints[-1].position)[0])
+            column = outlines[np.abs(outlines[:, 0] - x) < 0.08 * unit, 1]
+            at = np.array([x, float(column.max(initial=at[1])) + 0.05 * unit])
+        _write(oblique, leg.name.upper(), at)
+        widest = max(abs(float(leg.foot[1])), abs(float(leg.joints[-1].position[1])))
+        x, y = float(leg.foot[0]), (widest + 0.07 * unit) * (np.sign(leg.foot[1]) or 1.0)
+        _write(above, leg.name.upper(), np.array([x, y]))
 
 
 def _write(axes: Axes, text: str, at: Array) -> None:
