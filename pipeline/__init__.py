@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from pipeline.api.init import init
     from pipeline.api.logs import compare, forward, identify, read_log, validate
     from pipeline.api.machine import Machine, load
     from pipeline.api.motion import stand, walk
@@ -26,6 +27,7 @@ _HOME = {
     **dict.fromkeys(
         ("read_log", "compare", "identify", "validate", "forward"), "pipeline.api.logs"
     ),
+    "init": "pipeline.api.init",
     "reports": "pipeline.api.reports",
 }
 __all__ = [
@@ -33,6 +35,7 @@ __all__ = [
     "compare",
     "forward",
     "identify",
+    "init",
     "load",
     "read_log",
     "reports",

@@ -27,8 +27,16 @@ class OutOfReachError(PipelineError):
     """A foot target lies outside what the leg reaches."""
 
 
-class TippingError(PipelineError):
+class StanceError(PipelineError):
+    """No forces of the ground carry the robot: a finding, not unusable input."""
+
+
+class TippingError(StanceError):
     """A foot would have to pull on the ground: the robot tips."""
+
+
+class SlidingError(StanceError):
+    """The feet would have to hold more than friction does: the robot slides."""
 
 
 class InvalidMotionError(PipelineError):

@@ -15,21 +15,16 @@ for _library in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR"):
 import io
 import json
 import resource
-import statistics
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Callable, Mapping
 from pathlib import Path
 
-import numpy as np
-import pinocchio as pin
 import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from actuators.loading.build import load_catalog
-from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
+from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
@@ -37,135 +32,32 @@ from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.walk_stand import joint_series
 from reports.tables.walking import walking_joint_demand
 from reports.writer import csv_bytes
+from tests.bench_demand import demand_ratios, support
 from tests.bench_gap import gap_costs
+from tests.bench_kinematics import inverse_kinematics
+from tests.bench_timing import Call, ratio, spread, timed
 
 ROOT = Path(__file__).parents[1]
 SAMPLES = 3000  # of the whole cycle
-TURNS = 15
-#: Aims of the project: (most, least).
-DEMAND_OVER_RNEA = 2.2
-LOOP_OVER_DEMAND = 7.0
-
-Call = Callable[[], object]
+QUADRUPEDS = ("solo12", "anymal_c")
 
 
-def timed(calls: Mapping[str, Call], turns: int = TURNS) -> dict[str, list[float]]:
-    """CPU seconds of each call, taking turns; one turn to warm up is not counted."""
-    seconds: dict[str, list[float]] = {name: [] for name in calls}
-    for turn in range(turns + 1):
-        for name, call in calls.items():
-            start = time.process_time()
-            call()
-            if turn:
-                seconds[name].append(time.process_time() - start)
-    return seconds
-
-
-def spread(values: list[float], digits: int = 2) -> str:
-    """Median with range."""
-    low, high = min(values), max(values)
-    return f"{statistics.median(values):.{digits}f} ({low:.{digits}f} to {high:.{digits}f})"
-
-
-def ratio(over: list[float], under: list[float]) -> list[float]:
-    """Turn by turn."""
-    return [a / b for a, b in zip(over, under, strict=True)]
-
-
-def bare_rnea(robot: Robot, motion: Motion) -> Call:
-    """Pinocchio's batch alone, on the same samples."""
-    pool = pin.ModelPool(robot.model, 1)
-    inputs = [(s.configuration.T, s.velocity.T, s.acceleration.T) for s in motion.segments]
-
-    def call() -> None:
-        for q, v, a in inputs:
-            pin.rneaInParallel(1, pool, q, v, a)
-
-    return call
-
-
-def user_loop(
-    robot: Robot, motion: Motion, *, torques_only: bool
-) -> Callable[[], list[np.ndarray]]:
-    """What one would write first: rnea, frame Jacobians and lstsq, sample by sample.
-
-    With three feet on one plane least squares over all forces is least squares over the tangential
-    ones. The batch returns joint torques, foot forces and foot points of all legs; the loop returns
-    the same, or, to be strict, does the least that gives torques.
-    """
-    model, data = robot.model, robot.model.createData()
-    frames = [model.getFrameId(leg.foot) for leg in robot.spec.legs]
-    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-
-    def call() -> list[np.ndarray]:
-        torques, forces, points = [], [], []
-        for segment in motion.segments:
-            stance = [robot.leg_names.index(leg) for leg in segment.stance]
-            for q, v, a in zip(
-                segment.configuration, segment.velocity, segment.acceleration, strict=True
-            ):
-                tau = pin.rnea(model, data, q, v, a)
-                pin.computeJointJacobians(model, data, q)
-                pin.updateFramePlacements(model, data)
-                jacobian = np.vstack(
-                    [pin.getFrameJacobian(model, data, frames[i], world)[:3] for i in stance]
-                )
-                force, *_ = np.linalg.lstsq(jacobian[:, :6].T, tau[:6], rcond=None)
-                torques.append((tau - jacobian.T @ force)[robot.velocity_index])
-                if not torques_only:
-                    forces.append(np.zeros((len(frames), 3)))
-                    forces[-1][stance] = force.reshape(-1, 3)
-                    points.append(np.array([data.oMf[i].translation for i in frames]) - q[:3])
-        return [np.array(torques), np.array(forces), np.array(points)]
-
-    return call
-
-
-def check_same(loop: list[np.ndarray], demand: MotionDemand) -> None:
-    """Both ways give the same numbers, or the comparison means nothing."""
-    contacts = [part for part in demand.contacts if part is not None]
-    ours = (
-        np.concatenate([part.torque for part in demand.segments]),
-        np.concatenate([part.force_world for part in contacts]),
-        np.concatenate([part.position for part in contacts]),
-    )
-    for theirs, own in zip(loop, ours, strict=True):
-        np.testing.assert_allclose(theirs, own, atol=1e-8)
-
-
-def demand_ratios(robot: Robot, motion: Motion) -> None:
-    """Batch demand against bare RNEA, the user's loop, and the chains against the demand."""
-    demand = motion_demand(robot, motion)
-    check_same(user_loop(robot, motion, torques_only=False)(), demand)
-    series = joint_series(demand)
+def chain_ratios(robot: Robot, motion: Motion) -> None:
+    """The actuators against the batch demand."""
+    series = joint_series(motion_demand(robot, motion))
     chains = load_catalog().chains()
     calls: dict[str, Call] = {
-        "rnea": bare_rnea(robot, motion),
         "demand": lambda: motion_demand(robot, motion),
-        "loop": user_loop(robot, motion, torques_only=True),
-        "full loop": user_loop(robot, motion, torques_only=False),
         "split": lambda: joint_series(motion_demand(robot, motion)),
     }
     for name, chain in chains.items():
-        calls[f"chain {name}"] = lambda chain=chain: chain.moving(series)  # type: ignore[misc]
+        calls[name] = lambda chain=chain: chain.moving(series)  # type: ignore[misc]
     seconds = timed(calls)
-    us = {name: [1e6 * s / motion.samples for s in values] for name, values in seconds.items()}
-    print(f"hexapod, free-flyer, {motion.samples} samples, us per sample: median (range)")
-    print(f"  bare rneaInParallel                  {spread(us['rnea'])}")
-    print(f"  batch demand (contacts and RNEA)     {spread(us['demand'])}")
-    print(f"  Python loop, torques only            {spread(us['loop'])}")
-    print(f"  the same with foot forces and points {spread(us['full loop'])}")
-    print("ratios")
-    over_rnea = ratio(us["demand"], us["rnea"])
-    over_demand = ratio(us["loop"], us["demand"])
-    like = ratio(us["full loop"], us["demand"])
-    print(f"  batch demand / bare rnea   {spread(over_rnea)}   aim: below {DEMAND_OVER_RNEA}")
-    print(f"  torque loop / batch demand {spread(over_demand)}   aim: at least {LOOP_OVER_DEMAND}")
-    print(f"  full loop / batch demand   {spread(like)}   the same results")
-    print(f"chains, 18 joints, {series.time.size} rows after splitting at velocity zeros")
+    joints = len(robot.joints)
+    print(f"chains, {joints} joints, {series.time.size} rows after splitting at velocity zeros")
     for name in chains:
-        own = [1e6 * s / series.time.size for s in seconds[f"chain {name}"]]
-        relative = ratio(seconds[f"chain {name}"], seconds["demand"])
+        own = [1e6 * s / series.time.size for s in seconds[name]]
+        relative = ratio(seconds[name], seconds["demand"])
         print(f"  {name:13s} {spread(own)} us per row, {spread(relative)} of the batch demand")
     extra = [a - b for a, b in zip(seconds["split"], seconds["demand"], strict=True)]
     print(f"  splitting     {spread(ratio(extra, seconds['demand']))} of the batch demand")
@@ -244,9 +136,14 @@ def cold_run() -> None:
 
 def main() -> None:
     """Print everything."""
+    for name in QUADRUPEDS:
+        four = load_robot(load_robot_file(ROOT / "urdf" / f"{name}.toml"))
+        demand_ratios(name, four, support(four, SAMPLES))
     robot = load_robot(load_robot_file(ROOT / "urdf" / "hexapod.toml"))
     motion = walking_motion(robot, samples=SAMPLES // 2)
-    demand_ratios(robot, motion)
+    demand_ratios("hexapod", robot, motion)
+    inverse_kinematics(ROOT, timed)
+    chain_ratios(robot, motion)
     csv_ratio(robot, motion)
     cold_run()
     gap_costs()

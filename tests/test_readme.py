@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.logs.reading import mapping
 from pipeline.logs.reading.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
+from pipeline.logs.reading.mapping_schema import ColumnTable, MappingTable
 from pipeline.robot import robot_file
 from pipeline.robot.robot_file import GAIT_SCHEMA
 from tests.pages import pages
@@ -68,7 +68,8 @@ def test_every_key_of_robot_and_mapping_files_is_described(root: Path) -> None:
     for key in (*GAIT_SCHEMA, *robot_file._ROBOT_KEYS, *robot_file._LEG_KEYS):
         assert f"`{key}`" in robot, key
     logs = (root / "pipeline/logs/README.md").read_text(encoding="utf-8")
-    for key in (*mapping._TOP, *mapping._COLUMN):
+    fields = {**MappingTable.model_fields, **ColumnTable.model_fields}
+    for key in (field.alias or name for name, field in fields.items()):
         assert re.search(rf"\b{key}\b", logs), key
 
 

@@ -9,8 +9,10 @@ from pathlib import Path
 from pipeline.effects.model_file import ModelFile, read_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.model_writer import model_text
-from pipeline.robot.robot_file import DEFAULT_ROBOT
-from pipeline.simulation.settings import Settings, settings
+from pipeline.robot.published import published_names
+from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
+from pipeline.simulation.force_choice import ForceChoice
+from pipeline.simulation.settings import PAPER_FORCES, Settings, settings
 from reports.atomic import write_text
 
 
@@ -38,6 +40,8 @@ class Machine:
         samples: int,
         quasi_static: bool = False,
         regeneration: str = "none",
+        forces: ForceChoice = PAPER_FORCES,
+        compare_forces: bool = False,
         walks: bool = True,
     ) -> Settings:
         """The machine ready to stand and walk; see `pipeline.simulation.settings.settings`."""
@@ -50,6 +54,8 @@ class Machine:
             quasi_static=quasi_static,
             regeneration=regeneration,
             actuators=self.actuators,
+            forces=forces,
+            compare_forces=compare_forces,
             walks=walks,
         )
 
@@ -104,5 +110,7 @@ def load(
     if path.suffix.lower() == ".toml":
         machine.settings(samples=51, walks=False)
     elif not path.is_file():
+        if str(robot) in published_names():
+            load_robot_file(path)  # says how to make one
         raise RobotFileError(f"{path}: no such robot file; name a robot file or URDF")
     return machine

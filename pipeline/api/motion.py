@@ -14,10 +14,13 @@ from pipeline.api.tables import (
     table_of_parameters,
     tables_of_standing,
     tables_of_walking,
+    walked,
 )
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import RobotFileError
 from pipeline.machine.drivetrains import Actuators
 from pipeline.simulation import walk_stand
+from pipeline.simulation.force_choice import LEAST_POWER, ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from reports.table import Table
 
@@ -74,21 +77,32 @@ class Walk(Result):
         return self.table("walking_stage_energy")
 
 
-def stand(machine: Machine, actuator: str | None = None) -> Stand:
+def stand(
+    machine: Machine,
+    actuator: str | None = None,
+    *,
+    forces: str = LEAST_TANGENTIAL,
+    friction_coefficient: float | None = None,
+) -> Stand:
     """Stand still and hold, as the robot file says.
 
     Args:
         machine: From `load`, with a floating base.
         actuator: Name of an alternative; all by default.
+        forces: Rule of the ground's forces: ``least_tangential``, ``least_torque``, or
+            ``least_power`` of the actuator named.
+        friction_coefficient: Greatest tangential over normal force of a foot [1]; no limit by
+            default.
 
     Raises:
-        TippingError: A foot would have to pull.
+        StanceError: A foot would have to pull or slide.
         PipelineError: The robot stands on a fixed base.
         ActuatorError: No such alternative.
     """
-    given = _legged(machine, machine.settings(samples=SAMPLES, walks=False))
+    choice = _choice(forces, actuator, friction_coefficient)
+    given = _legged(machine, machine.settings(samples=SAMPLES, forces=choice, walks=False))
     chains = _chains(given, actuator)
-    result = walk_stand.stand(given.machine, chains, adjust=given.adjust)
+    result = walk_stand.stand(given.machine, chains, adjust=given.adjust, forces=given.ground)
     tables = [*tables_of_standing(given, result), table_of_parameters(given)]
     return Stand(by_name(tables), "stand", metadata(given), result)
 
@@ -100,6 +114,9 @@ def walk(
     samples: int = SAMPLES,
     quasi_static: bool = False,
     regeneration: str = "none",
+    forces: str = LEAST_TANGENTIAL,
+    friction_coefficient: float | None = None,
+    compare_forces: bool = False,
 ) -> Walk:
     """Walk one cycle of the robot file's gait.
 
@@ -110,25 +127,34 @@ def walk(
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
+        forces: Rule of the ground's forces: ``least_tangential``, ``least_torque``, or
+            ``least_power`` of the actuator named.
+        friction_coefficient: Greatest tangential over normal force of a foot [1]; no limit by
+            default.
+        compare_forces: Add the table ``walking_force_rules``: what each rule costs.
 
     Raises:
-        TippingError: A foot would have to pull.
+        StanceError: A foot would have to pull or slide.
         PipelineError: The robot stands on a fixed base, or an argument is out of range.
         ActuatorError: No such alternative.
     """
-    made = machine.settings(samples=samples, quasi_static=quasi_static, regeneration=regeneration)
+    made = machine.settings(
+        samples=samples,
+        quasi_static=quasi_static,
+        regeneration=regeneration,
+        forces=_choice(forces, actuator, friction_coefficient),
+        compare_forces=compare_forces,
+    )
     given = _legged(machine, made)
     chains = _chains(given, actuator)
-    result = walk_stand.walk(
-        given.machine,
-        chains,
-        samples=given.samples,
-        quasi_static=given.quasi_static,
-        regeneration=given.regeneration,
-        adjust=given.adjust,
-    )
+    result = walked(given, chains)
     tables = [*tables_of_walking(given, result), table_of_parameters(given)]
     return Walk(by_name(tables), "walk", metadata(given), result)
+
+
+def _choice(rule: str, actuator: str | None, friction_coefficient: float | None) -> ForceChoice:
+    own = actuator if rule == LEAST_POWER else None
+    return ForceChoice(rule, own, friction_coefficient)
 
 
 def _legged(machine: Machine, given: Settings) -> Settings:

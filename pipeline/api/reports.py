@@ -14,10 +14,13 @@ from pipeline.api.tables import (
     table_of_parameters,
     tables_of_standing,
     tables_of_walking,
+    walked,
 )
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import RobotFileError
+from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
-from pipeline.simulation.walk_stand import Standing, Walking, stand, walk
+from pipeline.simulation.walk_stand import Standing, Walking, stand
 from reports.folder.staging import staged
 from reports.table import Table
 from reports.writer import write_table
@@ -35,6 +38,10 @@ def reports(
     samples: int = SAMPLES,
     quasi_static: bool = False,
     regeneration: str = "none",
+    forces: str = LEAST_TANGENTIAL,
+    power_of: str | None = None,
+    friction_coefficient: float | None = None,
+    compare_forces: bool = False,
     decimal: str = ".",
 ) -> tuple[str, ...]:
     """Stand, walk, hold it against the paper where it is the paper's robot; tables, figures, page.
@@ -45,18 +52,38 @@ def reports(
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
+        forces: Rule of the ground's forces: ``least_tangential``, ``least_torque`` or
+            ``least_power``.
+        power_of: Alternative whose power ``least_power`` makes the least.
+        friction_coefficient: Greatest tangential over normal force of a foot [1]; no limit by
+            default.
+        compare_forces: Add the table ``walking_force_rules``: what each rule costs.
         decimal: ``","`` writes copies for a decimal-comma spreadsheet, too.
 
     Returns:
         What a reader should not overlook, a line each.
 
     Raises:
-        TippingError: A foot would have to pull.
+        StanceError: A foot would have to pull or slide.
         PipelineError: Unusable input.
         ReportError: The folder cannot be written.
     """
-    given = machine.settings(samples=samples, quasi_static=quasi_static, regeneration=regeneration)
+    given = machine.settings(
+        samples=samples,
+        quasi_static=quasi_static,
+        regeneration=regeneration,
+        forces=ForceChoice(forces, power_of, friction_coefficient),
+        compare_forces=compare_forces,
+    )
     return write(given, "reports", Path(folder), decimal)
+
+
+def _refuse_stand(given: Settings) -> None:
+    if not given.robot.floating:
+        raise RobotFileError(
+            f"{given.robot.spec.path}: a robot on a stand neither stands nor walks; "
+            "give one with a floating base"
+        )
 
 
 def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple[str, ...]:
@@ -75,28 +102,17 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         PipelineError: Unusable input.
         ReportError: The folder cannot be written.
     """
-    if not given.robot.floating:
-        raise RobotFileError(
-            f"{given.robot.spec.path}: a robot on a stand neither stands nor walks; "
-            "give one with a floating base"
-        )
+    _refuse_stand(given)
     said: list[str] = []
     tables: list[Table] = []
     standing = walking = None
     if verb in ("stand", "reports"):
         logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
-        standing = stand(given.machine, given.chains(), adjust=given.adjust)
+        standing = stand(given.machine, given.chains(), adjust=given.adjust, forces=given.ground)
         tables += tables_of_standing(given, standing)
     if verb in ("walk", "reports"):
         logger.info("walking one cycle, %d samples per segment", given.samples)
-        walking = walk(
-            given.machine,
-            given.chains(),
-            samples=given.samples,
-            quasi_static=given.quasi_static,
-            regeneration=given.regeneration,
-            adjust=given.adjust,
-        )
+        walking = walked(given, given.chains())
         tables += tables_of_walking(given, walking)
     tables.append(table_of_parameters(given))
     judgement = None

@@ -16,10 +16,11 @@ from pathlib import Path
 
 from pipeline.cli.blind_options import add_blind_options, add_twin_options
 from pipeline.cli.decimal_option import add_decimal_option
+from pipeline.cli.force_options import add_force_options
 from pipeline.cli.gap.options import add_gap_options
 from pipeline.cli.named_path import named_path
 from pipeline.cli.view import add_view_options
-from pipeline.errors import PipelineError, TippingError
+from pipeline.errors import PipelineError, StanceError
 
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
 DEFAULT_ROBOT = Path("urdf/hexapod.toml")
@@ -41,17 +42,7 @@ def parser() -> argparse.ArgumentParser:
     root.add_argument("--version", action="version", version=f"legwatt {version('legwatt')}")
     verbs = root.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=_Parser)
 
-    check = verbs.add_parser("check", help="judge a robot file or URDF for physical sense")
-    check.add_argument("file", type=named_path, help="robot file (.toml) or URDF")
-    check.add_argument("-v", "--verbose", action="store_true", help="list what passed, too")
-    check.set_defaults(run=_run_check)
-
-    urdf = verbs.add_parser("urdf", help="build the URDFs from their robot files")
-    urdf.add_argument(
-        "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
-    )
-    urdf.set_defaults(run=_run_urdf)
-
+    _robot_verbs(verbs)
     for verb, text in (
         ("stand", "standing still: torques, currents, power of every alternative"),
         ("walk", "one walking cycle: demand, stage energies, losses, limits"),
@@ -87,6 +78,35 @@ def parser() -> argparse.ArgumentParser:
     calibrate.add_argument("--seed", type=int, default=1, help="of everything random")
     calibrate.set_defaults(run=_run_calibrate)
     return root
+
+
+def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
+    """What makes and judges robot files."""
+    check = verbs.add_parser("check", help="judge a robot file or URDF for physical sense")
+    check.add_argument(
+        "file", type=named_path, help="robot file (.toml), URDF, or a published name"
+    )
+    check.add_argument("-v", "--verbose", action="store_true", help="list what passed, too")
+    check.set_defaults(run=_run_check)
+
+    init = verbs.add_parser("init", help="write a robot file for a URDF or a robot's name")
+    init.add_argument("source", help="URDF, or a robot that example-robot-data ships, e.g. solo12")
+    init.add_argument("--out", type=named_path, help="robot file; NAME.toml here by default")
+    init.add_argument(
+        "--foot",
+        action="append",
+        default=[],
+        metavar="LINK",
+        help="a link at a foot, once for each leg; looked for by default",
+    )
+    init.add_argument("--base", metavar="LINK", help="the base's link; the root by default")
+    init.set_defaults(run=_run_init)
+
+    urdf = verbs.add_parser("urdf", help="build the URDFs from their robot files")
+    urdf.add_argument(
+        "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
+    )
+    urdf.set_defaults(run=_run_urdf)
 
 
 def _run_options(sub: argparse.ArgumentParser) -> None:
@@ -130,8 +150,15 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
         metavar="POLICY",
         help="what becomes of returned electrical energy: none, bus, or a fraction such as 0.5",
     )
+    add_force_options(sub)
     add_decimal_option(sub)
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
+
+
+def _run_init(options: argparse.Namespace) -> int:
+    from pipeline.cli.init import run_init
+
+    return run_init(options.source, options.out, feet=options.foot, base=options.base)
 
 
 def _run_check(options: argparse.Namespace) -> int:
@@ -237,7 +264,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         return run(options)
-    except TippingError as error:
+    except StanceError as error:
         print(error, file=sys.stderr)
         return EXIT_NEGATIVE
     except (PipelineError, ActuatorError, GapError, ReportError) as error:

@@ -1,22 +1,34 @@
 """Ground forces that carry the robot with the least sum of squared tangential forces.
 
 The wrench which floating-base inverse dynamics demands of the base (gravity and inertia of all
-links) must come from the feet. With the feet of the stance on one plane, the three equations of
-vertical force and tipping moments bind the normal forces alone, and the three of horizontal force
-and yaw moment the tangential ones alone; "the tangential forces at the feet are the minimum ones
-which guarantee the desired robot motion" (section II.B of the paper) then has a closed form: every
-foot takes an equal share of the horizontal force, plus a share of the yaw moment in proportion to
-its distance from the centroid of the stance.
+links) must come from the feet. With at least three feet that are not in one line, the equations of
+normal force and tipping moments can be met by the normal forces whatever the tangential ones are,
+so that the horizontal force and the yaw moment alone bind the tangential ones, at whatever heights
+the feet stand; "the tangential forces at the feet are the minimum ones which guarantee the desired
+robot motion" (section II.B of the paper) then has a closed form: every foot takes an equal share of
+the horizontal force, plus a share of the yaw moment in proportion to its distance from the centroid
+of the stance. Of the normal forces that remain open with more than three feet, those of least
+spread about their mean are taken; as their sum is bound, these are the ones of least squares.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.dynamics.internal_forces import (
+    Bounds,
+    held_by_friction,
+    internal_basis,
+    out_of_bounds,
+)
+from pipeline.motion.motion import level_ground
+
 Array = NDArray[np.float64]
+_UNLOADED = 1e-9  # share of the largest load below which a foot bears none
 
 
 @dataclass(frozen=True)
@@ -30,6 +42,7 @@ class ContactForces:
         position: Foot points in the base frame [m], shape (N, L, 3).
         force: In the base frame, acting on the robot [N], shape (N, L, 3); zero in the air.
         force_world: The same in the world frame [N], shape (N, L, 3).
+        normal: Unit normal of the ground in the world frame, shape (3,).
     """
 
     legs: tuple[str, ...]
@@ -38,35 +51,90 @@ class ContactForces:
     position: Array
     force: Array
     force_world: Array
+    normal: Array = field(default_factory=level_ground)
+
+    @property
+    def normal_force(self) -> Array:
+        """Along the ground's normal, positive where the ground presses [N], shape (N, L)."""
+        return self._in_ground[..., 2]
+
+    @cached_property
+    def _in_ground(self) -> Array:
+        turn = ground_frame(self.normal)
+        return self.force_world if turn is None else self.force_world @ turn.T
 
     @property
     def friction_needed(self) -> Array:
-        """Tangential over normal force per foot [1], shape (N, L); NaN where no load rests."""
-        normal = self.force_world[..., 2]
-        tangential = np.hypot(self.force_world[..., 0], self.force_world[..., 1])
-        return np.divide(tangential, normal, out=np.full(normal.shape, np.nan), where=normal > 0)
+        """Tangential over normal force per foot [1], shape (N, L).
+
+        NaN where no load rests; infinite where a foot without load would have to hold.
+        """
+        normal = self.normal_force
+        tangential = np.hypot(self._in_ground[..., 0], self._in_ground[..., 1])
+        nothing = _UNLOADED * float(np.abs(normal).max())
+        loaded = normal > nothing
+        needed = np.divide(tangential, normal, out=np.full(normal.shape, np.nan), where=loaded)
+        needed[~loaded & (normal >= -nothing) & (tangential > nothing)] = np.inf
+        return needed
 
 
-def least_tangential_forces(wrench: Array, feet: Array) -> Array:
+def ground_frame(normal: Array) -> Array | None:
+    """The smallest rotation from the world to a frame whose z axis is a normal; None for none.
+
+    Args:
+        normal: Upward unit vector in the world frame, shape (3,).
+    """
+    x, y, z = normal
+    if z == 1.0:
+        return None
+    return np.array(
+        [
+            [1 - x * x / (1 + z), -x * y / (1 + z), -x],
+            [-x * y / (1 + z), 1 - y * y / (1 + z), -y],
+            [x, y, z],
+        ]
+    )
+
+
+def least_tangential_forces(
+    wrench: Array, feet: Array, friction_coefficient: float | None = None
+) -> Array:
     """Foot forces that add up to a wrench, with the least sum of squared tangential forces.
 
-    With more than three feet the tangential condition leaves the normal forces open; of those the
-    least sum of squares is taken, and feet that would have to pull are released one by one.
+    Of what that leaves open the normal forces have the least spread, and no foot pulls. Without a
+    friction coefficient no foot braces against another: the tangential forces are those of the
+    closed form, and of the feet that bear a load only. With one, every force lies in its (circular)
+    cone, and the tangential forces are the least for which that is so.
 
     Args:
         wrench: Force and moment about the origin that the ground must supply, in a frame whose z
             axis is the ground's normal [N, N*m], shape (N, 6).
         feet: Foot points in the same frame [m], shape (N, F, 3), F >= 3.
+        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
 
     Returns:
-        Forces on the robot [N], shape (N, F, 3). With three feet a normal force may come out
-        negative: that foot would have to pull, and it is for the caller to refuse it. Feet in one
-        line give normal forces that are not finite.
-
-    Note:
-        Feet at unequal heights are balanced exactly, but the tangential forces are then those of
-        the equal-height solution, not the exact optimum.
+        Forces on the robot [N], shape (N, F, 3). Rows that nothing satisfies come back in the
+        closed form, with a foot that pulls or slides, and it is for the caller to refuse them. Feet
+        in one line give normal forces that are not finite.
     """
+    force = _closed_form(wrench, feet)
+    if feet.shape[1] > 3:
+        for row in np.flatnonzero(force[..., 2].min(axis=1) < 0):
+            pushing = _pushing(wrench[row], feet[row])
+            if pushing is not None:
+                force[row] = pushing
+    if friction_coefficient is not None:
+        rows = np.flatnonzero(out_of_bounds(force, friction_coefficient))
+        for row in rows:
+            basis = internal_basis(feet[row : row + 1])[0]
+            held = held_by_friction(force[row], basis, friction_coefficient)
+            if held is not None:
+                force[row] = held
+    return force
+
+
+def _closed_form(wrench: Array, feet: Array) -> Array:
+    """The least tangential forces and the normals of least squares, bounds left aside."""
     n_feet = feet.shape[1]
     force = np.empty(feet.shape)
     centre = feet.mean(axis=1)
@@ -86,8 +154,6 @@ def least_tangential_forces(wrench: Array, feet: Array) -> Array:
     moment_x = wrench[:, 3] + np.einsum("nf,nf->n", z, force[..., 1]) - centre[:, 1] * wrench[:, 2]
     moment_y = wrench[:, 4] - np.einsum("nf,nf->n", z, force[..., 0]) + centre[:, 0] * wrench[:, 2]
     force[..., 2] = _normals(x, y, wrench[:, 2], moment_x, moment_y)
-    if n_feet > 3:
-        _release_pulling_feet(force, x, y, wrench[:, 2], moment_x, moment_y)
     return force
 
 
@@ -103,23 +169,31 @@ def _normals(x: Array, y: Array, total: Array, moment_x: Array, moment_y: Array)
         return total[:, None] / x.shape[1] + a[:, None] * x + b[:, None] * y
 
 
-def _release_pulling_feet(
-    force: Array, x: Array, y: Array, total: Array, moment_x: Array, moment_y: Array
-) -> None:
-    for row in np.flatnonzero((force[..., 2] < 0).any(axis=1)):
-        kept = np.arange(x.shape[1])
-        normal = force[row, :, 2]
-        while (normal[kept] < 0).any() and kept.size > 3:
-            kept = np.delete(kept, int(np.argmin(normal[kept])))
-            px, py = x[row, kept], y[row, kept]
-            cx, cy = px.mean(), py.mean()
-            part = _normals(
-                (px - cx)[None],
-                (py - cy)[None],
-                total[row : row + 1],
-                moment_x[row : row + 1] - cy * total[row],
-                moment_y[row : row + 1] + cx * total[row],
-            )
-            normal = np.zeros(x.shape[1])
-            normal[kept] = part[0]
-        force[row, :, 2] = normal
+def _pushing(wrench: Array, feet: Array) -> Array | None:
+    """Forces of one sample of which no normal force pulls, or None where there are none.
+
+    The tangential forces are kept, which the closed form makes the least whatever the normal ones
+    are. A foot that then bears nothing holds nothing either: the others share anew.
+    """
+    force = np.asarray(_closed_form(wrench[None], feet[None])[0])
+    if not np.isfinite(force).all():
+        return None
+    if force[:, 2].min() >= 0:
+        return force
+    if len(feet) == 3:
+        return None
+    levers = np.stack([np.ones(len(feet)), *(feet - feet.mean(axis=0))[:, :2].T], axis=1)
+    open_normals = np.linalg.qr(levers, mode="complete").Q[:, 3:]
+    basis = np.zeros((*feet.shape, open_normals.shape[1]))
+    basis[:, 2] = open_normals
+    metric, gradient = np.eye(open_normals.shape[1]), open_normals.T @ force[:, 2]
+    within = Bounds(basis, None).minimum(metric, gradient, force)
+    if within is None:
+        return None
+    loaded = within[:, 2] > 0
+    if within[~loaded, :2].any() and loaded.sum() >= 3:
+        shared = _pushing(wrench, feet[loaded])
+        if shared is not None:
+            within[:] = 0.0
+            within[loaded] = shared
+    return within

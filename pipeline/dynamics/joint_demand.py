@@ -9,10 +9,12 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pipeline.dynamics.contact_forces import ContactForces, least_tangential_forces
-from pipeline.dynamics.stability import stability_margins
-from pipeline.errors import GaitError, TippingError
+from pipeline.dynamics.falling import refuse_falling
+from pipeline.dynamics.force_rules import PAPER, GroundForces, Stance
+from pipeline.dynamics.ground_frames import GroundFrames
+from pipeline.errors import GaitError
 from pipeline.motion.motion import Motion, Segment
-from pipeline.robot.kinematics import posture_at
+from pipeline.robot.kinematics import LegPosture, posture_at
 from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -67,23 +69,28 @@ def inverse_dynamics(
     return np.asarray(pin.rneaInParallel(threads, pool, q.T, v.T, a.T)).T.reshape(v.shape)
 
 
-def contact_forces(robot: Robot, segment: Segment, generalised: Array) -> ContactForces:
+def contact_forces(
+    robot: Robot, segment: Segment, generalised: Array, choice: GroundForces = PAPER
+) -> ContactForces:
     """Ground forces that supply the wrench demanded of the base.
 
     Args:
         robot: A robot with a floating base.
         segment: The motion.
         generalised: From `inverse_dynamics`, shape (N, nv).
+        choice: Rule and friction.
 
     Raises:
-        TippingError: A foot would have to pull; names foot, instant, force and margin.
+        StanceError: A foot would have to pull or slide; names foot, instant, force and margin.
         GaitError: Fewer than three feet stand.
     """
-    return _ground(robot, segment, generalised)[0]
+    return _ground(robot, segment, generalised, choice)[0]
 
 
-def _ground(robot: Robot, segment: Segment, generalised: Array) -> tuple[ContactForces, Array]:
-    """Ground forces, and the torques (N, K, 3) they put into the joints of the K standing legs."""
+def _ground(
+    robot: Robot, segment: Segment, generalised: Array, choice: GroundForces
+) -> tuple[ContactForces, Array]:
+    """Ground forces, and the torques (N, K, M) they put into the joints of the K standing legs."""
     if len(segment.stance) < 3:
         raise GaitError(
             f"segment '{segment.name}' stands on {len(segment.stance)} feet; a statically stable "
@@ -95,52 +102,59 @@ def _ground(robot: Robot, segment: Segment, generalised: Array) -> tuple[Contact
     order = stance + [i for i in range(len(legs)) if i not in stance]
     chains = robot.chains.of(order)
     columns = robot.position_index[robot.leg_columns[order]]
-    rotation = robot.base_rotation(segment.configuration)  # base -> world, (N, 3, 3) or None
+    frames = GroundFrames(robot, segment)
     n, k = segment.time.size, len(stance)
     feet = np.empty((n, len(legs), 3))
     force = np.zeros_like(feet)
-    force_world = force if rotation is None else np.zeros_like(feet)
     torque = np.empty((n, k, columns.shape[1]))
+    in_ground, standing = np.empty((n, k, 3)), np.empty((n, k, 3))
+    unit_torque = None if choice.rule is None else np.empty((n, k, 3, columns.shape[1]))
     for s in _blocks(n):
         posture = posture_at(chains, segment.configuration[s].T[columns])
         feet[s, order] = posture.feet
-        turn = None if rotation is None else rotation[s]
-        in_base, in_world = _supplied(generalised[s, :6], posture.feet[:, :k], turn)
-        force_world[s, stance] = in_world
-        force[s, stance] = in_base
-        torque[s] = posture.force_torques(in_base)
-    _refuse_pulling(robot, segment, force_world[:, stance, 2])
-    contacts = ContactForces(legs, segment.stance, segment.time, feet, force, force_world)
+        standing[s] = points = frames.to_ground(posture.feet[:, :k], s)
+        in_ground[s] = least_tangential_forces(
+            frames.wrench_to_ground(generalised[s, :6], s), points, choice.friction_coefficient
+        )
+        if unit_torque is None:
+            force[s, stance] = in_base = frames.to_base(in_ground[s], s)
+            torque[s] = posture.force_torques(in_base)
+        else:
+            unit_torque[s] = _unit_torques(posture, frames, s, k)
+    refuse_falling(robot, segment, in_ground, standing, choice.friction_coefficient)
+    if choice.rule is not None and unit_torque is not None:
+        seen = Stance(
+            segment,
+            *_motion_and_torque(robot, segment, generalised),
+            robot.leg_columns[stance],
+            robot.layout.real[stance],
+            unit_torque,
+            standing,
+            in_ground,
+            choice.friction_coefficient,
+        )
+        in_ground = choice.rule.forces(seen)
+        force[:, stance] = frames.to_base(in_ground)
+        torque = seen.leg_torque(in_ground)
+    force_world = force
+    if not frames.same:
+        force_world = np.zeros_like(force)
+        force_world[:, stance] = frames.to_world(in_ground)
+    contacts = ContactForces(
+        legs, segment.stance, segment.time, feet, force, force_world, segment.ground_normal
+    )
     return contacts, torque
 
 
-def _supplied(wrench: Array, feet: Array, rotation: Array | None) -> tuple[Array, Array]:
-    """Forces on the standing feet in the base and in the world frame, for a wrench on the base."""
-    if rotation is None:
-        force = least_tangential_forces(wrench, feet)
-        return force, force
-    parts = [np.einsum("nij,nj->ni", rotation, part) for part in (wrench[:, :3], wrench[:, 3:])]
-    world_feet = np.einsum("nij,nfj->nfi", rotation, feet)
-    force = least_tangential_forces(np.concatenate(parts, axis=1), world_feet)
-    return np.einsum("nji,nfj->nfi", rotation, force), force
-
-
-def _refuse_pulling(robot: Robot, segment: Segment, normal: Array) -> None:
-    lowest = float(normal.min())  # NaN where any force is
-    if not np.isfinite(lowest):
-        raise TippingError(
-            f"the robot tips: in '{segment.name}' the feet stand in one line and carry no moment "
-            "across it; stand on feet of both sides"
-        )
-    # A foot that is exactly unloaded (a tripod at the edge of its stability) still stands.
-    if lowest < -1e-9 * max(1.0, float(np.abs(normal).max())):
-        sample, foot = np.unravel_index(int(normal.argmin()), normal.shape)
-        margin = stability_margins(robot, segment)[sample]
-        raise TippingError(
-            f"the robot tips at t = {segment.time[sample]:.4g} s ({segment.name}): the foot of leg "
-            f"'{segment.stance[foot]}' would have to pull with {-lowest:.1f} N, static margin "
-            f"{1e3 * margin:.1f} mm; widen the hip spacing or shorten the stroke"
-        )
+def _unit_torques(posture: LegPosture, frames: GroundFrames, rows: slice, count: int) -> Array:
+    """Joint torques of unit forces along the ground's axes, shape (n, K, 3, M) [N*m/N]."""
+    along = np.zeros((posture.feet.shape[0], count, 3))
+    parts = []
+    for axis in range(3):
+        along[:] = 0.0
+        along[..., axis] = 1.0
+        parts.append(posture.force_torques(frames.to_base(along, rows)))
+    return np.stack(parts, axis=2)
 
 
 def _blocks(n: int) -> list[slice]:
@@ -155,14 +169,33 @@ def _columns(values: Array, index: NDArray[np.intp]) -> Array:
     return values[:, index]
 
 
+def _motion_and_torque(
+    robot: Robot, segment: Segment, generalised: Array
+) -> tuple[tuple[str, ...], Array, Array, Array, Array]:
+    """Joints, their position, velocity, acceleration and generalised force."""
+    return (
+        robot.joints,
+        _columns(segment.configuration, robot.position_index),
+        _columns(segment.velocity, robot.velocity_index),
+        _columns(segment.acceleration, robot.velocity_index),
+        _columns(generalised, robot.velocity_index),
+    )
+
+
 def segment_demand(
-    robot: Robot, segment: Segment, *, quasi_static: bool = False, threads: int = 1
+    robot: Robot,
+    segment: Segment,
+    *,
+    forces: GroundForces = PAPER,
+    quasi_static: bool = False,
+    threads: int = 1,
 ) -> tuple[JointDemand, ContactForces | None]:
     """Joint torques over one segment, with the contact forces they rest on.
 
     Args:
         robot: With floating base the ground carries it; with fixed base there is no contact.
         segment: The motion.
+        forces: How the ground's forces are chosen.
         quasi_static: Leave out the links' inertial terms.
         threads: For Pinocchio's thread pool.
 
@@ -170,35 +203,38 @@ def segment_demand(
         The demand and the contact forces (None for a fixed base).
 
     Raises:
-        TippingError: A foot would have to pull.
+        StanceError: A foot would have to pull or slide.
     """
     generalised = inverse_dynamics(robot, segment, quasi_static=quasi_static, threads=threads)
-    torque = _columns(generalised, robot.velocity_index)
+    bare = _motion_and_torque(robot, segment, generalised)
+    joints, position, velocity, acceleration, torque = bare
     contacts = None
     if robot.floating:
-        contacts, from_ground = _ground(robot, segment, generalised)
+        contacts, from_ground = _ground(robot, segment, generalised, forces)
         for i, leg in enumerate(segment.stance):
             columns = robot.layout.of(robot.leg_names.index(leg))
             torque[:, columns] -= from_ground[:, i, : columns.size]
     demand = JointDemand(
-        joints=robot.joints,
-        time=segment.time,
-        position=_columns(segment.configuration, robot.position_index),
-        velocity=_columns(segment.velocity, robot.velocity_index),
-        acceleration=_columns(segment.acceleration, robot.velocity_index),
-        torque=torque,
-        segment=segment.name,
+        joints, segment.time, position, velocity, acceleration, torque, segment.name
     )
     return demand, contacts
 
 
 @dataclass(frozen=True)
 class MotionDemand:
-    """Demand and contact forces of a whole motion, segment by segment."""
+    """Demand and contact forces of a whole motion, segment by segment.
+
+    Attributes:
+        segments: Demand at the joints.
+        contacts: Forces of the ground; None for a fixed base.
+        period: Of the motion [s]; None where it does not repeat.
+        forces: How the ground's forces were chosen.
+    """
 
     segments: tuple[JointDemand, ...]
     contacts: tuple[ContactForces | None, ...]
     period: float | None
+    forces: GroundForces = PAPER
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -207,15 +243,21 @@ class MotionDemand:
 
 
 def motion_demand(
-    robot: Robot, motion: Motion, *, quasi_static: bool = False, threads: int = 1
+    robot: Robot,
+    motion: Motion,
+    *,
+    forces: GroundForces = PAPER,
+    quasi_static: bool = False,
+    threads: int = 1,
 ) -> MotionDemand:
     """Joint demand along a motion; see `segment_demand`."""
     parts = [
-        segment_demand(robot, segment, quasi_static=quasi_static, threads=threads)
+        segment_demand(robot, segment, forces=forces, quasi_static=quasi_static, threads=threads)
         for segment in motion.segments
     ]
     return MotionDemand(
         tuple(demand for demand, _ in parts),
         tuple(contacts for _, contacts in parts),
         motion.period,
+        forces,
     )

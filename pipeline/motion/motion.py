@@ -33,6 +33,8 @@ class Segment:
         stance: Names of the legs whose feet carry load.
         ground_normal: Unit vector in the world frame (z opposes gravity) that points out of the
             ground, shape (3,); the standing feet rest on one plane with this normal.
+        foot_target: Where the feet should be in the base frame, shape (N, L, 3) [m]; None where
+            the motion was not made from feet.
     """
 
     name: str
@@ -42,6 +44,7 @@ class Segment:
     acceleration: Array
     stance: tuple[str, ...]
     ground_normal: Array = field(default_factory=level_ground)
+    foot_target: Array | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no later stage could compute with.

@@ -45,7 +45,8 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     if lifted:
         target[lifted, 2] += lifts(table, spec)[lifted]
     time = np.zeros(1)
-    q = solve_positions(robot.chains, (target @ body)[None], start, time)
+    in_base = (target @ body)[None]
+    q = solve_positions(robot.chains, in_base, start, time)
     refuse_beyond_limits(robot, q, time)
     still = robot.tangent(np.zeros((1, len(robot.joints))))
     configuration = robot.configuration(robot.joint_positions(q), np.zeros((1, 3)))
@@ -59,4 +60,5 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
         acceleration=still,
         stance=stance,
         ground_normal=ground.normal,
+        foot_target=in_base,
     )

@@ -82,7 +82,9 @@ def _segment(
     feet = _feet(gait, begin, end, passed, shift)
     q = solve_positions(robot.chains, feet.position, start, time)
     refuse_beyond_limits(robot, q, time)
-    q_dot, q_ddot = solve_rates(robot.chains, q, feet.velocity, feet.acceleration, time)
+    q_dot, q_ddot = solve_rates(
+        robot.chains, q, feet.velocity, feet.acceleration, time, feet.position
+    )
     base = base_motion(gait, time, shift)
     configuration = robot.configuration(robot.joint_positions(q), base.position)
     configuration[:, 3:7] = base.quaternion
@@ -98,6 +100,7 @@ def _segment(
         acceleration=acceleration,
         stance=stance,
         ground_normal=gait.ground.normal,
+        foot_target=feet.position,
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from pipeline.errors import UnphysicalModelError
+from pipeline.robot.published import published_names, published_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 from pipeline.robot.urdf_check import MERGED, Finding, check_urdf
@@ -15,7 +16,12 @@ from pipeline.robot.urdf_source import read_urdf
 
 __all__ = ["Finding", "check_file", "check_robot", "check_urdf", "refuse_impossible", "refuse_urdf"]
 
-SYMMETRY_TOLERANCE = 0.01  # relative, lengths to the leg's; left and right of CAD exports differ
+#: Relative, lengths to the leg's: left and right of CAD exports differ.
+SYMMETRY_TOLERANCE = 0.01
+#: Up to here a difference is one of parts and noted, beyond it is a mistake: a wrong sign makes 2.
+SYMMETRY_FAULT = 0.1
+#: Of the leg's reach, within which a foot is the mirror image of another.
+MIRRORED_FOOT = 0.05
 #: Of the stated mass, where the robot file gives no interval: masses are stated in three digits.
 MASS_TOLERANCE = 0.005
 
@@ -24,7 +30,7 @@ def check_file(path: Path) -> list[Finding]:
     """Check a robot file or a bare URDF.
 
     Args:
-        path: ``.toml`` robot file or URDF.
+        path: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``.
 
     Returns:
         Every check with its outcome.
@@ -34,6 +40,8 @@ def check_file(path: Path) -> list[Finding]:
     """
     if path.suffix.lower() == ".toml":
         return check_robot(load_robot(load_robot_file(path)))
+    if not path.exists() and str(path) in published_names():
+        return check_urdf(read_urdf(published_robot(str(path)).urdf), str(path))
     return check_urdf(read_urdf(path), str(path))
 
 
@@ -49,7 +57,17 @@ def check_robot(robot: Robot) -> list[Finding]:
             f"{len(robot.joints)} joints, {len(spec.legs)} feet",
         )
     )
-    return findings + _symmetry(robot, spec)
+    return findings + _sliding(robot) + _symmetry(robot, spec)
+
+
+def _sliding(robot: Robot) -> list[Finding]:
+    """Joints whose numbers are metres and newtons under headings for those that turn."""
+    detail = (
+        "it slides: where columns are called rad, rad_s and Nm its numbers are m, m/s and N, and "
+        "its actuator's ratio is turned radians per metre"
+    )
+    names = [joint for joint, slides in zip(robot.joints, robot.sliding, strict=True) if slides]
+    return [Finding(joint, "unit of the joint", True, detail, note=True) for joint in names]
 
 
 def source_of(robot: Robot) -> str:
@@ -90,7 +108,8 @@ def refuse_impossible(robot: Robot) -> tuple[str, ...]:
             unit, a joint without a drive of its own, or another mass than the stated one.
     """
     where = source_of(robot)
-    return refused([*check_urdf(robot.urdf, where), *_masses(robot)], where, str(robot.spec.path))
+    findings = [*check_urdf(robot.urdf, where), *_masses(robot), *_sliding(robot)]
+    return refused(findings, where, str(robot.spec.path))
 
 
 def refuse_urdf(text: str, where: str) -> tuple[str, ...]:
@@ -128,32 +147,34 @@ def _symmetry(robot: Robot, spec: RobotSpec) -> list[Finding]:
     findings = []
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
-    for leg in spec.legs:
+    feet = np.array([leg.neutral_foot for leg in spec.legs])
+    for i, leg in enumerate(spec.legs):
         if leg.side != "left":
             continue
-        x, y, z = leg.neutral_foot
-        mirrored = [
-            other
-            for other in spec.legs
-            if other.side == partner[leg.side]
-            and np.allclose(other.neutral_foot, (x, -y, z), atol=1e-9)
-        ]
-        subject = leg.name if not mirrored else f"{leg.name}/{mirrored[0].name}"
-        if not mirrored:
-            findings.append(
-                Finding(subject, "mirror symmetry", False, "no right leg with the mirrored foot")
-            )
+        apart = np.linalg.norm(feet - feet[i] * [1, -1, 1], axis=1)
+        others = [k for k, other in enumerate(spec.legs) if other.side == partner[leg.side]]
+        near = min(others, key=lambda k: float(apart[k]), default=None)
+        if near is None or apart[near] > MIRRORED_FOOT * robot.chains.reach[i]:
+            detail = "no right leg with the mirrored foot"
+            findings.append(Finding(leg.name, "mirror symmetry", False, detail))
+            continue
+        other = spec.legs[near]
+        subject = f"{leg.name}/{other.name}"
+        if len(leg.joints) != len(other.joints):
+            detail = f"{len(leg.joints)} joints against {len(other.joints)}"
+            findings.append(Finding(subject, "mirror symmetry", False, detail))
             continue
         worst = max(
             _mirror_difference(robot, data, a, b)
-            for a, b in zip(leg.joints, mirrored[0].joints, strict=True)
+            for a, b in zip(leg.joints, other.joints, strict=True)
         )
         findings.append(
             Finding(
                 subject,
                 "mirror symmetry",
-                worst <= SYMMETRY_TOLERANCE,
+                worst <= SYMMETRY_FAULT,
                 f"largest relative difference {worst:.2g}",
+                note=SYMMETRY_TOLERANCE < worst <= SYMMETRY_FAULT,
             )
         )
     return findings

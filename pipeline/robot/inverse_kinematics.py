@@ -1,52 +1,69 @@
 """Joint positions, velocities and accelerations from a prescribed foot path.
 
-Positions come from a damped Newton iteration on the batched kinematics, so that any leg of three
-revolute joints is served; velocities and accelerations then follow exactly from
-``x_dot = J q_dot`` and ``x_ddot = J q_ddot + J_dot q_dot``.
+Positions come in closed form where a leg has one (`pipeline.robot.inverse.closed_form`), from
+damped least squares where it has three joints of another build, and of least motion or least miss
+where it has more or fewer joints than a foot has coordinates. Velocities and accelerations follow
+exactly, from ``x_dot = J q_dot`` and ``x_ddot = J q_ddot + J_dot q_dot``.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import OutOfReachError
-from pipeline.robot.kinematics import foot_jacobian_rates, foot_jacobians
+from pipeline.robot.inverse.closed_form import closed_form, closed_form_legs
+from pipeline.robot.inverse.damped import approach, square_solve
+from pipeline.robot.inverse.least_motion import Freedom, LeastMotion, freedoms
+from pipeline.robot.kinematics import bias_acceleration, foot_positions, swept
 from pipeline.robot.leg_chains import LegChains
 
 Array = NDArray[np.float64]
-_ITERATIONS = 60
-_MAX_STEP = 0.35  # [rad] per iteration, keeps the knee on the branch of the start posture
-_CONVERGED = 1e-12  # [m]
 ACCEPTED = 1e-9  # [m]
+_SINGULAR = 1e8  # condition number of a leg's Jacobian that is none any more
+_JUMP = 0.2  # [rad] between two samples that no velocity explains
+_PATH = 16  # samples from which velocities tell the way from one to the next
 
 
-def approach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Array]:
-    """Joint positions that bring the feet as close to their targets as the iteration gets.
+def reach(
+    chains: LegChains, target: Array, start: Array, *, closed: bool = True
+) -> tuple[Array, Array]:
+    """Joint positions that bring the feet as close to their targets as their legs get.
 
     Args:
         chains: The legs.
         target: Foot positions in the base frame [m], shape (N, L, 3).
-        start: Posture that names the branch (knee up or down) [rad, m], shape (L, K) or (N, L, K).
+        start: Posture that names the branch (knee up or down) [rad, m], shape (L, K).
+        closed: Whether closed forms are used where they exist; the iteration serves all.
 
     Returns:
-        Joint positions [rad, m], shape (N, L, K), and what is left to the targets [m], (N, L).
+        Joint positions [rad, m], shape (N, L, K), and by how much a foot misses what its leg
+        should reach [m], shape (N, L): all of the way to the target where the leg moves its foot
+        in every direction, nothing where it lacks one and stands as near as it gets.
     """
-    q = np.broadcast_to(start, (*target.shape[:2], chains.depth)).copy()
-    damping = 1e-2  # [m], relaxed as the iteration comes close
-    for _ in range(_ITERATIONS):
-        foot, jacobian = foot_jacobians(chains, q)
-        error = target - foot
-        size = np.abs(error).max()
-        if size < _CONVERGED:
-            break
-        damping = min(1e-2, 0.1 * float(size))
-        normal = jacobian @ jacobian.swapaxes(-1, -2) + damping**2 * np.eye(3)
-        step = jacobian.swapaxes(-1, -2) @ np.linalg.solve(normal, error[..., None])
-        largest = np.abs(step).max(axis=(-1, -2), keepdims=True)
-        q += (step * np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300)))[..., 0]
-    foot, _ = foot_jacobians(chains, q)
-    return q, np.linalg.norm(target - foot, axis=-1)
+    n_samples, n_legs = target.shape[:2]
+    q = np.zeros((n_samples, n_legs, chains.depth))
+    miss = np.zeros((n_samples, n_legs))
+    direct = closed_form_legs(chains, start) if closed else np.zeros(0, dtype=np.intp)
+    if direct.size:
+        found = closed_form(chains, direct, target[:, direct], start)
+        reached = np.isfinite(found).all(axis=(0, 2))
+        direct = direct[reached]  # the iteration says how far the others are off
+    if direct.size:
+        q[:, direct, :3] = found[:, reached]
+        feet = foot_positions(chains.of(direct.tolist()), q[:, direct])
+        miss[:, direct] = np.linalg.norm(target[:, direct] - feet, axis=-1)
+    for freedom, legs in _groups(chains, set(direct.tolist())):
+        own, goal, begin = chains.of(legs), target[:, legs], start[legs]
+        if freedom.square:
+            q[:, legs], miss[:, legs] = approach(own, goal, begin)
+        else:
+            q[:, legs], left = LeastMotion(own, freedom, own.nominal).positions(goal, begin)
+            if not freedom.lacks:
+                miss[:, legs] = left
+    return q, miss
 
 
 def solve_positions(chains: LegChains, target: Array, start: Array, time: Array) -> Array:
@@ -59,12 +76,13 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
         time: For messages [s], shape (N,).
 
     Returns:
-        Joint positions [rad, m], shape (N, L, K).
+        Joint positions [rad, m], shape (N, L, K). A leg that lacks a direction puts its foot as
+        near as it gets; `pipeline.robot.foot_tracking` tells how near.
 
     Raises:
         OutOfReachError: A target is not reached; names leg, instant and how far it is off.
     """
-    q, miss = approach(chains, target, start)
+    q, miss = reach(chains, target, start)
     if miss.max() > ACCEPTED:
         sample, leg = np.unravel_index(int(miss.argmax()), miss.shape)
         raise beyond_reach(
@@ -91,34 +109,109 @@ def beyond_reach(leg: str, target: Array, miss: float, time: float) -> OutOfReac
 
 
 def solve_rates(
-    chains: LegChains, q: Array, foot_velocity: Array, foot_acceleration: Array, time: Array
+    chains: LegChains,
+    q: Array,
+    foot_velocity: Array,
+    foot_acceleration: Array,
+    time: Array,
+    target: Array | None = None,
 ) -> tuple[Array, Array]:
     """Joint velocities and accelerations that move the feet as prescribed.
 
     Args:
         chains: The legs.
-        q: Joint positions [rad], shape (N, L, 3).
+        q: Joint positions from `solve_positions` [rad, m], shape (N, L, K).
         foot_velocity: In the base frame, relative to the base [m/s], shape (N, L, 3).
         foot_acceleration: Likewise [m/s^2], shape (N, L, 3).
         time: For messages [s], shape (N,).
+        target: Where the feet should be [m], shape (N, L, 3); where they are by default. A leg
+            that lacks a direction needs it: how it turns depends on how far it is off.
 
     Returns:
-        Joint velocities [rad/s] and accelerations [rad/s^2], each (N, L, 3).
+        Joint velocities [rad/s, m/s] and accelerations [rad/s^2, m/s^2], each (N, L, K).
 
     Raises:
         OutOfReachError: The leg is stretched (singular) at a sample.
     """
-    _, jacobian = foot_jacobians(chains, q)
-    singular = np.linalg.cond(jacobian) > 1e8
+    velocity, acceleration = np.zeros(q.shape), np.zeros(q.shape)
+    for freedom, legs in _groups(chains, set()):
+        own = chains.of(legs)
+        if freedom.square:
+            parts = _square_rates(
+                own, q[:, legs], foot_velocity[:, legs], foot_acceleration[:, legs], time
+            )
+        else:
+            goal = foot_positions(own, q[:, legs]) if target is None else target[:, legs]
+            _refuse_singular(own, freedom, q[:, legs], time)
+            problem = LeastMotion(own, freedom, own.nominal)
+            parts = problem.rates(
+                q[:, legs], foot_velocity[:, legs], foot_acceleration[:, legs], goal
+            )
+        velocity[:, legs], acceleration[:, legs] = parts
+    _refuse_jumps(chains, q, velocity, time)
+    return velocity, acceleration
+
+
+def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> None:
+    """Between samples a joint goes as far as its velocities say, or it changed its branch.
+
+    Raises:
+        OutOfReachError: One did not.
+    """
+    step = np.diff(time)[:, None, None]
+    if time.size < _PATH or step.min() <= 0:
+        return
+    gone = np.diff(q, axis=0)
+    told = 0.5 * step * (velocity[1:] + velocity[:-1])
+    # What the trapezoid leaves out grows with the step, as the change of velocity does.
+    jump = np.abs(gone - told) - 0.5 * step * np.abs(np.diff(velocity, axis=0))
+    if jump.max() > _JUMP:
+        sample, leg, joint = np.unravel_index(int(jump.argmax()), jump.shape)
+        raise OutOfReachError(
+            f"leg '{chains.names[leg]}', joint {joint + 1}: its position jumps by "
+            f"{gone[sample, leg, joint]:.3g} rad at t = {time[sample]:.4g} s, from one branch of "
+            "its inverse kinematics to another; keep the foot away from the axis of joint 1 and "
+            "the leg from being stretched, or state another start_posture"
+        )
+
+
+def _groups(chains: LegChains, but: set[int]) -> Iterator[tuple[Freedom, list[int]]]:
+    """Legs of the same freedom, without some."""
+    free = freedoms(chains)
+    for kind in dict.fromkeys(free):
+        legs = [i for i, own in enumerate(free) if own == kind and i not in but]
+        if legs:
+            yield kind, legs
+
+
+def _square_rates(
+    chains: LegChains, q: Array, foot_velocity: Array, foot_acceleration: Array, time: Array
+) -> tuple[Array, Array]:
+    angle = np.array(q.transpose(1, 2, 0))
+    columns = swept(chains, angle.copy()).columns[:, :3]
+    rate, condition = square_solve(columns, foot_velocity.transpose(2, 1, 0))
+    _refuse(chains, condition, time)
+    speed = np.zeros(angle.shape)
+    speed[:, :3] = rate.transpose(1, 0, 2)
+    bias = bias_acceleration(chains, angle, speed)
+    bend, _ = square_solve(columns, foot_acceleration.transpose(2, 1, 0) - bias)
+    acceleration = np.zeros(angle.shape)
+    acceleration[:, :3] = bend.transpose(1, 0, 2)
+    return speed.transpose(2, 0, 1), acceleration.transpose(2, 0, 1)
+
+
+def _refuse_singular(chains: LegChains, freedom: Freedom, q: Array, time: Array) -> None:
+    columns = swept(chains, np.array(q.transpose(1, 2, 0))).columns.transpose(3, 2, 0, 1)
+    values = np.linalg.svd(columns, compute_uv=False)
+    with np.errstate(divide="ignore"):
+        _refuse(chains, (values[..., 0] / values[..., freedom.directions - 1]).T, time)
+
+
+def _refuse(chains: LegChains, condition: Array, time: Array) -> None:
+    singular = ~(condition < _SINGULAR)
     if singular.any():
-        sample, leg = np.unravel_index(int(singular.argmax()), singular.shape)
+        leg, sample = np.unravel_index(int(singular.argmax()), singular.shape)
         raise OutOfReachError(
             f"leg '{chains.names[leg]}' is stretched or folded to a singular posture at "
             f"t = {time[sample]:.4g} s; shorten the stroke or move the neutral foot"
         )
-    velocity = np.asarray(
-        np.linalg.solve(jacobian, foot_velocity[..., None])[..., 0], dtype=np.float64
-    )
-    bias = foot_jacobian_rates(chains, q, velocity)
-    acceleration = np.linalg.solve(jacobian, (foot_acceleration - bias)[..., None])[..., 0]
-    return velocity, np.asarray(acceleration, dtype=np.float64)

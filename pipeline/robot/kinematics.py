@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def _turn(chains: LegChains, j: int, v: Array, cos: Array, sin: Array) -> Array:
-    """Rotate v (3, L, N) about the axis of joint j by the angle whose cos, sin (L, N) are given.
+    """Rotate v (3, ..., L, N) about joint j's axis by the angle whose cos, sin (L, N) are given.
 
     The angle is zero where joint j slides or a leg has no such joint.
     """
@@ -30,7 +30,7 @@ def _turn(chains: LegChains, j: int, v: Array, cos: Array, sin: Array) -> Array:
     c, sign = along
     a, b = (c + 1) % 3, (c + 2) % 3
     signed = sign * sin
-    out = np.empty(np.broadcast_shapes(v.shape, (3, *cos.shape)))
+    out = np.empty((3, *np.broadcast_shapes(v.shape[1:], cos.shape)))
     out[a] = cos * v[a] - signed * v[b]
     out[b] = signed * v[a] + cos * v[b]
     out[c] = v[c]
@@ -38,10 +38,10 @@ def _turn(chains: LegChains, j: int, v: Array, cos: Array, sin: Array) -> Array:
 
 
 def _rodrigues(v: Array, axis: Array, cos: Array, sin: Array) -> Array:
-    """Rodrigues' rotation of v (3, L, N) about axis (L, 3) by the angle whose cos, sin (L, N)."""
+    """Rodrigues' rotation of v (3, ..., L, N) about axis (L, 3); cos, sin of the angle (L, N)."""
     kx, ky, kz = axis[:, 0, None], axis[:, 1, None], axis[:, 2, None]
     along = (kx * v[0] + ky * v[1] + kz * v[2]) * (1 - cos)
-    out = np.empty(np.broadcast_shapes(v.shape, (3, *cos.shape)))
+    out = np.empty((3, *np.broadcast_shapes(v.shape[1:], cos.shape)))
     out[0] = v[0] * cos + (ky * v[2] - kz * v[1]) * sin + kx * along
     out[1] = v[1] * cos + (kz * v[0] - kx * v[2]) * sin + ky * along
     out[2] = v[2] * cos + (kx * v[1] - ky * v[0]) * sin + kz * along
@@ -61,7 +61,7 @@ def _moment(chains: LegChains, j: int, arm: Array, f: Array) -> Array:
     """Moment of f (3, L, N) at arm (3, L, N or 1) about the axis of joint j, (L, N)."""
     along = chains.along[j]
     if along is None:
-        k, moment = chains.axis[j], _cross(arm, f)
+        k, moment = chains.axis[j], cross(arm, f)
         return k[:, 0, None] * moment[0] + k[:, 1, None] * moment[1] + k[:, 2, None] * moment[2]
     c, sign = along
     a, b = (c + 1) % 3, (c + 2) % 3
@@ -73,7 +73,7 @@ def _to_parent(chains: LegChains, j: int, v: Array) -> Array:
     """From joint j's frame before its own rotation to its parent's axes; often nothing to do."""
     if not chains.turned[j]:
         return v
-    return np.einsum("lij,jln->iln", chains.rotation[j], v)
+    return np.einsum("lij,j...ln->i...ln", chains.rotation[j], v)
 
 
 def _from_parent(chains: LegChains, j: int, v: Array) -> Array:
@@ -83,7 +83,8 @@ def _from_parent(chains: LegChains, j: int, v: Array) -> Array:
     return np.einsum("lji,jln->iln", chains.rotation[j], v)
 
 
-def _cross(a: Array, b: Array) -> Array:
+def cross(a: Array, b: Array) -> Array:
+    """Of vectors whose components stand along the first axis."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
@@ -207,54 +208,52 @@ def foot_force_torques(chains: LegChains, q: Array, force: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class _Frames:
-    """Joints and feet in the base frame, component first.
+class Swept:
+    """What the joints do to the feet, in the base frame, component first.
 
     Attributes:
-        axes: Unit axes, shape (K, 3, L, N).
-        origins: Of the joints, those that slide at where they have slid to [m], (K, 3, L, N).
         tip: Foot points [m], shape (3, L, N).
-        turns: 1 where a joint turns, else 0, shape (K, L, 1).
+        columns: Velocity of the foot per unit of each joint's [m/rad, 1], shape (3, K, L, N); zero
+            where a leg has no joint.
+        axes: Unit axes, shape (3, K, L, N); None where they were not asked for.
     """
 
-    axes: Array
-    origins: Array
     tip: Array
-    turns: Array
-
-    def column(self, j: int) -> Array:
-        """Velocity of the foot per unit of joint j's, shape (3, L, N)."""
-        turning = _cross(self.axes[j], self.tip - self.origins[j])
-        if self.turns[j].all():
-            return turning
-        return np.where(self.turns[j] > 0, turning, self.axes[j])
+    columns: Array
+    axes: Array | None
 
 
-def _frames(chains: LegChains, q: Array) -> _Frames:
-    angle, shift = _parted(chains, _samples_last(q))
+def swept(chains: LegChains, coordinate: Array, *, axes: bool = False) -> Swept:
+    """Feet and the columns of their Jacobians, from the foot inward.
+
+    Args:
+        chains: The legs.
+        coordinate: Joint positions [rad, m], shape (L, K, N); overwritten.
+        axes: Whether to work out the joints' axes, too.
+    """
+    angle, shift = _parted(chains, coordinate)
+    cos, sin = np.cos(angle), np.sin(angle, out=angle)
     n_legs, depth, n = angle.shape
-    cos, sin = np.cos(angle), np.sin(angle)
-
-    def to_base(v: Array, joint: int, *, point: bool) -> Array:
-        # v is given in the frame of `joint`, after that joint's own motion.
-        for j in reversed(range(joint + 1)):
-            if point and shift is not None:
-                v = v + chains.axis[j].T[:, :, None] * shift[:, j]
-            v = _to_parent(chains, j, _turn(chains, j, v, cos[:, j], sin[:, j]))
-            if point:
-                v = v + chains.offset[j].T[:, :, None]
-        return v
-
-    axes = np.empty((depth, 3, n_legs, n))
-    origins = np.empty_like(axes)
-    zero = np.zeros((3, n_legs, n))
-    for j in range(depth):
-        own = np.broadcast_to(chains.axis[j].T[:, :, None], zero.shape)
-        axes[j] = to_base(own, j, point=False)
-        origins[j] = to_base(zero, j, point=True)
-    tip = to_base(np.broadcast_to(chains.foot.T[:, :, None], zero.shape), depth - 1, point=True)
-    turns = np.asarray(~chains.slides[:, :, None], dtype=np.float64)
-    return _Frames(axes, origins, tip, turns)
+    # One array of vectors that every joint further in carries along: the foot, then from the
+    # outermost joint inward each joint's column and, where asked for, its axis.
+    step = 2 if axes else 1
+    carried = np.empty((3, 1 + step * depth, n_legs, n))
+    carried[:, 0] = chains.foot.T[:, :, None]
+    for k, j in enumerate(reversed(range(depth))):
+        own = chains.axis[j].T[:, :, None]
+        if shift is not None:
+            carried[:, 0] += own * shift[:, j]
+        column = cross(own, carried[:, 0])
+        if chains.slides[j].any():
+            column = np.where(chains.slides[j][:, None], own, column)
+        carried[:, 1 + step * k] = column
+        if axes:
+            carried[:, 2 + step * k] = own
+        here = carried[:, : 1 + step * (k + 1)]
+        here[:] = _to_parent(chains, j, _turn(chains, j, here, cos[:, j], sin[:, j]))
+        carried[:, 0] += chains.offset[j].T[:, :, None]
+    columns = carried[:, 1::step][:, ::-1]
+    return Swept(carried[:, 0], columns, carried[:, 2::step][:, ::-1] if axes else None)
 
 
 def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
@@ -268,9 +267,8 @@ def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
         Positions [m], shape (N, L, 3), and Jacobians [m/rad, 1],
         shape (N, L, 3 xyz, K joints); a column is zero where a leg has no joint.
     """
-    frames = _frames(chains, q)
-    jacobian = np.stack([frames.column(j) for j in range(chains.depth)])  # joint, xyz, leg, sample
-    return frames.tip.transpose(2, 1, 0), jacobian.transpose(3, 2, 1, 0)
+    legs = swept(chains, _samples_last(q))
+    return legs.tip.transpose(2, 1, 0), legs.columns.transpose(3, 2, 0, 1)
 
 
 def foot_jacobian_rates(chains: LegChains, q: Array, q_dot: Array) -> Array:
@@ -284,26 +282,37 @@ def foot_jacobian_rates(chains: LegChains, q: Array, q_dot: Array) -> Array:
     Returns:
         The bias acceleration of the feet [m/s^2], shape (N, L, 3).
     """
-    frames = _frames(chains, q)
-    axes, origins, tip, turns = frames.axes, frames.origins, frames.tip, frames.turns
-    depth = chains.depth
-    rate = _samples_last(q_dot)  # (L, K, N)
-    spin = np.zeros((depth + 1, *tip.shape))  # angular velocity of what joint j hangs on
-    for j in range(depth):
-        spin[j + 1] = spin[j] + axes[j] * (turns[j] * rate[:, j])
-    velocity = np.zeros((depth + 1, *tip.shape))  # of the joint origins, then of the foot
-    points = [*origins, tip]
-    for j in range(depth + 1):
-        if j > 0:
-            velocity[j] = velocity[j - 1] + _cross(spin[j], points[j] - points[j - 1])
-        if j < depth and not turns[j].all():
-            velocity[j] += axes[j] * ((1.0 - turns[j]) * rate[:, j])
-    bias = np.zeros(tip.shape)
-    for j in range(depth):
-        axis_rate = _cross(spin[j], axes[j])
-        column_rate = _cross(axis_rate, tip - origins[j])
-        column_rate += _cross(axes[j], velocity[-1] - velocity[j])
-        if not turns[j].all():
-            column_rate = np.where(turns[j] > 0, column_rate, axis_rate)
-        bias += column_rate * rate[:, j]
-    return bias.transpose(2, 1, 0)
+    return bias_acceleration(chains, _samples_last(q), _samples_last(q_dot)).transpose(2, 1, 0)
+
+
+def bias_acceleration(chains: LegChains, coordinate: Array, rate: Array) -> Array:
+    """The feet's acceleration while all joints keep their velocity.
+
+    Args:
+        chains: The legs.
+        coordinate: Joint positions [rad, m], shape (L, K, N); overwritten.
+        rate: Joint velocities [rad/s, m/s], shape (L, K, N).
+
+    Returns:
+        In the base frame [m/s^2], shape (3, L, N).
+    """
+    angle, shift = _parted(chains, coordinate)
+    cos, sin = np.cos(angle), np.sin(angle, out=angle)
+    n_legs, depth, n = angle.shape
+    # Place, velocity and acceleration of the foot as seen from what the joint carries.
+    seen = np.zeros((3, 3, n_legs, n))
+    seen[:, 0] = chains.foot.T[:, :, None]
+    for j in reversed(range(depth)):
+        own, speed = chains.axis[j].T[:, :, None], rate[:, j]
+        if shift is not None:
+            seen[:, 0] += own * shift[:, j]
+        slides = chains.slides[j][:, None]
+        spin = own * np.where(slides, 0.0, speed)
+        turning = cross(spin, seen[:, 0])  # relative velocity that the joint's turning adds
+        seen[:, 2] += cross(spin, 2 * seen[:, 1] + turning)
+        seen[:, 1] += turning
+        if chains.slides[j].any():
+            seen[:, 1] += own * np.where(slides, speed, 0.0)
+        seen = _to_parent(chains, j, _turn(chains, j, seen, cos[:, j], sin[:, j]))
+        seen[:, 0] += chains.offset[j].T[:, :, None]
+    return seen[:, 2]

@@ -35,6 +35,7 @@ class LegChains:
             has no such joint.
         slides: Whether a joint is prismatic, shape (K joints, L).
         foot: Foot point in the frame of the last joint [m], shape (L, 3).
+        nominal: Posture about which a leg with joints to spare moves least, shape (L, K) [rad, m].
     """
 
     names: tuple[str, ...]
@@ -43,6 +44,7 @@ class LegChains:
     axis: Array
     slides: NDArray[np.bool_]
     foot: Array
+    nominal: Array
 
     @property
     def depth(self) -> int:
@@ -111,12 +113,16 @@ class LegChains:
                 self.axis[:, own],
                 self.slides[:, own],
                 self.foot[own],
+                self.nominal[own],
             )
         return self._parts[key]
 
 
 def leg_chains(
-    model: pin.Model, legs: Sequence[tuple[str, Sequence[str], str]], base_joint: int
+    model: pin.Model,
+    legs: Sequence[tuple[str, Sequence[str], str]],
+    base_joint: int,
+    nominal: Array | None = None,
 ) -> LegChains:
     """Read the legs' geometry out of a model.
 
@@ -124,6 +130,8 @@ def leg_chains(
         model: Pinocchio model.
         legs: For each leg its name, its joint names from the base outward and the foot frame.
         base_joint: Index of the joint that carries the base (0 for a fixed base).
+        nominal: Posture about which legs with joints to spare move least, shape (L, K); zero by
+            default.
 
     Raises:
         UrdfError: A joint or frame is missing, of several coordinates, or not the child of the one
@@ -149,11 +157,15 @@ def leg_chains(
             offset[j, i] = placement.translation
             axis[j, i], slides[j, i] = _axis(model, parent, leg, joint)
         foot[i] = _foot(model, leg, frame_name, joints[-1], parent)
-    return LegChains(tuple(leg for leg, _, _ in legs), rotation, offset, axis, slides, foot)
+    stance = np.zeros((n_legs, depth)) if nominal is None else nominal
+    names = tuple(leg for leg, _, _ in legs)
+    return LegChains(names, rotation, offset, axis, slides, foot, stance)
 
 
 def _next_joint(model: pin.Model, leg: str, joint: str, parent: int) -> int:
     if not model.existJointName(joint):
+        if model.existFrame(joint, pin.FrameType.FIXED_JOINT):
+            raise UrdfError(f"leg '{leg}': joint '{joint}' is fixed; list those that move")
         raise UrdfError(
             f"leg '{leg}': joint '{joint}' is not in the URDF; "
             f"{closest(joint, list(model.names)[1:])}"

@@ -66,7 +66,7 @@ class Robot:
     def chains(self) -> LegChains:
         """Constant geometry of the legs."""
         legs = [(leg.name, leg.joints, leg.foot) for leg in self.spec.legs]
-        return leg_chains(self.model, legs, base_joint=1 if self.floating else 0)
+        return leg_chains(self.model, legs, 1 if self.floating else 0, self.start_posture)
 
     @cached_property
     def position_index(self) -> NDArray[np.intp]:

@@ -13,7 +13,7 @@ from actuators.parameters import REQUIRED_KEYS, ParameterSet, parameters_from_ta
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import si_unit
 from pipeline.errors import RobotFileError
-from pipeline.robot.published import urdf_path
+from pipeline.robot.published import published_names, urdf_path
 
 #: Numbers every walking robot needs, with their dimension.
 #: Of the project, from the folder it is run in.
@@ -219,7 +219,11 @@ def load_robot_file(path: Path) -> RobotSpec:
     if path.suffix.lower() in (".urdf", ".xml", ".xacro"):
         raise RobotFileError(
             f"{path}: a URDF says nothing of legs and gait; give a robot file (TOML) that names it "
-            "as robot.urdf, as urdf/hexapod.toml does"
+            f"as robot.urdf, as urdf/hexapod.toml does: `python -m pipeline init {path}` writes one"
+        )
+    if not path.exists() and str(path) in published_names():
+        raise RobotFileError(
+            f"{path}: no such file; `python -m pipeline init {path}` writes one for that robot"
         )
     table, sources = _extended(path, ())
     where = str(path)
@@ -373,61 +377,7 @@ def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
 def _legs(
     table: dict[str, Any], parameters: ParameterSet, build: str | None, where: str
 ) -> tuple[LegSpec, ...]:
-    legs = []
-    for name, entry in table.items():
-        place = f"{where}: legs.{one_line(name)}"
-        _refuse_name(name, place)
-        if not isinstance(entry, dict):
-            raise RobotFileError(f"{place}: expected a table with joints, foot and side")
-        _known_keys(entry, _LEG_KEYS, where, f"key of [legs.{name}]")
-        joints = entry.get("joints")
-        if not isinstance(joints, list) or not all(isinstance(j, str) for j in joints):
-            raise RobotFileError(f"{place}: joints must be a list of names, base outward")
-        for joint in joints:
-            _refuse_name(joint, f"{place}: joints")
-        side = entry.get("side")
-        if side not in ("left", "right"):
-            raise RobotFileError(f"{place}: side = '{side}'; expected 'left' or 'right'")
-        station = entry.get("station", "")
-        if build:
-            if not isinstance(station, str) or station not in STATIONS:
-                raise RobotFileError(
-                    f"{place}: station = '{one_line(station)}'; "
-                    f"{closest(str(station), list(STATIONS))}"
-                )
-            if len(joints) != BUILT_JOINTS:
-                raise RobotFileError(
-                    f"{place}: names {len(joints)} joints; a built leg has {BUILT_JOINTS}"
-                )
-            neutral = built_neutral_foot(parameters, side, station)
-        else:
-            x, y, z = _numbers(entry, "neutral_foot", 3, None, place)
-            neutral = (x, y, z)
-        for k, at in enumerate(neutral):
-            if abs(at) > LARGEST_LENGTH:
-                raise RobotFileError(
-                    f"{place}: neutral_foot has {at:g} at place {k + 1}; it is written in metres, "
-                    "are these millimetres?"
-                )
-        start = _numbers(entry, "start_posture", len(joints), (0.0,) * len(joints), place)
-        for k, angle in enumerate(start):
-            if abs(angle) > 2 * math.pi:
-                raise RobotFileError(
-                    f"{place}: start_posture has {angle:g} at place {k + 1}; it is written in "
-                    f"radians, are these degrees ({math.radians(angle):.4g} rad)?"
-                )
-        legs.append(
-            LegSpec(
-                name,
-                tuple(joints),
-                _text(entry, "foot", place),
-                side,
-                station,
-                neutral,
-                start,
-                "start_posture" in entry,
-            )
-        )
+    legs = [_leg(name, entry, parameters, build, where) for name, entry in table.items()]
     if not legs:
         raise RobotFileError(f"{where}: [legs] names no leg")
     joints_seen = [joint for leg in legs for joint in leg.joints]
@@ -435,6 +385,68 @@ def _legs(
         if joints_seen.count(joint) > 1:
             raise RobotFileError(f"{where}: joint '{joint}' belongs to two legs")
     return tuple(legs)
+
+
+def _leg(
+    name: str, entry: object, parameters: ParameterSet, build: str | None, where: str
+) -> LegSpec:
+    place = f"{where}: legs.{one_line(name)}"
+    _refuse_name(name, place)
+    if not isinstance(entry, dict):
+        raise RobotFileError(f"{place}: expected a table with joints, foot and side")
+    _known_keys(entry, _LEG_KEYS, where, f"key of [legs.{name}]")
+    joints = _leg_joints(entry, place)
+    side = entry.get("side")
+    if side not in ("left", "right"):
+        raise RobotFileError(f"{place}: side = '{side}'; expected 'left' or 'right'")
+    station = entry.get("station", "")
+    if build:
+        if not isinstance(station, str) or station not in STATIONS:
+            raise RobotFileError(
+                f"{place}: station = '{one_line(station)}'; {closest(str(station), list(STATIONS))}"
+            )
+        if len(joints) != BUILT_JOINTS:
+            raise RobotFileError(
+                f"{place}: names {len(joints)} joints; a built leg has {BUILT_JOINTS}"
+            )
+        neutral = built_neutral_foot(parameters, side, station)
+    else:
+        x, y, z = _numbers(entry, "neutral_foot", 3, None, place)
+        neutral = (x, y, z)
+    for k, at in enumerate(neutral):
+        if abs(at) > LARGEST_LENGTH:
+            raise RobotFileError(
+                f"{place}: neutral_foot has {at:g} at place {k + 1}; it is written in metres, "
+                "are these millimetres?"
+            )
+    start = _numbers(entry, "start_posture", len(joints), (0.0,) * len(joints), place)
+    for k, angle in enumerate(start):
+        if abs(angle) > 2 * math.pi:
+            raise RobotFileError(
+                f"{place}: start_posture has {angle:g} at place {k + 1}; it is written in "
+                f"radians, are these degrees ({math.radians(angle):.4g} rad)?"
+            )
+    return LegSpec(
+        name,
+        joints,
+        _text(entry, "foot", place),
+        side,
+        station,
+        neutral,
+        start,
+        "start_posture" in entry,
+    )
+
+
+def _leg_joints(entry: Mapping[str, Any], place: str) -> tuple[str, ...]:
+    joints = entry.get("joints")
+    if not isinstance(joints, list) or not all(isinstance(j, str) for j in joints):
+        raise RobotFileError(f"{place}: joints must be a list of names, base outward")
+    if not joints:
+        raise RobotFileError(f"{place}: joints is empty; a leg has at least one actuated joint")
+    for joint in joints:
+        _refuse_name(joint, f"{place}: joints")
+    return tuple(joints)
 
 
 def _refuse_name(name: str, place: str) -> None:

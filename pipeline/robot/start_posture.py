@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import GaitError
-from pipeline.robot.inverse_kinematics import ACCEPTED, approach, beyond_reach
+from pipeline.robot.inverse.damped import approach
+from pipeline.robot.inverse.least_motion import freedoms
+from pipeline.robot.inverse_kinematics import ACCEPTED, beyond_reach, reach
 from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -36,7 +38,7 @@ def neutral_postures(robot: Robot) -> Array:
     """
     spec = robot.spec
     target = np.array([leg.neutral_foot for leg in spec.legs])[None]
-    q, miss = approach(robot.chains, target, robot.start_posture)
+    q, miss = reach(robot.chains, target, robot.start_posture)
     lower, upper = _limits(robot)
     inside = ((q[0] >= lower - ACCEPTED) & (q[0] <= upper + ACCEPTED)).all(axis=1)
     lost = np.flatnonzero((miss[0] > ACCEPTED) | ~inside)
@@ -64,11 +66,13 @@ def _explained(robot: Robot, target: Array, lost: NDArray[np.intp], miss: Array)
         if not good:
             best = min(found, key=lambda q: float(_beyond(q, low, high).max()))
             worst = int(_beyond(best, low, high).argmax())
+            slides = robot.chains.slides[worst, i]
+            scale, digits, unit = (1.0, 4, "m") if slides else (180 / np.pi, 1, "deg")
             return GaitError(
                 f"leg '{leg.name}': to stand on its neutral foot joint '{leg.joints[worst]}' would "
-                f"have to reach {np.degrees(best[worst]):.1f} deg, its limits are "
-                f"{np.degrees(lower[i, worst]):.1f} to {np.degrees(upper[i, worst]):.1f} deg; "
-                "change the stroke, the neutral foot or the limits"
+                f"have to reach {best[worst] * scale:.{digits}f} {unit}, its limits are "
+                f"{lower[i, worst] * scale:.{digits}f} to {upper[i, worst] * scale:.{digits}f} "
+                f"{unit}; change the stroke, the neutral foot or the limits"
             )
         shown = " or ".join(_written(q) for q in good[:_SHOWN])
         offers.append(f"legs.{leg.name}: {shown}")
@@ -86,19 +90,25 @@ def _beyond(q: Array, lower: Array, upper: Array) -> Array:
     return out
 
 
-def _spread(joints: int) -> Array:
-    """Points that fill the unit cube evenly, shape (_TRIES, joints)."""
-    if joints <= 3:
-        shares = (np.arange(_STARTS) + 0.5) / _STARTS
-        return np.array(list(itertools.product(shares, repeat=3)))[:, :joints]
-    # More joints ask for points that do not stand in rows: Kronecker's sequence of the root of
-    # x^(joints + 1) = x + 1.
+def spread(count: int, joints: int) -> Array:
+    """Points that fill the unit cube evenly, shape (count, joints).
+
+    Kronecker's sequence of the root of x^(joints + 1) = x + 1: points do not stand in rows.
+    """
     root = 2.0
     for _ in range(30):
         root = (1 + root) ** (1 / (joints + 1))
     steps = root ** -np.arange(1, joints + 1)
-    points: Array = (0.5 + np.arange(1, _TRIES + 1)[:, None] * steps) % 1.0
+    points: Array = (0.5 + np.arange(1, count + 1)[:, None] * steps) % 1.0
     return points
+
+
+def _starts(joints: int) -> Array:
+    """Shares of the limits to start from, shape (_TRIES, joints); in rows for few joints."""
+    if joints > 3:
+        return spread(_TRIES, joints)
+    shares = (np.arange(_STARTS) + 0.5) / _STARTS
+    return np.array(list(itertools.product(shares, repeat=3)))[:, :joints]
 
 
 def _written(q: Array) -> str:
@@ -117,14 +127,15 @@ def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float
     wide = ~np.isfinite(upper - lower) | (upper - lower > _UNLIMITED) | (upper <= lower)
     low, high = np.where(wide, -np.pi, lower), np.where(wide, np.pi, upper)
     starts = np.zeros((_TRIES, low.size))
-    starts[:, :count] = (low + (high - low) * _spread(low.size))[:, :count]
+    starts[:, :count] = (low + (high - low) * _starts(low.size))[:, :count]
     chains = robot.chains.of([leg])
     points = np.broadcast_to(target, (len(starts), 1, 3))
     # A start that never arrives keeps the damping of all up; those that come close go on alone.
     near, left = approach(chains, points, starts[:, None])
+    least = float(left.min()) if freedoms(chains)[0].lacks else 0.0
     found: list[Array] = []
-    for start in near[left[:, 0] < _NEAR]:
-        q, miss = approach(chains, target[None, None], start)
+    for start in near[left[:, 0] < least + _NEAR]:
+        q, miss = reach(chains, target[None, None], start)
         if miss[0, 0] > ACCEPTED:
             continue
         # Whole turns lead to the same posture; take the one inside the limits.

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from actuators.errors import CatalogError
 from actuators.loading.build import CATALOG, Catalog, load_catalog
+from pipeline.dynamics.force_rules import GroundForces
 from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.drivetrains import Actuators
@@ -16,15 +17,18 @@ from pipeline.motion.gait_table import read_gait_file
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
 from pipeline.simulation.changes import changed
 from pipeline.simulation.edited import IDEAL, Effects, effects
+from pipeline.simulation.force_choice import ForceChoice
+from pipeline.simulation.least_power import Adjust
 from pipeline.simulation.memory import refuse_beyond_memory
-from pipeline.simulation.walk_stand import Adjust, Regeneration
+from pipeline.simulation.walk_stand import Regeneration
 
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES = 51
 SAMPLES = 751
+PAPER_FORCES = ForceChoice()
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,8 @@ class Settings:
         effects: Of the model file; None without one.
         model: The model file; None without one.
         gait: The gait file; None without one.
+        forces: How the ground's forces are chosen.
+        compare_forces: Whether the rules for them are to be compared.
     """
 
     robot: Robot
@@ -58,6 +64,8 @@ class Settings:
     effects: Effects | None = None
     model: Path | None = None
     gait: Path | None = None
+    forces: ForceChoice = PAPER_FORCES
+    compare_forces: bool = False
 
     def chains(self) -> Mapping[str, Actuators]:
         """Every alternative, with the model file's effects in it."""
@@ -74,6 +82,11 @@ class Settings:
         """What the model file's effects change in the demand on the actuators."""
         return None if self.effects is None else self.effects.demand
 
+    @property
+    def ground(self) -> GroundForces:
+        """Rule and friction of the ground's forces."""
+        return self.forces.ground(self.chains(), self.regeneration.recovered, self.adjust)
+
 
 def settings(
     *,
@@ -85,6 +98,8 @@ def settings(
     quasi_static: bool = False,
     regeneration: str = "none",
     actuators: Path | None = None,
+    forces: ForceChoice = PAPER_FORCES,
+    compare_forces: bool = False,
     walks: bool = True,
 ) -> Settings:
     """Load robot, actuators and effects, and apply changes; defaults are the command line's.
@@ -98,6 +113,8 @@ def settings(
         quasi_static: Whether the links' inertial terms are left out.
         regeneration: ``none``, ``bus`` or a fraction of returned energy that is used again.
         actuators: Folder of actuator files; the project's catalogue by default.
+        forces: Rule and friction of the ground's forces.
+        compare_forces: Whether what the rules cost is to be compared.
         walks: Whether a gait cycle will be computed, which must fit into memory.
 
     Raises:
@@ -105,24 +122,14 @@ def settings(
         ActuatorError: A catalogue file or a changed parameter cannot be used.
         GapError: The model file cannot be used, or its effects do not fit the robot.
     """
+    _refuse_few(samples)
     path = model if isinstance(model, Path) else None
     file = read_model_file(model, actuators) if isinstance(model, Path) else model
-    spec = load_robot_file(robot or (file.robot if file else DEFAULT_ROBOT))
-    if gait is not None:
-        spec = spec.with_gait(**read_gait_file(gait))
+    spec = _spec(robot or (file.robot if file else DEFAULT_ROBOT), gait)
     actuators = actuators or actuator_folder(spec)
-    catalog = load_catalog(actuators or CATALOG)
-    if samples < LEAST_SAMPLES:
-        raise GaitError(
-            f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
-            "for energies within 1 %"
-        )
-    spec, catalog, remarks = changed(spec, catalog, changes)
-    own = own_actuators(spec, catalog)
-    catalog = own.catalog(catalog)
-    loaded = load_robot(spec)
-    remarks += refuse_impossible(loaded)
-    loaded = with_payload(loaded)
+    spec, catalog, remarks = changed(spec, load_catalog(actuators or CATALOG), changes)
+    catalog = (own := own_actuators(spec, catalog)).catalog(catalog)
+    loaded, warnings = _loaded(spec)
     if walks:
         refuse_beyond_memory(samples, len(loaded.joints), len(catalog.alternatives))
     return Settings(
@@ -132,13 +139,34 @@ def settings(
         samples=samples,
         quasi_static=quasi_static,
         changes=tuple(changes),
-        remarks=tuple(remarks),
+        remarks=(*remarks, *warnings),
         actuators=actuators,
         own=own,
         effects=_effects(file, path or Path("model.toml"), loaded, catalog, own) if file else None,
         model=path,
         gait=gait,
+        forces=forces.checked(catalog.alternatives),
+        compare_forces=compare_forces,
     )
+
+
+def _spec(robot: Path, gait: Path | None) -> RobotSpec:
+    spec = load_robot_file(robot)
+    return spec if gait is None else spec.with_gait(**read_gait_file(gait))
+
+
+def _loaded(spec: RobotSpec) -> tuple[Robot, Sequence[str]]:
+    """The robot with its payload, and what of it a reader should know."""
+    bare = load_robot(spec)
+    return with_payload(bare), refuse_impossible(bare)
+
+
+def _refuse_few(samples: int) -> None:
+    if samples < LEAST_SAMPLES:
+        raise GaitError(
+            f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
+            "for energies within 1 %"
+        )
 
 
 def _effects(

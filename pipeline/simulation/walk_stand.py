@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from actuators.energy.regeneration import Supply, supply
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
+from pipeline.dynamics.force_rules import PAPER, GroundForces
 from pipeline.dynamics.joint_demand import JointDemand, MotionDemand, motion_demand, segment_demand
 from pipeline.dynamics.stability import stability_margins
 from pipeline.machine.drivetrains import Actuators
@@ -20,10 +21,10 @@ from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.standing import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
+from pipeline.simulation.force_choice import RuleCost, recovered_share, rule_costs
+from pipeline.simulation.least_power import Adjust
 
 Array = NDArray[np.float64]
-#: From the demand of bodies and ground to that on the actuators.
-Adjust = Callable[[Segment, JointDemand], JointDemand]
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,11 @@ class Regeneration:
 
     policy: str = "none"
     fraction: float = 0.0
+
+    @property
+    def recovered(self) -> float:
+        """Share of returned power that counts as gained at an instant."""
+        return recovered_share(self.policy, self.fraction)
 
 
 @dataclass(frozen=True)
@@ -102,6 +108,7 @@ def stand(
     chains: Mapping[str, Actuators],
     feet: tuple[str, ...] | None = None,
     adjust: Adjust | None = None,
+    forces: GroundForces = PAPER,
 ) -> Standing:
     """Stand still and hold.
 
@@ -110,12 +117,13 @@ def stand(
         chains: By alternative.
         feet: Legs that stand; the robot file's by default.
         adjust: Changes the demand on the actuators; see `pipeline.simulation.edited`.
+        forces: How the ground's forces are chosen.
 
     Raises:
-        TippingError: A foot would have to pull.
+        StanceError: A foot would have to pull or slide.
     """
     segment = standing_posture(robot, feet)
-    demand, contacts = segment_demand(robot, segment)
+    demand, contacts = segment_demand(robot, segment, forces=forces)
     assert contacts is not None
     if adjust is not None:
         demand = adjust(segment, demand)
@@ -125,16 +133,28 @@ def stand(
     )
 
 
+def demand_along(
+    robot: Robot,
+    motion: Motion,
+    *,
+    quasi_static: bool = False,
+    adjust: Adjust | None = None,
+    forces: GroundForces = PAPER,
+) -> MotionDemand:
+    """What a gait demands of the actuators; see `walk` for the arguments."""
+    demand = motion_demand(robot, motion, forces=forces, quasi_static=quasi_static)
+    if adjust is None:
+        return demand
+    pairs = zip(motion.segments, demand.segments, strict=True)
+    return replace(demand, segments=tuple(adjust(segment, part) for segment, part in pairs))
+
+
 def walking_demand(
     robot: Robot, *, samples: int, quasi_static: bool = False, adjust: Adjust | None = None
 ) -> tuple[Motion, MotionDemand]:
     """One cycle and what it demands of the joints; see `walk`."""
     motion = walking_motion(robot, samples=samples)
-    demand = motion_demand(robot, motion, quasi_static=quasi_static)
-    if adjust is not None:
-        pairs = zip(motion.segments, demand.segments, strict=True)
-        demand = replace(demand, segments=tuple(adjust(segment, part) for segment, part in pairs))
-    return motion, demand
+    return motion, demand_along(robot, motion, quasi_static=quasi_static, adjust=adjust)
 
 
 def walk(
@@ -145,6 +165,7 @@ def walk(
     quasi_static: bool = False,
     regeneration: Regeneration | None = None,
     adjust: Adjust | None = None,
+    forces: GroundForces = PAPER,
 ) -> Walking:
     """Walk one cycle.
 
@@ -155,14 +176,14 @@ def walk(
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy; none by default.
         adjust: Changes the demand on the actuators; see `pipeline.simulation.edited`.
+        forces: How the ground's forces are chosen.
 
     Raises:
-        TippingError: A foot would have to pull.
+        StanceError: A foot would have to pull or slide.
     """
     policy = regeneration or Regeneration()
-    motion, demand = walking_demand(
-        robot, samples=samples, quasi_static=quasi_static, adjust=adjust
-    )
+    motion = walking_motion(robot, samples=samples)
+    demand = demand_along(robot, motion, quasi_static=quasi_static, adjust=adjust, forces=forces)
     series = joint_series(demand)
     results = {name: chain.moving(series) for name, chain in chains.items()}
     return Walking(
@@ -171,4 +192,43 @@ def walk(
         tuple(stability_margins(robot, segment) for segment in motion.segments),
         results,
         {name: supply(r, policy.policy, policy.fraction) for name, r in results.items()},
+    )
+
+
+def compare_rules(
+    robot: Robot,
+    chains: Mapping[str, Actuators],
+    motion: Motion,
+    *,
+    quasi_static: bool = False,
+    regeneration: Regeneration | None = None,
+    adjust: Adjust | None = None,
+    friction_coefficient: float | None = None,
+) -> Iterator[RuleCost]:
+    """What every rule of the ground's forces costs along a gait; see `walk` for the arguments.
+
+    Args:
+        robot: With a floating base.
+        chains: By alternative.
+        motion: The gait.
+        quasi_static: Leave out the links' inertial terms.
+        regeneration: What becomes of returned energy; none by default.
+        adjust: Changes the demand on the actuators.
+        friction_coefficient: For all rules; None for no limit.
+    """
+    policy = regeneration or Regeneration()
+
+    def demanded(forces: GroundForces) -> tuple[MotionDemand, ShaftSeries]:
+        demand = demand_along(
+            robot, motion, quasi_static=quasi_static, adjust=adjust, forces=forces
+        )
+        return demand, joint_series(demand)
+
+    return rule_costs(
+        chains,
+        demanded,
+        friction_coefficient=friction_coefficient,
+        policy=policy.policy,
+        fraction=policy.fraction,
+        adjust=adjust,
     )

@@ -11,14 +11,22 @@ from actuators.chain import ChainResult
 from actuators.energy.energy import loss_energies, stage_energies
 from actuators.energy.limits import limit_rows
 from actuators.energy.regeneration import BUS, Supply
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.dynamics.joint_demand import MotionDemand
+from pipeline.simulation.force_choice import RuleCost
 from reports.table import Table, table_from_rows
 from reports.wide import Quantity, wide_series
 
 Array = NDArray[np.float64]
+#: Rules of the ground's forces in words.
+_FORCES = {
+    "least_tangential": "Least tangential",
+    "least_torque": "Least joint torque squared:",
+    "least_power": "Least electrical power:",
+}
 ALTERNATIVE = ("actuator alternative", "")
 #: What tables by leg call the joints outside the legs, which are held.
-OUTSIDE = "outside_legs"
+HELD = "held joints"
 
 
 def walking_joint_demand(demand: MotionDemand) -> Table:
@@ -69,7 +77,7 @@ def walking_contact_forces(demand: MotionDemand) -> Table:
             Quantity("friction_needed", "1", "tangential over normal force", needed),
         ],
         labels={"segment": (labels, "which feet support")},
-        description="Least tangential foot forces; world frame, z up.",
+        description=f"{_FORCES[demand.forces.name]} foot forces; world frame, z up.",
     )
 
 
@@ -78,7 +86,7 @@ def walking_stability(demand: MotionDemand, margins: Sequence[Array]) -> Table:
     rows = []
     for part, contacts, margin in zip(demand.segments, demand.contacts, margins, strict=True):
         assert contacts is not None
-        normal = contacts.force_world[..., 2][:, [leg in contacts.stance for leg in contacts.legs]]
+        normal = contacts.normal_force[:, [leg in contacts.stance for leg in contacts.legs]]
         at = int(margin.argmin())
         needed = contacts.friction_needed
         rows.append(
@@ -232,7 +240,7 @@ def robot_energy(
     for name, supply in supplies.items():
         energy = float(supply.supplied_energy.sum())
         support = _support_energy(demand, supply, legs)
-        held = leg_energies(supply, legs).get(OUTSIDE, 0.0)
+        held = leg_energies(supply, legs).get(HELD, 0.0)
         power = energy / demand.period
         rows.append(
             {
@@ -324,6 +332,44 @@ def motor_limits(results: Mapping[str, ChainResult]) -> Table:
             "share_of_time_over": ("share of the cycle above the limit", "1"),
             "breach": ("whether the peak is above the limit", ""),
         },
+    )
+
+
+def force_rules(costs: Sequence[RuleCost], friction_coefficient: float | None) -> Table:
+    """What the paper's rule of the ground's forces costs against others."""
+    paper = {cost.alternative: cost.energy for cost in costs if cost.rule == LEAST_TANGENTIAL}
+    rows = [
+        {
+            "alternative": cost.alternative,
+            "rule": cost.rule,
+            "electrical_J": cost.energy,
+            "relative_difference": cost.energy / paper[cost.alternative] - 1
+            if paper[cost.alternative]
+            else None,
+            "rms_joint_torque_Nm": cost.root_mean_square_torque,
+            "greatest_friction_needed": cost.friction_needed,
+        }
+        for cost in costs
+    ]
+    limit = "no limit" if friction_coefficient is None else f"{friction_coefficient:g}"
+    return table_from_rows(
+        "walking_force_rules",
+        rows,
+        {
+            "alternative": ALTERNATIVE,
+            "rule": (
+                "least_tangential: sum of squared tangential forces (the paper's); least_torque: "
+                "sum of squared joint torques; least_power: power this alternative draws, at "
+                "every instant",
+                "",
+            ),
+            "electrical_J": ("electrical energy of the whole robot in one cycle", "J"),
+            "relative_difference": ("energy over that of least_tangential, less one", "1"),
+            "rms_joint_torque_Nm": ("root mean square over all joints and samples", "N*m"),
+            "greatest_friction_needed": ("largest tangential over normal force", "1"),
+        },
+        description="The ground's forces chosen by other rules, motion being the same; friction "
+        f"coefficient: {limit}.",
     )
 
 

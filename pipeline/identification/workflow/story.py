@@ -12,7 +12,7 @@ import numpy as np
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import Edit, apply_edits, edits_in
 from pipeline.effects.registry import effect_named
-from pipeline.errors import GaitError, TippingError
+from pipeline.errors import GaitError, StanceError
 from pipeline.identification.compare.stages import Stage, noise_floor, overall
 from pipeline.identification.results import Found, Naming
 from pipeline.identification.selection.deciding_motion import Deciding
@@ -117,7 +117,7 @@ def cost(
     try:
         every = given.own.every(given.catalog)
         return energy_change(given.robot, every, edits, start), edits.remarks
-    except TippingError as error:
+    except StanceError as error:
         return None, (f"With these effects {error}",)
     except GaitError as error:
         return None, (f"No energy of a gait cycle: {error}",)

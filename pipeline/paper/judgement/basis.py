@@ -13,7 +13,7 @@ from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
 from pipeline.paper.calibration.store import RESULTS_FILE, load_results
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.published import Published, load_published
-from pipeline.simulation.settings import Settings
+from pipeline.simulation.settings import PAPER_FORCES, Settings
 
 #: A robot or an actuator built otherwise than the paper's has no such numbers to compare.
 _STRUCTURE = ("legs", "gait.", "standing.feet")
@@ -111,6 +111,8 @@ def basis(given: Settings) -> Basis | str | None:
         return "a model file changes the robot, and the paper knows nothing of its effects"
     if given.quasi_static:
         return "the paper counts the links' inertia, this run does not"
+    if given.forces != PAPER_FORCES:
+        return "the paper's ground forces are the least tangential ones, this run's are others"
     if given.regeneration.policy != "none":
         return "in the paper energy that flows back is lost, in this run it is used again"
     published, prior = load_published(IDS, DIMENSIONS), load_prior()

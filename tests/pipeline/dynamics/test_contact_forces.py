@@ -2,25 +2,47 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import combinations
+
 import numpy as np
 import pytest
 from scipy.linalg import null_space
+from scipy.optimize import minimize
 
 from pipeline.dynamics.contact_forces import ContactForces, least_tangential_forces
-from pipeline.dynamics.joint_demand import contact_forces, inverse_dynamics, motion_demand
+from pipeline.dynamics.force_rules import GroundForces
+from pipeline.dynamics.joint_demand import (
+    contact_forces,
+    inverse_dynamics,
+    motion_demand,
+    segment_demand,
+)
 from pipeline.dynamics.stability import stability_margins
-from pipeline.errors import TippingError
-from pipeline.motion.motion import Motion
+from pipeline.errors import GaitError, SlidingError, TippingError
+from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.standing import standing_posture
 from pipeline.motion.support import support_margin
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 
 TRIPOD = np.array([[0.30, 0.25, -0.31], [-0.24, 0.26, -0.31], [0.02, -0.27, -0.31]])
 SIX = np.array([[x, y, -0.3] for x in (-0.27, 0.0, 0.27) for y in (-0.26, 0.26)])
+STEPS = SIX + [[0, 0, 0], [0, 0, 0.1], [0.02, 0, -0.1], [0, 0.03, 0], [0, 0, 0.05], [0, 0, 0.07]]
+STANCES = {"three": TRIPOD, "six": SIX, "four": SIX[:4], "steps": STEPS, "three steps": STEPS[1:4]}
 
 
 def wrench_of(feet: np.ndarray, force: np.ndarray) -> np.ndarray:
     return np.concatenate([force.sum(axis=0), np.cross(feet, force).sum(axis=0)])
+
+
+def weight_over(point: object) -> np.ndarray:
+    weight = np.array([0.0, 0.0, 400.0])
+    return np.concatenate([weight, np.cross(np.asarray(point, dtype=float), weight)])
+
+
+def chosen_feet(count: int) -> list[list[int]]:
+    return [list(c) for k in range(2, count + 1) for c in combinations(range(count), k)]
 
 
 def random_wrench(feet: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -28,7 +50,7 @@ def random_wrench(feet: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return wrench_of(feet, force)
 
 
-@pytest.mark.parametrize("feet", [TRIPOD, SIX, SIX[:4]], ids=["three", "six", "four"])
+@pytest.mark.parametrize("feet", STANCES.values(), ids=STANCES)
 def test_forces_add_up_to_the_wrench(feet: np.ndarray) -> None:
     rng = np.random.default_rng(1)
     wrench = np.array([random_wrench(feet, rng) for _ in range(50)])
@@ -37,7 +59,7 @@ def test_forces_add_up_to_the_wrench(feet: np.ndarray) -> None:
         np.testing.assert_allclose(wrench_of(feet, force[row]), wrench[row], atol=1e-9)
 
 
-@pytest.mark.parametrize("feet", [TRIPOD, SIX, SIX[:4]], ids=["three", "six", "four"])
+@pytest.mark.parametrize("feet", STANCES.values(), ids=STANCES)
 def test_no_other_distribution_has_less_tangential_force(feet: np.ndarray) -> None:
     """Held against the definition: all forces that meet the wrench are one of them plus the null
     space of the six equations, and among those a linear least-squares problem has the answer.
@@ -54,13 +76,6 @@ def test_no_other_distribution_has_less_tangential_force(feet: np.ndarray) -> No
         step = np.linalg.lstsq(other[tangential], -one[tangential])[0]
         least = one[tangential] + other[tangential] @ step
         np.testing.assert_allclose(ours[:, :2].ravel(), least, atol=1e-9)
-
-
-def test_unequal_heights_are_balanced() -> None:
-    feet = TRIPOD + np.array([[0, 0, 0.02], [0, 0, -0.01], [0, 0, 0]])
-    wrench = random_wrench(feet, np.random.default_rng(3))
-    force = least_tangential_forces(wrench[None], feet[None])[0]
-    np.testing.assert_allclose(wrench_of(feet, force), wrench, atol=1e-9)
 
 
 def test_feet_that_would_pull_are_released() -> None:
@@ -99,14 +114,92 @@ def test_released_feet_bear_nothing_and_the_rest_share_anew() -> None:
         np.testing.assert_allclose(null_space(lift).T @ force[kept, 2], 0.0, atol=1e-9)
 
 
-def test_weight_beside_the_feet_leaves_three_and_one_of_them_would_pull() -> None:
+def test_weight_beside_the_feet_leaves_one_that_would_pull() -> None:
     """It is for the caller to refuse; the wrench is met all the same."""
-    weight = np.array([0.0, 0.0, 400.0])
-    wrench = np.concatenate([weight, np.cross([0.35, 0.1, 0.0], weight)])
+    wrench = weight_over([0.35, 0.1, 0.0])
     force = least_tangential_forces(wrench[None], SIX[None])[0]
     np.testing.assert_allclose(wrench_of(SIX, force), wrench, atol=1e-9)
-    assert (force[:, 2] != 0).sum() == 3
     assert force[:, 2].min() < 0
+
+
+@pytest.mark.parametrize("feet", [SIX, STEPS, SIX[:5]], ids=["six", "steps", "five"])
+def test_normals_that_only_push_are_those_of_least_squares(feet: np.ndarray) -> None:
+    """Held against every choice of unloaded feet: of those without a pull, the least sum."""
+    rng = np.random.default_rng(4)
+    lift = np.vstack([np.ones(len(feet)), feet[:, 1], -feet[:, 0]])
+    several = 0
+    for _ in range(30):
+        corner = feet[rng.integers(len(feet))]
+        inward = feet.mean(axis=0) - corner
+        wrench = weight_over(corner + inward * rng.uniform(0.05, 0.6))
+        force = least_tangential_forces(wrench[None], feet[None])[0]
+        best = np.inf
+        for kept in chosen_feet(len(feet)):
+            normal = np.linalg.lstsq(lift[:, kept], wrench[2:5])[0]
+            met = np.allclose(lift[:, kept] @ normal, wrench[2:5], atol=1e-9)
+            if met and normal.min() >= -1e-12:
+                best = min(best, float(normal @ normal))
+        assert force[:, 2].min() >= 0
+        assert force[:, 2] @ force[:, 2] == pytest.approx(best, rel=1e-9)
+        np.testing.assert_allclose(wrench_of(feet, force), wrench, atol=1e-7)
+        several += int((force[:, 2] == 0).any())
+    assert several > 10
+
+
+def test_a_foot_that_bears_nothing_holds_nothing() -> None:
+    """The others share its part of the horizontal force, and none needs endless friction."""
+    wrench = weight_over([0.26, 0.2, 0.0]) + [20.0, 0.0, 0.0, 0.0, -0.3 * 20.0, 0.0]
+    force = least_tangential_forces(wrench[None], SIX[None])[0]
+    idle = force[:, 2] == 0
+    assert idle.any()
+    assert not force[idle].any()
+    np.testing.assert_allclose(wrench_of(SIX, force), wrench, atol=1e-7)
+
+
+@pytest.mark.parametrize("feet", STANCES.values(), ids=STANCES)
+def test_forces_in_the_friction_cone_are_the_least_there(feet: np.ndarray) -> None:
+    """Held against a general solver that knows the cone as it is."""
+    rng = np.random.default_rng(5)
+    limit, seen = 0.4, 0
+    while seen < 2:
+        inside = rng.uniform(20, 150, size=len(feet))[:, None] * np.array([0.0, 0.0, 1.0])
+        angle = rng.uniform(-1, 1, size=len(feet))
+        reach = limit * inside[:, 2] * rng.uniform(0.9, 1.0, size=len(feet))
+        inside[:, :2] = (reach * [np.cos(angle), np.sin(angle)]).T
+        wrench = wrench_of(feet, inside)
+        free = least_tangential_forces(wrench[None], feet[None])[0]
+        if np.all(np.hypot(free[:, 0], free[:, 1]) <= limit * free[:, 2]):
+            continue
+        seen += 1
+        force = least_tangential_forces(wrench[None], feet[None], limit)[0]
+        np.testing.assert_allclose(wrench_of(feet, force), wrench, atol=1e-6)
+        assert np.all(np.hypot(force[:, 0], force[:, 1]) <= limit * force[:, 2] + 1e-6)
+        least = least_in_cone(feet, wrench, inside, limit)
+        assert (force[:, :2] ** 2).sum() == pytest.approx(least, rel=1e-6)
+
+
+def least_in_cone(feet: np.ndarray, wrench: np.ndarray, start: np.ndarray, limit: float) -> float:
+    """The least sum of squared tangential forces that scipy finds."""
+
+    def squares(x: np.ndarray) -> float:
+        return float((x.reshape(-1, 3)[:, :2] ** 2).sum()) / 1e3
+
+    def rest(x: np.ndarray) -> np.ndarray:
+        return wrench_of(feet, x.reshape(-1, 3)) - wrench
+
+    def spare(x: np.ndarray) -> np.ndarray:
+        return limit * x[2::3] - np.hypot(x[::3], x[1::3])
+
+    found = minimize(
+        squares,
+        start.ravel(),
+        method="SLSQP",
+        constraints=[{"type": "eq", "fun": rest}, {"type": "ineq", "fun": spare}],
+        options={"maxiter": 200, "ftol": 1e-13},
+    )
+    assert np.abs(rest(found.x)).max() < 1e-6
+    assert spare(found.x).min() > -1e-6
+    return 1e3 * float(found.fun)
 
 
 def test_rows_of_a_batch_are_released_on_their_own() -> None:
@@ -123,6 +216,49 @@ def test_friction_needed_is_tangential_over_normal_where_a_foot_is_loaded() -> N
     force = np.array([[[3.0, 4.0, 10.0], [0.0, 0.0, 0.0], [1.0, 0.0, -2.0], [0.0, 0.5, 0.25]]])
     contacts = ContactForces(("a", "b", "c", "d"), ("a",), np.zeros(1), force, 0 * force, force)
     np.testing.assert_allclose(contacts.friction_needed, [[0.5, np.nan, np.nan, 2.0]])
+    held = replace(contacts, force_world=force * [1.0, 1.0, 0.0])
+    np.testing.assert_array_equal(held.friction_needed, [[np.inf, np.nan, np.inf, np.inf]])
+
+
+def slope(robot: Robot, degrees: float) -> Segment:
+    """The robot standing square to ground that rises forward."""
+    level = standing_posture(robot)
+    angle = np.radians(degrees)
+    q = level.configuration.copy()
+    q[:, 3:7] = [0.0, -np.sin(angle / 2), 0.0, np.cos(angle / 2)]
+    return replace(
+        level, configuration=q, ground_normal=np.array([-np.sin(angle), 0.0, np.cos(angle)])
+    )
+
+
+def test_on_a_slope_the_ground_carries_the_weight_with_the_friction_of_its_angle(
+    hexapod: Robot,
+) -> None:
+    segment = slope(hexapod, 12.0)
+    _, contacts = segment_demand(hexapod, segment)
+    assert contacts is not None
+    weight = hexapod.mass * hexapod.spec.parameters["gravity"]
+    np.testing.assert_allclose(contacts.force_world.sum(axis=1), [[0, 0, weight]], atol=1e-9)
+    normal, tangential = contacts.normal_force, contacts.friction_needed * contacts.normal_force
+    assert normal.sum() == pytest.approx(weight * np.cos(np.radians(12)))
+    assert np.nansum(tangential) >= weight * np.sin(np.radians(12)) - 1e-9
+    np.testing.assert_allclose(contacts.force @ [0, 0, 1], normal, atol=1e-9)  # square to it
+
+
+def test_a_slope_steeper_than_friction_holds_is_named_with_what_is_missing(
+    hexapod: Robot,
+) -> None:
+    steep = slope(hexapod, 15.0)  # tan 15 deg = 0.268
+    segment_demand(hexapod, steep, forces=GroundForces(friction_coefficient=0.27))
+    with pytest.raises(SlidingError, match=r"slides at t = 0 s .* leg '\w+' .* below 0\.268") as e:
+        segment_demand(hexapod, steep, forces=GroundForces(friction_coefficient=0.2))
+    assert "0.2 is given (0.0679 short)" in str(e.value)
+
+
+@pytest.mark.parametrize("coefficient", [0.0, -0.5, np.nan, np.inf])
+def test_a_friction_coefficient_that_no_ground_has_is_refused(coefficient: float) -> None:
+    with pytest.raises(GaitError, match="friction coefficient .* finite number above 0"):
+        GroundForces(friction_coefficient=coefficient)
 
 
 def test_margin_is_the_distance_to_the_nearest_edge() -> None:

@@ -106,13 +106,7 @@ def test_the_path_is_periodic_and_its_rates_are_its_derivatives() -> None:
         np.testing.assert_allclose(slope, rate[1:-1], atol=1e-4 * np.abs(rate).max())
 
 
-#: Its legs have two joints: inverse kinematics of three coordinates does not serve them yet.
-TWO_JOINTS = pytest.mark.xfail(raises=np.linalg.LinAlgError, strict=True)
-
-
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=TWO_JOINTS) if n == "solo8" else n for n in QUADRUPEDS]
-)
+@pytest.mark.parametrize("name", QUADRUPEDS)
 def test_every_published_quadruped_crawls_with_sway(name: str, tmp_path: Path) -> None:
     gait = {"name": "crawl", "period": "3 s", "stroke": "60 mm", "lift": "40 mm"}
     robot = quadruped(name, tmp_path, gait)

@@ -30,8 +30,14 @@ MIXED: tuple[Leg, ...] = (
 )
 
 
-def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1) -> str:
-    """A trunk on the legs given, with placements drawn at random; `arm` adds a joint on top."""
+def _corner(leg: int, legs: int) -> tuple[int, float]:
+    """Left (1) or right (-1), and how far ahead from 1 to -1: pairs in rows."""
+    rows = (legs + 1) // 2
+    return (1 if leg % 2 == 0 else -1), 1 - 2 * (leg // 2) / (rows - 1)
+
+
+def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1, turned: bool = True) -> str:
+    """A trunk on the legs given, placements drawn at random; `arm` adds a joint on top."""
     rng = np.random.default_rng(seed)
     parts = [f'<robot name="walker"><link name="base">{INERTIAL.format(mass=9)}</link>']
 
@@ -46,13 +52,17 @@ def urdf_text(legs: Sequence[Leg], *, arm: bool = False, seed: int = 1) -> str:
         )
 
     for i, leg in enumerate(legs):
-        side, along = (1 if i % 2 == 0 else -1), (1 if i < len(legs) / 2 else -1)
+        side, along = _corner(i, len(legs))
         parent, place = "base", f'<origin xyz="{0.4 * along} {0.3 * side} 0"/>'
         for k, (kind, axis) in enumerate(leg):
             joint(f"leg{i}_{k}", kind, axis, parent, f"leg{i}_link{k}", place)
             parent = f"leg{i}_link{k}"
             x, y = rng.uniform(-0.05, 0.05, 2)
-            turn = " ".join(f"{a:.3f}" for a in rng.uniform(-0.3, 0.3, 3)) if k == 1 else "0 0 0"
+            turn = (
+                " ".join(f"{a:.3f}" for a in rng.uniform(-0.3, 0.3, 3))
+                if turned and k == 1
+                else "0 0 0"
+            )
             place = f'<origin xyz="{x:.3f} {y:.3f} {-0.6 / len(leg):.3f}" rpy="{turn}"/>'
         joint(f"leg{i}_tip", "fixed", "", parent, f"leg{i}_foot", place)
     if arm:
@@ -65,7 +75,7 @@ def robot_text(legs: Sequence[Leg], *, arm: bool = False) -> str:
     lines = ["[robot]", 'name = "walker"', 'urdf = "walker.urdf"', 'base_link = "base"']
     lines += ["[held]", "arm = 0.4"] if arm else []
     for i, leg in enumerate(legs):
-        side, along = (1 if i % 2 == 0 else -1), (1 if i < len(legs) / 2 else -1)
+        side, along = _corner(i, len(legs))
         lines += [
             f"[legs.leg{i}]",
             f"joints = {json.dumps([f'leg{i}_{k}' for k in range(len(leg))])}",
@@ -85,8 +95,11 @@ def robot_text(legs: Sequence[Leg], *, arm: bool = False) -> str:
     return "\n".join(lines)
 
 
-def walker(folder: Path, legs: Sequence[Leg], *, arm: bool = False, seed: int = 1) -> Robot:
+def walker(
+    folder: Path, legs: Sequence[Leg], *, arm: bool = False, seed: int = 1, turned: bool = True
+) -> Robot:
     """Write such a machine into a folder and load it."""
-    (folder / "walker.urdf").write_text(urdf_text(legs, arm=arm, seed=seed), encoding="utf-8")
+    urdf = urdf_text(legs, arm=arm, seed=seed, turned=turned)
+    (folder / "walker.urdf").write_text(urdf, encoding="utf-8")
     (folder / "walker.toml").write_text(robot_text(legs, arm=arm), encoding="utf-8")
     return load_robot(load_robot_file(folder / "walker.toml"))

@@ -1,0 +1,97 @@
+"""A robot file from a URDF or a robot's name, with a picture of the stance beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+
+from actuators.errors import one_line
+from pipeline.dynamics.stability import support_margin
+from pipeline.errors import RobotFileError
+from pipeline.robot.check import Finding, check_robot
+from pipeline.robot.guess.guess import Guess, guess_robot
+from pipeline.robot.guess.writer import robot_text
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+from reports.atomic import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Init:
+    """A robot file that was written.
+
+    Attributes:
+        path: The file.
+        picture: Of the stance; its SVG lies beside it.
+        guess: What was found, with reasons.
+        findings: What `check` says of it.
+    """
+
+    path: Path
+    picture: Path
+    guess: Guess
+    findings: tuple[Finding, ...]
+
+
+def init(
+    source: str | Path,
+    out: str | Path | None = None,
+    *,
+    feet: Sequence[str] = (),
+    base: str | None = None,
+) -> Init:
+    """Write a robot file for a URDF.
+
+    Args:
+        source: A URDF's path, or a robot's name in ``example-robot-data``.
+        out: The robot file to write; ``NAME.toml`` in the current folder by default.
+        feet: Frames at the feet, one for each leg; looked for where none is named.
+        base: The base's link; the root by default.
+
+    Raises:
+        PipelineError: Something cannot be found or used; one line says which option names it.
+        ReportError: The file cannot be written.
+    """
+    guess = guess_robot(str(source), support_margin, feet=feet, base=base)
+    path = Path(out) if out is not None else Path(f"{guess.source.name}.toml")
+    if path.suffix.lower() != ".toml":
+        raise RobotFileError(f"--out {one_line(path)}: a robot file's name ends in .toml")
+    if path.exists():
+        raise RobotFileError(f"{path}: there is such a file; give another name with --out")
+    text = robot_text(guess, path)
+    with replacing(path) as (temporary,):
+        temporary.write_text(text, encoding="utf-8")
+        robot = load_robot(load_robot_file(temporary))
+        findings = tuple(check_robot(robot))
+    picture = _draw(robot, path)
+    return Init(path, picture, guess, findings)
+
+
+def _draw(robot: Robot, path: Path) -> Path:
+    """The stance in four views, beside the robot file."""
+    from pipeline.api.pictures.scene import Scenery
+    from reports.figures.robot.robot_view import robot_figure
+    from reports.figures.several import Drawing, save_figures
+
+    stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
+    data = robot.model.createData()
+    centre = pin.centerOfMass(robot.model, data, stance[0]).copy()
+
+    def draw() -> Figure:
+        return robot_figure(
+            *Scenery(robot).at(stance[0]),
+            title=f"{robot.spec.name}: the stance guessed",
+            subtitle="left and right, front and rear, feet and knees as they should be?",
+            mass_centre=centre,
+        )
+
+    save_figures([Drawing(path.stem, draw)], path.absolute().parent)
+    return path.with_suffix(".png")

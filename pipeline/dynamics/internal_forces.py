@@ -1,0 +1,201 @@
+"""Forces of the feet against each other, which leave the wrench on the robot as it is.
+
+All foot forces that meet one wrench are one of them plus a combination z of internal forces, which
+span the null space of the six equations of balance. What no closed form gives (feet that would pull
+or slide, other rules than the least tangential forces) is then a small problem in z alone, and
+balance holds to rounding whatever z comes out. A quadratic in z within bounds goes to quadprog (the
+dual method of Goldfarb and Idnani) through qpsolvers, row by row and only where a bound is active.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+#: Weight of normal beside tangential forces: what the least tangential forces leave open.
+NORMAL_WEIGHT = 1e-8
+#: Share of the largest force below which a violated bound is rounding.
+TOLERANCE = 1e-10
+#: The same for a friction cone, where so much is left of a light foot's coefficient.
+_CONE_TOLERANCE = 1e-13
+_ROUNDS = 60  # of tangent planes; a handful is usual
+_ENOUGH = 6  # rounds after which `TOLERANCE` will do
+_HALVINGS = 40
+_MOST_FRICTION = 1e3  # beyond this no coefficient is looked for
+
+
+def internal_basis(feet: Array) -> Array:
+    """Orthonormal basis of the forces that add up to no force and no moment.
+
+    Args:
+        feet: Foot points [m], shape (N, F, 3), F >= 3, not in one line.
+
+    Returns:
+        Shape (N, F, 3, D) with D = 3 F - 6.
+    """
+    n, count, _ = feet.shape
+    arm = feet - feet.mean(axis=1, keepdims=True)
+    arm = arm / np.abs(arm).max()  # newtons beside newton-metres: only the null space counts
+    balance = np.zeros((n, count, 3, 6))
+    balance[..., :3] = np.eye(3)
+    for axis in range(3):
+        after, last = (axis + 1) % 3, (axis + 2) % 3
+        balance[:, :, last, 3 + axis] = arm[..., after]
+        balance[:, :, after, 3 + axis] = -arm[..., last]
+    q, _ = np.linalg.qr(balance.reshape(n, 3 * count, 6), mode="complete")
+    return np.asarray(q[..., 6:]).reshape(n, count, 3, -1)
+
+
+def tangential_metric(basis: Array) -> Array:
+    """Matrix of the sum of squared tangential forces in z, normals weighted little.
+
+    Args:
+        basis: Shape (..., F, 3, D).
+
+    Returns:
+        Shape (..., D, D).
+    """
+    weight = np.array([1.0, 1.0, NORMAL_WEIGHT])[:, None]
+    flat = basis.reshape(*basis.shape[:-3], -1, basis.shape[-1])
+    weighted = (basis * weight).reshape(flat.shape)
+    return np.asarray(np.swapaxes(flat, -1, -2) @ weighted)
+
+
+def out_of_bounds(force: Array, friction_coefficient: float | None) -> NDArray[np.bool_]:
+    """Samples at which a foot pulls or leaves its friction cone, shape (N,), beyond rounding.
+
+    Args:
+        force: z along the ground's normal [N], shape (N, F, 3).
+        friction_coefficient: None for no limit.
+    """
+    slack = TOLERANCE * np.abs(force).max(axis=(1, 2), keepdims=True)[..., 0]
+    normal = force[..., 2]
+    outside = normal < -slack
+    if friction_coefficient is not None:
+        tangential = np.hypot(force[..., 0], force[..., 1])
+        outside = outside | (tangential > friction_coefficient * normal + slack)
+    return np.asarray(outside.any(axis=1))
+
+
+class Bounds:
+    """What the feet of one sample can do: press, and hold within their friction cones.
+
+    Planes tangent to a cone at a force that was found outside it are added until every force is
+    inside, so that what comes out is the minimum over the cone itself, and a sample for which there
+    is none over the planes has none over the cone. They are kept for the next question.
+
+    Args:
+        basis: Of the internal forces, shape (F, 3, D).
+        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
+    """
+
+    def __init__(self, basis: Array, friction_coefficient: float | None) -> None:
+        self._basis, self._friction = basis, friction_coefficient
+        # Rows of  G z <= h: that no foot pulls, then tangent planes.
+        self._rows = _cleaned(-basis[:, 2])
+        self._feet = np.empty(0, dtype=np.intp)
+        self._toward = np.empty((0, 2))
+
+    def minimum(self, metric: Array, gradient: Array, start: Array) -> Array | None:
+        """Forces that minimise z' metric z / 2 + gradient' z.
+
+        Args:
+            metric: Positive definite, shape (D, D).
+            gradient: At z = 0, shape (D,).
+            start: Force at z = 0 [N], shape (F, 3).
+
+        Returns:
+            Force [N], shape (F, 3); None where no force is within the bounds.
+        """
+        import qpsolvers  # a tenth of a second, for motions that need it
+
+        size = float(np.abs(start).max())
+        unit = float(np.trace(metric)) / metric.shape[0]
+        metric, gradient, at_zero = metric / unit, gradient / (unit * size), start / size
+        for done in range(_ROUNDS):
+            z = qpsolvers.solve_qp(
+                metric, gradient, self._rows, self._limits(at_zero), solver="quadprog"
+            )
+            if z is None:
+                return None
+            force = at_zero + self._basis @ z
+            if not self._add_planes(force, _CONE_TOLERANCE if done < _ENOUGH else TOLERANCE):
+                return np.asarray(_without_residues(force) * size)
+        return None
+
+    def _limits(self, at_zero: Array) -> Array:
+        """h, with what rounding needs."""
+        pressing = at_zero[:, 2] + TOLERANCE / 2
+        if self._friction is None:
+            return pressing
+        along = np.einsum("pi,pi->p", self._toward, at_zero[self._feet, :2])
+        inside = self._friction * at_zero[self._feet, 2] - along + _CONE_TOLERANCE / 2
+        return np.concatenate([pressing, inside])
+
+    def _add_planes(self, force: Array, slack: float) -> bool:
+        """Planes for the forces that are outside their cones; whether there are any."""
+        if self._friction is None:
+            return False
+        tangential = np.hypot(force[:, 0], force[:, 1])
+        feet = np.flatnonzero(tangential > self._friction * force[:, 2] + slack)
+        if not feet.size:
+            return False
+        toward = force[feet, :2] / tangential[feet, None]
+        across = np.einsum("pi,pid->pd", toward, self._basis[feet, :2])
+        rows = _cleaned(across - self._friction * self._basis[feet, 2])
+        self._rows = np.vstack([self._rows, rows])
+        self._feet = np.concatenate([self._feet, feet])
+        self._toward = np.vstack([self._toward, toward])
+        return True
+
+
+def _without_residues(force: Array) -> Array:
+    """An unloaded foot bears nothing."""
+    unloaded = np.abs(force[:, 2]) < 2 * TOLERANCE
+    force[unloaded, 2] = 0.0
+    force[unloaded & (np.abs(force[:, :2]).max(axis=1) < 1e2 * TOLERANCE)] = 0.0
+    return force
+
+
+def _cleaned(rows: Array) -> Array:
+    """Without what rounding leaves of forces that do not act on a bound at all."""
+    return np.where(np.abs(rows) < 1e-12, 0.0, rows)
+
+
+def held_by_friction(start: Array, basis: Array, friction_coefficient: float) -> Array | None:
+    """Least tangential forces of one sample within the friction cones; None where there are none.
+
+    Args:
+        start: Forces that meet the wrench [N], shape (F, 3).
+        basis: Shape (F, 3, D).
+        friction_coefficient: Greatest tangential over normal force [1].
+    """
+    metric = tangential_metric(basis)
+    weighted = start * np.array([1.0, 1.0, NORMAL_WEIGHT])
+    gradient = np.einsum("fi,fid->d", weighted, basis)
+    return Bounds(basis, friction_coefficient).minimum(metric, gradient, start)
+
+
+def least_friction(start: Array, basis: Array, enough: float) -> float:
+    """The least friction coefficient with which any forces meet the wrench of one sample.
+
+    Args:
+        start: Forces that meet the wrench [N], shape (F, 3).
+        basis: Shape (F, 3, D).
+        enough: A coefficient that suffices; infinite where none is known.
+    """
+    low, high = 0.0, enough
+    if not np.isfinite(enough):
+        high = 1.0
+        while held_by_friction(start, basis, high) is None:
+            high *= 2.0
+            if high > _MOST_FRICTION:
+                return np.inf
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if held_by_friction(start, basis, middle) is None:
+            low = middle
+        else:
+            high = middle
+    return high

@@ -1,0 +1,90 @@
+"""How well legs can follow their feet: directions they lack, distance from the path, singularity.
+
+A leg of two joints cannot put its foot where it likes; it puts it as near as it gets
+(`pipeline.robot.inverse`). What that costs is told here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.robot.inverse.least_motion import freedoms
+from pipeline.robot.inverse_kinematics import ACCEPTED
+from pipeline.robot.kinematics import foot_jacobians
+from pipeline.robot.leg_chains import LegChains
+
+Array = NDArray[np.float64]
+Vector = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class FootTracking:
+    """What one leg does with its foot's path.
+
+    Attributes:
+        leg: Its name.
+        joints: Number of its joints.
+        directions: In how many directions they move the foot.
+        cannot_move: Unit vectors in the base frame along which they do not, at the first sample.
+        deviation: Largest distance of the foot from its path [m].
+        deviation_time: When [s]; not a number where the foot follows.
+        least_singular_value: Of the Jacobian, among as many as there are directions [m/rad]: the
+            smaller, the nearer to a stretched or folded leg.
+        singular_time: When it is that small [s].
+    """
+
+    leg: str
+    joints: int
+    directions: int
+    cannot_move: tuple[Vector, ...]
+    deviation: float
+    deviation_time: float
+    least_singular_value: float
+    singular_time: float
+
+
+def foot_tracking(
+    chains: LegChains, pieces: Sequence[tuple[Array, Array, Array]]
+) -> tuple[FootTracking, ...]:
+    """Judge a motion leg by leg.
+
+    Args:
+        chains: The legs.
+        pieces: Stretches of the motion: time (N,) [s], joint positions (N, L, K) [rad, m], and
+            where the feet should be in the base frame (N, L, 3) [m].
+    """
+    time = np.concatenate([t for t, _, _ in pieces])
+    q = np.concatenate([position for _, position, _ in pieces])
+    target = np.concatenate([goal for _, _, goal in pieces])
+    feet, jacobian = foot_jacobians(chains, q)
+    off = np.linalg.norm(feet - target, axis=-1)
+    left, values, _ = np.linalg.svd(jacobian)
+    out = []
+    for i, (name, own) in enumerate(zip(chains.names, freedoms(chains), strict=True)):
+        smallest = values[:, i, own.directions - 1]
+        far, near = int(off[:, i].argmax()), int(smallest.argmin())
+        lacking = [_signed(left[0, i, :, k]) for k in range(own.directions, 3)]
+        out.append(
+            FootTracking(
+                leg=name,
+                joints=own.joints,
+                directions=own.directions,
+                cannot_move=tuple(lacking),
+                deviation=float(off[far, i]),
+                deviation_time=float(time[far]) if off[far, i] > ACCEPTED else float("nan"),
+                least_singular_value=float(smallest[near]),
+                singular_time=float(time[near]),
+            )
+        )
+    return tuple(out)
+
+
+def _signed(direction: Array) -> Vector:
+    """The sense in which its largest component is positive; rounding is none."""
+    sign = np.sign(direction[int(np.abs(direction).argmax())])
+    x, y, z = (float(round(sign * c, 9)) + 0.0 for c in direction)
+    return (x, y, z)

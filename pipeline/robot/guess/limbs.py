@@ -1,0 +1,223 @@
+"""Legs and feet in the tree of a URDF's bodies.
+
+A foot is a frame that is called one, else a leaf that is as low as any; a leg is the chain of
+joints from the base to a foot. What belongs to no leg is held.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from actuators.errors import closest, one_line
+from pipeline.errors import RobotFileError
+from pipeline.robot.leg_chains import MOST_JOINTS
+
+Array = NDArray[np.float64]
+#: What nothing but feet is called, the plainest first; what other ends of chains are called, too.
+_FEET = ("foot", "feet", "sole", "toe", "paw", "hoof")
+_ENDS = ("contact", "tip", "end")
+_ROOT = 1  # the free flyer's index
+_FEWEST = 3
+#: A leaf this share of the tree's height above the lowest one is no foot.
+_LOW = 0.15
+
+
+@dataclass(frozen=True)
+class Limb:
+    """One leg as found.
+
+    Attributes:
+        name: Short name.
+        joints: From the base outward.
+        foot: Frame at the foot point.
+        reason: Why this is its foot.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    foot: str
+    reason: str
+
+
+def find_limbs(
+    model: pin.Model, configuration: Array, feet: Sequence[str], where: str
+) -> tuple[Limb, ...]:
+    """The legs of a robot.
+
+    Args:
+        model: With a floating base.
+        configuration: A pose that stands, if any is known, else the zero pose.
+        feet: Frames that the user named; none to look for them.
+        where: File, for messages.
+
+    Raises:
+        RobotFileError: No legs, fewer than three, or two feet on one leg; says what to name.
+    """
+    if model.njoints <= _ROOT + 1:
+        raise RobotFileError(f"{where}: no joint moves; a leg has at least one actuated joint")
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, configuration)
+    if feet:
+        chosen = [_named(model, foot, where) for foot in feet]
+        reason = "named by --foot"
+    else:
+        chosen, reason = _looked_for(model, data, where)
+    _refuse_few(model, chosen, where)
+    paths = [_path(model, model.frames[k].parentJoint) for k in chosen]
+    _refuse_shared(model, chosen, where)
+    _refuse_long(model, chosen, paths, where)
+    joints = [tuple(str(model.names[j]) for j in path) for path in paths]
+    frames = [str(model.frames[k].name) for k in chosen]
+    places = np.array([data.oMf[k].translation for k in chosen])
+    names = _leg_names(joints, places)
+    return tuple(
+        Limb(name, own, frame, reason)
+        for name, own, frame in zip(names, joints, frames, strict=True)
+    )
+
+
+def _bodies(model: pin.Model) -> list[int]:
+    """Frames of links that joints move."""
+    return [
+        k
+        for k, frame in enumerate(model.frames)
+        if frame.type == pin.FrameType.BODY and frame.parentJoint > _ROOT
+    ]
+
+
+def _named(model: pin.Model, foot: str, where: str) -> int:
+    known = [str(model.frames[k].name) for k in _bodies(model)]
+    if foot not in known:
+        raise RobotFileError(
+            f"{where}: --foot {one_line(foot)}: no link of that name moves; {closest(foot, known)}"
+        )
+    return int(model.getFrameId(foot))
+
+
+def _looked_for(model: pin.Model, data: pin.Data, where: str) -> tuple[list[int], str]:
+    """Frames that are called feet, else ends of legs, else the lowest leaves."""
+    for word in (*_FEET, *_ENDS):
+        # As a word of its own: 'pendulum' ends nowhere.
+        pattern = re.compile(rf"(?<![a-z]){word}(?![a-z])", re.IGNORECASE)
+        found = _outermost(
+            model, [k for k in _bodies(model) if pattern.search(_spaced(model.frames[k].name))]
+        )
+        apart = _shared(model, found) is None and len(found) >= _FEWEST
+        if found and (word in _FEET or apart):
+            return found, f"the outermost link of its chain that is called {word}"
+    leaves = [j for j in range(_ROOT + 1, model.njoints) if not list(model.children[j])]
+    ends = _outermost(model, [k for k in _bodies(model) if model.frames[k].parentJoint in leaves])
+    height = {k: float(data.oMf[k].translation[2]) for k in ends}
+    top = max(float(place.translation[2]) for place in data.oMi[_ROOT:])
+    low = min(height.values())
+    lowest = [k for k in ends if height[k] <= low + _LOW * max(top - low, 1e-9)]
+    bare = [k for k in lowest if np.linalg.norm(model.frames[k].placement.translation) < 1e-6]
+    if len(lowest) >= _FEWEST and bare:
+        raise RobotFileError(
+            f"{where}: link '{model.frames[bare[0]].name}' ends a chain, but its frame lies in its "
+            "joint and not at a foot; add a link at the foot on a fixed joint, or name feet with "
+            f"--foot among {_some(model, _bodies(model))}"
+        )
+    return lowest, "the end of a chain that reaches as low as any"
+
+
+def _outermost(model: pin.Model, frames: list[int]) -> list[int]:
+    """Of frames along one chain the one furthest out, and on one joint the furthest from it."""
+    best: dict[int, int] = {}
+    for k in frames:
+        joint = model.frames[k].parentJoint
+        out = float(np.linalg.norm(model.frames[k].placement.translation))
+        kept = best.get(joint)
+        if kept is None or out > np.linalg.norm(model.frames[kept].placement.translation) + 1e-9:
+            best[joint] = k
+    above = {j for joint in best for j in _path(model, joint)[:-1]}
+    return [k for joint, k in best.items() if joint not in above]
+
+
+def _path(model: pin.Model, joint: int) -> list[int]:
+    """Joints from the base to one, itself included."""
+    path: list[int] = []
+    while joint > _ROOT:
+        path.insert(0, int(joint))
+        joint = model.parents[joint]
+    return path
+
+
+def _some(model: pin.Model, frames: Sequence[int]) -> str:
+    names = [str(model.frames[k].name) for k in frames]
+    shown = names if len(names) <= 12 else [*names[:12], f"{len(names) - 12} more"]
+    return ", ".join(shown)
+
+
+def _refuse_few(model: pin.Model, chosen: Sequence[int], where: str) -> None:
+    if len(chosen) >= _FEWEST:
+        return
+    found = f" ({_some(model, chosen)})" if chosen else ""
+    feet = {0: "no foot", 1: "one foot", 2: "two feet"}[len(chosen)]
+    leaves = _outermost(model, _bodies(model))
+    raise RobotFileError(
+        f"{where}: {feet} found{found}; a gait that is statically stable needs three feet on the "
+        f"ground. If there are more, name them with --foot; chains end in {_some(model, leaves)}"
+    )
+
+
+def _spaced(name: str) -> str:
+    """A name with its humps parted: LeftFootLink to Left Foot Link."""
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+
+
+def _shared(model: pin.Model, chosen: Sequence[int]) -> tuple[int, int, int] | None:
+    """Two feet that hang on one joint, and that joint; None where every leg has its own."""
+    owner: dict[int, int] = {}
+    for k in chosen:
+        for joint in _path(model, model.frames[k].parentJoint):
+            if joint in owner:
+                return owner[joint], k, joint
+            owner[joint] = k
+    return None
+
+
+def _refuse_shared(model: pin.Model, chosen: Sequence[int], where: str) -> None:
+    shared = _shared(model, chosen)
+    if shared is not None:
+        one, other = (model.frames[i].name for i in shared[:2])
+        raise RobotFileError(
+            f"{where}: feet '{one}' and '{other}' both hang on joint '{model.names[shared[2]]}'; a "
+            "leg has one foot and joints of its own: name the feet with --foot, one for each leg"
+        )
+
+
+def _refuse_long(
+    model: pin.Model, chosen: Sequence[int], paths: Sequence[list[int]], where: str
+) -> None:
+    for k, path in zip(chosen, paths, strict=True):
+        if len(path) > MOST_JOINTS:
+            raise RobotFileError(
+                f"{where}: {len(path)} joints lead to foot '{model.frames[k].name}'; a leg has at "
+                f"most {MOST_JOINTS}: name a frame further in with --foot"
+            )
+
+
+def _leg_names(joints: Sequence[tuple[str, ...]], places: Array) -> list[str]:
+    """From what a leg's joint names share and no other leg's do; else from where its foot is."""
+    words = [[re.split(r"[_\-. ]+", name) for name in own] for own in joints]
+    shared = [[w for w in own[0] if all(w in other for other in own)] for own in words]
+    common = set.intersection(*(set(own) for own in shared)) if shared else set()
+    names = ["_".join(w for w in own if w not in common) for own in shared]
+    names = [f"leg_{name}" if name.isdigit() else name for name in names]
+    plain = all(re.fullmatch(r"\w+", name, re.ASCII) for name in names)
+    if plain and len({name.lower() for name in names}) == len(names):
+        return names
+    order = np.argsort(-places[:, 0], kind="stable")
+    out = [""] * len(names)
+    for side, sign in (("left", 1), ("right", -1)):
+        own = [k for k in order if (places[k, 1] >= 0) == (sign > 0)]
+        for number, k in enumerate(own, start=1):
+            out[k] = f"{side}_{number}"
+    return out

@@ -1,0 +1,76 @@
+"""A slow walk that the legs can do: stroke and lift within reach and limits, period and speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.robot.guess.stance import Stance
+from pipeline.robot.inverse.least_motion import freedoms
+from pipeline.robot.inverse_kinematics import ACCEPTED, reach
+from pipeline.robot.kinematics import foot_positions
+from pipeline.robot.leg_chains import LegChains
+
+Array = NDArray[np.float64]
+_FIRST = 0.3  # stroke over the height of the hips, if the legs allow
+_SHRINK = 0.85
+_TRIES = 20
+_LIFT = 0.4  # over the stroke
+_SIDE = 0.25  # room to the sides, over the stroke: the body sways
+#: Over the stroke: how far the foot of a leg that lacks a direction may leave its path.
+_ASTRAY = 0.25
+_PERIOD = 2.0  # [s] of a robot whose hips are at _HEIGHT
+_HEIGHT = 0.3  # [m]
+
+
+@dataclass(frozen=True)
+class Pace:
+    """Numbers of a walk.
+
+    Attributes:
+        stroke: Of the feet [m].
+        lift: Of the feet [m].
+        period: [s].
+    """
+
+    stroke: float
+    lift: float
+    period: float
+
+
+def find_pace(chains: LegChains, stance: Stance, lower: Array, upper: Array) -> Pace | None:
+    """The longest stroke of a row of shorter and shorter ones that every leg can do.
+
+    Args:
+        chains: The legs.
+        stance: About which they walk.
+        lower: Limits of the legs' joints, shape (L, K) [rad, m].
+        upper: Likewise.
+
+    Returns:
+        None where the legs cannot take even the shortest.
+    """
+    height = float((chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
+    about = replace(chains, nominal=stance.posture)
+    follows = np.array([not own.lacks for own in freedoms(about)])
+    for k in range(_TRIES):
+        stroke = _rounded(_FIRST * height * _SHRINK**k)
+        lift = _rounded(_LIFT * stroke)
+        x, y, z = stroke / 2, _SIDE * stroke, lift
+        steps = [(a * x, b * y, c * z) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (0, 1)]
+        room = np.array(steps)[:, None, :] * np.where(follows[:, None], 1.0, [1.0, 0.0, 1.0])
+        target = stance.feet + room
+        q, miss = reach(about, target, stance.posture)
+        inside = (q >= lower) & (q <= upper) | ~chains.real
+        off = np.linalg.norm(foot_positions(about, q) - target, axis=-1)
+        if miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and inside.all():
+            # Robots of one shape walk alike where the period goes with the root of their height.
+            return Pace(stroke, lift, _rounded(_PERIOD * (height / _HEIGHT) ** 0.5))
+    return None
+
+
+def _rounded(value: float) -> float:
+    """Two significant digits."""
+    return float(f"{value:.2g}")

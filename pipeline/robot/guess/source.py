@@ -1,0 +1,111 @@
+"""The URDF to start from, and the poses that come with it."""
+
+from __future__ import annotations
+
+import math
+import os
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+
+from actuators.errors import closest, one_line
+from pipeline.errors import RobotFileError
+from pipeline.robot.published import SCHEME, published_names, published_robot
+from pipeline.robot.urdf_source import read_urdf
+
+#: Poses of an SRDF that are meant to stand, those before others.
+STANDING_POSES = ("standing", "stand", "half_sitting", "home", "default")
+
+
+@dataclass(frozen=True)
+class Source:
+    """A URDF and what lies beside it.
+
+    Attributes:
+        name: Of the robot.
+        urdf: The file.
+        text: Its content.
+        published: Whether it is known by name and not by its place.
+        srdf: Poses with names; None without.
+        pose: Name of the pose that the publisher refers to; empty where there is none.
+    """
+
+    name: str
+    urdf: Path
+    text: str
+    published: bool
+    srdf: Path | None
+    pose: str
+
+    def reference(self, out: Path) -> str:
+        """How a robot file at `out` names the URDF."""
+        if self.published:
+            return SCHEME + self.name
+        folder = out.absolute().parent
+        return Path(os.path.relpath(self.urdf.absolute(), folder)).as_posix()
+
+
+def source_of(given: str) -> Source:
+    """A URDF by path, or by its name in ``example-robot-data``.
+
+    Raises:
+        RobotFileError: It is neither.
+        UrdfError: The file cannot be read.
+    """
+    path = Path(given)
+    if path.suffix.lower() == ".toml":
+        raise RobotFileError(f"{given}: a robot file; init starts from a URDF or a robot's name")
+    if path.is_file() or path.suffix or len(path.parts) > 1:
+        beside = [path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf"]
+        srdf = next((p for p in beside if p.is_file()), None)
+        return Source(path.stem, path, read_urdf(path), False, srdf, "")
+    if given not in published_names():
+        raise RobotFileError(
+            f"{one_line(given)}: no such file, and no robot of example-robot-data; "
+            f"{closest(given, published_names())}"
+        )
+    known = published_robot(given)
+    return Source(given, known.urdf, read_urdf(known.urdf), True, known.srdf, known.pose)
+
+
+def standing_pose(source: Source) -> tuple[str, dict[str, float]] | None:
+    """The SRDF's pose for standing: its name, and joint positions [rad, m].
+
+    Returns:
+        None where there is no SRDF, or no pose in it that is called as poses for standing are.
+
+    Raises:
+        RobotFileError: The SRDF is malformed.
+    """
+    if source.srdf is None:
+        return None
+    try:
+        root = ET.fromstring(source.srdf.read_bytes())
+    except ET.ParseError as error:
+        line, _ = error.position
+        raise RobotFileError(
+            f"{source.srdf}: line {line}: malformed XML; correct it, or move it away and the "
+            "stance is sought"
+        ) from None
+    poses: dict[str, dict[str, float]] = {}
+    for state in root.findall("group_state"):
+        values = {}
+        for joint in state.findall("joint"):
+            words = joint.get("value", "").split()
+            if len(words) == 1:  # a floating base has seven
+                values[joint.get("name", "")] = _number(words[0], source.srdf)
+        poses.setdefault(state.get("name", ""), {}).update(values)
+    for name in (source.pose, *STANDING_POSES):
+        if poses.get(name):
+            return name, poses[name]
+    return None
+
+
+def _number(word: str, where: Path) -> float:
+    try:
+        number = float(word)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise RobotFileError(f"{where}: joint value '{one_line(word)}', expected a finite number")
+    return number

@@ -1,0 +1,118 @@
+"""A guess as the text of a robot file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.robot.guess.guess import Guess
+from pipeline.robot.guess.pace import Pace
+
+Array = NDArray[np.float64]
+_PLACES = 4  # digits of feet and postures [m, rad]
+
+
+def robot_text(guess: Guess, out: Path) -> str:
+    """The robot file of a guess, every guess with its reason under ``[assumed]``.
+
+    Args:
+        guess: What was found.
+        out: Where the file will stand; it names the URDF from there.
+    """
+    assumed = {"robot.base_link": "the root of the URDF's tree of links"}
+    lines = [
+        f"# {guess.source.name}, guessed by `python -m pipeline init`. [assumed] says why each",
+        "# guess was made: look at the picture beside this file, then correct what is wrong.",
+        "",
+        "[robot]",
+        f"name = {_text(guess.source.name)}",
+        f"urdf = {_text(guess.source.reference(out))}",
+        f"base_link = {_text(guess.base_link)}",
+        'base = "floating"',
+    ]
+    stance = guess.stance
+    for limb, foot, posture in zip(guess.limbs, stance.feet, stance.posture, strict=True):
+        key = f"legs.{_key(limb.name)}"
+        lines += [
+            "",
+            f"[{key}]",
+            f"joints = [{', '.join(map(_text, limb.joints))}]",
+            f"foot = {_text(limb.foot)}",
+            f'side = "{"left" if foot[1] >= 0 else "right"}"',
+            f"neutral_foot = {_numbers(foot)}",
+            f"start_posture = {_numbers(posture[: len(limb.joints)])}",
+        ]
+        assumed[f"{key}.joints"] = "the chain of joints from the base to the foot"
+        assumed[f"{key}.foot"] = limb.reason
+        assumed[f"{key}.side"] = "the side of the foot in the stance"
+        levelled = f", feet levelled by up to {1e3 * stance.levelled:.2g} mm"
+        assumed[f"{key}.neutral_foot"] = stance.reason + (
+            levelled if stance.levelled >= 0.5 * 10**-_PLACES else ""
+        )
+        assumed[f"{key}.start_posture"] = "the same"
+    if guess.held:
+        lines += ["", "[held]  # [rad, m]"]
+        for joint, value, reason in guess.held:
+            lines.append(f"{_key(joint)} = {value!r}")
+            assumed[f"held.{_key(joint)}"] = reason
+    lines += _gait(guess)
+    lines += ["", "[assumed]"]
+    lines += [f"{_text(key)} = {_text(reason)}" for key, reason in assumed.items()]
+    lines += _parameters(guess)
+    return "\n".join(lines) + "\n"
+
+
+def _gait(guess: Guess) -> list[str]:
+    """The slowest of the usual gaits for so many legs; six walk in two tripods."""
+    name = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
+    return ["", "[gait]", f'name = "{name}"', 'transfer_path = "harmonic"']
+
+
+def _parameters(guess: Guess) -> list[str]:
+    pace = guess.pace or Pace(0.02, 0.01, 2.0)
+    why = (
+        "the longest of a row of strokes that every leg can do within its limits"
+        if guess.pace
+        else "no stroke was found within reach and limits: change the stance"
+    )
+    lines = _parameter(
+        "total_mass", float(f"{guess.mass:.6g}"), "kg", "derived", "the sum of the URDF's links"
+    )
+    numbers = {
+        "foot_stroke": (1e3 * pace.stroke, "mm", why),
+        "foot_lift": (1e3 * pace.lift, "mm", "a share of the stroke"),
+        "gait_period": (pace.period, "s", "slow; goes with the root of the hips' height"),
+    }
+    for name, (value, unit, reason) in numbers.items():
+        number = float(f"{value:.9g}")
+        lines += _parameter(name, number, unit, "assumed", "python -m pipeline init")
+        low, high = (float(f"{factor * number:.6g}") for factor in (0.5, 2.0))
+        lines += [f"reason = {_text(reason)}", f"interval = [{low!r}, {high!r}]"]
+    return lines + _parameter("gravity", 9.81, "m/s^2", "datasheet", "usual engineering value")
+
+
+def _parameter(name: str, value: float, unit: str, basis: str, source: str) -> list[str]:
+    return [
+        "",
+        f"[parameters.{name}]",
+        f"value = {value!r}",
+        f'unit = "{unit}"',
+        f'basis = "{basis}"',
+        f"source = {_text(source)}",
+    ]
+
+
+def _numbers(values: Array) -> str:
+    return "[" + ", ".join(repr(round(float(x), _PLACES) + 0.0) for x in values) + "]"
+
+
+def _text(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _key(name: str) -> str:
+    bare = name.isascii() and name.replace("_", "").replace("-", "").isalnum()
+    return name if bare else _text(name)

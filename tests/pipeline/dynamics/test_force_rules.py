@@ -1,0 +1,130 @@
+"""Rules for the ground's forces: what they minimise, and what none of them may change."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.dynamics.force_rules import GroundForces, LeastTorque, Stance
+from pipeline.dynamics.internal_forces import internal_basis, out_of_bounds
+from pipeline.dynamics.joint_demand import segment_demand
+from pipeline.errors import TippingError
+from pipeline.motion.motion import Segment
+from pipeline.motion.walking import walking_motion
+from pipeline.robot.robot import Robot, load_robot
+from tests.pipeline.robot.walkers import MIXED, walker
+
+LIMITS = (None, 0.6, 0.15)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A rule that keeps what it was shown."""
+
+    name: str = "seen"
+    shown: list[Stance] = field(default_factory=list)
+
+    def forces(self, stance: Stance) -> np.ndarray:
+        self.shown.append(replace(stance, torque=stance.torque.copy()))
+        return stance.force
+
+
+def swinging(robot: Robot, samples: int = 9) -> Segment:
+    """All feet down, joints moving: four feet or six, so that normal forces are open, too."""
+    rng = np.random.default_rng(3)
+    angle = rng.uniform(-0.05, 0.05, (samples, len(robot.joints)))
+    return Segment(
+        name="swinging",
+        time=np.arange(samples) / 10,
+        configuration=robot.configuration(angle, np.zeros((samples, 3))),
+        velocity=rng.uniform(-0.2, 0.2, (samples, robot.model.nv)),
+        acceleration=rng.uniform(-0.2, 0.2, (samples, robot.model.nv)),
+        stance=robot.leg_names,
+    )
+
+
+def shown(robot: Robot, segment: Segment, limit: float | None) -> Stance:
+    seen = Seen()
+    segment_demand(robot, segment, forces=GroundForces(seen, limit))
+    return seen.shown[0]
+
+
+@pytest.fixture(scope="module", params=["hexapod", "mixed legs"])
+def robot(
+    request: pytest.FixtureRequest, hexapod: Robot, tmp_path_factory: pytest.TempPathFactory
+) -> Robot:
+    """Six legs of three joints; four legs of two to seven that turn and slide."""
+    if request.param == "hexapod":
+        return hexapod
+    return walker(Path(tmp_path_factory.mktemp("walker")), MIXED, arm=True)
+
+
+@pytest.mark.parametrize("limit", LIMITS)
+def test_no_forces_within_bounds_have_less_torque_squared(
+    robot: Robot, limit: float | None
+) -> None:
+    stance = shown(robot, swinging(robot), limit)
+    force = LeastTorque().forces(stance)
+    basis = internal_basis(stance.feet)
+    least = (stance.loaded_torque(force) ** 2).sum(axis=1)
+    assert np.all(least <= (stance.loaded_torque(stance.force) ** 2).sum(axis=1) * (1 + 1e-9))
+    assert not out_of_bounds(force, limit).any()
+    rng = np.random.default_rng(4)
+    tried = 0
+    for _ in range(300):
+        step = rng.normal(size=basis.shape[-1]) * 10.0 ** rng.uniform(-3, 2)
+        other = force + basis @ step
+        inside = ~out_of_bounds(other, limit)
+        tried += int(inside.sum())
+        more = (stance.loaded_torque(other) ** 2).sum(axis=1)
+        assert np.all(more[inside] >= least[inside] * (1 - 1e-6))
+    assert tried > 100
+
+
+@pytest.mark.parametrize("limit", LIMITS)
+def test_every_rule_leaves_the_wrench_as_it_is(robot: Robot, limit: float | None) -> None:
+    segment = swinging(robot)
+    _, paper = segment_demand(robot, segment, forces=GroundForces(None, limit))
+    demand, other = segment_demand(robot, segment, forces=GroundForces(LeastTorque(), limit))
+    assert paper is not None
+    assert other is not None
+    for of in (
+        lambda c: c.force.sum(axis=1),
+        lambda c: np.cross(c.position, c.force).sum(axis=1),
+    ):
+        np.testing.assert_allclose(of(other), of(paper), atol=1e-7)
+    assert np.isfinite(demand.torque).all()
+
+
+def test_joints_that_bear_no_ground_force_keep_their_torque(hexapod: Robot) -> None:
+    segment = walking_motion(hexapod, samples=51).segments[0]
+    plain, _ = segment_demand(hexapod, segment)
+    other, _ = segment_demand(hexapod, segment, forces=GroundForces(LeastTorque()))
+    for leg in hexapod.leg_names:
+        columns = hexapod.layout.of(hexapod.leg_names.index(leg))
+        same = np.array_equal(plain.torque[:, columns], other.torque[:, columns])
+        assert same == (leg not in segment.stance)
+
+
+def test_where_a_robot_tips_no_rule_helps(hexapod: Robot) -> None:
+    robot = load_robot(hexapod.spec.with_parameters({"hip_spacing": 0.20}))
+    segment = walking_motion(robot, samples=51).segments[0]
+    for rule in (None, LeastTorque()):
+        with pytest.raises(TippingError, match="tips at t"):
+            segment_demand(robot, segment, forces=GroundForces(rule))
+
+
+def test_internal_forces_add_up_to_nothing() -> None:
+    feet = np.random.default_rng(6).normal(size=(5, 5, 3))
+    basis = internal_basis(feet)
+    assert basis.shape == (5, 5, 3, 9)
+    np.testing.assert_allclose(basis.sum(axis=1), 0.0, atol=1e-12)
+    moment = np.cross(feet[..., None, :], basis.transpose(0, 1, 3, 2)).sum(axis=1)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-12)
+    flat = basis.reshape(5, 15, 9)
+    np.testing.assert_allclose(
+        flat.transpose(0, 2, 1) @ flat, np.broadcast_to(np.eye(9), (5, 9, 9)), atol=1e-12
+    )

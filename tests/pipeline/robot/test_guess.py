@@ -1,0 +1,211 @@
+"""Robot files guessed from URDFs: what is found, why, and what is asked for."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.dynamics.joint_demand import segment_demand
+from pipeline.dynamics.stability import support_margin
+from pipeline.errors import PipelineError, RobotFileError
+from pipeline.motion.gait import gait_of
+from pipeline.motion.standing import standing_posture
+from pipeline.robot.check import check_robot
+from pipeline.robot.guess.guess import Guess, guess_robot
+from pipeline.robot.guess.writer import robot_text
+from pipeline.robot.published import published_names, published_robot
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import load_robot_file
+from tests.pipeline.robot.walkers import MIXED, urdf_text
+
+#: Published robots that walk on four legs: joints of each leg, joints that are held, SRDF pose.
+WALKERS = {
+    "a1": (3, 0, "standing"),
+    "anymal": (3, 0, "standing"),
+    "anymal_c": (3, 0, "standing"),
+    "anymal_kinova": (3, 6, "standing_with_arm_up"),
+    "b1": (3, 0, "standing"),
+    "b1_z1": (3, 7, "standing_with_arm_home"),
+    "centauro": (5, 19, "homing_balanced"),
+    "go1": (3, 0, "standing"),
+    "go2": (3, 0, "standing"),
+    "hyq": (3, 0, "standing"),
+    "laikago": (3, 0, ""),
+    "solo12": (3, 0, "standing"),
+    "solo8": (2, 0, "standing"),
+}
+
+
+def guessed(given: str, folder: Path, **options: object) -> tuple[Guess, Robot]:
+    guess = guess_robot(given, support_margin, **options)  # type: ignore[arg-type]
+    path = folder / "robot.toml"
+    path.write_text(robot_text(guess, path), encoding="utf-8")
+    return guess, load_robot(load_robot_file(path))
+
+
+@pytest.mark.parametrize("name", WALKERS)
+def test_published_quadrupeds_are_found_and_stand(name: str, tmp_path: Path) -> None:
+    joints, held, pose = WALKERS[name]
+    guess, robot = guessed(name, tmp_path)
+    assert [len(limb.joints) for limb in guess.limbs] == [joints] * 4
+    assert len(guess.held) == held
+    assert guess.stance.reason.startswith(f"pose '{pose}'" if pose else "the largest margin")
+    assert guess.pace is not None
+    assert [f.detail for f in check_robot(robot) if not f.passed] == []
+    sides = [leg.side for leg in robot.spec.legs]
+    assert sorted(sides) == ["left", "left", "right", "right"]
+    segment = standing_posture(robot)  # within reach and limits
+    np.testing.assert_allclose(
+        robot.leg_positions(segment.configuration)[0], guess.stance.posture, atol=2e-3
+    )
+    _, contacts = segment_demand(robot, segment)
+    assert contacts is not None
+    assert contacts.force_world[0, :, 2].sum() == pytest.approx(9.81 * guess.mass, rel=1e-9)
+    assert (contacts.force_world[0, :, 2] > 0).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", published_names())
+def test_every_published_robot_is_guessed_or_told_in_one_line(name: str, tmp_path: Path) -> None:
+    if name in WALKERS:
+        return
+    with pytest.raises(PipelineError) as caught:
+        guessed(name, tmp_path)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 800
+
+
+def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_path: Path) -> None:
+    """Without an SRDF: the stance of a search, level, clear of limits, with the largest margin."""
+    guess, robot = guessed(str(root / "urdf" / "hexapod.urdf"), tmp_path)
+    assert [(leg.name, leg.joints, leg.foot, leg.side) for leg in robot.spec.legs] == [
+        (leg.name, leg.joints, leg.foot, leg.side) for leg in hexapod.spec.legs
+    ]
+    stances = [gait_of(each.spec).footfall.stances() for each in (robot, hexapod)]
+    assert stances[0] == stances[1]
+    assert robot.mass == pytest.approx(hexapod.mass)
+    feet = guess.stance.feet
+    assert np.ptp(feet[:, 2]) < 1e-9
+    np.testing.assert_allclose(feet[:3], feet[3:] * [1, -1, 1], atol=1e-9)  # mirrored
+    lower, upper = (robot.layout.by_leg(limit[None])[0] for limit in robot.limits)
+    assert (guess.stance.posture > lower).all()
+    assert (guess.stance.posture < upper).all()
+    own = standing_posture(hexapod, hexapod.leg_names)
+    usual = support_margin(
+        np.array([[leg.neutral_foot for leg in hexapod.spec.legs]]), np.zeros((1, 2))
+    )
+    assert own.stance == hexapod.leg_names
+    assert guess.stance.margin > usual[0]
+
+
+def test_every_guess_has_its_reason(tmp_path: Path) -> None:
+    guess, robot = guessed("b1_z1", tmp_path)
+    table = tomllib.loads((tmp_path / "robot.toml").read_text(encoding="utf-8"))
+    for leg in guess.limbs:
+        keys = {k.rsplit(".", 1)[1] for k in table["assumed"] if f"legs.{leg.name}." in k}
+        assert keys == set(table["legs"][leg.name])
+    assert {k for k in table["assumed"] if k.startswith("held.")} == {
+        f"held.{joint}" for joint in table["held"]
+    }
+    assert dict(robot.spec.assumed) == table["assumed"]
+    for name in ("foot_stroke", "foot_lift", "gait_period"):
+        row = robot.spec.parameters.parameter(name)
+        assert row.basis == "assumed"
+        assert row.interval is not None
+    assert robot.spec.parameters.parameter("total_mass").basis == "derived"
+    assert table["robot"]["urdf"] == "example-robot-data:b1_z1"
+
+
+def test_mixed_legs_without_a_pose_or_names(tmp_path: Path) -> None:
+    """Feet of any kind of leg, an arm that is held, joints that mirror nobody."""
+    sturdy = (MIXED[0], MIXED[0], MIXED[0], MIXED[0], MIXED[0])
+    (tmp_path / "walker.urdf").write_text(urdf_text(sturdy, arm=True), encoding="utf-8")
+    guess, robot = guessed(str(tmp_path / "walker.urdf"), tmp_path)
+    assert [limb.foot for limb in guess.limbs] == [f"leg{i}_foot" for i in range(5)]
+    assert [limb.name for limb in guess.limbs] == [f"leg{i}" for i in range(5)]
+    assert [(joint, at) for joint, at, _ in guess.held] == [("arm", 0.0)]
+    assert robot.spec.urdf == tmp_path / "walker.urdf"
+    assert guess.stance.margin > 0.05
+
+
+def test_leaves_are_feet_where_nothing_is_called_one(tmp_path: Path) -> None:
+    text = urdf_text((MIXED[0],) * 4).replace("_foot", "_x").replace("_tip", "_y")
+    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
+    guess, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path)
+    assert [limb.foot for limb in guess.limbs] == [f"leg{i}_x" for i in range(4)]
+    assert {limb.reason for limb in guess.limbs} == {
+        "the end of a chain that reaches as low as any"
+    }
+    named, _ = guessed(str(tmp_path / "walker.urdf"), tmp_path, feet=["leg0_x", "leg1_x", "leg2_x"])
+    assert [limb.reason for limb in named.limbs] == ["named by --foot"] * 3
+    assert len(named.held) == 3
+
+
+def test_meshes_that_are_missing_leave_the_numbers_as_they_are(tmp_path: Path) -> None:
+    text = published_robot("solo12").urdf.read_text(encoding="utf-8")
+    assert "<mesh" in text
+    lost = re.sub(r'filename="[^"]*"', 'filename="package://nowhere/lost.stl"', text)
+    (tmp_path / "solo12.urdf").write_text(lost, encoding="utf-8")
+    _, without = guessed(str(tmp_path / "solo12.urdf"), tmp_path)
+    bare = re.sub(r"<(visual|collision)>.*?</\1>", "", text, flags=re.S)
+    (tmp_path / "solo12.urdf").write_text(bare, encoding="utf-8")
+    _, none = guessed(str(tmp_path / "solo12.urdf"), tmp_path)
+    assert without.spec.legs == none.spec.legs
+    one, other = (segment_demand(r, standing_posture(r))[0].torque for r in (without, none))
+    np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize(
+    ("given", "options", "message"),
+    [
+        ("bolt", {}, r"bolt: two feet found \(FL_FOOT, FR_FOOT\); .* needs three feet on the gr"),
+        ("talos", {}, r"two feet found \(left_sole_link, right_sole_link\); .* three feet"),
+        ("ur5", {}, r"one foot found \(ee_link\); .*--foot; chains end in ee_link"),
+        ("iris", {}, r"iris: no joint moves; a leg has at least one actuated joint"),
+        ("cassie", {}, r"cassie.sdf, not in a URDF"),
+        ("solo21", {}, r"no such file, and no robot of example-robot-data; did you mean 'solo"),
+        ("nowhere/x.urdf", {}, r"nowhere/x.urdf: no such file"),
+        ("x.toml", {}, r"x.toml: a robot file; init starts from a URDF"),
+        ("quadruped", {}, r"limits of 'BL_KFE', .*: lower equals upper"),
+        ("a1", {"feet": ["FL_fot"]}, r"--foot FL_fot: no link of that name moves; .*'FL_foot'"),
+        ("a1", {"feet": ["FL_foot", "FR_foot"]}, r"two feet found \(FL_foot, FR_foot\)"),
+        (
+            "a1",
+            {"feet": ["FL_foot", "FL_calf", "FR_foot"]},
+            r"feet 'FL_foot' and 'FL_calf' both hang on joint 'FL_hip_joint'; a leg has one foot",
+        ),
+        ("a1", {"base": "trunk"}, r"--base trunk: the URDF's tree begins at 'base', and that is"),
+        ("a1", {"base": "bse"}, r"--base bse: no such link; did you mean 'base'"),
+    ],
+)
+def test_what_cannot_be_found_is_asked_for(
+    tmp_path: Path, given: str, options: dict[str, object], message: str
+) -> None:
+    with pytest.raises(PipelineError, match=message) as caught:
+        guessed(given, tmp_path, **options)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_leg_that_cannot_stand_is_named(tmp_path: Path) -> None:
+    """Legs whose limits keep their feet above their hips."""
+    text = urdf_text((MIXED[0],) * 4, turned=False)
+    up = text.replace('lower="-3" upper="3"', 'lower="2.9" upper="3"')
+    (tmp_path / "walker.urdf").write_text(up, encoding="utf-8")
+    with pytest.raises(RobotFileError, match="no posture of leg 'leg0' within its limits puts"):
+        guessed(str(tmp_path / "walker.urdf"), tmp_path)
+
+
+def test_an_srdf_beside_the_urdf_names_the_stance(tmp_path: Path) -> None:
+    solo = published_robot("solo12")
+    assert solo.srdf is not None
+    (tmp_path / "mine.urdf").write_text(solo.urdf.read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "mine.srdf").write_text(solo.srdf.read_text(encoding="utf-8"), encoding="utf-8")
+    guess, _ = guessed(str(tmp_path / "mine.urdf"), tmp_path)
+    assert guess.stance.reason == "pose 'standing' of mine.srdf"
+    (tmp_path / "mine.srdf").write_text("<robot", encoding="utf-8")
+    with pytest.raises(RobotFileError, match="mine.srdf: line 1: malformed XML"):
+        guessed(str(tmp_path / "mine.urdf"), tmp_path)
