@@ -4,34 +4,28 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from actuators.energy.energy import stage_energies
+from pipeline.api.pictures.gait import legs_stretches
+from pipeline.api.pictures.robot import robot_drawings, write_gait_steps
+from pipeline.api.pictures.scene import Scenery
 from pipeline.motion.gait import gait_of
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
-from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
+from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
 from reports.figures.energy.joint_demand import joint_demand_figure, stretches
-from reports.figures.energy.motor_limits import common_scale, motor_limits_figure
+from reports.figures.energy.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
-from reports.figures.robot.gait_view import GaitStretch, gait_figure
-from reports.figures.robot.joint_directions import joint_directions_figure
-from reports.figures.robot.robot_view import Leg, legs_of, robot_figure
-from reports.figures.robot.visuals import Primitive, joint_marks, primitives
 from reports.figures.several import Drawing, save_figures
 from reports.pages.names import leg_words, short_titles, shown_leg
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 #: File name of each subject's Fig. 21.
@@ -42,22 +36,40 @@ SUBJECT_TITLES = {
 }
 
 
-def write_figures(given: Settings, standing: Standing, walking: Walking, out: Path) -> int:
+def write_figures(
+    given: Settings, standing: Standing, walking: Walking, out: Path, *, paper: bool = False
+) -> int:
     """Draw and save every figure of a run.
+
+    Args:
+        given: The run.
+        standing: Its result.
+        walking: Its result.
+        out: Folder.
+        paper: Whether the run is held against the paper, whose figures are then named.
 
     Returns:
         How many.
     """
-    return save_figures(drawings(given, standing, walking), out)
+    write_gait_steps(Scenery(given.robot), walking, out)
+    return 1 + save_figures(drawings(given, standing, walking, paper=paper), out)
 
 
-def drawings(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
+def drawings(
+    given: Settings, standing: Standing, walking: Walking, *, paper: bool = False
+) -> list[Drawing]:
     """Every figure of a run, the longest first, so that two processes end together."""
     return [
-        *_robot(given, standing, walking),
+        *robot_drawings(Scenery(given.robot), standing, walking),
         *_energy(given, walking),
-        *_demand(given, walking),
+        *_all_legs(given, walking),
+        *_demand(given, walking, paper),
     ]
+
+
+def _name(given: Settings) -> str:
+    """Robot and gait, which every figure names."""
+    return f"{given.robot.spec.name}, {gait_of(given.robot.spec).title}"
 
 
 def _joints(given: Settings) -> tuple[str, dict[str, str]]:
@@ -67,8 +79,9 @@ def _joints(given: Settings) -> tuple[str, dict[str, str]]:
     return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
 
 
-def _demand(given: Settings, walking: Walking) -> list[Drawing]:
+def _demand(given: Settings, walking: Walking, paper: bool) -> list[Drawing]:
     leg, joints = _joints(given)
+    sliding = dict(zip(given.robot.joints, given.robot.sliding, strict=True))
     return [
         Drawing(
             f"joint_demand_{joint}",
@@ -77,10 +90,44 @@ def _demand(given: Settings, walking: Walking) -> list[Drawing]:
                 joint,
                 stretches(walking.demand, joint, leg),
                 title=f"{label.capitalize()} of the {leg_words(leg)}: velocity and torque",
-                subtitle=f"demand over one gait cycle, as in Fig. {number} of the paper",
+                subtitle=f"{_name(given)}: demand over one cycle"
+                + (f", as in Fig. {number} of the paper" if paper else ""),
+                slides=bool(sliding[joint]),
             ),
         )
         for number, (joint, label) in enumerate(joints.items(), start=2)
+    ]
+
+
+def _all_legs(given: Settings, walking: Walking) -> list[Drawing]:
+    robot = given.robot
+    parts = legs_stretches(robot, walking)
+    slide = [name for name, one in zip(robot.joints, robot.sliding, strict=True) if one]
+    legs = {leg.name: leg.joints for leg in robot.spec.legs}
+    words = "a line is thin while its leg is in the air"
+    return [
+        Drawing(
+            "joint_torques",
+            partial(
+                joint_torques_figure,
+                parts,
+                walking.demand.joints,
+                legs,
+                sliding=slide,
+                title="Torque of every joint over one cycle",
+                subtitle=f"{_name(given)}; {words}",
+            ),
+        ),
+        Drawing(
+            "ground_forces",
+            partial(
+                ground_forces_figure,
+                parts,
+                robot.leg_names,
+                title="Ground forces and static stability over one cycle",
+                subtitle=_name(given),
+            ),
+        ),
     ]
 
 
@@ -110,6 +157,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                     labels,
                     support,
                     title=f"{title}: its motors, {leg_words(leg)}",
+                    subtitle=f"{_name(given)}: {SUBTITLE}",
                     scale=scale,
                 ),
             ),
@@ -121,8 +169,8 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                     labels,
                     places=given.catalog.alternatives[name].stage_names,
                     title=title,
-                    subtitle=f"energy per cycle through each stage, {leg_words(leg)}; "
-                    "one scale for all alternatives",
+                    subtitle=f"{_name(given)}: energy per cycle through each stage, "
+                    f"{leg_words(leg)}; one scale for all alternatives",
                     limits=limits,
                 ),
             ),
@@ -140,89 +188,9 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
         electrical,
         reference=titles.get(IDEAL),
         title=f"Electrical energy per cycle, {leg_words(leg)}",
-        subtitle=subtitle,
+        subtitle=f"{_name(given)}; {subtitle}",
     )
     return [*out, Drawing("electrical_energy", figure)]
-
-
-def scene(robot: Robot, configuration: Array) -> tuple[list[Primitive], list[Leg]]:
-    """The robot's visual primitives and legs in one posture."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, configuration)
-    links = {
-        frame.name: data.oMf[i].homogeneous.copy()
-        for i, frame in enumerate(robot.model.frames)
-        if frame.type == pin.FrameType.BODY
-    }
-    marks = joint_marks(robot.urdf, links)
-    legs = {leg.name: (leg.joints, leg.foot) for leg in robot.spec.legs}
-    return primitives(robot.urdf, links), legs_of(legs, marks, links)
-
-
-def _robot(given: Settings, standing: Standing, walking: Walking) -> list[Drawing]:
-    robot, leg = given.robot, shown_leg(given.robot)
-    posture = standing.segment.configuration[0]
-    zero = robot.configuration(np.zeros((1, len(robot.joints))), np.zeros((1, 3)))[0]
-    data = robot.model.createData()
-
-    def standing_robot() -> Figure:
-        return robot_figure(
-            *scene(robot, posture),
-            title=f"{robot.spec.name}, {standing.segment.name}",
-            subtitle="the other feet are lifted to mid-transfer",
-            mass_centre=pin.centerOfMass(robot.model, data, posture).copy(),
-        )
-
-    def zero_pose() -> Figure:
-        return joint_directions_figure(
-            *scene(robot, zero),
-            leg,
-            title=f"{robot.spec.name}: zero pose and positive directions",
-            zero_pose=robot.spec.zero_pose,
-        )
-
-    def gait() -> Figure:
-        solids, _ = scene(robot, zero)
-        trunk = next((p for p in solids if p.link == robot.spec.base_link), None)
-        return gait_figure(
-            robot.leg_names,
-            _gait_stretches(robot, walking),
-            shown=leg,
-            body=(0.0, 0.0) if trunk is None else (float(trunk.size[0]), float(trunk.size[1])),
-            title=f"{robot.spec.name}: {gait_of(robot.spec).title}",
-            subtitle=f"transfer path '{gait_of(robot.spec).path}'",
-        )
-
-    return [
-        Drawing("gait", gait),
-        Drawing("robot", standing_robot),
-        Drawing("zero_pose", zero_pose),
-    ]
-
-
-def _gait_stretches(robot: Robot, walking: Walking) -> list[GaitStretch]:
-    data = robot.model.createData()
-    out = []
-    for segment, contacts, margin in zip(
-        walking.motion.segments, walking.demand.contacts, walking.margins, strict=True
-    ):
-        assert contacts is not None
-        # As many as a picture can show, both ends and the middle among them.
-        rows = np.unique(np.linspace(0, segment.time.size - 1, 101).round().astype(int))
-        centres = [
-            pin.centerOfMass(robot.model, data, row).copy() - row[:3]
-            for row in segment.configuration[rows]
-        ]
-        out.append(
-            GaitStretch(
-                segment.time[rows],
-                contacts.position[rows],
-                segment.stance,
-                np.array(centres),
-                margin[rows],
-            )
-        )
-    return out
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:

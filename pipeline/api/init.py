@@ -77,7 +77,7 @@ def init(
 
 def _draw(robot: Robot, path: Path) -> Path:
     """The stance in four views, beside the robot file."""
-    from pipeline.api.figures import scene
+    from pipeline.api.pictures.scene import Scenery
     from reports.figures.robot.robot_view import robot_figure
     from reports.figures.several import Drawing, save_figures
 
@@ -87,7 +87,7 @@ def _draw(robot: Robot, path: Path) -> Path:
 
     def draw() -> Figure:
         return robot_figure(
-            *scene(robot, stance[0]),
+            *Scenery(robot).at(stance[0]),
             title=f"{robot.spec.name}: the stance guessed",
             subtitle="left and right, front and rear, feet and knees as they should be?",
             mass_centre=centre,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pipeline.api.machine import Machine
 from pipeline.api.tables import (
@@ -19,10 +20,13 @@ from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import RobotFileError
 from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
-from pipeline.simulation.walk_stand import stand
+from pipeline.simulation.walk_stand import Standing, Walking, stand
 from reports.folder.staging import staged
 from reports.table import Table
 from reports.writer import write_table
+
+if TYPE_CHECKING:
+    from pipeline.paper.judgement.basis import Judged
 
 logger = logging.getLogger("legwatt")
 
@@ -113,31 +117,55 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
     tables.append(table_of_parameters(given))
     judgement = None
     if verb == "reports":
-        from pipeline.api import judgement as judging
-        from pipeline.paper.judgement.basis import basis
-
-        by = basis(given)
-        if isinstance(by, str):
-            said.append(f"not held against the paper: {by}")
-        else:
-            logger.info("holding the run against the paper")
-            judgement, more = judging.judged(given, by)
-            tables += more
-            if by.word:
-                said.append(by.word)
+        judgement, more = _held_against_the_paper(given, said)
+        tables += more
     with staged(folder, verb, inputs=inputs_of(given)) as out:
         for table in tables:
             write_table(table, out, meta=metadata(given), decimal=decimal)
         files = len(tables)
-        if verb == "reports":
-            from pipeline.api.figures import write_figures
-
-            assert standing is not None
-            assert walking is not None
-            logger.info("drawing figures")
-            files += write_figures(given, standing, walking, out)
-            if judgement is not None:
-                files += judging.pages(given, judgement, tables, out)
+        if standing is not None and walking is not None:
+            files += _pictures(given, (standing, walking), judgement, tables, out, said)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
     remarks = given.effects.remarks if given.effects else ()
     return (*said, *given.remarks, *remarks, *(findings(walking) if walking else ()))
+
+
+def _held_against_the_paper(given: Settings, said: list[str]) -> tuple[Judged | None, list[Table]]:
+    """The judgement of the paper's robot, of no other; what there is to say is added to `said`."""
+    from pipeline.api import judgement as judging
+    from pipeline.api.pictures.scene import Scenery
+    from pipeline.paper.judgement.basis import basis
+
+    judged: Judged | None = None
+    tables: list[Table] = []
+    by = basis(given)
+    if isinstance(by, str):
+        said.append(f"not held against the paper: {by}")
+    elif by is not None:
+        logger.info("holding the run against the paper")
+        judged, tables = judging.judged(given, by)
+        said += [by.word] if by.word else []
+    remark = Scenery(given.robot).shapes.remark
+    said += [remark] if remark else []
+    return judged, tables
+
+
+def _pictures(
+    given: Settings,
+    results: tuple[Standing, Walking],
+    judged: Judged | None,
+    tables: list[Table],
+    out: Path,
+    said: list[str],
+) -> int:
+    """Figures and pages; how many files."""
+    from pipeline.api import judgement as judging
+    from pipeline.api.figures import write_figures
+    from reports.pages.robot_page import write_robot_page
+
+    logger.info("drawing figures")
+    files = write_figures(given, *results, out, paper=judged is not None)
+    if judged is not None:
+        return files + judging.pages(given, judged, tables, out)
+    remarks = given.effects.remarks if given.effects else ()
+    return files + write_robot_page(given, tables, out, [*said, *given.remarks, *remarks])

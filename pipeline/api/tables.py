@@ -25,9 +25,9 @@ from reports.tables import parameters as parameter_tables
 from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
 from reports.tables.gait import walking_base, walking_gait
+from reports.tables.walking import HELD
 
 IDEAL = "ideal"
-HELD = "held joints"
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 

@@ -19,6 +19,7 @@ from pipeline.cli.decimal_option import add_decimal_option
 from pipeline.cli.force_options import add_force_options
 from pipeline.cli.gap.options import add_gap_options
 from pipeline.cli.named_path import named_path
+from pipeline.cli.view import add_view_options
 from pipeline.errors import PipelineError, StanceError
 
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
@@ -50,6 +51,10 @@ def parser() -> argparse.ArgumentParser:
         sub = verbs.add_parser(verb, help=text)
         _run_options(sub)
         sub.set_defaults(run=_run_reports)
+
+    view = verbs.add_parser("view", help="play robot, gait, forces and torques in a browser, in 3D")
+    add_view_options(view)
+    view.set_defaults(run=_run_view)
 
     gap = verbs.add_parser(
         "gap", help="find what the model lacks: from a measured log to a named effect"
@@ -199,6 +204,12 @@ def _run_reports(options: argparse.Namespace) -> int:
         from pipeline.cli.run import run
 
         return run(options)
+
+
+def _run_view(options: argparse.Namespace) -> int:
+    from pipeline.cli.view import run_view
+
+    return run_view(options)
 
 
 def _run_gap(options: argparse.Namespace) -> int:

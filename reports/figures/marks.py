@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.figures.robot.projection import View
-from reports.figures.robot.visuals import JointMark
+from reports.figures.robot.solids import JointMark
 from reports.figures.style import INK
 
 if TYPE_CHECKING:
@@ -108,6 +108,39 @@ def rotation_arrow(
     )
     centre = view.project(joint.position)[:2]
     axes.plot(*centre, marker="o", markersize=3.2, color=color, zorder=7)
+    return float(centre[0]), float(centre[1])
+
+
+def sliding_arrow(
+    axes: Axes, view: View, joint: JointMark, color: str, length: float = 0.05
+) -> tuple[float, float]:
+    """A straight arrow along a sliding joint's axis in its positive sense.
+
+    Args:
+        axes: In metres.
+        view: The camera.
+        joint: Where and along what.
+        color: Of the arrow.
+        length: Half of it [m].
+
+    Returns:
+        The joint's place in the image [m].
+    """
+    ends = view.project(joint.position + np.array([[-1.0], [1.0]]) * length * joint.axis)[:, :2]
+    axes.annotate(
+        "",
+        ends[1],
+        ends[0],
+        arrowprops={
+            "arrowstyle": "-|>,head_width=0.22,head_length=0.5",
+            "linewidth": 2.2,
+            "color": color,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
+        zorder=7,
+    )
+    centre = view.project(joint.position)[:2]
     return float(centre[0]), float(centre[1])
 
 

@@ -30,7 +30,7 @@ INK, QUIET, FAINT, SHADE_DARK, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#dde1e6
 WIDTH = 9.5
 
 #: Colours in order, for things without a colour of their own.
-CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY)
+CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, QUIET)
 #: Energy towards the joint, and energy that comes back.
 FORWARD, REVERSE = BLUE, ORANGE
 

@@ -40,10 +40,13 @@ def short_titles(catalog: Catalog) -> dict[str, str]:
 
 def names_text(given: Settings) -> str:
     """A paragraph for the first place where a reader meets the names."""
+    legs = {joint for leg in given.robot.spec.legs for joint in leg.joints}
+    outside = "" if legs >= set(given.robot.joints) else " with the joints outside them"
     titles = [f"`{name}` ({title})" for name, title in short_titles(given.catalog).items()]
     return (
         f"An *alternative* is one way to build the actuators of all joints: {', '.join(titles)}. "
-        f"{legs_text(given.robot)} `robot` is all {len(given.robot.leg_names)} legs together."
+        f"{legs_text(given.robot)} `robot` is all {len(given.robot.leg_names)} legs together"
+        f"{outside}."
     )
 
 

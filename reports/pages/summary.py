@@ -14,12 +14,11 @@ from pipeline.simulation.settings import Settings
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
-from reports.pages.names import names_text, short_titles
+from reports.pages.names import shown_leg
+from reports.pages.robot_page import FOOTER, energy_section, files_of, gait_section
 from reports.pages.summary_words import answer, percent, roles_text
 from reports.table import Table
 
-#: Actuators of so few stages that a picture of them is left to the folder.
-PLAIN = ("ideal", "rotor")
 TONES = {
     "reproduced": "good",
     "not reproduced": "bad",
@@ -50,7 +49,7 @@ def write_summary(given: Settings, judged: Judged, tables: Sequence[Table], out:
 def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: Path) -> Page:
     """The page; see `write_summary`."""
     sections = [
-        _energy(tables, out, names_text(given), short_titles(given.catalog)),
+        energy_section(given, tables, out),
         _reproduction(judged, tables),
     ]
     if judged.by.results is not None:
@@ -58,37 +57,14 @@ def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: P
     sections += [
         _conclusions(judged, tables, out),
         _parameters(judged.by, tables, given),
-        _robot(out),
+        _robot(given, out),
     ]
     return Page(
         title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
         answer=answer(judged, tables),
         sections=tuple(sections),
-        files={f"{t.name}.csv": t.description or _first_meanings(t) for t in tables.values()},
-        footer="Every CSV has a .meta.json beside it: meanings, units, input hashes, versions.",
-    )
-
-
-def _energy(
-    tables: Mapping[str, Table], out: Path, names: str, titles: Mapping[str, str]
-) -> Section:
-    walking = tables["walking_energy"]
-    keep = [leg in ("rm", "robot") for leg in walking.columns["leg"]]
-    return Section(
-        "What it costs",
-        (
-            Text(names),
-            FigureBlock(out / "electrical_energy.svg", "Electrical energy of one cycle by joint."),
-            table_block(
-                walking, keep=keep, caption="Energy drawn from the supply in one walking cycle."
-            ),
-            table_block(tables["robot_energy"], caption="The whole robot, walking."),
-            *(
-                FigureBlock(out / f"stage_energy_{name}.svg", f"Stages of the {title}.")
-                for name, title in titles.items()
-                if name not in PLAIN
-            ),
-        ),
+        files=files_of(tables),
+        footer=FOOTER,
     )
 
 
@@ -340,22 +316,15 @@ def _number_words(numbers: Sequence[Calibrated]) -> list[str]:
     ]
 
 
-def _robot(out: Path) -> Section:
-    return Section(
-        "The robot and its gait",
-        tuple(
-            FigureBlock(out / f"{name}.svg", caption)
-            for name, caption in (
-                ("robot", "The hexapod standing on three feet."),
-                ("zero_pose", "Zero pose and positive directions."),
-                ("gait", "Foot paths, support polygons, footfall."),
-                ("joint_demand_rm_joint_1", "Joint 1, as in Fig. 2."),
-                ("joint_demand_rm_joint_2", "Joint 2, as in Fig. 3."),
-                ("joint_demand_rm_joint_3", "Joint 3, as in Fig. 4."),
-            )
+def _robot(given: Settings, out: Path) -> Section:
+    leg = shown_leg(given.robot)
+    joints = next(entry.joints for entry in given.robot.spec.legs if entry.name == leg)
+    more = [
+        FigureBlock(out / "joint_torques.svg", "Torque of every joint, all legs."),
+        FigureBlock(out / "ground_forces.svg", "Ground forces of all feet, margin of stability."),
+        *(
+            FigureBlock(out / f"joint_demand_{joint}.svg", f"Joint {k}, as in Fig. {k + 1}.")
+            for k, joint in enumerate(joints, start=1)
         ),
-    )
-
-
-def _first_meanings(table: Table) -> str:
-    return ", ".join(list(table.columns)[:6])
+    ]
+    return gait_section(given.robot, out, more, "The hexapod standing on three feet.")

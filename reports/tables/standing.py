@@ -34,7 +34,7 @@ def standing(demand: JointDemand, holding: Mapping[str, HoldingResult]) -> Table
         "standing",
         rows,
         {
-            "alternative": ("actuator alternative of section III", ""),
+            "alternative": ("actuator alternative", ""),
             "joint": ("joint", ""),
             "joint_torque_Nm": ("torque the actuator applies to hold the joint", "N*m"),
             "motor_torque_Nm": ("motor torque of least magnitude that holds", "N*m"),
@@ -67,7 +67,7 @@ def standing_energy(
         "standing_energy",
         rows,
         {
-            "alternative": ("actuator alternative of section III", ""),
+            "alternative": ("actuator alternative", ""),
             "leg": ("leg; those not among the standing feet are lifted", ""),
             "energy_J": ("electrical energy of the leg in 3 s", "J"),
         },

@@ -24,7 +24,9 @@ _FORCES = {
     "least_torque": "Least joint torque squared:",
     "least_power": "Least electrical power:",
 }
-ALTERNATIVE = ("actuator alternative of section III", "")
+ALTERNATIVE = ("actuator alternative", "")
+#: What tables by leg call the joints outside the legs, which are held.
+HELD = "held joints"
 
 
 def walking_joint_demand(demand: MotionDemand) -> Table:
@@ -238,6 +240,7 @@ def robot_energy(
     for name, supply in supplies.items():
         energy = float(supply.supplied_energy.sum())
         support = _support_energy(demand, supply, legs)
+        held = leg_energies(supply, legs).get(HELD, 0.0)
         power = energy / demand.period
         rows.append(
             {
@@ -246,7 +249,7 @@ def robot_energy(
                 "average_power_W": power,
                 "cost_of_transport": power / (weight * speed) if speed else None,
                 "support_share": None if support is None else support / energy,
-                "transfer_share": None if support is None else 1 - support / energy,
+                "transfer_share": None if support is None else 1 - support / energy - held / energy,
                 "dumped_J": float(supply.dumped_energy.sum()),
             }
         )

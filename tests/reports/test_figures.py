@@ -34,6 +34,7 @@ PARTS = (
     Stretch(np.linspace(1.5, 3, 5), np.linspace(-1, 1, 5), np.full(5, 2.0), False),
 )
 JOINTS = {"a": "joint 1", "b": "joint 2"}
+BODY = np.array([[-0.3, -0.1], [0.3, -0.1], [0.3, 0.1], [-0.3, 0.1]])
 
 
 def texts(figure) -> list[str]:
@@ -279,16 +280,16 @@ def gait(legs: tuple[str, ...]) -> list[GaitStretch]:
 
 def test_gait_view_states_margins_and_measures_the_path() -> None:
     legs = ("lf", "rf", "lr", "rr")
-    figure = gait_figure(legs, gait(legs), shown="rr", body=(0.6, 0.2), title="t")
+    figure = gait_figure(legs, gait(legs), shown="rr", body=BODY, title="t")
     assert len(figure.axes) == 6
     words = texts(figure)
     assert "200 mm" in words
     assert "50 mm" in words
     assert sum("stability margin 50 mm" in word for word in words) == 3
     with pytest.raises(FigureError, match="both stand and swing"):
-        gait_figure(legs, gait(legs), shown="rf", body=(0.6, 0.2), title="t")
+        gait_figure(legs, gait(legs), shown="rf", body=BODY, title="t")
     with pytest.raises(FigureError, match="'xx'"):
-        gait_figure(legs, gait(legs), shown="xx", body=(0.6, 0.2), title="t")
+        gait_figure(legs, gait(legs), shown="xx", body=BODY, title="t")
 
 
 def test_energy_per_minute_with_and_without_break_even() -> None:

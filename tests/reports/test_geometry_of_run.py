@@ -15,7 +15,7 @@ from reports.pages.names import leg_words, names_text
 from tests.reports import geometry
 
 NAMES = (
-    *("gait", "robot", "zero_pose", "electrical_energy"),
+    *("gait", "robot", "zero_pose", "electrical_energy", "joint_torques", "ground_forces"),
     *(
         f"{kind}_{alternative}"
         for kind in ("motor_limits", "stage_energy")

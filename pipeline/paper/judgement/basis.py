@@ -94,8 +94,8 @@ class Judged:
     by: Basis
 
 
-def basis(given: Settings) -> Basis | str:
-    """What the run may be judged by, or why not at all, in words.
+def basis(given: Settings) -> Basis | str | None:
+    """What the run may be judged by, or why not at all, in words; None for any other robot.
 
     Raises:
         CalibrationError: The stored calibration, the printed values or the prior cannot be read.
@@ -104,7 +104,7 @@ def basis(given: Settings) -> Basis | str:
         return "there is no stored calibration; `make calibrate` makes one"
     results = load_results()
     if given.robot.spec.path.name != results.get("robot"):
-        return f"{given.robot.spec.path.name} is not the paper's robot"
+        return None
     if given.own:
         return "its joints have actuators of their own, of which the paper says nothing"
     if given.effects is not None:
@@ -128,6 +128,8 @@ def basis(given: Settings) -> Basis | str:
     # A number of which nothing is left is not one that differs.
     changed = [name for name in differences(stored, now) if name in now]
     built = [name for name in changed if name.startswith(_STRUCTURE) and name != _SHAPE]
+    if "legs" in built:
+        return None
     if built:
         return f"{built[0]} differs from the paper's"
     missing = tuple(name for name in _alternatives_of(stored) if name not in own)

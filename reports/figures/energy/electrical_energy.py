@@ -77,7 +77,7 @@ def _name_joints(axes: Axes, joints: Sequence[str]) -> None:
     """Joint names in their colours above the first bar, spaced like the words they are."""
     for j, joint in enumerate(joints):
         axes.text(
-            0.005 + 0.12 * j,
+            0.005 + min(0.12, 0.98 / len(joints)) * j,
             1.0,
             joint,
             transform=axes.transAxes,

@@ -1,4 +1,4 @@
-"""Velocity and torque demanded of one joint over a gait cycle: Fig. 2 to 4 of the paper."""
+"""Velocity and torque demanded of one joint over a gait cycle."""
 
 from __future__ import annotations
 
@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 #: Torque in the air gets a panel of its own below this share of the torque on the ground.
 _READABLE = 0.2
+#: A phase shorter than this share of the cycle has no room for its name.
+_NARROW = 0.09
 
 
 @dataclass(frozen=True)
@@ -73,12 +75,17 @@ def stretches(demand: MotionDemand, joint: str, leg: str) -> tuple[Stretch, ...]
 
 @styled
 def joint_demand_figure(
-    joint: str, parts: Sequence[Stretch], *, title: str = "", subtitle: str = ""
+    joint: str,
+    parts: Sequence[Stretch],
+    *,
+    title: str = "",
+    subtitle: str = "",
+    slides: bool = False,
 ) -> Figure:
     """Panels over the cycle: velocity, torque, and transfer's torque enlarged where it is small.
 
     Every stretch is drawn by itself, so that a jump between two is a gap and not a slope. Support
-    is shaded.
+    is shaded. A sliding joint has metres and newtons instead of radians and newton metres.
 
     Raises:
         FigureError: There is nothing to draw.
@@ -90,20 +97,23 @@ def joint_demand_figure(
     headline(figure, title or f"{joint}: velocity and torque demand", subtitle)
     panels = figure.subplots(3 if enlarged else 2, 1, sharex=True)
     upper, middle = panels[:2]
-    _panel(upper, parts, [p.velocity for p in parts], BLUE, "velocity [rad/s]", "rad/s")
-    _panel(middle, parts, [p.torque for p in parts], VERMILION, "torque [N·m]", "N·m")
+    rate, effort, unit = ("m/s", "force", "N") if slides else ("rad/s", "torque", "N·m")
+    _panel(upper, parts, [p.velocity for p in parts], BLUE, f"velocity [{rate}]", rate)
+    _panel(middle, parts, [p.torque for p in parts], VERMILION, f"{effort} [{unit}]", unit)
     if enlarged:
-        torque = [p.torque for p in enlarged]
-        _panel(panels[2], enlarged, torque, VERMILION, "torque in transfer,\nenlarged [N·m]", "N·m")
-    for part in parts:
-        first, last = float(part.time[0]), float(part.time[-1])
-        for axes in panels:
-            if part.support:
+        torque, label = [p.torque for p in enlarged], f"{effort} in transfer,\nenlarged [{unit}]"
+        _panel(panels[2], enlarged, torque, VERMILION, label, unit)
+    whole = float(parts[-1].time[-1] - parts[0].time[0])
+    for first, last, support in _phases(parts):
+        if support:
+            for axes in panels:
                 axes.axvspan(first, last, color=SHADE, linewidth=0, zorder=0)
+        if last - first < _NARROW * whole:
+            continue
         upper.text(
             (first + last) / 2,
             1.02,
-            "support" if part.support else "transfer",
+            "support" if support else "transfer",
             transform=upper.get_xaxis_transform(),
             ha="center",
             va="bottom",
@@ -113,6 +123,17 @@ def joint_demand_figure(
     panels[-1].set_xlabel("time [s]")
     figure.align_ylabels(list(panels))
     return figure
+
+
+def _phases(parts: Sequence[Stretch]) -> list[tuple[float, float, bool]]:
+    """Start, end and whether the leg stands, of stretches of the same kind in a row."""
+    phases: list[tuple[float, float, bool]] = []
+    for part in parts:
+        first, last = float(part.time[0]), float(part.time[-1])
+        if phases and phases[-1][2] == part.support:
+            first = phases.pop()[0]
+        phases.append((first, last, part.support))
+    return phases
 
 
 def _hidden(parts: Sequence[Stretch]) -> list[Stretch]:

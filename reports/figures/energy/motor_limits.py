@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +40,10 @@ _RPM = 60 / (2 * np.pi)
 _CONTINUOUS = "#dff3ec"
 #: From here on torques are written in N·m.
 _STRONG = 10.0  # [N*m]
-#: Of a piece of the path; more than a picture can show.
-_POINTS = 201
+#: Joints side by side.
+_IN_ROW = 4
+#: Of half the path, more than a picture can show; the least of a piece of it.
+_POINTS, _LEAST = 201, 31
 #: Least length of a piece of the path that gets an arrow, as a share of the panel.
 _ARROW = 0.06
 
@@ -122,9 +124,9 @@ def motor_limits_figure(
     scale = scale or common_scale([(series, motors)], joints)
     rms = rms_over_time(series.time, series.torque[:, columns])
     unit, factor = ("N·m", 1.0) if scale.torque >= _STRONG else ("mN·m", 1e3)
-    figure = new_figure(4.6)
+    figure, whole, rows = _panels(len(joints))
     headline(figure, title, subtitle)
-    whole, *panels = figure.subplots(1, 1 + len(joints), width_ratios=[0.8] + [1.0] * len(joints))
+    panels = [axes for row in rows for axes in row]
     _whole(whole, motors[columns[0]], columns[0], scale, factor)
     whole.set_ylabel(f"motor torque [{unit}]")
     whole.set_title("whole region\n", loc="center", fontweight="bold")
@@ -136,15 +138,28 @@ def motor_limits_figure(
         share = f" of {number(allowed * factor)}" if np.isfinite(allowed) else ""
         axes.set_title(f"{label}\n", loc="center", fontweight="bold")
         words = f"rms {number(float(value) * factor)}{share} {unit}"
-        look = {"ha": "center", "va": "bottom", "color": QUIET, "fontsize": 8}
+        look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": QUIET, "fontsize": 8}
         axes.text(0.5, 1.015, words, transform=axes.transAxes, **look)
-        if axes is not panels[0]:
+        if all(axes is not row[0] for row in rows):
             axes.tick_params(labelleft=False)
     for axes in (whole, *panels):
         axes.set_xlabel("motor speed [1000 rpm]")
     key = _common(key, [motors[column] for column in columns])
     figure.legend(handles=key, loc="outside lower center", ncols=4, fontsize=8, handlelength=2.2)
     return figure
+
+
+def _panels(joints: int) -> tuple[Figure, Axes, list[list[Axes]]]:
+    """A figure, its panel of the whole region, and rows of panels, one for each joint."""
+    rows = -(-joints // _IN_ROW)
+    across = -(-joints // rows)
+    figure = new_figure(1.2 + 3.4 * rows)
+    grid = figure.subplots(rows, 1 + across, width_ratios=[0.8] + [1.0] * across, squeeze=False)
+    for axes in (*grid[1:, 0], *grid[:, 1:].ravel()[joints:]):
+        axes.set_visible(False)
+    shown = [list(row[1:]) for row in grid]
+    shown[-1] = shown[-1][: joints - across * (rows - 1)]
+    return figure, grid[0, 0], shown
 
 
 def _common(key: list[Artist], motors: Sequence[DCMotor]) -> list[Artist]:
@@ -251,8 +266,9 @@ def _path(
     points = np.column_stack([series.velocity[:, column] * _RPM, series.torque[:, column] * factor])
     breaks = np.flatnonzero(np.diff(series.time) <= 0) + 1
     blocks = [b for b in np.split(np.arange(series.time.size), breaks) if b.size > 1]
+    most = max(_LEAST, 2 * _POINTS // max(2, len(blocks)))
     for block, following in zip(blocks, [*blocks[1:], blocks[0]], strict=True):
-        shown = block[np.unique(np.linspace(0, block.size - 1, _POINTS).round().astype(int))]
+        shown = block[np.unique(np.linspace(0, block.size - 1, most).round().astype(int))]
         middle = 0.5 * float(series.time[block[0]] + series.time[block[-1]])
         stands = any(start <= middle <= end for start, end in support)
         color = BLUE if stands else VERMILION

@@ -1,4 +1,4 @@
-"""Energy per cycle at every stage of an actuator: Fig. 14, 16, 18 and 20 of the paper."""
+"""Energy per cycle at every stage of an actuator."""
 
 from __future__ import annotations
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from actuators.energy.energy import StageEnergy
 
 Array = NDArray[np.float64]
+#: Joints side by side.
+_IN_ROW = 4
 
 
 @styled
@@ -66,31 +68,42 @@ def stage_energy_figure(
     top, bottom = limits or energy_limits([stages], joints)
     names = {s.stage: (_symbol(s.stage), places[s.stage]) for s in stages}
     long = [f"{symbol}  {words}" for symbol, words in names.values() if " " in words]
-    figure = new_figure(4.5 + 0.2 * math.ceil(len(long) / 2))
+    rows = math.ceil(len(joints) / _IN_ROW)
+    across = math.ceil(len(joints) / rows)
+    figure = new_figure(1.3 + 3.2 * rows + 0.2 * math.ceil(len(long) / 2))
     headline(figure, title, subtitle)
-    panels = figure.subplots(1, len(joints), sharey=True, squeeze=False)[0]
+    grid = figure.subplots(rows, across, sharey=True, squeeze=False)
+    panels = grid.ravel()[: len(joints)]
+    for axes in grid.ravel()[len(joints) :]:
+        axes.set_visible(False)
     for j, (axes, joint) in enumerate(zip(panels, joints.values(), strict=True)):
         _bars(axes, forward[:, j], reverse[:, j])
         axes.set_title(joint, loc="center", fontweight="bold")
-        axes.set_xticks(np.arange(len(stages)), [symbol for symbol, _ in names.values()])
-        for x, (_, words) in enumerate(names.values()):
-            axes.annotate(
-                "" if " " in words else words,
-                (x, 0),
-                xycoords=axes.get_xaxis_transform(),
-                xytext=(0, -18),
-                textcoords="offset points",
-                ha="center",
-                va="top",
-                color=QUIET,
-                fontsize=7.5,
-            )
+        _name_stages(axes, list(names.values()))
     room = 0.075 * (top + bottom)  # for the values at the ends of the bars
     panels[0].set_ylim(-bottom - room, top + room)
-    panels[0].set_ylabel("energy per cycle [J]")
+    for axes in grid[:, 0]:
+        axes.set_ylabel("energy per cycle [J]")
     panels[0].yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
     _key(figure, long)
     return figure
+
+
+def _name_stages(axes: Axes, names: Sequence[tuple[str, str]]) -> None:
+    """Symbols below the bars, and below those the words that are short enough."""
+    axes.set_xticks(np.arange(len(names)), [symbol for symbol, _ in names])
+    for x, (_, words) in enumerate(names):
+        axes.annotate(
+            "" if " " in words else words,
+            (x, 0),
+            xycoords=axes.get_xaxis_transform(),
+            xytext=(0, -18),
+            textcoords="offset points",
+            ha="center",
+            va="top",
+            color=QUIET,
+            fontsize=7.5,
+        )
 
 
 def energy_limits(

@@ -29,8 +29,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-#: Feet nearer than this would have their names on one another [m].
-_NEAR = 0.08
+#: Feet nearer than this share of the field of feet would have their names on one another.
+_NEAR = 0.1
+#: Instants of a support that are drawn, and how many of a gait with many sets of feet.
+_THREE = ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
+_MOST = 6
 
 
 @dataclass(frozen=True)
@@ -59,17 +62,20 @@ def gait_figure(
     stretches: Sequence[GaitStretch],
     *,
     shown: str,
-    body: tuple[float, float],
+    body: Array,
     title: str,
     subtitle: str = "",
 ) -> Figure:
-    """Foot paths from above and from the side, three support polygons, footfall.
+    """Foot paths from above and from the side, support polygons, footfall.
+
+    Where at most two sets of feet take turns, the polygons are those at the start, the middle and
+    the end of the shown leg's support; else every set's at its least stable instant.
 
     Args:
         legs: All legs, in the order of the feet's arrays.
         stretches: One period.
         shown: The leg whose path is shown from the side.
-        body: Length and width of the trunk [m].
+        body: Of the trunk as seen from above, an outline in the base frame, shape (P, 2) [m].
         title: First line.
         subtitle: Second line.
 
@@ -81,31 +87,64 @@ def gait_figure(
     standing = [s for s in stretches if shown in s.stance]
     if not standing or len(standing) == len(stretches):
         raise FigureError(f"leg '{shown}' must both stand and swing in the gait drawn")
-    figure = new_figure(8.8)
+    instants = _instants(stretches, standing[0])
+    rows = -(-len(instants) // 3)
+    figure = new_figure(5.7 + 2.65 * rows + 0.12 * max(0, len(legs) - 6))
     headline(figure, title, subtitle)
-    grid = figure.add_gridspec(3, 6, height_ratios=[1.25, 1.15, 0.95])
+    ratios = [1.25, *[1.15] * rows, 0.95 + 0.05 * max(0, len(legs) - 6)]
+    grid = figure.add_gridspec(2 + rows, 6, height_ratios=ratios)
+    unit = _size(stretches)
     paths = figure.add_subplot(grid[0, :3])
     beside = figure.add_subplot(grid[0, 3:])
-    _paths_from_above(paths, legs, stretches, body)
+    _paths_from_above(paths, legs, stretches, body, unit)
     _path_from_the_side(beside, list(legs).index(shown), shown, stretches)
-    for column, (share, word) in enumerate(((0.0, "start"), (0.5, "middle"), (1.0, "end"))):
-        axes = figure.add_subplot(grid[1, 2 * column : 2 * column + 2])
-        _support(axes, legs, standing[0], share, word, body)
-    _footfall(figure.add_subplot(grid[2, :]), legs, stretches)
+    for k, (stretch, sample, words) in enumerate(instants):
+        column = 2 * (k % 3)
+        axes = figure.add_subplot(grid[1 + k // 3, column : column + 2])
+        _support(axes, legs, stretch, sample, words, body, unit)
+    _footfall(figure.add_subplot(grid[-1, :]), legs, stretches)
     return figure
 
 
-def _body(axes: Axes, body: tuple[float, float]) -> None:
-    from matplotlib.patches import Rectangle
+def _instants(
+    stretches: Sequence[GaitStretch], first: GaitStretch
+) -> list[tuple[GaitStretch, int, str]]:
+    """Stretch, sample and words of every support polygon to draw."""
+    stances = {frozenset(stretch.stance) for stretch in stretches}
+    if len(stances) <= 2:
+        n = first.time.size - 1
+        return [(first, round(share * n), f"{word} of support") for share, word in _THREE]
+    # The least stable instant of every stance; a gait with many shows the most critical ones.
+    least: dict[frozenset[str], tuple[GaitStretch, int, str]] = {}
+    for stretch in stretches:
+        key, sample = frozenset(stretch.stance), int(stretch.margin.argmin())
+        if key not in least or stretch.margin[sample] < _margin(least[key]):
+            least[key] = (stretch, sample, "least stable")
+    chosen = sorted(least.values(), key=_margin)[:_MOST]
+    return sorted(chosen, key=lambda one: float(one[0].time[one[1]]))
 
-    length, width = body
-    axes.add_patch(
-        Rectangle((-length / 2, -width / 2), length, width, facecolor=SHADE, edgecolor=FAINT)
-    )
+
+def _margin(instant: tuple[GaitStretch, int, str]) -> float:
+    stretch, sample, _ = instant
+    return float(stretch.margin[sample])
+
+
+def _size(stretches: Sequence[GaitStretch]) -> float:
+    """Longer side of the field of feet [m]."""
+    feet = np.concatenate([s.feet[..., :2].reshape(-1, 2) for s in stretches])
+    return max(float(np.ptp(feet, axis=0).max()), 1e-6)
+
+
+def _body(axes: Axes, body: Array, unit: float) -> None:
+    from matplotlib.patches import Polygon
+
+    axes.add_patch(Polygon(body, facecolor=SHADE, edgecolor=FAINT))
+    front = float(body[:, 0].max())
+    middle = 0.5 * float(body[:, 1].min() + body[:, 1].max())
     axes.annotate(
         "",
-        (length / 2 + 0.03, 0),
-        (length / 2 - 0.10, 0),
+        (front + 0.04 * unit, middle),
+        (front - 0.13 * unit, middle),
         arrowprops={"arrowstyle": "-|>", "color": QUIET, "linewidth": 1.2},
     )
     axes.set_aspect("equal")
@@ -113,9 +152,13 @@ def _body(axes: Axes, body: tuple[float, float]) -> None:
 
 
 def _paths_from_above(
-    axes: Axes, legs: Sequence[str], stretches: Sequence[GaitStretch], body: tuple[float, float]
+    axes: Axes,
+    legs: Sequence[str],
+    stretches: Sequence[GaitStretch],
+    body: Array,
+    unit: float,
 ) -> None:
-    _body(axes, body)
+    _body(axes, body, unit)
     for i, leg in enumerate(legs):
         for stretch in stretches:
             x, y = stretch.feet[:, i, 0], stretch.feet[:, i, 1]
@@ -123,73 +166,101 @@ def _paths_from_above(
                 axes.plot(x, y, color=BLUE, linewidth=4)
             else:
                 axes.plot(x, y, color=VERMILION, linewidth=1.2, zorder=3)
-        middle = np.concatenate([s.feet[:, i] for s in stretches]).mean(axis=0)
+        path = np.concatenate([s.feet[:, i, :2] for s in stretches])
+        side = float(np.sign(path[:, 1].mean())) or 1.0
         axes.text(
-            middle[0],
-            middle[1] + 0.05 * np.sign(middle[1]),
+            float(path[:, 0].mean()),
+            side * float((side * path[:, 1]).max()) + 0.065 * unit * side,
             leg.upper(),
             ha="center",
             va="center",
             fontweight="bold",
         )
     axes.set_title("foot paths relative to the body, from above", color=QUIET)
-    axes.text(0, 0.03, "support", color=BLUE, ha="right", va="bottom", fontweight="bold")
-    axes.text(0, -0.03, "transfer", color=VERMILION, ha="right", va="top", fontweight="bold")
+    bold = "bold"
+    axes.text(0, 0.04 * unit, "support", color=BLUE, ha="right", va="bottom", fontweight=bold)
+    axes.text(0, -0.04 * unit, "transfer", color=VERMILION, ha="right", va="top", fontweight=bold)
     axes.margins(0.04, 0.12)
 
 
 def _path_from_the_side(axes: Axes, index: int, leg: str, stretches: Sequence[GaitStretch]) -> None:
-    ground = min(float(s.feet[:, index, 2].min()) for s in stretches)
+    """One foot's path in the vertical plane in which it moves on the ground."""
+    every = np.concatenate([s.feet[:, index] for s in stretches])
+    on_ground = np.concatenate([s.feet[:, index] for s in stretches if leg in s.stance])
+    along, lowest = _direction(on_ground), float(every[:, 2].min())
+    middle = on_ground[:, :2].mean(axis=0)
+    path = np.column_stack([(every[:, :2] - middle) @ along, every[:, 2] - lowest])
+    size = max(float(np.ptp(path, axis=0).max()), 1e-6)
+    phases: dict[bool, tuple[Array, Array]] = {}
+    start = 0
     for stretch in stretches:
-        x, z = stretch.feet[:, index, 0], stretch.feet[:, index, 2] - ground
+        piece = path[start : start + stretch.time.size]
+        start += stretch.time.size
         stands = leg in stretch.stance
         color = BLUE if stands else VERMILION
-        axes.plot(x, z, color=color, linewidth=4 if stands else 1.6, zorder=3)
-        k = len(x) // 2
-        axes.annotate(
-            "",
-            (x[k], z[k]),
-            (x[k - max(1, k // 12)], z[k - max(1, k // 12)]),
-            arrowprops={"arrowstyle": "-|>,head_width=0.3,head_length=0.6", "color": color},
-            zorder=4,
-        )
-        axes.text(
-            x[k],
-            z[k] - 0.012 if stands else z[k] + 0.012,
-            "support: the foot rests on the ground" if stands else "transfer",
-            color=color,
-            ha="center",
-            va="top" if stands else "bottom",
-            fontweight="bold",
-        )
-    every = np.concatenate([s.feet[:, index] for s in stretches]) - [0, 0, ground]
-    on_ground = np.concatenate([s.feet[:, index, 0] for s in stretches if leg in s.stance])
-    stroke = np.array([[on_ground.min(), 0.0], [on_ground.max(), 0.0]])
-    length = 1e3 * float(np.ptp(on_ground))
-    dimension(axes, stroke[0], stroke[1], (0, -0.05), f"{length:.0f} mm")
-    high = float(every[:, 2].max())
-    right = float(every[:, 0].max())
+        axes.plot(*piece.T, color=color, linewidth=4 if stands else 1.6, zorder=3)
+        k = len(piece) // 2
+        before = phases.get(stands)
+        if before is None or np.ptp(piece[:, 0]) > np.ptp(before[0][:, 0]):
+            phases[stands] = piece, piece[k - max(1, k // 12)]
+    for stands, (piece, tail) in phases.items():
+        _phase_words(axes, piece[len(piece) // 2], tail, stands, size)
+    ends = (on_ground[:, :2] - middle) @ along
+    stroke = np.array([[ends.min(), 0.0], [ends.max(), 0.0]])
+    length = 1e3 * float(np.ptp(ends))
+    dimension(axes, stroke[0], stroke[1], (0, -0.19 * size), f"{length:.0f} mm")
+    high, right = float(path[:, 1].max()), float(path[:, 0].max())
     base, top = np.array([right, 0.0]), np.array([right, high])
-    dimension(axes, base, top, (0.03, 0), f"{1e3 * high:.0f} mm")
+    dimension(axes, base, top, (0.11 * size, 0), f"{1e3 * high:.0f} mm")
     axes.set_title(f"path of foot {leg.upper()} relative to the body, from its side", color=QUIET)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    axes.set_xlim(float(every[:, 0].min()) - 0.03, right + 0.07)
-    axes.set_ylim(-0.085, high + 0.05)
+    axes.set_xlim(float(path[:, 0].min()) - 0.11 * size, right + 0.26 * size)
+    axes.set_ylim(-0.32 * size, high + 0.19 * size)
+
+
+def _direction(path: Array) -> Array:
+    """Horizontal unit vector along which a path is longest, forward where that is to say."""
+    centred = path[:, :2] - path[:, :2].mean(axis=0)
+    along: Array = np.linalg.svd(centred, full_matrices=False)[2][0]
+    if np.ptp(centred, axis=0).max() < 1e-9:
+        along = np.array([1.0, 0.0])
+    return along * (np.sign(along[np.abs(along).argmax()]) or 1.0)
+
+
+def _phase_words(axes: Axes, at: Array, tail: Array, stands: bool, size: float) -> None:
+    """An arrow along the path in one phase, and what the phase is."""
+    color = BLUE if stands else VERMILION
+    axes.annotate(
+        "",
+        tuple(at),
+        tuple(tail),
+        arrowprops={"arrowstyle": "-|>,head_width=0.3,head_length=0.6", "color": color},
+        zorder=4,
+    )
+    axes.text(
+        at[0],
+        at[1] + (-0.046 if stands else 0.046) * size,
+        "support" if stands else "transfer",
+        color=color,
+        ha="center",
+        va="top" if stands else "bottom",
+        fontweight="bold",
+    )
 
 
 def _support(
     axes: Axes,
     legs: Sequence[str],
     stretch: GaitStretch,
-    share: float,
-    word: str,
-    body: tuple[float, float],
+    sample: int,
+    words: str,
+    body: Array,
+    unit: float,
 ) -> None:
     from matplotlib.patches import Polygon
 
-    sample = round(share * (stretch.time.size - 1))
-    _body(axes, body)
+    _body(axes, body, unit)
     stance = [i for i, leg in enumerate(legs) if leg in stretch.stance]
     feet = stretch.feet[sample, :, :2]
     around = feet[stance] - feet[stance].mean(axis=0)
@@ -205,7 +276,7 @@ def _support(
             color=BLUE if stands else "white",
             markeredgecolor=BLUE if stands else VERMILION,
         )
-        align, aside = _beside(feet, i)
+        align, aside = _beside(feet, i, unit)
         axes.annotate(
             leg.upper(),
             feet[i],
@@ -221,20 +292,21 @@ def _support(
     axes.plot(x, y, marker="o", markersize=7, color="white", markeredgecolor=INK)
     axes.plot(x, y, marker="+", markersize=7, color=INK, markeredgewidth=1.1)
     axes.set_title(
-        f"{word} of support, t = {stretch.time[sample]:.2f} s\n"
+        f"{words}, t = {stretch.time[sample]:.2f} s\n"
         f"stability margin {number(1e3 * float(stretch.margin[sample]))} mm",
         color=QUIET,
     )
-    reach = np.abs(stretch.feet[..., :2]).max(axis=(0, 1))
-    axes.set_xlim(-reach[0] - 0.04, reach[0] + 0.04)
-    axes.set_ylim(-reach[1] - 0.06, reach[1] + 0.06)
+    drawn = np.concatenate([np.abs(stretch.feet[..., :2]).reshape(-1, 2), np.abs(body)])
+    reach = drawn.max(axis=0)
+    axes.set_xlim(-reach[0] - 0.06 * unit, reach[0] + 0.06 * unit)
+    axes.set_ylim(-reach[1] - 0.08 * unit, reach[1] + 0.08 * unit)
 
 
-def _beside(feet: Array, i: int) -> tuple[Literal["left", "center", "right"], float]:
+def _beside(feet: Array, i: int, unit: float) -> tuple[Literal["left", "center", "right"], float]:
     """Alignment of a foot's name and its shift [points], away from a near foot of the same side."""
     same = (np.sign(feet[:, 1]) == np.sign(feet[i, 1])) & (np.arange(len(feet)) != i)
     away = feet[same, 0] - feet[i, 0]
-    near = away[np.abs(away) < _NEAR]
+    near = away[np.abs(away) < _NEAR * unit]
     if near.size == 0:
         return "center", 0.0
     return ("right", 1.0) if near[np.argmin(np.abs(near))] >= 0 else ("left", -1.0)

@@ -1,4 +1,4 @@
-"""Orthographic views of boxes and spheres with hidden surfaces removed, one lamp, drawn edges.
+"""Orthographic views of boxes, spheres and meshes, hidden surfaces removed, one lamp, edges drawn.
 
 A depth buffer decides pixel by pixel what is in front; it is exact where bodies touch or enter one
 another, which sorting polygons is not.
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.robot.visuals import Primitive
+from reports.figures.robot.solids import Mesh, Primitive, Solid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 #: Towards the lamp, in the camera's frame: right, up, towards the viewer.
 _LAMP = np.array([-0.35, 0.75, 0.56]) / np.linalg.norm([-0.35, 0.75, 0.56])
-_CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
 _OVERSAMPLED = 2  # per pixel and direction, for smooth edges
 #: A body nearer by less than this does not cover what was drawn before: coplanar faces.
 _TOUCHING = 1e-6  # [m]
@@ -57,37 +56,37 @@ FRONT = camera("from ahead", (1, 0, 0))
 SIDE = camera("from the right", (0, -1, 0))
 TOP = camera("from above", (0, 0, 1), up=(0, 1, 0))
 OBLIQUE = camera("oblique", (1.0, -1.35, 0.85))
+OBLIQUE_LEFT = camera("oblique, from the left", (1.0, 1.35, 0.85))
 
 
-def extent(view: View, scene: Sequence[Primitive]) -> tuple[Array, Array]:
+def extent(view: View, scene: Sequence[Solid]) -> tuple[Array, Array]:
     """Lower left and upper right corner of a scene in the image, each of shape (2,) [m]."""
-    points = np.concatenate(
-        [(p.size * _CORNERS) @ p.placement[:3, :3].T + p.placement[:3, 3] for p in scene]
-    )
-    seen = view.project(points)[:, :2]
+    seen = view.project(np.concatenate([solid.points for solid in scene]))[:, :2]
     return seen.min(axis=0), seen.max(axis=0)
 
 
 def draw_scene(
-    axes: Axes, view: View, scene: Sequence[Primitive], fade: float = 0.0, pixels: int = 600
+    axes: Axes, view: View, scene: Sequence[Solid], fade: float = 0.0, pixels: int = 600
 ) -> None:
     """Draw a scene into axes whose unit is the metre.
 
     Args:
         axes: Matplotlib axes; its aspect is set to equal.
         view: The camera.
-        scene: What to draw; at least one primitive.
+        scene: What to draw; at least one solid.
         fade: From 0 to 1, towards white, for a robot behind its annotation.
         pixels: Along the longer side of the picture.
     """
     low, high = extent(view, scene)
     step = float((high - low).max()) / (pixels * _OVERSAMPLED)
     canvas = _Canvas(low - 4 * step, high + 4 * step, step)
-    for primitive in scene:
-        if primitive.sphere:
-            canvas.sphere(view, primitive)
+    for solid in scene:
+        if isinstance(solid, Mesh):
+            canvas.mesh(view, solid)
+        elif solid.sphere:
+            canvas.sphere(view, solid)
         else:
-            canvas.box(view, primitive)
+            canvas.box(view, solid)
     image = canvas.picture()
     image[..., :3] += fade * (1 - image[..., :3])
     axes.imshow(image, extent=canvas.extent, origin="lower", zorder=2, interpolation="antialiased")
@@ -151,6 +150,51 @@ class _Canvas:
             rows, columns, rest >= 0, float(centre[2]) + radius * dz, _shaded(ball.color, normal)
         )
 
+    def mesh(self, view: View, mesh: Mesh) -> None:
+        """Triangles, both of their sides, shaded flat; one line around them all."""
+        corners = view.project(mesh.points)[mesh.faces]  # (F, 3 corners, 3)
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        facing = normal[:, 2]  # twice the area that is seen, signed
+        shown = np.abs(facing) > 1e-4 * self.step**2
+        corners, normal, facing = corners[shown], normal[shown], facing[shown]
+        color = normal * (np.sign(facing) / np.linalg.norm(normal, axis=1))[:, None]
+        color = _shaded(mesh.colors[shown], color).astype(np.float32)
+        slope = -normal[:, :2] / facing[:, None] * self.step  # of the depth, per sample
+        flat = (corners[..., :2] - self.low) / self.step - 0.5  # in samples
+        first = np.maximum(np.ceil(flat[..., 1].min(axis=1)), 0).astype(int)
+        last = np.minimum(np.floor(flat[..., 1].max(axis=1)), self.y.size - 1).astype(int)
+        self.surfaces += 1
+        rows = np.maximum(last - first + 1, 0)
+        which = np.repeat(np.arange(rows.size), rows)
+        y = first[which] + _counted_up(rows)
+        begin, end = _spans(flat, which, y)
+        begin, end = np.maximum(begin, 0), np.minimum(end, self.x.size - 1)
+        at = flat[which, 0]
+        depth = corners[which, 0, 2] + slope[which, 0] * (begin - at[:, 0])
+        depth += slope[which, 1] * (y - at[:, 1])
+        self._runs(y, begin, np.maximum(end - begin + 1, 0), depth, slope[which, 0], color[which])
+
+    def _runs(
+        self,
+        y: NDArray[np.intp],
+        begin: NDArray[np.intp],
+        length: NDArray[np.intp],
+        depth: Array,
+        slope: Array,
+        color: NDArray[np.float32],
+    ) -> None:
+        """Runs of samples along rows, each of one colour and of a depth that grows by a slope."""
+        which = np.repeat(np.arange(length.size), length)
+        along = _counted_up(length)
+        at = (y * self.x.size + begin)[which] + along
+        near = (depth[which] + slope[which] * along).astype(np.float32)
+        seen = np.flatnonzero(near > self.depth.ravel()[at] + _TOUCHING)
+        seen = seen[np.argsort(near[seen], kind="stable")]  # the nearest last: it stays
+        at = at[seen]
+        self.depth.reshape(-1)[at] = near[seen]
+        self.color.reshape(-1, 3)[at] = color[which[seen]]
+        self.surface.reshape(-1)[at] = self.surfaces
+
     def picture(self) -> Array:
         """Red, green, blue and opacity, with a dark line where one surface ends."""
         edge = np.zeros(self.surface.shape, dtype=bool)
@@ -189,7 +233,40 @@ class _Canvas:
         self.surface[rows, columns][nearer] = self.surfaces
 
 
-def _shaded(color: tuple[float, float, float], normal: Array) -> Array:
+def _counted_up(counts: NDArray[np.intp]) -> NDArray[np.intp]:
+    """0, 1, ... for every count in a row."""
+    first = np.repeat(np.cumsum(counts) - counts, counts)
+    counted: NDArray[np.intp] = np.arange(first.size) - first
+    return counted
+
+
+def _spans(
+    flat: Array, which: NDArray[np.intp], y: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First and last sample of rows that lie within triangles.
+
+    Args:
+        flat: Corners of triangles [samples], shape (F, 3, 2).
+        which: Triangle of each row.
+        y: The rows.
+    """
+    low, high = np.full(y.size, np.inf), np.full(y.size, -np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        a, b = flat[which, i], flat[which, j]
+        rise = b[:, 1] - a[:, 1]
+        crossed = (np.minimum(a[:, 1], b[:, 1]) <= y) & (y <= np.maximum(a[:, 1], b[:, 1]))
+        crossed &= rise != 0
+        x = a[:, 0] + (y - a[:, 1]) * (b[:, 0] - a[:, 0]) / np.where(crossed, rise, 1.0)
+        low, high = (
+            np.where(crossed, np.minimum(low, x), low),
+            np.where(crossed, np.maximum(high, x), high),
+        )
+    crossed = low <= high
+    low, high = np.where(crossed, low, 0.0), np.where(crossed, high, -1.0)
+    return np.ceil(low).astype(np.intp), np.floor(high).astype(np.intp)
+
+
+def _shaded(color: tuple[float, float, float] | Array, normal: Array) -> Array:
     """Lambert's law with some ambient light; lightened, so that labels stay legible on top."""
     light = 0.66 + 0.34 * np.maximum(0.0, normal @ _LAMP)
     shaded: Array = (0.22 + 0.78 * np.asarray(color)) * light[..., None]

@@ -1,4 +1,4 @@
-"""Visual primitives, joints and placements of a robot, as read from its URDF text.
+"""Surfaces, joints and placements of a robot, as read from its URDF text.
 
 Placements come from the caller (from Pinocchio); this module computes no kinematics.
 """
@@ -6,88 +6,164 @@ Placements come from the caller (from Pinocchio); this module computes no kinema
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reports.errors import FigureError
+from reports.figures.robot.meshes import Surface, cylinder, mesh_file, read_surface
+from reports.figures.robot.solids import JointMark, Mesh, Primitive, Solid
 
 Array = NDArray[np.float64]
+Color = tuple[float, float, float]
+#: Of what has no colour of its own.
+GREY: Color = (0.6, 0.6, 0.6)
 
 
 @dataclass(frozen=True)
-class Primitive:
-    """A box or a sphere somewhere in the world.
+class Shape:
+    """A surface that a link carries.
 
     Attributes:
-        link: The link it belongs to.
-        color: Red, green, blue from 0 to 1.
-        placement: Of its centre in the world, homogeneous, shape (4, 4) [m].
-        size: Edge lengths of a box, shape (3,) [m]; for a sphere its diameter three times.
+        link: The link.
+        origin: In the link's frame, homogeneous, shape (4, 4) [m].
+        color: The URDF's; None for the mesh's own, or grey.
+        size: See `Primitive`; of a mesh its scale along each axis.
         sphere: Whether it is a sphere.
+        surface: Of a mesh or cylinder; None for a box or sphere.
     """
 
     link: str
-    color: tuple[float, float, float]
-    placement: Array
+    origin: Array
+    color: Color | None
     size: Array
-    sphere: bool
+    sphere: bool = False
+    surface: Surface | None = None
+
+    def at(self, placement: Array) -> Solid:
+        """The surface in the world, for the link's placement of shape (4, 4) [m]."""
+        world = placement @ self.origin
+        if self.surface is None:
+            return Primitive(self.link, self.color or GREY, world, self.size, self.sphere)
+        points = (self.surface.vertices * self.size) @ world[:3, :3].T + world[:3, 3]
+        colors = self.surface.colors
+        if self.color is not None or colors is None:
+            colors = np.tile(self.color or GREY, (len(self.surface.faces), 1))
+        return Mesh(self.link, points, self.surface.faces, colors)
 
 
 @dataclass(frozen=True)
-class JointMark:
-    """Where a joint is and which way it turns.
+class Shapes:
+    """What a URDF shows of its robot.
 
     Attributes:
-        name: Of the joint.
-        position: Origin in the world, shape (3,) [m].
-        axis: Unit vector in the world, shape (3,); positive rotation is right-handed about it.
+        shapes: In the URDF's order.
+        missing: Meshes that were not found or not read, as the URDF names them.
     """
 
-    name: str
-    position: Array
-    axis: Array
+    shapes: tuple[Shape, ...]
+    missing: tuple[str, ...] = ()
+
+    @property
+    def remark(self) -> str:
+        """What is to be said of the picture; empty where nothing is missing."""
+        if not self.missing:
+            return ""
+        more = f" and {len(self.missing) - 1} more" if len(self.missing) > 1 else ""
+        return (
+            f"mesh '{self.missing[0]}'{more} not found or not readable: pictures show the URDF's "
+            "other shapes or sticks; numbers do not depend on meshes"
+        )
+
+    def at(self, links: Mapping[str, Array]) -> list[Solid]:
+        """Everything placed in the world.
+
+        Args:
+            links: Link name to its placement in the world, shape (4, 4) [m].
+
+        Raises:
+            FigureError: A link with a visual has no placement.
+        """
+        for shape in self.shapes:
+            if shape.link not in links:
+                raise FigureError(
+                    f"link '{shape.link}' has a visual but no placement; give its 4x4"
+                )
+        return [shape.at(links[shape.link]) for shape in self.shapes]
 
 
-def primitives(urdf: str, links: Mapping[str, Array]) -> list[Primitive]:
-    """The boxes and spheres of a URDF, placed in the world.
+def read_shapes(urdf: str, beside: Path | None = None) -> Shapes:
+    """The surfaces of a URDF: visuals, and where a visual's mesh is missing the collision shapes.
 
     Args:
         urdf: Text of the URDF.
-        links: Link name to its placement in the world, shape (4, 4) [m].
+        beside: Folder of the URDF, from which its meshes are looked for.
 
     Raises:
-        FigureError: The text is not XML, or a link with a visual has no placement.
-
-    Note:
-        Cylinders and meshes are left out: the project's robots are built of boxes and spheres.
+        FigureError: The text is not XML, or a shape's numbers are none.
     """
     root = _root(urdf)
-    colors = {
+    named = {
         material.get("name", ""): _color(material)
         for material in root.iter("material")
         if material.find("color") is not None
     }
-    found = []
+    shapes: list[Shape] = []
+    missing: dict[str, None] = {}
     for link in root.iter("link"):
+        lacking: list[str] = []
+        seen = _carried(link, "visual", named, beside, lacking)
+        if lacking:
+            seen += _carried(link, "collision", named, beside, [])
+        shapes += seen
+        missing |= dict.fromkeys(lacking)
+    return Shapes(tuple(shapes), tuple(missing))
+
+
+def _carried(
+    link: ET.Element, kind: str, named: Mapping[str, Color], beside: Path | None, lacking: list[str]
+) -> list[Shape]:
+    """A link's visuals or collision shapes; names of unusable meshes are added to `lacking`."""
+    found = []
+    for element in link.findall(kind):
+        geometry = element.find("geometry")
+        solid = None if geometry is None else next(iter(geometry), None)
+        if solid is None:
+            continue
+        shape = _shape(solid, beside)
+        if shape is None:
+            lacking.append(solid.get("filename", solid.tag))
+            continue
+        size, sphere, surface = shape
+        color = _material_color(element.find("material"), named)
         name = link.get("name", "")
-        for visual in link.iter("visual"):
-            shape = _shape(visual)
-            if shape is None:
-                continue
-            if name not in links:
-                raise FigureError(f"link '{name}' has a visual but no placement; give its 4x4")
-            size, sphere = shape
-            material = visual.find("material")
-            color = (0.6, 0.6, 0.6)
-            if material is not None:
-                color = colors.get(material.get("name", ""), color)
-            found.append(
-                Primitive(name, color, links[name] @ _origin(visual), size, sphere),
-            )
+        found.append(Shape(name, _origin(element), color, size, sphere, surface))
     return found
+
+
+def _shape(solid: ET.Element, beside: Path | None) -> tuple[Array, bool, Surface | None] | None:
+    """Size, whether a sphere, and triangles of a geometry; None for what cannot be drawn."""
+    if solid.tag == "box":
+        return _vector(solid.get("size", "0 0 0")), False, None
+    if solid.tag == "sphere":
+        return np.full(3, 2 * _vector(solid.get("radius", "0"), 1)), True, None
+    if solid.tag in ("cylinder", "capsule"):
+        radius, length = (float(_vector(solid.get(k, "0"), 1)[0]) for k in ("radius", "length"))
+        return np.ones(3), False, cylinder(radius, length)
+    file = mesh_file(solid.get("filename", ""), beside) if solid.tag == "mesh" else None
+    surface = None if file is None else read_surface(file)
+    return None if surface is None else (_vector(solid.get("scale", "1 1 1")), False, surface)
+
+
+def _material_color(material: ET.Element | None, named: Mapping[str, Color]) -> Color | None:
+    if material is None:
+        return None
+    if material.find("color") is not None:
+        return _color(material)
+    return named.get(material.get("name", ""))
 
 
 def joint_marks(urdf: str, links: Mapping[str, Array]) -> list[JointMark]:
@@ -99,7 +175,9 @@ def joint_marks(urdf: str, links: Mapping[str, Array]) -> list[JointMark]:
         FigureError: The text is not XML, or a child link has no placement.
     """
     marks = []
-    for joint in _moving(_root(urdf)):
+    root = _root(urdf)
+    fixed = _fixed_children(root)
+    for joint in _moving(root):
         child = joint.find("child")
         link = "" if child is None else child.get("link", "")
         if link not in links:
@@ -108,7 +186,10 @@ def joint_marks(urdf: str, links: Mapping[str, Array]) -> list[JointMark]:
         direction = _vector("1 0 0" if axis is None else axis.get("xyz", "1 0 0"))
         placement = links[link]
         world = placement[:3, :3] @ (direction / np.linalg.norm(direction))
-        marks.append(JointMark(joint.get("name", ""), placement[:3, 3], world))
+        slides = joint.get("type") == "prismatic"
+        marks.append(
+            JointMark(joint.get("name", ""), placement[:3, 3], world, _rigid(link, fixed), slides)
+        )
     return marks
 
 
@@ -125,17 +206,7 @@ def _moving(root: ET.Element) -> Iterator[ET.Element]:
             yield joint
 
 
-def _shape(visual: ET.Element) -> tuple[Array, bool] | None:
-    box = visual.find("geometry/box")
-    if box is not None:
-        return _vector(box.get("size", "0 0 0")), False
-    sphere = visual.find("geometry/sphere")
-    if sphere is not None:
-        return np.full(3, 2 * _vector(sphere.get("radius", "0"), 1)), True
-    return None
-
-
-def _color(material: ET.Element) -> tuple[float, float, float]:
+def _color(material: ET.Element) -> Color:
     color = material.find("color")
     text = "0.6 0.6 0.6 1" if color is None else color.get("rgba", "0.6 0.6 0.6 1")
     red, green, blue = _vector(text, 4)[:3]
@@ -159,6 +230,27 @@ def _origin(element: ET.Element) -> Array:
     ]
     placement[:3, 3] = _vector(origin.get("xyz", "0 0 0"))
     return placement
+
+
+def _fixed_children(root: ET.Element) -> dict[str, list[str]]:
+    """Links that hang on fixed joints, by the link they are fixed to."""
+    children: dict[str, list[str]] = {}
+    for joint in root.iter("joint"):
+        parent, child = joint.find("parent"), joint.find("child")
+        if joint.get("type") == "fixed" and parent is not None and child is not None:
+            children.setdefault(parent.get("link", ""), []).append(child.get("link", ""))
+    return children
+
+
+def _rigid(link: str, fixed: Mapping[str, Sequence[str]]) -> frozenset[str]:
+    """A link and all that is fixed to it."""
+    found, waiting = set(), [link]
+    while waiting:
+        name = waiting.pop()
+        if name not in found:
+            found.add(name)
+            waiting += fixed.get(name, ())
+    return frozenset(found)
 
 
 def _vector(text: str, length: int = 3) -> Array:

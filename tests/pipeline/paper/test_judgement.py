@@ -127,8 +127,16 @@ def test_a_run_the_paper_says_nothing_of_is_left_out_with_a_word(
 
 
 def test_another_robot_is_not_held_against_the_paper(root: Path) -> None:
-    reason = basis(given(root, robot=root / "urdf" / "hexapod_axis90.toml"))
-    assert reason == "hexapod_axis90.toml is not the paper's robot"
+    assert basis(given(root, robot=root / "urdf" / "hexapod_axis90.toml")) is None
+
+
+def test_another_robot_under_the_same_file_name_is_not_held_against_the_paper(
+    root: Path, tmp_path: Path
+) -> None:
+    text = (root / "urdf" / "hexapod.toml").read_text(encoding="utf-8")
+    other = tmp_path / "hexapod.toml"
+    other.write_text(text.replace('"rm"', '"mr"').replace("legs.rm", "legs.mr"), encoding="utf-8")
+    assert basis(given(root, robot=other)) is None
 
 
 def test_the_first_paragraph_says_what_is_fitted_predicted_contradicted_and_what_it_costs(

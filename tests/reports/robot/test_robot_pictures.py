@@ -15,8 +15,9 @@ from pipeline.robot.robot_file import load_robot_file
 from reports.errors import FigureError
 from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.projection import FRONT, OBLIQUE, SIDE, TOP, draw_scene, extent
-from reports.figures.robot.robot_view import Leg, legs_of, robot_figure
-from reports.figures.robot.visuals import Primitive, joint_marks, primitives
+from reports.figures.robot.robot_view import robot_figure
+from reports.figures.robot.solids import Leg, Mesh, Primitive, Solid, legs_of
+from reports.figures.robot.visuals import joint_marks, read_shapes
 from reports.figures.style import new_figure
 
 
@@ -30,10 +31,10 @@ def placements(robot: Robot, configuration) -> dict[str, np.ndarray]:
     }
 
 
-def standing(robot: Robot) -> tuple[list[Primitive], list[Leg]]:
+def standing(robot: Robot) -> tuple[list[Solid], list[Leg]]:
     links = placements(robot, standing_posture(robot, robot.leg_names).configuration[0])
     names = {leg.name: (leg.joints, leg.foot) for leg in robot.spec.legs}
-    return primitives(robot.urdf, links), legs_of(names, joint_marks(robot.urdf, links), links)
+    return read_shapes(robot.urdf).at(links), legs_of(names, joint_marks(robot.urdf, links), links)
 
 
 def texts(figure) -> list[str]:
@@ -80,7 +81,7 @@ def test_a_robot_without_boxes_is_drawn_as_sticks_and_its_trunk_not_measured(
     scene, legs = standing(hexapod)
     spheres = [primitive for primitive in scene if primitive.sphere]
     words = texts(robot_figure(spheres, legs, title="t"))
-    assert any("the URDF shows no boxes: legs are drawn as sticks" in word for word in words)
+    assert any("legs without shapes in the URDF: sticks" in word for word in words)
     assert "600 mm" not in words
     for expected in ("520 mm", "180 mm", "340 mm", "270 mm", "RM"):
         assert expected in words
@@ -94,7 +95,7 @@ def test_joint_directions_names_the_joints(hexapod: Robot) -> None:
     scene, legs = standing(hexapod)
     figure = joint_directions_figure(scene, legs, "rm", title="t", zero_pose="straight")
     words = texts(figure)
-    for expected in ("rm_joint_1", "rm_joint_2", "rm_joint_3"):
+    for expected in ("1 rm_joint_1", "2 rm_joint_2", "3 rm_joint_3"):
         assert expected in words
     assert any("Zero pose: straight" in word for word in words)
     with pytest.raises(FigureError, match="'xx'"):
@@ -143,12 +144,14 @@ def test_sphere_cylinder_and_default_colour() -> None:
       <visual><geometry><cylinder radius="1" length="1"/></geometry></visual>
       <visual><origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>
         <geometry><box size="1 2 3"/></geometry></visual></link></robot>"""
-    ball, cuboid = primitives(urdf, {"l": np.eye(4)})
+    ball, tube, cuboid = read_shapes(urdf).at({"l": np.eye(4)})
     assert ball.sphere
     np.testing.assert_allclose(ball.size, 0.4)
     np.testing.assert_allclose(cuboid.placement[:3, 0], [0, 1, 0], atol=1e-12)
+    assert isinstance(tube, Mesh)
+    np.testing.assert_allclose(np.ptp(tube.points, axis=0), [2, 2, 1])
     axes = new_figure(2, 2).subplots()
-    draw_scene(axes, TOP, [ball, cuboid])
+    draw_scene(axes, TOP, [ball, tube, cuboid])
     assert len(axes.images) == 1
 
 
@@ -168,5 +171,5 @@ def test_sphere_cylinder_and_default_colour() -> None:
 )  # fmt: skip
 def test_broken_visuals_are_one_clear_line(urdf: str, says: str) -> None:
     with pytest.raises(FigureError, match=says) as caught:
-        primitives(urdf, {"k": np.eye(4)})
+        read_shapes(urdf).at({"k": np.eye(4)})
     assert "\n" not in str(caught.value)

@@ -1,0 +1,61 @@
+"""The verb view: a gait cycle in a browser, until it is interrupted."""
+
+from __future__ import annotations
+
+import argparse
+
+from pipeline.cli.named_path import named_path
+
+
+def add_view_options(sub: argparse.ArgumentParser) -> None:
+    """The options of the verb."""
+    sub.add_argument(
+        "--robot", type=named_path, help="robot file; the model file's or the hexapod by default"
+    )
+    sub.add_argument("--model", type=named_path, help="model file whose effects are included")
+    sub.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", help="change a number"
+    )
+    sub.add_argument("--samples", type=int, default=201, help="samples per segment of the gait")
+    sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
+    sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
+
+
+def _port(text: str) -> int:
+    try:
+        port = int(text)
+    except ValueError:
+        port = 0
+    if not 0 < port < 65536:
+        raise argparse.ArgumentTypeError(f"'{text}' is no port; expected 1 to 65535")
+    return port
+
+
+def run_view(options: argparse.Namespace) -> int:
+    """Serve the cycle until interrupted.
+
+    Raises:
+        PipelineError: Unusable input.
+        ReportError: The package viser is not installed.
+    """
+    from pipeline.api.pictures.player import viser_module
+
+    viser_module()  # before anything is computed
+    from pipeline.api.pictures.view import player
+    from pipeline.simulation.settings import settings
+
+    given = settings(
+        robot=options.robot,
+        model=options.model,
+        changes=options.set,
+        samples=options.samples,
+    )
+    shown = player(given, host=options.host, port=options.port)
+    print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)
+    try:
+        shown.play()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        shown.stop()
+    return 0

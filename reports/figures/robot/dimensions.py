@@ -1,0 +1,120 @@
+"""Dimension lines on the views of a robot, measured from the robot that is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from reports.figures.marks import dimension
+from reports.figures.robot.projection import FRONT, SIDE, TOP, View, extent
+from reports.figures.robot.solids import Leg, Primitive, Solid
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+#: A link shorter than this share of its leg gets no dimension.
+_SHORT = 0.12
+#: A link is measured in a view that shows at least this share of its length.
+_FLAT = 0.95
+
+
+def links_of(leg: Leg) -> list[tuple[Array, Array]]:
+    """The links of a leg that are long enough to be seen: both ends in the world [m]."""
+    points = [*(joint.position for joint in leg.joints), leg.foot]
+    whole = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
+    return [
+        (a, b) for a, b in pairwise(points) if float(np.linalg.norm(b - a)) > _SHORT * whole > 0
+    ]
+
+
+def hip_of(leg: Leg) -> Array:
+    """Where the first long link of a leg begins, shape (3,) [m]."""
+    links = links_of(leg)
+    return links[0][0] if links else leg.joints[0].position
+
+
+def _millimetres(a: Array, b: Array) -> str:
+    return f"{1e3 * float(np.linalg.norm(b - a)):.0f} mm"
+
+
+def link_dimensions(axes: Axes, view: View, legs: Sequence[Leg], unit: float) -> None:
+    """Lengths of the links that show it, of the leg that shows most, at the image's left."""
+    most = max(len(flat_links(leg, view)) for leg in legs)
+    able = [leg for leg in legs if len(flat_links(leg, view)) == most]
+    leg = min(
+        able, key=lambda one: (round(float(view.project(one.foot)[0] / unit), 2), one.foot[1])
+    )
+    links = flat_links(leg, view)
+    middle = np.mean([view.project(end)[:2] for link in links for end in link], axis=0)
+    for start, end in links:
+        a, b = view.project(start)[:2], view.project(end)[:2]
+        normal = np.array([-(b - a)[1], (b - a)[0]]) / np.linalg.norm(b - a)
+        normal *= np.sign(normal @ ((a + b) / 2 - middle)) or 1.0  # outside of the knee
+        dimension(axes, a, b, tuple(0.14 * unit * normal), _millimetres(start, end))
+
+
+def flat_links(leg: Leg, view: View) -> list[tuple[Array, Array]]:
+    """Those links of a leg that a view shows in nearly their length."""
+    return [
+        (a, b)
+        for a, b in links_of(leg)
+        if np.hypot(*view.project(b - a)[:2]) > _FLAT * np.linalg.norm(b - a)
+    ]
+
+
+def front_dimensions(axes: Axes, legs: Sequence[Leg], ground: float, unit: float) -> None:
+    """Track and height of the hip."""
+    feet = FRONT.project(np.array([leg.foot for leg in legs]))[:, :2]
+    left, right = feet[feet[:, 0].argmin()], feet[feet[:, 0].argmax()]
+    level = np.array([1.0, 0.0])
+    a, b = left * level + [0, ground], right * level + [0, ground]
+    dimension(axes, a, b, (0, -0.1 * unit), _millimetres(a, b))
+    hip = max((FRONT.project(hip_of(leg))[:2] for leg in legs), key=lambda at: float(at[0]))
+    a, b = np.array([hip[0], ground]), hip
+    x = max(float(right[0]), float(hip[0])) + 0.22 * unit - float(hip[0])
+    dimension(axes, a, b, (x, 0), _millimetres(a, b))
+
+
+def side_dimensions(axes: Axes, scene: Sequence[Solid], legs: Sequence[Leg], unit: float) -> None:
+    """Distances of the hips, and the length of the trunk where it is a box that carries them."""
+    hips = _apart([float(hip_of(leg)[0]) for leg in legs], 0.05 * unit)
+    top = max(float(hip_of(leg)[2]) for leg in legs)
+    boxes = [p for p in scene if isinstance(p, Primitive) and not p.sphere]
+    trunks = [p for p in boxes if p.size[0] >= hips[-1] - hips[0] > 0]
+    if trunks:
+        trunk = max(trunks, key=lambda p: float(np.prod(p.size)))
+        half = trunk.placement[:3, :3] @ np.array([trunk.size[0] / 2, 0, trunk.size[2] / 2])
+        front = SIDE.project(trunk.placement[:3, 3] + half)[:2]
+        length = np.array([trunk.size[0], 0.0])
+        dimension(axes, front - length, front, (0, 0.25 * unit), f"{1e3 * trunk.size[0]:.0f} mm")
+        top = float(front[1])
+    else:
+        top = max(top, float(extent(SIDE, scene)[1][1]) - 0.04 * unit)
+    for a, b in pairwise(hips):
+        start, end = np.array([a, top]), np.array([b, top])
+        dimension(axes, start, end, (0, 0.117 * unit), _millimetres(start, end))
+
+
+def _apart(values: Sequence[float], least: float) -> list[float]:
+    """Values in order, without those nearer than `least` to the one before."""
+    kept: list[float] = []
+    for value in sorted(values):
+        if not kept or value - kept[-1] > least:
+            kept.append(value)
+    return kept
+
+
+def top_dimensions(axes: Axes, scene: Sequence[Solid], legs: Sequence[Leg], unit: float) -> None:
+    """Half the distance between the hips, from the mid-plane."""
+    left = [leg for leg in legs if hip_of(leg)[1] > 0.02 * unit]
+    if not left:
+        return
+    hip = TOP.project(hip_of(max(left, key=lambda one: hip_of(one)[0])))[:2]
+    middle = np.array([hip[0], 0.0])
+    x = float(extent(TOP, scene)[1][0]) + 0.14 * unit - float(hip[0])
+    dimension(axes, middle, hip, (x, 0), _millimetres(middle, hip))

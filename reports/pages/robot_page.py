@@ -1,0 +1,260 @@
+"""The page of any robot: what it costs, torque, ground forces, stability, limits, what went in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from actuators.loading.build import Catalog
+from pipeline.motion.gait import Gait, gait_of
+from pipeline.robot.robot import Robot
+from pipeline.simulation.settings import Settings
+from reports.html import write_html
+from reports.markdown import write_markdown
+from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
+from reports.pages.names import leg_words, names_text, short_titles, shown_leg
+from reports.table import Table
+from reports.typeset import number_text
+
+FOOTER = "Every CSV has a .meta.json beside it: meanings, units, input hashes, versions."
+#: Actuators of so few stages that a picture of them is left to the folder.
+PLAIN = ("ideal", "rotor")
+#: Rows of a long table that a page shows.
+_ROWS = 24
+
+
+def write_robot_page(
+    given: Settings, tables: Sequence[Table], out: Path, remarks: Sequence[str] = ()
+) -> int:
+    """Write ``summary.md`` and ``index.html``.
+
+    Args:
+        given: The run.
+        tables: All tables of the run.
+        out: Folder; the figures must be there already.
+        remarks: What a reader should not overlook.
+
+    Returns:
+        How many files.
+    """
+    page = robot_page(given, {t.name: t for t in tables}, out, remarks)
+    write_markdown(page, out / "summary.md")
+    write_html(page, out / "index.html")
+    return 2
+
+
+def robot_page(
+    given: Settings, tables: Mapping[str, Table], out: Path, remarks: Sequence[str] = ()
+) -> Page:
+    """The page; see `write_robot_page`."""
+    robot, gait = given.robot, gait_of(given.robot.spec)
+    return Page(
+        title=f"What it costs to actuate {robot.spec.name}, {gait.title}",
+        answer=_answer(given, gait, tables, remarks),
+        sections=(
+            gait_section(robot, out),
+            energy_section(given, tables, out),
+            _demand(robot, tables, out),
+            _limits(given.catalog, tables, out),
+            _standing(tables),
+            _numbers(tables),
+        ),
+        files=files_of(tables),
+        footer=FOOTER,
+    )
+
+
+def files_of(tables: Mapping[str, Table]) -> dict[str, str]:
+    """Every table's file with what it holds."""
+    return {
+        f"{t.name}.csv": t.description or ", ".join(list(t.columns)[:6]) for t in tables.values()
+    }
+
+
+def _answer(
+    given: Settings, gait: Gait, tables: Mapping[str, Table], remarks: Sequence[str]
+) -> tuple[str, ...]:
+    robot, energy = given.robot, tables["robot_energy"].columns
+    joints = sorted({len(leg.joints) for leg in robot.spec.legs})
+    held = len(robot.joints) - sum(len(leg.joints) for leg in robot.spec.legs)
+    outside = f" and {held} joint{'s' if held > 1 else ''} outside the legs" if held else ""
+    what = (
+        f"**{robot.spec.name}**, {number_text(given.machine.mass)} kg on {len(robot.leg_names)} "
+        f"legs of {' or '.join(map(str, joints))} joints{outside}, walks the {gait.title} at "
+        f"{number_text(gait.speed)} m/s with a period of {number_text(gait.period)} s."
+    )
+    titles = short_titles(given.catalog)
+    costs = "; ".join(
+        f"{titles[name]} **{number_text(power)} W**"
+        + ("" if _missing(cot) else f" (cost of transport {number_text(cot)})")
+        for name, power, cot in zip(
+            energy["alternative"], energy["average_power_W"], energy["cost_of_transport"],
+            strict=True,
+        )
+    )  # fmt: skip
+    return (
+        what,
+        f"**What it costs** to drive all joints, on average over one cycle: {costs}.",
+        _stability(tables["walking_stability"]),
+        breaches_text(tables["motor_limits"], titles),
+        *(f"**Note:** {remark}." for remark in remarks),
+    )
+
+
+def _missing(value: object) -> bool:
+    return value is None or (isinstance(value, float) and not np.isfinite(value))
+
+
+def _stability(table: Table) -> str:
+    c = table.columns
+    margins = np.array(c["least_margin_m"], dtype=float)
+    at = int(margins.argmin())
+    frictions = np.array(c["greatest_friction_needed"], dtype=float)
+    slip = int(np.nanargmax(frictions))
+    return (
+        f"**Stability:** the centre of mass stays at least {number_text(1e3 * margins[at])} mm "
+        f"inside the feet that stand ({c['segment'][at]}, at {number_text(c['at_time_s'][at])} s); "
+        f"the lightest foot carries {number_text(min(c['least_normal_force_N']))} N, and leg "
+        f"`{c['foot_of_greatest_friction'][slip]}` needs a coefficient of friction of "
+        f"{number_text(frictions[slip])}."
+    )
+
+
+def breaches_text(table: Table, titles: Mapping[str, str]) -> str:
+    """Which motors leave their data sheet, the worst of each alternative.
+
+    Args:
+        table: ``motor_limits``.
+        titles: Alternative to its title.
+    """
+    c = table.columns
+    over = [i for i, breach in enumerate(c["breach"]) if breach]
+    if not over:
+        return "**Motors:** every alternative's motor stays within its data sheet at every joint."
+    worst: dict[str, int] = {}
+    for i in over:
+        name = str(c["alternative"][i])
+        if name not in worst or c["peak"][i] / c["limit"][i] > (
+            c["peak"][worst[name]] / c["limit"][worst[name]]
+        ):
+            worst[name] = i
+    said = "; ".join(
+        f"{titles[name]}: {c['quantity'][i].replace('_', ' ')} of `{c['joint'][i]}` "
+        f"{number_text(c['peak'][i])} of {number_text(c['limit'][i])} {c['unit'][i]}"
+        for name, i in worst.items()
+    )
+    return f"**Motors beyond their data sheet** (the worst of each alternative): {said}."
+
+
+def energy_section(given: Settings, tables: Mapping[str, Table], out: Path) -> Section:
+    """What one cycle takes from the supply, by alternative, stage and joint."""
+    leg, walking = shown_leg(given.robot), tables["walking_energy"]
+    keep = [name in (leg, "robot") for name in walking.columns["leg"]]
+    return Section(
+        "What it costs",
+        (
+            Text(names_text(given)),
+            FigureBlock(out / "electrical_energy.svg", "Electrical energy of one cycle by joint."),
+            table_block(
+                walking, keep=keep, caption="Energy drawn from the supply in one walking cycle."
+            ),
+            table_block(tables["robot_energy"], caption="The whole robot, walking."),
+            *(
+                FigureBlock(out / f"stage_energy_{name}.svg", f"Stages of the {title}.")
+                for name, title in short_titles(given.catalog).items()
+                if name not in PLAIN
+            ),
+        ),
+    )
+
+
+def _demand(robot: Robot, tables: Mapping[str, Table], out: Path) -> Section:
+    leg = shown_leg(robot)
+    joints = next(entry.joints for entry in robot.spec.legs if entry.name == leg)
+    blocks: list[Text | FigureBlock | TableBlock | Points] = [
+        FigureBlock(out / "joint_torques.svg", "Torque of every joint, all legs."),
+        FigureBlock(out / "ground_forces.svg", "Ground forces of all feet, margin of stability."),
+        table_block(tables["walking_stability"], caption="Stability by set of standing feet."),
+    ]
+    if "quasi_static_torque" in tables:
+        blocks.append(
+            table_block(
+                tables["quasi_static_torque"],
+                caption="Largest torque of every joint, and what the links' inertia adds.",
+            )
+        )
+    blocks += [
+        FigureBlock(
+            out / f"joint_demand_{joint}.svg", f"Joint {k} of the {leg_words(leg)}: `{joint}`."
+        )
+        for k, joint in enumerate(joints, start=1)
+    ]
+    return Section("Torque, ground forces, stability", tuple(blocks))
+
+
+def _limits(catalog: Catalog, tables: Mapping[str, Table], out: Path) -> Section:
+    table = tables["motor_limits"]
+    over = np.array(table.columns["breach"], dtype=bool)
+    share = np.array(table.columns["peak"], dtype=float) / np.array(table.columns["limit"])
+    first = sorted(np.flatnonzero(over), key=lambda i: -share[i])[:_ROWS]
+    keep = np.isin(np.arange(table.rows), first)
+    shown: tuple[Text | TableBlock, ...]
+    if first:
+        shown = (
+            table_block(
+                table,
+                keep=keep.tolist(),
+                caption=f"Motors beyond their data sheet: {len(first)} of {int(over.sum())} rows.",
+            ),
+        )
+    else:
+        shown = (Text("No motor leaves its data sheet; `motor_limits.csv` has every peak."),)
+    return Section(
+        "Motors against their data sheets",
+        (
+            *shown,
+            *(
+                FigureBlock(out / f"motor_limits_{name}.svg", f"Motors of the {title}.")
+                for name, title in short_titles(catalog).items()
+            ),
+        ),
+    )
+
+
+def _standing(tables: Mapping[str, Table]) -> Section:
+    blocks = [table_block(tables["standing_energy"], caption="Standing still, by leg.")]
+    blocks.append(table_block(tables["standing_contacts"], caption="Feet and ground forces."))
+    return Section("Standing still", tuple(blocks))
+
+
+def gait_section(
+    robot: Robot, out: Path, more: Sequence[FigureBlock] = (), robot_words: str = ""
+) -> Section:
+    """The robot, its gait in motion and in one picture.
+
+    Args:
+        robot: The robot.
+        out: Folder of the pictures.
+        more: Pictures below those.
+        robot_words: Caption of the picture of the robot.
+    """
+    pictures = (
+        (
+            "gait_steps",
+            "The gait in motion: ground forces, torques, support; still in print.",
+        ),
+        ("robot", robot_words or f"{robot.spec.name}, standing."),
+        ("zero_pose", "Zero pose and positive directions."),
+        ("gait", "Foot paths, support polygons, footfall."),
+    )
+    shown = tuple(FigureBlock(out / f"{name}.svg", caption) for name, caption in pictures)
+    return Section("The robot and its gait", (*shown, *more))
+
+
+def _numbers(tables: Mapping[str, Table]) -> Section:
+    columns = ("group", "parameter", "value", "unit", "basis", "source")
+    shown = {c: "file" if c == "group" else c for c in columns}
+    block = table_block(tables["parameters"], shown, caption="Every number that went in.")
+    return Section("What went in", (block,))

@@ -1,0 +1,142 @@
+"""What the player in the browser is told: bodies, arrows, torques; and what is said without it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+from unittest.mock import MagicMock
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pipeline.api.pictures.cycle import Cycle, arrow, quaternions, towards, triangles
+from pipeline.api.pictures.player import Player, viser_module
+from pipeline.api.pictures.scene import Scenery
+from pipeline.api.pictures.view import cycle
+from pipeline.robot.robot import Robot
+from pipeline.simulation.walk_stand import Walking, walk
+from reports.errors import ReportError
+from tests.command_line import exit_code
+
+COUNT = 8
+
+
+@pytest.fixture(scope="module")
+def walking(hexapod: Robot) -> Walking:
+    return walk(hexapod, {}, samples=101)
+
+
+@pytest.fixture(scope="module")
+def played(hexapod: Robot, walking: Walking) -> Cycle:
+    return cycle(Scenery(hexapod), walking, COUNT)
+
+
+def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    w, x, y, z = quaternion
+    return np.asarray(pin.Quaternion(w, x, y, z).toRotationMatrix() @ vector)
+
+
+def test_bodies_are_carried_to_where_pinocchio_has_them(
+    hexapod: Robot, walking: Walking, played: Cycle
+) -> None:
+    from pipeline.api.pictures.gait import rows_of_steps
+
+    scenery = Scenery(hexapod)
+    _, q = rows_of_steps(walking, COUNT)
+    k = 5
+    solids = {id(s): s for s in scenery.at(q[k])[0]}
+    expected = sorted(tuple(np.round(s.points.mean(axis=0), 6)) for s in solids.values())
+    found = []
+    for body in played.bodies:
+        for solid in body.solids:
+            centre = solid.points.mean(axis=0)
+            moved = body.rotation[k] @ centre + body.position[k] + played.steps.origin[k]
+            found.append(tuple(np.round(moved, 6)))
+    np.testing.assert_allclose(sorted(found), expected, atol=1e-6)
+
+
+def test_surfaces_become_triangles_with_their_colours(hexapod: Robot) -> None:
+    scenery = Scenery(hexapod)
+    (trunk,) = (s for s in scenery.at(scenery.zero)[0] if s.link == "base_link")
+    mesh = triangles([trunk])
+    assert len(mesh.faces) == 12
+    np.testing.assert_allclose(mesh.bounds, [trunk.points.min(axis=0), trunk.points.max(axis=0)])
+    np.testing.assert_allclose(mesh.visual.face_colors[0, :3] / 255, trunk.color, atol=0.01)
+
+
+def test_arrows_point_along_the_force() -> None:
+    vertices, faces = arrow(0.02)
+    assert faces.max() < len(vertices)
+    np.testing.assert_allclose(vertices[:, 2].max(), 1.0)
+    for direction in ([0, 0, 1], [0, 0, -1], [1, 0, 0], [0.6, 0.0, 0.8], [-0.48, 0.6, 0.64]):
+        unit = np.array(direction, dtype=float)
+        np.testing.assert_allclose(rotated(towards(unit), np.array([0, 0, 1.0])), unit, atol=1e-12)
+    turn = pin.exp3(np.array([0.2, -0.4, 1.0]))
+    np.testing.assert_allclose(rotated(quaternions(turn[None])[0], np.eye(3)[0]), turn[:, 0])
+
+
+def stub() -> tuple[ModuleType, MagicMock]:
+    """A viser that remembers what it is told."""
+    server = MagicMock()
+    server.get_host.return_value, server.get_port.return_value = "127.0.0.1", 8080
+    for add in ("add_mesh_trimesh", "add_mesh_simple", "add_icosphere"):
+        getattr(server.scene, add).side_effect = lambda name, *_, **__: MagicMock(label=name)
+    server.gui.add_checkbox.side_effect = lambda *_: MagicMock(value=True)
+    server.gui.add_slider.side_effect = lambda *_, initial_value=0, **__: MagicMock(
+        value=initial_value
+    )
+    module: Any = ModuleType("viser")
+    module.ViserServer = MagicMock(return_value=server)
+    return module, server
+
+
+def test_each_step_shows_bodies_forces_and_torques(
+    played: Cycle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module, server = stub()
+    monkeypatch.setitem(sys.modules, "viser", module)
+    player = Player(played, "127.0.0.1", 8080)
+    assert player.address == "http://127.0.0.1:8080"
+    steps = played.steps
+    lengths = {}
+    for k in (0, 3):
+        player.show(k)
+        np.testing.assert_array_equal(player.bodies[2].position, played.bodies[2].position[k])
+        for i, shown in enumerate(player.forces):
+            assert shown.visible == bool(steps.stands[k, i])
+            if shown.visible:
+                np.testing.assert_array_equal(shown.position, steps.feet[k, i])
+                lengths[k, i] = shown.scale[2] / np.linalg.norm(steps.force[k, i])
+        assert f"t = {steps.time[k]:.2f} s" in player.words.content
+        joint = played.joints[4]
+        assert f"| {joint} | {steps.torque[k, 4]:.3g} N·m |" in player.words.content
+    assert np.ptp(list(lengths.values())) < 1e-12  # one scale for all forces
+    turns = iter([True, True, False])
+    player.play(lambda: next(turns))
+    player.stop()
+    server.stop.assert_called_once()
+
+
+def test_without_viser_one_line_says_how_to_install_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "viser", None)
+    with pytest.raises(ReportError, match="make view"):
+        viser_module()
+    assert exit_code(["view"]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "reports/view.lock" in said
+
+
+@pytest.mark.parametrize("port", ["0", "70000", "http"])
+def test_a_port_that_is_none_is_refused(port: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["view", "--port", port]) == 2
+    assert "expected 1 to 65535" in capsys.readouterr().err
+
+
+def test_the_lock_of_the_extra_is_where_the_message_says(root: Path) -> None:
+    assert "viser==" in (root / "reports" / "view.lock").read_text(encoding="utf-8")
