@@ -301,10 +301,8 @@ BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "blind standard effects": ("pipeline/blind/README.md", blind_standard_effects),
 }
 OF_BLIND = ("blind", "blind effects")
-<<<<<<< HEAD
-WITHOUT_RUN = {"agreement", "effects", "force rules", *OF_BLIND}
-=======
-WITHOUT_RUN = {"agreement", "effects", *OF_BLIND, "blind standard", "blind standard effects"}
+OF_STANDARD = ("blind standard", "blind standard effects")
+WITHOUT_RUN = {"agreement", "effects", "force rules", *OF_BLIND, *OF_STANDARD}
 PAGES = tuple(dict.fromkeys(page for page, _ in BLOCKS.values()))
 #: What a run of `make blind` leaves that its page shows.
 BLIND = ("blind_trials.csv", "blind_rates.csv", "blind_by_effect.csv", "blind_confusion.csv")
@@ -313,7 +311,6 @@ BLIND_PICTURE = "blind_confusion.png"
 STANDARD = tuple(
     f"blind_standard_{name}.csv" for name in ("trials", "rates", "by_effect", "reliability")
 )
-OF_STANDARD = ("blind standard", "blind standard effects")
 
 
 def renewed(page: str, text: str, out: Path, names: Collection[str] = tuple(BLOCKS)) -> str:
