@@ -254,7 +254,9 @@ def force_rules(out: Path) -> str:
 
 
 def blind_standard(out: Path) -> str:
-    """Rates of the standard matrix, from the stored run."""
+    """Rates of the standard matrix, from the stored run; a sentence where none is stored."""
+    if not (PICTURES / STANDARD[0]).exists():
+        return "No run of the standard matrix is stored yet."
     lines = [
         (
             r["meaning"],
@@ -271,6 +273,8 @@ def blind_standard(out: Path) -> str:
 
 def blind_standard_effects(out: Path) -> str:
     """How each effect of the standard matrix fared that was hidden alone, from the stored run."""
+    if not (PICTURES / STANDARD[0]).exists():
+        return "No run of the standard matrix is stored yet."
     lines = []
     for r in rows(PICTURES, "blind_standard_by_effect"):
         known = r["in_catalogue"] == "true"
