@@ -39,7 +39,7 @@ $(VENV)/.view: $(STAMP) reports/view.lock
 	@touch $@
 
 test: $(STAMP)  ## Run the tests (Table III among them)
-	$(PY) -m pytest -m "not slow"
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(PY) -m pytest -n auto --dist loadfile -m "not slow"
 
 test-slow: $(STAMP)  ## Run the long tests
 	$(PY) -m pytest -m slow
