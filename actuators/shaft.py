@@ -107,6 +107,19 @@ class ShaftSeries:
         """Power through the shaft towards the joint, (N, J) [W]."""
         return self.torque * self.velocity
 
+    def at(self, joint: int) -> "ShaftSeries":
+        """Return the series of one joint, by column."""
+        k = slice(joint, joint + 1)
+        return ShaftSeries(
+            joints=self.joints[k],
+            time=self.time,
+            position=self.position[:, k],
+            velocity=self.velocity[:, k],
+            acceleration=self.acceleration[:, k],
+            torque=self.torque[:, k],
+            direction=self.direction[:, k],
+        )
+
     def with_torque(self, torque: FloatArray) -> "ShaftSeries":
         """Return the same motion with another torque, (N, J) [N*m]; arrays are shared."""
         return replace(self, torque=torque)

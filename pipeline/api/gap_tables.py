@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Where
-from pipeline.identification.results import INDISTINGUISHABLE, Candidate, Found
+from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candidate, Found
 from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.logs.errors import EffectError
 from pipeline.logs.quality.finding import Finding
@@ -62,12 +62,16 @@ def found_table(found: Sequence[Found], model: MachineModel) -> Table:
     """Rows of `found.csv`, one per parameter."""
     rows: list[dict[str, Any]] = []
     for f in found:
-        for p in f.parameters:
-            rows.append(
+        for one in f.each:
+            effect = effect_named(f.effect)
+            rows += [
                 {
                     "order": f.order,
                     "effect": f.effect,
-                    "joint": joint_of(model, f.effect, f.place),
+                    "law": f.law,
+                    "amounts_to": JOINED.join(effect.amounts_to(one.values)),
+                    "joint": joint_of(model, f.effect, one.place),
+                    "place": JOINED.join(one.place),
                     "parameter": p.name,
                     "value": p.value,
                     "ci_low": p.low,
@@ -77,10 +81,13 @@ def found_table(found: Sequence[Found], model: MachineModel) -> Table:
                     "gap_after": _known(f.gap_after),
                     "gap_unit": f.unit,
                     "noise_floor": f.noise_floor,
-                    "doubt": f.doubtful,
+                    "level": f.level if f.level == SUSPECTED else one.level,
+                    "share": _known(one.share),
+                    "reason": f.reason,
                     "written": f.written,
                 }
-            )
+                for p in one.parameters
+            ]
     return tables.found(rows)
 
 

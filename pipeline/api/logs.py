@@ -66,7 +66,7 @@ class Identified(Result):
 
     @property
     def found(self) -> Table:
-        """Effects with parameters, intervals, doubt, and whether the model holds them."""
+        """Effects with parameters, intervals, levels, and whether the model holds them."""
         return self.table("found")
 
     @property

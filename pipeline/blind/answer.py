@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pipeline.identification.results import ACCEPTED, INDISTINGUISHABLE
+from pipeline.identification.results import CONFIRMED, INDISTINGUISHABLE
 
 _ROOT = Path(__file__).parents[2]
 #: An answer takes some ten seconds of computing; after this much it counts as failed [s].
@@ -128,24 +128,23 @@ def read_answer(run: dict[str, Any], out: Path) -> Answer:
         return Answer(code, run["seconds"], (), run["message"])
     if not (out / "candidates.csv").exists():
         return Answer(FAILED, run["seconds"], (), "candidates.csv was not written")
-    verdicts = {
-        (row["effect"], row["joint"]): (tuple(row["place"].split("+")), row["verdict"])
+    rivals = {
+        (row["effect"], row["place"]): row["verdict"].removeprefix(INDISTINGUISHABLE)
         for row in _rows(out / "candidates.csv")
-        if row["verdict"] == ACCEPTED or row["verdict"].startswith(INDISTINGUISHABLE)
+        if row["verdict"].startswith(INDISTINGUISHABLE)
     }
     grouped: dict[tuple[int, str, str], list[dict[str, str]]] = {}
     for row in _rows(out / "found.csv"):
-        grouped.setdefault((int(row["order"]), row["effect"], row["joint"]), []).append(row)
+        grouped.setdefault((int(row["order"]), row["effect"], row["place"]), []).append(row)
     named = []
-    for (_, effect, joint), rows in sorted(grouped.items()):
-        place, verdict = verdicts.get((effect, joint), ((joint,), ACCEPTED))
+    for (_, effect, place), rows in sorted(grouped.items()):
         first = rows[0]
         named.append(
             Named(
                 effect=effect,
-                place=place,
-                rivals=verdict.removeprefix(INDISTINGUISHABLE) if verdict != ACCEPTED else "",
-                doubt=first["doubt"],
+                place=tuple(place.split("+")),
+                rivals=rivals.get((effect, place), ""),
+                doubt=first["reason"] or ("" if first["level"] == CONFIRMED else first["level"]),
                 intervals={
                     row["parameter"]: (
                         _number(row["value"]),

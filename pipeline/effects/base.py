@@ -84,6 +84,7 @@ class Effect(ABC):
         reaches: Multiples of the coordinates' steps to look across, where the prediction bends.
         contains: Effects that are special cases of this one at the same place.
         rescales: Whether what bodies do to a channel is multiplied by it.
+        competes: Whether it is tried by itself; others are fitted together for a whole machine.
     """
 
     name: ClassVar[str]
@@ -96,6 +97,7 @@ class Effect(ABC):
     reaches: ClassVar[tuple[float, ...]] = (1.0,)
     contains: ClassVar[tuple[str, ...]] = ()
     rescales: ClassVar[bool] = False
+    competes: ClassVar[bool] = True
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Where in this machine and log the effect could be."""
@@ -136,6 +138,14 @@ class Effect(ABC):
         exceeds `verdict.TOLERANCE_SIGMAS` of these.
         """
         return {}
+
+    def law(self, values: Values) -> str:
+        """Which of its laws it is at some parameters, in words; empty where it has but one."""
+        return ""
+
+    def amounts_to(self, values: Values) -> tuple[str, ...]:
+        """Effects of the catalogue that it is the sum of; empty where it is one by itself."""
+        return ()
 
     def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
         """Tolerances (kind, place) that are this effect in small: they stand back where it is."""

@@ -15,6 +15,8 @@
     effect = "coulomb_friction"
     place = ["rm_joint_1"]
     basis = "identified"
+    level = "confirmed"
+    share = 1.0                      # of draws of the log's blocks in which it wins
     source = "log.csv, SHA-256 ..."
     [edit.parameters.torque]
     value = 0.108
@@ -27,6 +29,7 @@ Edits are applied in order to what the files say; the files themselves are never
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -76,9 +79,11 @@ class Edit:
         effect: Name in the catalogue of effects.
         place: Joints, link, ground or effort channels.
         parameters: In the effect's order.
-        basis: ``"identified"``, ``"doubtful"`` (identified, but the name is not trusted) or
-            ``"assumed"``.
+        basis: ``"identified"`` or ``"assumed"``.
         source: The log and its hash.
+        level: ``"confirmed"``, or ``"approximate"``: it closes a large part of the gap, though its
+            law is not exactly the machine's or its size scatters.
+        share: Of draws of the log's blocks in which it wins; NaN where it is not known.
     """
 
     effect: str
@@ -86,6 +91,8 @@ class Edit:
     parameters: tuple[EditParameter, ...]
     basis: str = "identified"
     source: str = ""
+    level: str = "confirmed"
+    share: float = math.nan
 
     @property
     def values(self) -> dict[str, float]:
@@ -171,7 +178,9 @@ class _Edit(Table):
     expected = "effect, place and parameters"
     effect: Annotated[Text, AfterValidator(_known_effect)]
     place: Annotated[Names, Field(min_length=1)]
-    basis: Literal["identified", "doubtful", "assumed"] = "identified"
+    basis: Literal["identified", "assumed"] = "identified"
+    level: Literal["confirmed", "approximate"] = "confirmed"
+    share: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
     source: Text
     parameters: dict[str, _Value]
 
@@ -356,4 +365,7 @@ def _as_edit(entry: _Edit) -> Edit:
         for name, p in written.items()
         if p is not None
     )
-    return Edit(entry.effect, entry.place, parameters, entry.basis, entry.source)
+    share = math.nan if entry.share is None else entry.share
+    return Edit(
+        entry.effect, entry.place, parameters, entry.basis, entry.source, entry.level, share
+    )

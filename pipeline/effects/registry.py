@@ -12,6 +12,7 @@ from pipeline.effects.bodies.base_tilt import BaseTilt
 from pipeline.effects.bodies.center_of_mass_offset import CenterOfMassOffset
 from pipeline.effects.bodies.internal_foot_force import InternalFootForce
 from pipeline.effects.bodies.link_mass import LinkMass
+from pipeline.effects.bodies.rigid_body_parameters import RigidBodyParameters
 from pipeline.effects.drive.backlash import Backlash
 from pipeline.effects.drive.joint_elasticity import JointElasticity
 from pipeline.effects.drive.parallel_spring import ParallelSpring
@@ -23,6 +24,8 @@ from pipeline.effects.drive.winding_heating import SensedHeating, WindingHeating
 from pipeline.effects.friction.backdrive_loss import BackdriveLoss
 from pipeline.effects.friction.coulomb_friction import CoulombFriction
 from pipeline.effects.friction.direction_dependent_friction import DirectionDependentFriction
+from pipeline.effects.friction.friction_curve import FrictionCurveEffect
+from pipeline.effects.friction.joint_friction import JointFrictionLaw
 from pipeline.effects.friction.load_dependent_friction import LoadDependentFriction
 from pipeline.effects.friction.stribeck_friction import StribeckFriction
 from pipeline.effects.friction.viscous_friction import ViscousFriction
@@ -43,7 +46,10 @@ EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
             LoadDependentFriction(),
             DirectionDependentFriction(),
             BackdriveLoss(),
+            JointFrictionLaw(),
+            FrictionCurveEffect(),
             RotorInertia(),
+            RigidBodyParameters(),
             LinkMass(),
             CenterOfMassOffset(),
             BaseTilt(),
@@ -81,7 +87,9 @@ def catalogue(model: MachineModel) -> tuple[Effect, ...]:
     """Every effect in the form in which it competes for this machine."""
     bare = any(a.motor is None for a in model.actuators)
     effects = [
-        _BARE_COUPLING if bare and e.name == _BARE_COUPLING.name else e for e in EFFECTS.values()
+        _BARE_COUPLING if bare and e.name == _BARE_COUPLING.name else e
+        for e in EFFECTS.values()
+        if e.competes
     ]
     # A log with the motors' temperature has places for this one, any other for the plain one.
     return (*effects, _SENSED_HEATING)

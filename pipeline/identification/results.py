@@ -10,6 +10,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+#: How far a finding is to be trusted: name, law and size stand; it closes a large part though its
+#: law is not exactly the machine's or its size scatters; it is listed and not written.
+CONFIRMED: Final = "confirmed"
+APPROXIMATE: Final = "approximate"
+SUSPECTED: Final = "suspected"
+
 ACCEPTED: Final = "accepted"
 REJECTED: Final = "rejected"
 NOT_IDENTIFIABLE: Final = "not identifiable on this motion"
@@ -56,6 +62,10 @@ NEAREST: Final = (
     "it takes a fifth or more of the gap on validation data, but parts of the log disagree about "
     "its size too much to be sure of the law"
 )
+BOUND: Final = "its estimate runs into the bound of what can be"
+NOTHING: Final = "beside the other effects found its size may be nothing at all"
+#: Effects that a small explanation holds at most; what needs more is fitted as a whole machine.
+FEW: Final = 3
 #: Effects that one log may be found to lack, per joint.
 MOST_EFFECTS: Final = 4
 
@@ -77,6 +87,28 @@ class Estimate:
     low: float
     high: float
     unit: str
+
+
+@dataclass(frozen=True)
+class Member:
+    """One of several like findings that are told as one.
+
+    Attributes:
+        place: Where.
+        parameters: Estimates.
+        level: Of this one.
+        share: Of draws of the log's blocks in which it wins.
+    """
+
+    place: tuple[str, ...]
+    parameters: tuple[Estimate, ...]
+    level: str
+    share: float
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters by name."""
+        return {p.name: p.value for p in self.parameters}
 
 
 @dataclass(frozen=True)
@@ -123,7 +155,11 @@ class Found:
         unit: Of the compared channel.
         noise_floor: Of the same joints, in `unit`.
         excitation: The motion that would tell it from its rivals.
-        doubtful: Why the name is not trusted, or empty.
+        level: `CONFIRMED`, `APPROXIMATE` or `SUSPECTED`.
+        reason: Why it is not confirmed, or empty.
+        share: Of draws of the log's blocks in which it wins; NaN where none were drawn.
+        law: Which of its laws, where the effect has several.
+        members: Where several like findings are told as one, each of them.
         gap_before: Error on *prove* without it, where it shows most; NaN until the written model
             was held against those rows, and where there is no row.
         gap_after: The same with it.
@@ -140,7 +176,11 @@ class Found:
     unit: str
     noise_floor: float
     excitation: str
-    doubtful: str = ""
+    level: str = CONFIRMED
+    reason: str = ""
+    share: float = float("nan")
+    law: str = ""
+    members: tuple[Member, ...] = ()
     gap_before: float = float("nan")
     gap_after: float = float("nan")
     written: bool = False
@@ -149,6 +189,21 @@ class Found:
     def values(self) -> dict[str, float]:
         """Parameters by name."""
         return {p.name: p.value for p in self.parameters}
+
+    @property
+    def each(self) -> tuple[Member, ...]:
+        """Its members; itself where it has none."""
+        return self.members or (Member(self.place, self.parameters, self.level, self.share),)
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...]]:
+        """Effect and place."""
+        return self.effect, self.place
+
+    @property
+    def kept(self) -> bool:
+        """Whether it belongs into a model file."""
+        return self.level != SUSPECTED
 
 
 @dataclass(frozen=True)
@@ -197,3 +252,11 @@ class Naming:
     channel: str
     unit: str
     notes: tuple[str, ...] = field(default=())
+
+
+def named(found: Found) -> str:
+    """A finding in words: its name, its law and where."""
+    law = f" ({found.law})" if found.law else ""
+    places = [" with ".join(one.place) for one in found.each]
+    where = places[0] if len(places) == 1 else f"{', '.join(places[:-1])} and {places[-1]}"
+    return f"{found.effect}{law} at {where or 'the whole machine'}"

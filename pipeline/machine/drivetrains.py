@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.chain import Chain, ChainResult, HoldingResult
+from actuators.chain import Chain, ChainResult, HoldingResult, held, least_magnitude
 from actuators.shaft import ShaftSeries
 from pipeline.machine.joint import JointModel, joints_of
 
@@ -88,7 +88,7 @@ class Drivetrains:
         """Chains with the joints that share them; a coupled joint is computed apart."""
         groups: dict[object, tuple[Chain, list[int]]] = {}
         for k, joint in enumerate(self.joints):
-            key = (*map(id, joint.elements), id(joint.motor), k if k in self.coupled else -1)
+            key = (*map(id, joint.path), id(joint.motor), k if k in self.coupled else -1)
             if key not in groups:
                 groups[key] = (joint.chain, [])
             groups[key][1].append(k)
@@ -102,10 +102,28 @@ class Drivetrains:
         """
         if len(self._groups) == 1 and not self.coupled:
             return replace(self._groups[0][0].moving(joint), chain=self.name)
+        joint, lost = self._behind(joint)
         parts = [
             (columns, chain.moving(self._side(joint, columns))) for chain, columns in self._groups
         ]
-        return _merged(self.name, joint, parts)
+        merged = _merged(self.name, joint, parts)
+        return replace(merged, losses={**lost, **merged.losses}) if lost else merged
+
+    def _behind(self, joint: ShaftSeries) -> tuple[ShaftSeries, dict[str, Array]]:
+        """The joints behind what does not turn with their motors, and what that loses, by name."""
+        lost: dict[str, Array] = {}
+        torque = np.array(joint.torque)
+        for k, own in enumerate(self.joints):
+            side = joint.at(k)
+            for element in own.apart:
+                behind = element.moving(side)
+                loss = element.loss(side, behind)
+                if loss is not None:
+                    total = lost.setdefault(element.name, np.zeros_like(torque))
+                    total[:, k] += loss[:, 0]
+                side = behind
+            torque[:, k] = side.torque[:, 0]
+        return (joint.with_torque(torque), lost) if lost else (joint, lost)
 
     def _side(self, joint: ShaftSeries, columns: list[int]) -> ShaftSeries:
         """The joints' side of one group; a coupled motor turns with another joint, too."""
@@ -128,7 +146,10 @@ class Drivetrains:
         Args:
             torque: (..., J) [N*m].
         """
-        asked = np.asarray(torque, dtype=float)
+        asked = np.array(torque, dtype=float)
+        for k, own in enumerate(self.joints):
+            if own.apart:  # its friction carries what it can
+                asked[..., k] = least_magnitude(*held(own.apart, asked[..., k], asked[..., k]))
         out: dict[str, Array] = {}
         for chain, columns in self._groups:
             load = [self.load(k, lambda i: asked[..., i]) for k in columns]

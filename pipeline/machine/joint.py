@@ -52,6 +52,8 @@ class JointModel:
         gains: Channel to how many times what it should its column reads; once where absent.
         stages: Names of shafts to the elements they follow, as a chain has them; the last one is
             the motor's.
+        output: Elements of the joint's own bearings and seals, nearest to it: they turn with the
+            joint alone, also where its motor turns with another joint, too.
     """
 
     name: str
@@ -69,6 +71,17 @@ class JointModel:
     delay: float = 0.0
     gains: Mapping[str, float] = field(default_factory=dict)
     stages: Mapping[str, str] = field(default_factory=dict)
+    output: tuple[Element, ...] = ()
+
+    @property
+    def path(self) -> tuple[Element, ...]:
+        """Elements that turn with the motor: all of them, unless it turns with another joint."""
+        return self.elements if self.coupled_to else (*self.output, *self.elements)
+
+    @property
+    def apart(self) -> tuple[Element, ...]:
+        """Elements that do not turn with the motor."""
+        return self.output if self.coupled_to else ()
 
     @property
     def ratio(self) -> float:
@@ -85,13 +98,20 @@ class JointModel:
 
     def with_element(self, element: Element, *, at_motor: bool = False) -> JointModel:
         """The same with an element more, at the joint's or the motor's shaft; names made unique."""
-        taken = {e.name for e in self.elements}
+        named = self._renamed(element)
+        elements = (*self.elements, named) if at_motor else (named, *self.elements)
+        return replace(self, elements=elements)
+
+    def with_output(self, element: Element) -> JointModel:
+        """The same with an element more that turns with the joint alone; names made unique."""
+        return replace(self, output=(self._renamed(element), *self.output))
+
+    def _renamed(self, element: Element) -> Element:
+        taken = {e.name for e in (*self.output, *self.elements)}
         name, k = element.name, 2
         while name in taken:
             name, k = f"{element.name}_{k}", k + 1
-        named = replace(element, name=name)
-        elements = (*self.elements, named) if at_motor else (named, *self.elements)
-        return replace(self, elements=elements)
+        return replace(element, name=name)
 
     def beside(self, position: Array, torque: Array) -> Array:
         """What the drivetrain has to supply with springs and ripples beside it, (...) [N*m].
@@ -114,11 +134,11 @@ class JointModel:
 
     def at_motor(self, side: ShaftSeries) -> ShaftSeries:
         """What the motor's shaft needs for a motion and load at the joint side (inverse)."""
-        return moved(self.elements, side)
+        return moved(self.path, side)
 
     def holding(self, low: Array, high: Array) -> tuple[Array, Array]:
         """Motor torques that hold a load between `low` and `high` (...) [N*m] at standstill."""
-        return held(self.elements, low, high)
+        return held(self.path, low, high)
 
     def warm(self, rise: Array) -> DCMotor:
         """The motor with its winding warmer than the data sheet's by `rise` (...) [K].
@@ -148,7 +168,7 @@ class JointModel:
         *inner, last = self.stages or (_MOTOR_STAGE,)
         # The motor's stage stays at the motor: behind an element that was added there.
         stages = {stage: self.stages[stage] for stage in inner}
-        return Chain(self.name, self.elements, self.motor, stages | {last: self.elements[-1].name})
+        return Chain(self.name, self.path, self.motor, stages | {last: self.path[-1].name})
 
 
 def joints_of(chain: Chain | None, names: tuple[str, ...]) -> tuple[JointModel, ...]:

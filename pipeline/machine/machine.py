@@ -84,6 +84,7 @@ class MachineModel:
         bodies: Changes of bodies, ground and contact.
         actuators: One per joint.
         links: Moving link's name to the joint that carries it.
+        identified: Links whose inertial parameters a log has shown: they have no tolerance.
     """
 
     name: str
@@ -96,6 +97,7 @@ class MachineModel:
     bodies: Bodies = field(default_factory=Bodies)
     actuators: tuple[JointModel, ...] = ()
     links: Mapping[str, str] = field(default_factory=dict)
+    identified: tuple[str, ...] = ()
 
     @cached_property
     def drivetrains(self) -> Drivetrains:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import scipy.stats
 from numpy.typing import NDArray
 
 from pipeline.regression.laws.base_parameters import base_set
@@ -106,11 +107,33 @@ class Reporting(Standing):
             tuple(frictions),
             tuple(self.couplings),
             {key: float(x[fit.system.where[key]]) for key in keys},
+            {key: float(t * error[fit.system.where[key]]) for key in keys},
+            x[:nb],
+            self._bodies_half(fit, keys, error, t),
+            self.refit_share,
             tuple(self.noise),
             self.rows.cutoff,
             len(self.blocks),
             self.rows.sigma_v,
         )
+
+    def _bodies_half(self, fit: Fit, keys: Sequence[Key], error: Array, t: float) -> Array:
+        """Half of the intervals of body parameters, (10 B,).
+
+        What the motion does not tell does not scatter from block to block either: there the
+        uncertainty of the URDF counts, as far as the log leaves it (the curvature of the fit).
+        """
+        nb = fit.n_bodies
+        if not fit.prior.refit:
+            return np.zeros(nb)
+        at = fit.columns(keys)
+        gram, _ = fit.normal(self.weight, at)
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        inverse = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        own = np.zeros(nb)
+        count = len(fit.free_bodies)
+        own[fit.free_bodies] = np.sqrt(np.maximum(np.diag(inverse)[:count], 0.0)) / scale[:count]
+        return np.asarray(np.maximum(t * error[:nb], scipy.stats.norm.ppf(0.975) * own))
 
     def _base(
         self, x: Array, replicas: Array, t: float

@@ -124,6 +124,10 @@ class Result:
         friction: Of every joint.
         couplings: Found.
         sizes: Of every column in the model: (place, term) to value.
+        halves: Half of the 95 % interval of the same.
+        bodies: Parameters of the bodies, (10 B,).
+        bodies_half: Half of their 95 % intervals; what the motion does not tell has the URDF's.
+        refit_share: Of draws of the log's blocks in which fitted bodies predict better.
         noise: Of every joint.
         cutoff: Up to which the model was fitted [Hz].
         blocks: Number of blocks.
@@ -140,6 +144,10 @@ class Result:
     friction: tuple[Friction, ...]
     couplings: tuple[Coupling, ...]
     sizes: Mapping[tuple[str, str], float]
+    halves: Mapping[tuple[str, str], float]
+    bodies: Array
+    bodies_half: Array
+    refit_share: float
     noise: tuple[Colour, ...]
     cutoff: float
     blocks: int

@@ -51,6 +51,7 @@ class State:
         self.friction: Array | None = None
         self.sigma = 1.0
         self.bend = 0.1
+        self.refit_share = 0.0
         self.bends = frozenset(bends())
         self.choices = [general(j) for j in range(model.nv)]
         self._block(5.0)

@@ -82,7 +82,7 @@ class Effects:
         edited = self.apply(bare).actuators
         if not self.counts_in(actuators.name):
             edited = tuple(
-                replace(new, elements=old.elements, coupled_to="", coupling=0.0)
+                replace(new, elements=old.elements, output=(), coupled_to="", coupling=0.0)
                 for old, new in zip(bare.actuators, edited, strict=True)
             )
         if all(
@@ -139,7 +139,8 @@ class Effects:
 
 def _drivetrain(actuator: JointModel) -> tuple[object, ...]:
     """What stands between joint and motor."""
-    return (*map(id, actuator.elements), actuator.coupled_to, actuator.coupling)
+    elements = (*actuator.output, *actuator.elements)
+    return (*map(id, elements), actuator.coupled_to, actuator.coupling)
 
 
 def effects(
@@ -169,7 +170,7 @@ def effects(
     """
     bare = machine_of_robot(robot, actuators)
     machine = apply(bare)
-    model = changed_model(robot.model, machine.bodies)
+    model = changed_model(machine.rigid, machine.bodies)
     edited = robot if model is robot.model else replace(robot, model=model)
     own = actuators.name if found_with is None else found_with
     return Effects(edited, file, names, own, apply, bare, machine, warnings)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.chain import moved
 from actuators.elements.motor import DCMotor
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import ModelError
@@ -150,35 +151,52 @@ class Simulator:
         wind = np.zeros_like(q)
         for k, a in enumerate(model.actuators):
             if a.wound:
-                wind[:, k] = m.lowpass(a.wind(_load(model, k, q, torque)))
+                wind[:, k] = m.lowpass(a.wind(self._load(model, k, q, torque)))
         rate = m.derivative(wind)
         bend = m.derivative(rate)
         q = q - wind
         return q, self._bodies.torque(model, (q, m.v - rate, m.a - bend))
+
+    def _load(self, model: MachineModel, k: int, q: Array, torque: Array) -> Array:
+        """What one motor's transmission has to supply, at the joint side, (N,) [N*m]."""
+        m, joints = self.measurement, model.actuators
+
+        def demand(i: int) -> Array:
+            asked = joints[i].beside(q[:, i], torque[:, i])
+            if not joints[i].apart:
+                return asked
+            own = self._side(i, (q[:, i], m.v[:, i], m.a[:, i]), asked)
+            return np.asarray(moved(joints[i].apart, own).torque[:, 0])
+
+        return model.drivetrains.load(k, demand)
+
+    def _side(self, k: int, motion: tuple[Array, Array, Array], torque: Array) -> ShaftSeries:
+        """The joint side of one joint's drivetrain, for a motion and its load, (N,) each."""
+        m = self.measurement
+        position, velocity, acceleration = (x[:, None] for x in motion)
+        return ShaftSeries(
+            joints=(m.joints[k],),
+            time=m.time,
+            position=position,
+            velocity=velocity,
+            acceleration=acceleration,
+            torque=torque[:, None],
+            direction=np.tanh(velocity / m.rest_speed[k]),
+        )
 
     def _joint(
         self, model: MachineModel, k: int, q: Array, torque: Array, motor: Array
     ) -> tuple[Array, Array]:
         """Motor torque at the joint side (N,) and effort channels (N, C) of one joint."""
         m, a, drives = self.measurement, model.actuators[k], model.drivetrains
-        load = _load(model, k, q, torque)
+        load = self._load(model, k, q, torque)
         position, velocity, acceleration = (drives.turned(k, x) for x in (m.q, m.v, m.a))
         if a.wound and not m.at_motor:
             wind = m.lowpass(a.wind(load))
             rate = m.derivative(wind)
             position, velocity = position + wind, velocity + rate
             acceleration = acceleration + m.derivative(rate)
-        shaft = a.at_motor(
-            ShaftSeries(
-                joints=(a.name,),
-                time=m.time,
-                position=position[:, None],
-                velocity=velocity[:, None],
-                acceleration=acceleration[:, None],
-                torque=load[:, None],
-                direction=np.tanh(velocity / m.rest_speed[k])[:, None],
-            )
-        )
+        shaft = a.at_motor(self._side(k, (position, velocity, acceleration), load))
         shaft_torque, speed = shaft.torque[:, 0], shaft.velocity[:, 0]
         at_joint = shaft_torque * a.ratio
         brought = at_joint + drives.carried(k, motor)
@@ -260,12 +278,6 @@ class Simulator:
                 raise ModelError(
                     f"channel '{channel}' is not known; torque, current, voltage, power"
                 )
-
-
-def _load(model: MachineModel, k: int, q: Array, torque: Array) -> Array:
-    """What one motor's transmission has to supply, at the joint side, (N,) [N*m]."""
-    joints = model.actuators
-    return model.drivetrains.load(k, lambda i: joints[i].beside(q[:, i], torque[:, i]))
 
 
 def _winding(a: JointModel) -> tuple[float, float, float]:

@@ -14,7 +14,17 @@ from pipeline.effects.drive.torque_constant_error import TorqueConstantError
 from pipeline.effects.registry import effect_named
 from pipeline.effects.sensing.effort_gain import EffortGain
 from pipeline.identification.compare.circumstances import WHOLE, Where
-from pipeline.identification.results import Estimate, Found, Naming, Remainder
+from pipeline.identification.results import (
+    APPROXIMATE,
+    CONFIRMED,
+    SUSPECTED,
+    Estimate,
+    Found,
+    Member,
+    Naming,
+    Remainder,
+    named,
+)
 from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import PROVE, Measurement
 from pipeline.simulation.energy_change import PAIR, EnergyChange
@@ -27,6 +37,8 @@ STANDS_OUT = 1.25
 GAIN, CONSTANT = EffortGain.name, TorqueConstantError.name
 #: Effects that the first lines tell in full.
 TOLD = 3
+#: Parameters of one effect that a sentence tells.
+MANY = 6
 #: Held-out rows turn one way where less than this share turns the other way.
 ONE_WAY = 0.05
 #: A change of energy below this is none, as a share.
@@ -93,17 +105,23 @@ def what_words(naming: Naming, channels: Sequence[str], *, unexplained: bool) ->
             f"**What:** nothing is missing. {naming.tried} candidates were tried and none is "
             "needed beyond the stated tolerances of the machine's parts."
         )
-    sure = [f for f in naming.found if not f.doubtful]
-    nearest = [f for f in naming.found if f.doubtful]
+    sure, near, suspected = (
+        [f for f in naming.found if f.level == level]
+        for level in (CONFIRMED, APPROXIMATE, SUSPECTED)
+    )
     text = "**What:** "
     if sure:
         text += f"the model lacks {_named(sure)}."
-    else:
+    if near:
+        text += " Approximate" if sure else "approximate"
+        text += (
+            f", closing a large part though the law or its size is not exactly the machine's: "
+            f"{_named(near)}."
+        )
+    if not sure and not near:
         text += "no effect of the catalogue explains it."
-    if nearest:
-        joined = "come" if len(nearest) > 1 else "comes"
-        text += f" Nearest to what is {'left ' if sure else ''}missing {joined} {_named(nearest)},"
-        text += " doubtful; `--keep-doubtful` writes doubtful names into the model file, too."
+    if suspected:
+        text += f" Suspected, and not written into the model file: {_named(suspected)}."
     if len(naming.found) == 1:
         text += f" {meaning(naming.found[0].effect)}"
     return text + scale_words(naming.found, channels)
@@ -132,12 +150,34 @@ def scale_words(found: Sequence[Found], channels: Sequence[str]) -> str:
 
 def _named(found: Sequence[Found]) -> str:
     """Effects with their places, the first ones with their parameters."""
-    parts = [
-        f"**{f.effect} at {place_text(f.place)}** ({parameters_text(f.parameters)})"
-        for f in found[:TOLD]
-    ]
-    parts += [f"{f.effect} at {place_text(f.place)}" for f in found[TOLD:]]
+    parts = [_with_parameters(f) for f in found[:TOLD]]
+    parts += [named(f) for f in found[TOLD:]]
     return _listed(parts)
+
+
+def _with_parameters(f: Found) -> str:
+    """One finding; of many parameters the page's table tells the rest."""
+    if len(f.members) > 1:
+        sizes = _ranges(f.members)
+        return f"**{named(f)}**" + (f" ({sizes})" if sizes else "")
+    if len(f.parameters) > MANY:
+        return f"**{named(f)}**"
+    return f"**{named(f)}** ({parameters_text(f.parameters)})"
+
+
+def _ranges(members: Sequence[Member]) -> str:
+    """From the least to the largest of every parameter of like findings; empty where many."""
+    by: dict[str, list[Estimate]] = {}
+    for member in members:
+        for p in member.parameters:
+            by.setdefault(p.name, []).append(p)
+    if len(by) > MANY:
+        return ""
+    return "; ".join(
+        f"{name} {number(min(p.value for p in own))} to {number(max(p.value for p in own))}"
+        f"{_unit(own[0].unit)}"
+        for name, own in by.items()
+    )
 
 
 def meaning(effect: str) -> str:
@@ -215,14 +255,14 @@ def shrink_words(
         )
     text += f", root mean square (noise floor {number(noise)} {unit})."
     if left_out and pairs:
-        names = "doubtful name is" if left_out == 1 else "doubtful names are"
+        names = "suspected name is" if left_out == 1 else "suspected names are"
         text += f" {left_out} {names} not in that file, nor in that number."
     return text
 
 
 def _fall(f: Found, joint: str) -> str:
     """What one effect closes at the joint where it shows."""
-    effect = f"{f.effect} at {place_text(f.place)}"
+    effect = named(f)
     if math.isnan(f.gap_before):
         return f"{effect} cannot be proved: no row of {joint} is held out"
     share = removed(f.gap_before, f.gap_after, f.noise_floor)
@@ -346,11 +386,9 @@ def doubts(found: Sequence[Found]) -> list[str]:
     for f in found:
         if f.rivals:
             others = _listed([f"{name} at {place_text(place)}" for name, place in f.rivals])
-            parts.append(
-                f"{f.effect} at {place_text(f.place)} cannot be told from {others} on this motion"
-            )
-        if f.doubtful:
-            parts.append(f"{f.effect} at {place_text(f.place)} is doubtful: {f.doubtful}")
+            parts.append(f"{named(f)} cannot be told from {others} on this motion")
+        if f.reason:
+            parts.append(f"{named(f)} is {f.level}: {f.reason}")
     return parts
 
 

@@ -49,7 +49,10 @@ CANDIDATES = {
 FOUND: dict[str, Meaning] = {
     "order": ("in which it was accepted; one row per parameter", "1", "no."),
     "effect": ("name in the catalogue of effects", ""),
+    "law": ("which of the effect's laws; empty where it has but one", ""),
+    "amounts_to": ("effects of one term each that the law is the sum of, joined by +", ""),
     "joint": ("joint it acts at; empty where it acts on all", ""),
+    "place": ("joints, link, column or ground it acts on, joined by +", ""),
     "parameter": ("of the effect", ""),
     "value": ("best estimate", "see unit"),
     "ci_low": ("lower end of the 95 % interval", "see unit", "95 % from"),
@@ -62,7 +65,13 @@ FOUND: dict[str, Meaning] = {
     "gap_after": ("the same with it", "see gap_unit"),
     "gap_unit": ("unit of both gaps and the noise floor", ""),
     "noise_floor": ("of the joints it acts on", "see gap_unit"),
-    "doubt": ("why the name is not trusted; empty where it is", ""),
+    "level": ("confirmed, approximate (both written) or suspected (not written)", ""),
+    "share": (
+        "of draws of the log's blocks in which it wins; empty where none were drawn",
+        "1",
+        "share of draws",
+    ),
+    "reason": ("why it is not confirmed; empty where it is", ""),
     "written": ("whether model.toml holds it; one that it leaves out: gap beside the file's", ""),
 }
 

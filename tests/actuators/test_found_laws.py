@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +13,11 @@ from scipy.integrate import solve_ivp
 from actuators.elements.directional import DirectionalFriction
 from actuators.elements.element import Element
 from actuators.elements.friction import Friction
+from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
 from actuators.elements.inertia import Inertia
+from actuators.elements.joint_friction import JointFriction
+from actuators.elements.loaded_friction import LoadedFriction, erf
 from actuators.elements.position_torque import ParallelSpring, Ripple
 from actuators.elements.quadrant import QuadrantFriction
 from actuators.elements.ratio import Ratio
@@ -24,6 +29,29 @@ LAWS = [
     Stribeck("s", excess=2.0, speed=0.1),
     DirectionalFriction("d", positive=2.0, negative=0.5),
     QuadrantFriction("q", when_driving=0.2, when_driven=0.05),
+    JointFriction(
+        "f",
+        coulomb=0.5,
+        viscous=0.3,
+        asymmetry=-0.2,
+        excess=0.4,
+        stribeck_speed=0.2,
+        quadratic=0.1,
+        saturating=0.3,
+        saturation_speed=0.5,
+        when_driving=0.4,
+        when_driven=0.1,
+        rise=0.02,
+    ),
+    FrictionCurve(
+        "c",
+        speeds=(0.0, 0.5, 2.0),
+        levels=(0.5, 0.8, -0.2),
+        asymmetries=(0.0, 0.3, -0.2),
+        shares=(0.1, 0.3, 0.2),
+        viscous=0.4,
+        rise=0.05,
+    ),
 ]
 
 
@@ -63,9 +91,14 @@ def test_driving_inverts_moving(law: Element) -> None:
 
 @pytest.mark.parametrize("law", LAWS, ids=lambda e: e.name)
 def test_holding_ends_where_motion_sets_in(law: Element) -> None:
-    """Friction at standstill is the limit of friction in either sense, for every load."""
+    """Friction at standstill is the limit of friction in either sense, for every load.
+
+    What rises over some speed stands for presliding, and holds with its whole level.
+    """
+    if isinstance(law, LoadedFriction):
+        law = replace(law, rise=0.0)
     load = np.array([[5.0, -5.0, 0.3, -0.3, 0.0]])
-    slow = 1e-9
+    slow = 1e-12
     limits = []
     for sign in (1.0, -1.0):
         v = np.full_like(load, sign * slow)
@@ -230,3 +263,73 @@ def test_a_motor_that_would_melt_is_warmed_to_an_end() -> None:
     cold = Heating(rise=-9000.0).temperature_rise(np.arange(100.0), np.zeros(100))
     assert cold.min() == -500.0
     assert warm_torque_constant(0.03, rise).min() > 0.0
+
+
+def test_the_error_function_is_that_of_the_standard_library() -> None:
+    x = np.linspace(-6.0, 6.0, 241)
+    assert np.allclose(erf(x), [math.erf(value) for value in x], atol=2e-7, rtol=0.0)
+    assert erf(np.zeros(1))[0] == 0.0
+
+
+def test_dry_friction_rises_over_the_stated_speed_and_is_whole_beyond() -> None:
+    law = JointFriction("f", coulomb=2.0, rise=0.1)
+    side = series([0.0, 0.1, -0.1, 1.0], [0.0] * 4)
+    one_sigma = 2.0 * math.erf(1.0 / math.sqrt(2.0))
+    assert np.allclose(law.moving(side).torque[:, 0], [0.0, one_sigma, -one_sigma, 2.0], atol=1e-6)
+
+
+def test_a_joint_law_of_one_term_is_that_of_the_catalogue() -> None:
+    rng = np.random.default_rng(5)
+    side = series(list(rng.normal(size=50)), list(rng.normal(size=50)))
+    pairs = [
+        (JointFriction("f", coulomb=0.3, viscous=0.2), Friction("g", coulomb=0.3, viscous=0.2)),
+        (
+            JointFriction("f", when_driving=0.2, when_driven=0.1),
+            QuadrantFriction("g", when_driving=0.2, when_driven=0.1),
+        ),
+        (
+            JointFriction("f", excess=0.3, stribeck_speed=0.4),
+            Stribeck("g", excess=0.3, speed=0.4),
+        ),
+    ]
+    for one, other in pairs:
+        assert np.allclose(one.moving(side).torque, other.moving(side).torque)
+        assert np.allclose(one.driving(side).torque, other.driving(side).torque)
+        held = (law.holding(side.torque, side.torque) for law in (one, other))
+        assert np.allclose(*held)
+
+
+def test_a_friction_curve_goes_through_its_knots_and_on() -> None:
+    curve = FrictionCurve(
+        "c",
+        speeds=(0.0, 1.0, 2.0),
+        levels=(0.5, 1.0, 2.0),
+        asymmetries=(0.0, 0.2, 0.2),
+        shares=(0.1, 0.1, 0.1),
+    )
+    side = series([1.0, -1.0, 3.0, 1.5], [0.0, 0.0, 10.0, -10.0])
+    expected = [1.2, 0.2 - 1.0, 13.0 + 0.2 + 1.0, -10.0 + 1.5 + 0.2 + 1.0]
+    assert np.allclose(curve.moving(side).torque[:, 0], expected)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"speeds": (0.1, 1.0)},
+        {"speeds": (0.0, 0.0)},
+        {"levels": (0.1, -0.1)},
+        {"asymmetries": (0.0, 0.3)},
+        {"shares": (0.0, 1.0)},
+        {"levels": (0.1,)},
+    ],
+)
+def test_a_curve_that_would_give_energy_or_has_no_shape_is_refused(wrong: dict[str, Any]) -> None:
+    right = {"speeds": (0.0, 1.0), "levels": (0.1, 0.1), "asymmetries": (0.0, 0.0)}
+    FrictionCurve("c", **{**right, "shares": (0.0, 0.0)})
+    with pytest.raises(UnphysicalElementError):
+        FrictionCurve("c", **{**right, "shares": (0.0, 0.0), **wrong})
+
+
+def test_viscous_friction_by_direction_may_not_give_energy() -> None:
+    with pytest.raises(UnphysicalElementError, match="asymmetry"):
+        JointFriction("f", viscous=0.1, asymmetry=0.2)

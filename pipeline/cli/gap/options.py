@@ -58,11 +58,6 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         help="prove on this last share of every log instead of on blocks in between",
     )
     sub.add_argument(
-        "--keep-doubtful",
-        action="store_true",
-        help="write effects whose name is doubted into the model file, too, marked as such",
-    )
-    sub.add_argument(
         "--out", type=named_path, default=DEFAULT_OUT, help="folder for everything written"
     )
     add_decimal_option(sub)

@@ -30,7 +30,7 @@ from pipeline.identification.workflow.forward import Drive, by_model, forward, r
 from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where, judged
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
-from pipeline.identification.workflow.story import Story, Told, tell
+from pipeline.identification.workflow.story import Story, Told, signature_name, tell
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
 from reports.folder.staging import staged
@@ -152,10 +152,11 @@ def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None
     unit = story.naming.unit
     write_waterfall(weighed.stages, story.noise, unit, model.name, folder)
     write_in_time(where.measurements, weighed.stages[1], weighed.stages[-1], told.shown, folder)
-    shown = zip(story.naming.found, story.signatures, weighed.pairs, weighed.joints, strict=True)
-    for found, name, pair, joint in shown:
-        stem = Path(name).stem
-        write_signature(where.measurements, *pair, joint, found.effect, found.place, stem, folder)
+    for found, pair, joint in zip(story.naming.found, weighed.pairs, weighed.joints, strict=True):
+        name = signature_name(found)
+        if name in story.signatures:
+            stem, place = Path(name).stem, found.place
+            write_signature(where.measurements, *pair, joint, found.effect, place, stem, folder)
     footer = (
         f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "
         "input hashes, versions."

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from actuators.elements.friction import Friction
 from actuators.elements.inertia import Inertia
+from actuators.elements.joint_friction import JointFriction
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
@@ -30,6 +31,7 @@ class TransmissionCoupling(Effect):
         Parameter("inertia", "kg*m^2", 0.0, 1e3),
         Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
         Parameter("coulomb", "N*m", 0.0, 1e3),
+        Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
     )
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("ratio", 1e-3, signed=True),)
     signature = "velocity of the other joint"
@@ -104,9 +106,12 @@ def _refuse_circle(model: MachineModel, place: Place) -> None:
 
 def with_shaft(actuator: JointModel, values: Values) -> JointModel:
     """An actuator with inertia and friction at its shaft."""
-    name = TransmissionCoupling.name
+    name, rise = TransmissionCoupling.name, values.get("rise", 0.0)
+    coulomb, viscous = values["coulomb"], values["viscous"]
     actuator = actuator.with_element(
-        Friction(name=name, coulomb=values["coulomb"], viscous=values["viscous"])
+        JointFriction(name=name, rise=rise, coulomb=coulomb, viscous=viscous)
+        if rise
+        else Friction(name=name, coulomb=coulomb, viscous=viscous)
     )
     return actuator.with_element(Inertia(name=f"{name}_inertia", inertia=values["inertia"]))
 

@@ -230,12 +230,15 @@ class Problem:
 
         Columns at untouched joints are kept.
         """
-        before = self.model
+        before, tolerances = self.model, self.tolerances
+        if model.identified != before.identified:
+            tolerances = nuisances(model, [b.measurement for b in self.benches])
         other = replace(
             self,
             model=model,
             accepted=(),
-            held=np.zeros_like(self.held),
+            tolerances=tolerances,
+            held=np.zeros(len(tolerances)),
             _columns=dict(self._columns),
             _computed=_Computed(near=self.predictions()),
         )
@@ -248,7 +251,7 @@ class Problem:
             for k, (old, new) in enumerate(pairs)
             if old.motor is not new.motor or old.gains != new.gains
         }
-        touched |= self._shifted(self.held, other.held)
+        touched |= self._shifted(self.held, np.zeros_like(self.held))
         for key, per_log in self._columns.items():
             joints = {j for column in per_log for j in column}
             if joints & scaled or (joints & touched and not key.of_body):

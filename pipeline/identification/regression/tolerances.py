@@ -140,7 +140,7 @@ def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple
     out = []
     com = CenterOfMassOffset()
     for link, joint in model.links.items():
-        if not felt(model, m, joint):
+        if link in model.identified or not felt(model, m, joint):
             continue
         lever = com.tolerance(model, (link,))
         out.append(Nuisance("mass", link, MASS_TOLERANCE, "1"))

@@ -6,7 +6,7 @@ looked at here: `weigh` holds the model that came of it against those rows.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -38,27 +38,47 @@ class Identified:
         naming: Results.
         model: With the accepted effects, tolerances as the files state them.
         problem: The least-squares problem at the end.
+        enough: Whether no more effects than were allowed are needed.
     """
 
     naming: Naming
     model: MachineModel
     problem: Problem
+    enough: bool = True
+
+    @property
+    def excess(self) -> Array:
+        """What is left on *choose*, by joint and channel, in noise floors, (J, C)."""
+        squares, rows = errors(self.problem, (CHOOSE,))
+        excess = np.sqrt(squares) / self.problem.floor
+        return np.where(rows[:, None] > 0, excess, 0.0)
 
 
-def identify(model: MachineModel, measurements: Sequence[Measurement]) -> Identified:
+def identify(
+    model: MachineModel,
+    measurements: Sequence[Measurement],
+    *,
+    most: int | None = None,
+    without: Collection[str] = (),
+) -> Identified:
     """Name what the model lacks.
 
     Args:
         model: What the engineer has.
         measurements: Logs with parts, from `observe`.
+        most: Effects at most; where more are needed the answer says so and is not worked out.
+        without: Names of effects that do not compete.
 
     Raises:
         NamingError: A part of the data has no usable row.
         ModelError: Model and logs do not fit.
     """
     start = Problem(model, make_benches(measurements), floor_of(measurements))
-    selection = select(start)
+    selection = select(start, most=most, without=without)
     channel = measurements[0].channels[0]
+    if not selection.enough:
+        naming = Naming((), (), {}, selection.tried, channel, CHANNEL_UNITS[channel])
+        return Identified(naming, model, selection.problem, enough=False)
     found = _found(selection, channel)
     if selection.nearest and found[-1].valid_after > limits.IDLE * found[-1].valid_before:
         selection, found = selection.without_nearest(), found[:-1]
@@ -133,7 +153,7 @@ def _found(selection: Selection, channel: str) -> tuple[Found, ...]:
                 unit=unit,
                 noise_floor=_rms(problem.floor**2, touched, c),
                 excitation=a.effect.excitation,
-                doubtful=(
+                reason=(
                     limits.NEAREST
                     if key == selection.nearest
                     else _doubt(problem, number, intervals[number].certain)
@@ -202,9 +222,9 @@ def _doubt(problem: Problem, number: int, certain: bool) -> str:
     a = problem.accepted[number]
     further = {name: 1.1 * value for name, value in a.x.items()}
     if not a.effect.plausible(problem.model, a.place, further, a.shape):
-        return "its estimate runs into the bound of what can be"
+        return limits.BOUND
     if not certain:
-        return "beside the other effects found its size may be nothing at all"
+        return limits.NOTHING
     return ""
 
 
@@ -215,19 +235,32 @@ def _second_thoughts(problem: Problem, found: list[Found]) -> tuple[Found, ...]:
         effect = problem.accepted[number].effect
         idle = f.valid_after > limits.IDLE * f.valid_before and not effect.is_tolerance
         _, excess = fit_quality(problem, number)
-        if not f.doubtful and idle and excess > limits.UNEXPLAINED:
-            f = replace(f, doubtful=limits.IDLE_NAME)
+        if not f.reason and idle and excess > limits.UNEXPLAINED:
+            f = replace(f, reason=limits.IDLE_NAME)
         out.append(f)
-    doubted = [k for k, f in enumerate(out) if f.doubtful not in ("", limits.IDLE_NAME)]
+    doubted = [k for k, f in enumerate(out) if f.reason not in ("", limits.IDLE_NAME)]
     shaken = {j for k in doubted for j in _touched(problem, k)}
     for k, f in enumerate(out):
         _, excess = fit_quality(problem, k)
         near = shaken & set(_touched(problem, k))
         small = excess > limits.UNEXPLAINED and not _dwarfs(problem, k)
-        if near and not f.doubtful and small:
+        if near and not f.reason and small:
             joints = ", ".join(problem.model.joints[j] for j in sorted(near))
-            out[k] = replace(f, doubtful=f"what else was found in {joints} is doubtful itself")
-    return tuple(out)
+            out[k] = replace(f, reason=f"what else was found in {joints} is doubtful itself")
+    return tuple(replace(f, level=_level(f)) for f in out)
+
+
+def _level(f: Found) -> str:
+    """How far a finding is to be trusted, by why it is not sure and what it closes.
+
+    What may be nothing, stands at a bound or closes nothing is no part of a model.
+    """
+    if not f.reason:
+        return limits.CONFIRMED
+    if f.reason in (limits.NOTHING, limits.BOUND, limits.IDLE_NAME):
+        return limits.SUSPECTED
+    closes = 1.0 - (f.valid_after / f.valid_before) ** 2 if f.valid_before > 0 else 0.0
+    return limits.APPROXIMATE if closes > limits.NEAREST_SHARE else limits.SUSPECTED
 
 
 def _dwarfs(problem: Problem, number: int) -> bool:

@@ -6,7 +6,7 @@ one. `verdict` holds every threshold. *prove* has no say: it is looked at when a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,6 +67,7 @@ class Selection:
         tried: Candidates screened, shapes not counted.
         nearest: What was added last though its case does not stand, where nothing better explains
             a large gap.
+        enough: Whether no more effects than were allowed are needed.
     """
 
     problem: Problem
@@ -76,6 +77,7 @@ class Selection:
     trials: dict[Key, Trial]
     tried: int
     nearest: Key | None = None
+    enough: bool = True
 
     def without_nearest(self) -> Selection:
         """The same where what came nearest is not offered after all."""
@@ -83,11 +85,15 @@ class Selection:
         return replace(self, problem=problem, rounds=self.rounds[:-1], nearest=None)
 
 
-def select(problem: Problem) -> Selection:
+def select(
+    problem: Problem, *, most: int | None = None, without: Collection[str] = ()
+) -> Selection:
     """Accept effects until none is needed any more.
 
     Args:
         problem: Without effects, its noise level decided.
+        most: Effects at most; the answer says where more would be needed, and is not worked out.
+        without: Names of effects that do not compete.
     """
     rounds: list[Round] = []
     trials: dict[Key, Trial] = {}
@@ -95,10 +101,14 @@ def select(problem: Problem) -> Selection:
     refused: set[Key] = set()
     made: list[Trial] = []
     problem = refit(problem)
+
+    def offered() -> list[Effect]:
+        return [e for e in catalogue(problem.current()) if e.name not in without]
+
     while True:
         screen = Screen(problem)
         held = [(a.effect.name, a.place) for a in problem.accepted]
-        scores = score_all(screen, catalogue(problem.current()), skip=held)
+        scores = score_all(screen, offered(), skip=held)
         if not first:
             first = tuple(scores)
             noise = problem.richest()
@@ -106,7 +116,7 @@ def select(problem: Problem) -> Selection:
                 # The log holds more than noise and the catalogue: judge against what is left.
                 problem = refit(problem.rescaled(noise))
                 screen = Screen(problem)
-                scores = score_all(screen, catalogue(problem.current()), skip=held)
+                scores = score_all(screen, offered(), skip=held)
                 first = tuple(scores)
         tried = len(first)
         if len(problem.accepted) >= limits.MOST_EFFECTS * len(problem.model.joints):
@@ -128,6 +138,10 @@ def select(problem: Problem) -> Selection:
             trials.setdefault(t.key, t)
         if not good:
             break
+        if most is not None and len(problem.accepted) >= most:
+            return Selection(
+                problem, tuple(rounds), first, tuple(scores), trials, tried, enough=False
+            )
         winner = _preferred(problem, good)
         rivals = _rivals(problem, winner, made)
         added = _accepted(winner)
@@ -141,7 +155,7 @@ def select(problem: Problem) -> Selection:
             continue
         rounds.append(Round(winner.key, winner, rivals))
         problem = candidate
-    problem, rounds = _reconsidered(problem, rounds, tried)
+    problem, rounds = _reconsidered(problem, rounds, tried, without)
     problem, rounds = _dissolved(problem, rounds)
     nearest = None
     if (best := _nearest(problem, made)) is not None:
@@ -248,7 +262,7 @@ def _related(a: Effect, b: Effect) -> bool:
 
 
 def _reconsidered(
-    problem: Problem, rounds: Sequence[Round], tried: int
+    problem: Problem, rounds: Sequence[Round], tried: int, without: Collection[str]
 ) -> tuple[Problem, list[Round]]:
     """With every effect chosen anew while the others stay: what came early was judged alone.
 
@@ -262,7 +276,9 @@ def _reconsidered(
             others = [o for k, o in enumerate(problem.accepted) if k != number]
             rest = refit(problem.with_accepted(others))
             screen = Screen(rest)
-            made = [try_candidate(rest, refine(screen, s)) for s in _again(screen, a, others)]
+            made = [
+                try_candidate(rest, refine(screen, s)) for s in _again(screen, a, others, without)
+            ]
             good = [t for t in made if acceptable(rest, t, tried)]
             if not good:
                 continue
@@ -312,12 +328,15 @@ def _dissolved(problem: Problem, rounds: Sequence[Round]) -> tuple[Problem, list
     return problem, out
 
 
-def _again(screen: Screen, a: Accepted, others: Sequence[Accepted]) -> list[Score]:
+def _again(
+    screen: Screen, a: Accepted, others: Sequence[Accepted], without: Collection[str]
+) -> list[Score]:
     """What may stand in the place of an accepted effect, itself among it."""
     held = [(o.effect.name, o.place) for o in others]
     problem = screen.problem
     if others:
-        scores = score_all(screen, catalogue(problem.current()), skip=held, near=a.place)
+        offered = [e for e in catalogue(problem.current()) if e.name not in without]
+        scores = score_all(screen, offered, skip=held, near=a.place)
         return [s for s in scores[:_TRIED] if s.gain > 0.7 * least_gain(problem, s)]
     every = [(a.effect, a.shape), *((effect_named(name), {}) for name in a.effect.contains)]
     scored = [screen.score(effect, a.place, shape) for effect, shape in every]

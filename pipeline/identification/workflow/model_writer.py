@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,38 +11,37 @@ import tomlkit
 
 from pipeline.effects.model_file import SCHEMA, Edit, EditParameter, ModelFile
 from pipeline.effects.registry import effect_named
-from pipeline.identification.results import Found
+from pipeline.identification.results import Estimate, Found
 
 
-def edits_of(
-    found: Sequence[Found], source: str, *, keep_doubtful: bool = False
-) -> tuple[Edit, ...]:
-    """Edits of the effects that naming accepted.
+def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
+    """Edits of what belongs into a model file, what is only suspected left out.
 
     Args:
-        found: From naming.
+        found: From identification.
         source: The logs and their hashes, in words.
-        keep_doubtful: Whether those whose name is doubted are among them.
     """
     return tuple(
         Edit(
             effect=one.effect,
-            place=one.place,
-            parameters=_in_order(one),
+            place=member.place,
+            parameters=_in_order(one.effect, member.parameters),
             source=source,
-            basis="doubtful" if one.doubtful else "identified",
+            level=member.level,
+            share=member.share,
         )
         for one in found
-        if keep_doubtful or not one.doubtful
+        if one.kept
+        for member in one.each
     )
 
 
-def _in_order(found: Found) -> tuple[EditParameter, ...]:
+def _in_order(effect: str, parameters: Sequence[Estimate]) -> tuple[EditParameter, ...]:
     """Parameters in the effect's order, in which a reader has them, too."""
-    names = [p.name for p in effect_named(found.effect).parameters]
+    names = [p.name for p in effect_named(effect).parameters]
     return tuple(
         EditParameter(p.name, p.value, p.unit, (p.low, p.high))
-        for p in sorted(found.parameters, key=lambda p: names.index(p.name))
+        for p in sorted(parameters, key=lambda p: names.index(p.name))
     )
 
 
@@ -79,6 +79,9 @@ def _edit(edit: Edit) -> tomlkit.items.Table:
     table["effect"] = edit.effect
     table["place"] = list(edit.place)
     table["basis"] = edit.basis
+    table["level"] = edit.level
+    if not math.isnan(edit.share):
+        table["share"] = float(edit.share)
     table["source"] = edit.source
     parameters = tomlkit.table()
     for p in edit.parameters:

@@ -37,7 +37,6 @@ class Options:
         effort: Channel to compare; the log's most direct by default.
         cutoff: Bandwidth of the comparison [Hz]; the data's own by default.
         prove_last: Last share of every log that only proves; blocks in between by default.
-        keep_doubtful: Whether doubted effects are written into the model file, too.
         out: Folder for what is written; the model file names its robot relative to it.
         decimal: Sign of decimals in copies of the tables.
     """
@@ -56,6 +55,5 @@ class Options:
     effort: str | None = None
     cutoff: float | None = None
     prove_last: float | None = None
-    keep_doubtful: bool = False
     out: Path = DEFAULT_OUT
     decimal: str = "."

@@ -9,15 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.effects.base import place_text
 from pipeline.effects.model_file import Edit, apply_edits, edits_in
-from pipeline.effects.registry import effect_named
 from pipeline.errors import GaitError, StanceError
 from pipeline.identification.compare.stages import Stage, noise_floor, overall
-from pipeline.identification.results import Found, Naming
+from pipeline.identification.results import Found, Naming, named
 from pipeline.identification.selection.deciding_motion import Deciding
-from pipeline.identification.selection.identify import estimated_alone, identify
+from pipeline.identification.whole.fit import with_found
 from pipeline.identification.workflow.deciding import decide
+from pipeline.identification.workflow.explain import explain
 from pipeline.identification.workflow.locate import Progress, Whereabouts
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.options import Options
@@ -43,7 +42,7 @@ class Story:
         naming: Step 3; without candidates where a model file was checked.
         weighed: The model as written against the logs, effect by effect.
         energy: With and without the effects; None for a robot that does not walk.
-        signatures: File name to caption, one per effect.
+        signatures: File name to caption, one per effect that shows at a joint with rows.
         decides: What the deciding motion is, in words; empty without one.
         remarks: What else a reader should know.
     """
@@ -80,9 +79,9 @@ class Told:
     shown: tuple[int, ...]
 
 
-def with_found(model: MachineModel, found: Sequence[Found]) -> MachineModel:
+def with_every(model: MachineModel, found: Sequence[Found]) -> MachineModel:
     """The model with effects, in order."""
-    return reduce(lambda m, f: effect_named(f.effect).apply(m, f.place, f.values), found, model)
+    return reduce(with_found, found, model)
 
 
 def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -> Effects:
@@ -95,7 +94,7 @@ def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -
     actuators = given.own.actuators(given.catalog, name)
 
     def apply(model: MachineModel) -> MachineModel:
-        return with_found(apply_edits(model, edits), found)
+        return with_every(apply_edits(model, edits), found)
 
     return effects(given.robot, actuators, apply, names, "model.toml", found_with=given.alternative)
 
@@ -132,14 +131,14 @@ def most_improved(before: Stage, after: Stage, found: Sequence[int]) -> tuple[in
 
 
 def added(
-    given: Setup, where: Whereabouts, found: Sequence[Found], out: Path, *, keep_doubtful: bool
+    given: Setup, where: Whereabouts, found: Sequence[Found], out: Path
 ) -> tuple[str, tuple[Edit, ...]]:
     """Step 4: the model file with what was found, and what of it is new, read back from its text.
 
     The text is empty where there is nothing to write.
     """
     logs = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in where.measurements)
-    edits = edits_of(found, logs, keep_doubtful=keep_doubtful)
+    edits = edits_of(found, logs)
     if not edits and not given.file.edits:
         return "", ()
     text = model_text(given.file.with_edits(edits), out)
@@ -152,21 +151,23 @@ def tell(given: Setup, where: Whereabouts, options: Options, progress: Progress)
     Raises:
         GapError: Nothing can be compared.
     """
-    named = identify(given.model, where.measurements)
+    explanation = explain(given, where, progress)
     progress.step("weighing what was found")
 
     def written(found: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
-        keep = bool(options.keep_doubtful)
-        own = estimated_alone(named, [f for f in found if keep or not f.doubtful])
-        alone = {(f.effect, f.place): f for f in own}
-        told = tuple(alone.get((f.effect, f.place), f) for f in found)
-        return told, *added(given, where, told, options.out, keep_doubtful=keep)
+        told = explanation.estimated(tuple(found))
+        return told, *added(given, where, told, options.out)
 
-    weighed = weigh_found(given.model, where, named.naming.found, written)
-    naming = replace(named.naming, found=weighed.found)
+    weighed = weigh_found(given.model, where, explanation.naming.found, written)
+    naming = replace(explanation.naming, found=weighed.found)
     energy = cost(given, [f for f in naming.found if f.written])
     decided = decide(given, given.model, where.measurements, naming.found)
     return gathered(given, where, naming, weighed, energy, decided)
+
+
+def signature_name(f: Found) -> str:
+    """File of the figure that shows an effect's gap against what it depends on."""
+    return f"effect_{f.order}_{f.effect}.svg"
 
 
 def gathered(
@@ -188,12 +189,13 @@ def gathered(
         decided: Deciding motion, and it in words.
     """
     signatures = {
-        f"effect_{f.order}_{f.effect}.svg": (
-            f"{f.effect} at {place_text(f.place)}: the gap of {given.model.joints[j]} against the "
+        signature_name(f): (
+            f"{named(f)}: the gap of {given.model.joints[j]} against the "
             f"variable on which the effect depends, without it and with it."
             + ("" if f.written else " The model file written leaves it out.")
         )
         for f, j in zip(naming.found, weighed.joints, strict=True)
+        if any(m.mask[:, j].any() for m in where.measurements)
     }
     story = Story(
         given=given,

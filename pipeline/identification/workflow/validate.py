@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.model_file import Edit
 from pipeline.effects.registry import effect_named
-from pipeline.identification.results import Estimate, Found, Naming
+from pipeline.identification.results import (
+    APPROXIMATE,
+    CONFIRMED,
+    Estimate,
+    Found,
+    Member,
+    Naming,
+)
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.story import Told, cost, gathered
@@ -16,8 +25,9 @@ def check(given: Setup, where: Whereabouts) -> Told:
     """Gap with and without the model file's effects, tolerances estimated anew for every model."""
     channel = where.measurements[0].channels[0]
     unit = CHANNEL_UNITS[channel]
-    named = [_found(k, edit, unit) for k, edit in enumerate(given.file.edits, start=1)]
-    weighed = weigh_edits(given.bare, where, given.file.edits, named)
+    groups = together(given.file.edits)
+    named = [_found(k, group, unit) for k, group in enumerate(groups, start=1)]
+    weighed = weigh_edits(given.bare, where, groups, named)
     naming = Naming(
         found=weighed.found, candidates=(), tolerances={}, tried=0, channel=channel, unit=unit
     )
@@ -25,19 +35,48 @@ def check(given: Setup, where: Whereabouts) -> Told:
     return gathered(given, where, naming, weighed, energy, None)
 
 
-def _found(number: int, edit: Edit, unit: str) -> Found:
-    """An edit of the model file as something found."""
+def together(edits: Sequence[Edit]) -> list[list[Edit]]:
+    """Edits in order, like ones that follow each other and were fitted together in one group."""
+    out: list[list[Edit]] = []
+    before: tuple[str, str] | None = None
+    for edit in edits:
+        effect = effect_named(edit.effect)
+        kind = (edit.effect, effect.law(edit.values))
+        if kind == before and not effect.competes:
+            out[-1].append(edit)
+        else:
+            out.append([edit])
+        before = kind
+    return out
+
+
+def _found(number: int, group: Sequence[Edit], unit: str) -> Found:
+    """Edits of the model file as something found."""
+    members = tuple(
+        Member(
+            edit.place,
+            tuple(Estimate(p.name, p.value, *p.interval, unit=p.unit) for p in edit.parameters),
+            edit.level,
+            edit.share,
+        )
+        for edit in group
+    )
+    first, several = group[0], len(group) > 1
+    effect = effect_named(first.effect)
+    levels = {edit.level for edit in group}
     return Found(
         order=number,
-        effect=edit.effect,
-        place=edit.place,
-        parameters=tuple(
-            Estimate(p.name, p.value, *p.interval, unit=p.unit) for p in edit.parameters
-        ),
+        effect=first.effect,
+        place=tuple(name for edit in group for name in edit.place),
+        parameters=() if several else members[0].parameters,
         rivals=(),
         valid_before=float("nan"),
         valid_after=float("nan"),
         unit=unit,
         noise_floor=float("nan"),
-        excitation=effect_named(edit.effect).excitation,
+        excitation=effect.excitation,
+        level=CONFIRMED if levels == {CONFIRMED} else APPROXIMATE,
+        share=min(edit.share for edit in group),
+        law=effect.law(first.values),
+        members=members if several else (),
     )

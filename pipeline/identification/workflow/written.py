@@ -7,19 +7,20 @@ whole is simulated. Names that the file leaves out are listed with what each wou
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.effects.base import CHANNEL_UNITS, place_text
+from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.stages import Stage, noise_floor, stages
-from pipeline.identification.results import IDLE_NAME, Found, Remainder
+from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Remainder, named
 from pipeline.identification.selection.residual import remainders
 from pipeline.identification.selection.weigh import Weighing, floor_of
+from pipeline.identification.whole.fit import with_found
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.logs.prepared.measurement import PROVE
 from pipeline.machine.machine import MachineModel
@@ -73,49 +74,47 @@ def weigh_found(
     weighing = Weighing(model, where.measurements)
     while True:
         told, text, edits = written(found)
-        keys = [(edit.effect, edit.place) for edit in edits]
-        models = _models(weighing, model, edits)
-        seen = stages(models, where.measurements)
-        doubted = _worse(model, told, keys, seen)
-        if not doubted:
+        kept = [f for f in told if f.kept]
+        groups = list(_dealt(edits, [len(f.each) for f in kept]))
+        seen = stages(_models(weighing, model, kept, groups), where.measurements)
+        worse = _worse(model, kept, seen)
+        if not worse:
             found = told
             break
         found = [
-            replace(f, doubtful=IDLE_NAME) if (f.effect, f.place) in doubted else f for f in found
+            replace(f, level=SUSPECTED, reason=IDLE_NAME) if f.key in worse else f for f in found
         ]
     last = apply_edits(model, edits)
-    beside = [
-        (_label(f.effect, f.place), weighing.calibrated(_with(last, f)))
-        for f in found
-        if (f.effect, f.place) not in keys
-    ]
-    models = [(AS_IT_WAS, model), *models, *beside]
+    others = [f for f in found if not f.kept]
+    beside = [(named(f), weighing.calibrated(with_found(last, f))) for f in others]
+    models = [(AS_IT_WAS, model), *_models(weighing, model, kept, groups), *beside]
     seen = stages(models, where.measurements, where.intake.long)
-    first = 1 + len(edits)
-    pairs = {key: (seen[k + 1], seen[k + 2]) for k, key in enumerate(keys)}
-    others = [(f.effect, f.place) for f in found if (f.effect, f.place) not in keys]
-    pairs |= {key: (seen[first], seen[first + 1 + k]) for k, key in enumerate(others)}
-    return gathered(model, where, found, seen[: first + 1], pairs, keys, text)
+    first = 1 + len(kept)
+    pairs = {f.key: (seen[k + 1], seen[k + 2]) for k, f in enumerate(kept)}
+    pairs |= {f.key: (seen[first], seen[first + 1 + k]) for k, f in enumerate(others)}
+    return gathered(model, where, found, seen[: first + 1], pairs, text)
 
 
 def weigh_edits(
-    model: MachineModel, where: Whereabouts, edits: Sequence[Edit], found: Sequence[Found]
+    model: MachineModel,
+    where: Whereabouts,
+    groups: Sequence[Sequence[Edit]],
+    found: Sequence[Found],
 ) -> Weighed:
     """Hold the edits of a model file against the logs.
 
     Args:
         model: Before the edits.
         where: Steps 1 and 2.
-        edits: Of the file.
-        found: One per edit.
+        groups: Edits of the file, those together that are told as one.
+        found: One per group.
     """
     weighing = Weighing(model, where.measurements)
-    models = [(AS_IT_WAS, model), *_models(weighing, model, edits)]
+    models = [(AS_IT_WAS, model), *_models(weighing, model, found, groups)]
     seen = stages(models, where.measurements, where.intake.long)
-    keys = [(edit.effect, edit.place) for edit in edits]
     # A file may hold an effect twice: each edit has a pair of its own.
-    pairs = [(seen[k + 1], seen[k + 2]) for k in range(len(keys))]
-    joints = [effect_column(model, f.place, *pair) for f, pair in zip(found, pairs, strict=True)]
+    pairs = [(seen[k + 1], seen[k + 2]) for k in range(len(groups))]
+    joints = [effect_column(model, f, *pair) for f, pair in zip(found, pairs, strict=True)]
     floor = noise_floor(where.measurements)
     told = tuple(
         _told(f, pair, j, float(floor[j]), where, written=True)
@@ -124,23 +123,29 @@ def weigh_edits(
     return Weighed(told, seen, tuple(pairs), tuple(joints), _left(where, seen[-1]))
 
 
+def _dealt(edits: Sequence[Edit], counts: Sequence[int]) -> Iterator[Sequence[Edit]]:
+    """Edits in groups of these sizes."""
+    at = 0
+    for count in counts:
+        yield edits[at : at + count]
+        at += count
+
+
 def gathered(
     model: MachineModel,
     where: Whereabouts,
     found: Sequence[Found],
     seen: tuple[Stage, ...],
     pairs: dict[tuple[str, tuple[str, ...]], tuple[Stage, Stage]],
-    keys: Sequence[tuple[str, tuple[str, ...]]],
     text: str,
 ) -> Weighed:
     """Effects with their proofs, those of the file first to last."""
     floor = noise_floor(where.measurements)
     told, joints, own = [], [], []
     for f in found:
-        key = (f.effect, f.place)
-        pair = pairs[key]
-        j = effect_column(model, f.place, *pair)
-        told.append(_told(f, pair, j, float(floor[j]), where, written=key in keys))
+        pair = pairs[f.key]
+        j = effect_column(model, f, *pair)
+        told.append(_told(f, pair, j, float(floor[j]), where, written=f.kept))
         joints.append(j)
         own.append(pair)
     left = _left(where, seen[-1])
@@ -166,51 +171,44 @@ def _left(where: Whereabouts, last: Stage) -> tuple[Remainder, ...]:
 
 
 def _models(
-    weighing: Weighing, model: MachineModel, edits: Sequence[Edit]
+    weighing: Weighing,
+    model: MachineModel,
+    found: Sequence[Found],
+    groups: Sequence[Sequence[Edit]],
 ) -> list[tuple[str, MachineModel]]:
-    """Labels and models: with tolerances, then with one edit after another."""
+    """Labels and models: with tolerances, then with one group of edits after another."""
     out = [(TOLERANCES, weighing.calibrated(model))]
-    for k, edit in enumerate(edits, start=1):
-        with_it = weighing.calibrated(apply_edits(model, edits[:k]))
-        out.append((_label(edit.effect, edit.place), with_it))
+    edited = model
+    for f, group in zip(found, groups, strict=True):
+        edited = apply_edits(edited, group)
+        out.append((named(f), weighing.calibrated(edited)))
     return out
 
 
 def _worse(
-    model: MachineModel,
-    found: Sequence[Found],
-    keys: Sequence[tuple[str, tuple[str, ...]]],
-    seen: Sequence[Stage],
-) -> list[tuple[str, tuple[str, ...]]]:
-    """Trusted names with which the simulated gap on *choose* is larger than without.
+    model: MachineModel, found: Sequence[Found], seen: Sequence[Stage]
+) -> set[tuple[str, tuple[str, ...]]]:
+    """Names to be written with which the simulated gap on *choose* is larger than without.
 
     Naming judges by a linear step. What a tolerance would have taken up is its own merit.
     """
-    out: list[tuple[str, tuple[str, ...]]] = []
-    for f in found:
-        key = (f.effect, f.place)
-        if f.doubtful or key not in keys or effect_named(f.effect).is_tolerance:
+    out: set[tuple[str, tuple[str, ...]]] = set()
+    for k, f in enumerate(found):
+        # What is fitted together for a whole machine is judged together.
+        if f.members or not effect_named(f.effect).competes or effect_named(f.effect).is_tolerance:
             continue
-        before, after = seen[keys.index(key)], seen[keys.index(key) + 1]
-        j = effect_column(model, f.place, before, after)
+        before, after = seen[k], seen[k + 1]
+        j = effect_column(model, f, before, after)
         if after.valid[j] > before.valid[j]:
-            out.append(key)
+            out.add(f.key)
     return out
 
 
-def effect_column(model: MachineModel, place: Sequence[str], before: Stage, after: Stage) -> int:
+def effect_column(model: MachineModel, found: Found, before: Stage, after: Stage) -> int:
     """Column at which an effect shows: its joint, the one that carries its link, or the largest."""
-    for name in place:
+    for name in () if found.members else found.place:
         owner = name.partition("__")[0]  # of a column of the log
         joint = owner if owner in model.joints else model.links.get(owner, "")
         if joint in model.joints:
             return model.index(joint)
     return int(np.argmax(np.nan_to_num(before.gap - after.gap, nan=-np.inf)))
-
-
-def _with(model: MachineModel, f: Found) -> MachineModel:
-    return effect_named(f.effect).apply(model, f.place, f.values)
-
-
-def _label(effect: str, place: Sequence[str]) -> str:
-    return f"{effect} at {place_text(place)}"

@@ -147,6 +147,19 @@ class Shape:
         knots = np.maximum.accumulate(knots + 1e-9 * top * np.arange(knots.size))
         return cls(top, knots, sigma_v)
 
+    def stribeck_speed(self, number: int) -> float:
+        """Speed at which 1/e of the excess of a Stribeck term is left [rad/s]."""
+        return STRIBECK_SPEEDS[number] * self.speed
+
+    def saturation_speed(self, number: int) -> float:
+        """Speed over which a saturating term grows [rad/s]."""
+        return SATURATION_SPEEDS[number] * self.speed
+
+    @staticmethod
+    def motor_share(number: int) -> float:
+        """Share of the motor's torque in the shape of a term "per motor torque"."""
+        return MOTOR_SHARES[number]
+
     def columns(self, v: Array, a: Array, load: Array) -> tuple[dict[str, Array], Array]:
         """Columns of every term, (N,) each, and the doubt about the sign, (N,).
 

@@ -51,10 +51,17 @@ class Choosing(Stages):
                 self._plain_losses(normal, plain, columns, 0.0, kept, folds),
                 self._plain_losses(normal, plain, columns, self.sigma, refit, folds),
             )
+        self.refit_share = self._share_of_draws(kept_loss - loss)
         if wins:
             self.choices = refit
         else:
             self.choices, self.sigma = kept, 0.0
+
+    def _share_of_draws(self, gain: Array) -> float:
+        """Share of draws of the blocks in which their sum is a gain."""
+        rng, n = np.random.default_rng(self.options.seed), len(gain)
+        drawn = rng.integers(0, n, (max(self.options.draws, 1), n))
+        return float((gain[drawn].sum(axis=1) > 0).mean())
 
     def _beyond_chance(self, first: Array, second: Array) -> bool:
         gain, error = compare(first, second, self.weight)

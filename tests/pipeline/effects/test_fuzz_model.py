@@ -40,10 +40,19 @@ def bare(root: Path) -> MachineModel:
     return base_model(new_model_file(root / "urdf" / "leg.toml", "rotor"))
 
 
+#: Values in the middle of what can be where those of others decide what can: knots ascend from
+#: none, and a body's inertia has the room that its first moments need.
+MIDDLE = {f"speed_{k}": 0.5 * (k - 1) for k in range(1, 9)}
+MIDDLE |= {"mass": 2.0, "mx": 0.1, "my": 0.1, "mz": 0.1, "Ixy": 0.0, "Ixz": 0.0, "Iyz": 0.0}
+
+
 def _parameters(effect: Effect) -> tuple[EditParameter, ...]:
     """Values in the middle of what can be."""
     out = []
     for p in effect.parameters:
+        if p.name in MIDDLE:
+            out.append(EditParameter(p.name, MIDDLE[p.name], p.unit, (MIDDLE[p.name],) * 2))
+            continue
         value = 0.1 if p.low < 0.1 < p.high else 0.5 * (p.low + min(p.high, 100.0))
         low, high = sorted((0.9 * value, 1.1 * value))
         unit = "A" if p.unit == "channel" else p.unit

@@ -20,7 +20,8 @@ from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.logs.errors import ModelFileError
 from pipeline.machine.machine import MachineModel
 
-FORMS = (*EFFECTS.values(), BareCoupling(), SensedHeating())
+FORMS = (*(e for e in EFFECTS.values() if e.competes), BareCoupling(), SensedHeating())
+EVERY = (*EFFECTS.values(), BareCoupling(), SensedHeating())
 #: Places of the leg, by kind.
 PLACES: Mapping[str, Place] = {
     "joint": ("rm_joint_2",),
@@ -140,7 +141,7 @@ def test_every_form_that_competes_is_tried_above(root: Path, alternative: str) -
     assert {type(e) for e in catalogue(model)} <= {type(e) for e in FORMS}
 
 
-@pytest.mark.parametrize("effect", FORMS, ids=_form)
+@pytest.mark.parametrize("effect", EVERY, ids=_form)
 def test_an_estimate_at_its_bound_is_read_back(tmp_path: Path, root: Path, effect: Effect) -> None:
     """Whatever is plausible lies in the reader's bounds, the bounds themselves among it."""
     file = new_model_file(root / "urdf" / "leg.toml", "rotor")
@@ -169,3 +170,20 @@ def test_a_parameter_that_may_be_left_out_may_and_another_may_not(
         else:
             with pytest.raises(ModelFileError, match=f"needs the parameter '{left}'"):
                 read_model_file(path)
+
+
+def test_level_and_share_of_a_finding_are_written_and_read_back(tmp_path: Path, root: Path) -> None:
+    file = new_model_file(root / "urdf" / "leg.toml", "rotor")
+    friction, path = EFFECTS["coulomb_friction"], tmp_path / "model.toml"
+    found = _found(friction, ("rm_joint_2",), {"torque": 0.3}, "current")
+    found = dataclasses.replace(found, level="approximate", share=0.8)
+    path.write_text(
+        model_text(file.with_edits(edits_of([found], source="log")), tmp_path), encoding="utf-8"
+    )
+    (edit,) = read_model_file(path).edits
+    assert (edit.level, edit.share) == ("approximate", 0.8)
+    for old, new in (('"approximate"', '"doubtful"'), ("share = 0.8", "share = 1.2")):
+        path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
+        with pytest.raises(ModelFileError, match="edit 1: (level|share)"):
+            read_model_file(path)
+        path.write_text(path.read_text(encoding="utf-8").replace(new, old), encoding="utf-8")

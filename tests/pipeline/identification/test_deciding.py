@@ -20,7 +20,12 @@ def log():  # type: ignore[no-untyped-def]
 
 
 @pytest.mark.parametrize(
-    "name", [n for n in EFFECTS if n not in ("coulomb_friction", "internal_foot_force")]
+    "name",
+    [
+        n
+        for n, e in EFFECTS.items()
+        if e.competes and n not in ("coulomb_friction", "internal_foot_force")
+    ],
 )
 def test_any_effect_may_be_the_rival(name: str, log) -> None:  # type: ignore[no-untyped-def]
     model = leg.leg_model()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.effects.registry import EFFECTS, effect_named
+from pipeline.identification.results import CONFIRMED
 from pipeline.identification.selection.identify import identify
 from pipeline.logs.prepared.measurement import PROVE
 from tests.pipeline.identification import bench_leg as leg
@@ -46,7 +47,8 @@ HIDDEN = {
 
 def test_every_effect_is_tried() -> None:
     # Squeezing feet need feet: see test_ground.
-    assert set(EFFECTS) == {*HIDDEN, "internal_foot_force"}
+    competing = {name for name, effect in EFFECTS.items() if effect.competes}
+    assert competing == {*HIDDEN, "internal_foot_force"}
 
 
 @pytest.fixture(scope="module")
@@ -104,10 +106,10 @@ def test_law_outside_the_catalogue_stays_unexplained(motion) -> None:  # type: i
     result = identify(nominal, [log]).naming
     trusted = nominal
     for f in result.found:
-        if not f.doubtful:
+        if f.level == CONFIRMED:
             trusted = effect_named(f.effect).apply(trusted, f.place, f.values)
     assert any(r.significant for r in leg.left_by(trusted, [log]))
-    assert not [f for f in result.found if not f.doubtful and f.place == ("rm_joint_1",)]
+    assert not [f for f in result.found if f.level == CONFIRMED and f.place == ("rm_joint_1",)]
 
 
 @pytest.mark.parametrize(
@@ -132,7 +134,7 @@ def test_a_column_that_reads_a_multiple_is_named_and_nothing_else(  # type: igno
     scale[joints, channels.index(scaled)] = factor
     log = replace(log, noise=log.noise * scale)
     found = identify(nominal, [log]).naming.found
-    trusted = [f for f in found if not f.doubtful]
+    trusted = [f for f in found if f.level == CONFIRMED]
     one = joints == slice(1, 2)
     if one and channels == ("current",):
         # A sensor of one joint's current and that motor's constant cannot be told apart.
@@ -181,6 +183,6 @@ def test_what_only_proves_has_no_say(motion) -> None:  # type: ignore[no-untyped
 
     assert judged(first) == judged(second)
     alone = identify(nominal, [replace(log, effort=garbage)]).naming
-    assert [(f.effect, f.place, f.doubtful) for f in alone.found] == [
-        (f.effect, f.place, f.doubtful) for f in first.found
+    assert [(f.effect, f.place, f.level) for f in alone.found] == [
+        (f.effect, f.place, f.level) for f in first.found
     ]

@@ -112,7 +112,7 @@ def test_no_interval_is_narrower_than_laws_are_true(
 
 def test_a_size_that_may_be_nothing_is_doubted_and_no_other(motion: Measurement) -> None:
     result = identify(leg.leg_model(), [log_with(motion, FRICTION)])
-    assert [f.doubtful for f in result.naming.found] == [""]
+    assert [f.level for f in result.naming.found] == ["confirmed"]
     assert _doubt(result.problem, 0, certain=True) == ""
     assert "may be nothing at all" in _doubt(result.problem, 0, certain=False)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.identification.results import Estimate, Found
+from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Estimate, Found
 from pipeline.identification.workflow.model_writer import edits_of
 from tests.command_line import exit_code, rows_of
 
@@ -48,8 +48,8 @@ def test_a_payload_is_weighed_once_the_friction_is_in_the_model(tmp_path: Path) 
     assert both >= {"coulomb_friction", "link_mass"}
 
 
-def test_a_doubted_name_reaches_the_model_file_only_when_asked() -> None:
-    def found(doubt: str) -> Found:
+def test_a_suspected_name_does_not_reach_the_model_file() -> None:
+    def found(level: str) -> Found:
         torque = Estimate("torque", 1.0, 0.9, 1.1, "N*m")
         return Found(
             order=1,
@@ -62,10 +62,8 @@ def test_a_doubted_name_reaches_the_model_file_only_when_asked() -> None:
             unit="A",
             noise_floor=0.1,
             excitation="",
-            doubtful=doubt,
+            level=level,
         )
 
-    both = [found(""), found("its law is not that of the machine")]
-    assert [edit.basis for edit in edits_of(both, "log")] == ["identified"]
-    kept = edits_of(both, "log", keep_doubtful=True)
-    assert [edit.basis for edit in kept] == ["identified", "doubtful"]
+    every = [found(level) for level in (CONFIRMED, APPROXIMATE, SUSPECTED)]
+    assert [edit.level for edit in edits_of(every, "log")] == [CONFIRMED, APPROXIMATE]

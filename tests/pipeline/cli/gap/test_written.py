@@ -11,7 +11,13 @@ import pytest
 from pipeline.effects.model_file import Edit, ModelFile, edits_in
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.stages import overall
-from pipeline.identification.results import Estimate, Found
+from pipeline.identification.results import (
+    APPROXIMATE,
+    CONFIRMED,
+    SUSPECTED,
+    Estimate,
+    Found,
+)
 from pipeline.identification.selection.identify import estimated_alone, identify
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.written import Weighed, weigh_found
@@ -23,7 +29,7 @@ FRICTION = 0.5  # [N*m]
 VISCOUS = {"coefficient": 0.8}  # [N*m*s/rad]
 
 
-def found(effect: str, parameter: str, value: float, unit: str, doubt: str = "") -> Found:
+def found(effect: str, parameter: str, value: float, unit: str, level: str = CONFIRMED) -> Found:
     return Found(
         order=1,
         effect=effect,
@@ -35,7 +41,8 @@ def found(effect: str, parameter: str, value: float, unit: str, doubt: str = "")
         unit="A",
         noise_floor=0.004,
         excitation="",
-        doubtful=doubt,
+        level=level,
+        reason="" if level == CONFIRMED else "its law is not the machine's",
     )
 
 
@@ -46,9 +53,9 @@ def where() -> Any:
     return SimpleNamespace(measurements=(log,), intake=SimpleNamespace(long=None))
 
 
-def weighed(where: Any, *names: Found, keep: bool = False) -> Weighed:
+def weighed(where: Any, *names: Found) -> Weighed:
     def written(among: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
-        edits = edits_of(among, "log", keep_doubtful=keep)
+        edits = edits_of(among, "log")
         robot = ModelFile(leg.ROOT / "urdf" / "leg.toml", "0" * 64, "rotor")
         text = model_text(robot.with_edits(edits), leg.ROOT)
         return tuple(among), text, edits_in(text)
@@ -57,7 +64,8 @@ def weighed(where: Any, *names: Found, keep: bool = False) -> Weighed:
 
 
 RIGHT = found("coulomb_friction", "torque", FRICTION, "N*m")
-DOUBTED = found("coulomb_friction", "torque", FRICTION, "N*m", "its law is not the machine's")
+NEAR = found("coulomb_friction", "torque", FRICTION, "N*m", APPROXIMATE)
+SUSPECT = found("coulomb_friction", "torque", FRICTION, "N*m", SUSPECTED)
 
 
 def test_a_written_effect_explains_the_log(where: Any) -> None:
@@ -68,8 +76,8 @@ def test_a_written_effect_explains_the_log(where: Any) -> None:
     assert 'effect = "coulomb_friction"' in result.text
 
 
-def test_a_doubted_name_is_left_out_and_so_is_what_it_would_close(where: Any) -> None:
-    result = weighed(where, DOUBTED)
+def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) -> None:
+    result = weighed(where, SUSPECT)
     assert result.unexplained
     (one,) = result.found
     assert not one.written
@@ -84,11 +92,11 @@ def test_a_doubted_name_is_left_out_and_so_is_what_it_would_close(where: Any) ->
     assert "coulomb_friction" not in words
 
 
-def test_a_doubted_name_that_is_written_all_the_same_counts(where: Any) -> None:
-    result = weighed(where, DOUBTED, keep=True)
+def test_an_approximate_name_is_written_and_counts(where: Any) -> None:
+    result = weighed(where, NEAR)
     assert not result.unexplained
     assert result.found[0].written
-    assert 'basis = "doubtful"' in result.text
+    assert 'level = "approximate"' in result.text
 
 
 def test_a_wrong_value_in_the_file_is_not_called_explained(where: Any) -> None:
@@ -96,10 +104,11 @@ def test_a_wrong_value_in_the_file_is_not_called_explained(where: Any) -> None:
     assert weighed(where, found("coulomb_friction", "torque", 0.2, "N*m")).unexplained
 
 
-def test_a_name_with_which_the_simulation_is_worse_is_doubted(where: Any) -> None:
+def test_a_name_with_which_the_simulation_is_worse_is_suspected(where: Any) -> None:
     result = weighed(where, found("viscous_friction", "coefficient", 9.0, "N*m*s/rad"))
     (one,) = result.found
-    assert "validation" in one.doubtful
+    assert one.level == SUSPECTED
+    assert "validation" in one.reason
     assert not one.written
     assert "viscous_friction" not in result.text
 

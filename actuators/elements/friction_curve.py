@@ -1,0 +1,77 @@
+"""Friction of a joint as curves over its speed, where no law has a name for it.
+
+Levels, their asymmetry and shares of the load stand at knots of the speed; between knots they are
+straight lines, beyond the last one the last line goes on as long as it takes energy out.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+from actuators.elements.loaded_friction import LoadedFriction
+from actuators.shaft import ShaftSeries
+
+_MOST_SHARE = 0.99  # of the load: at 1 no load could drive the shaft
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionCurve(LoadedFriction):
+    """Friction over speed and load, for one joint.
+
+    Attributes:
+        speeds: Knots, ascending from 0, (K,) [rad/s].
+        levels: Mean of both directions at the knots, (K,) [N*m].
+        asymmetries: By which it is larger forward and smaller backward, (K,) [N*m].
+        shares: Friction per transmitted torque at the knots, (K,), dimensionless.
+        viscous: Per speed, beside the curves [N*m*s/rad].
+
+    Raises:
+        UnphysicalElementError: Knots do not ascend, or the curves would give energy at a knot.
+    """
+
+    speeds: tuple[float, ...] = (0.0, 1.0)
+    levels: tuple[float, ...] = (0.0, 0.0)
+    asymmetries: tuple[float, ...] = (0.0, 0.0)
+    shares: tuple[float, ...] = (0.0, 0.0)
+    viscous: float = 0.0
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        lengths = {len(x) for x in (self.speeds, self.levels, self.asymmetries, self.shares)}
+        require(lengths == {len(self.speeds)} and len(self.speeds) > 1, self.name, "one per knot")
+        ascending = self.speeds[0] == 0.0 and (np.diff(self.speeds) > 0.0).all()
+        require(ascending, self.name, "speeds must ascend from 0")
+        require_non_negative(self.name, viscous=self.viscous)
+        passive = np.array(self.levels) + self.viscous * np.array(self.speeds)
+        # Sums of a few terms that cancel leave rounding.
+        slack = 1e-9 * (1.0 + np.abs(passive).max())
+        out = passive - np.abs(self.asymmetries) >= -slack
+        require(out, self.name, "friction must not be negative in either direction")
+        shares = np.array(self.shares)
+        require((shares >= 0.0) & (shares <= _MOST_SHARE), self.name, "shares must be 0 to 0.99")
+
+    def at(self, values: tuple[float, ...], speed: FloatArray) -> FloatArray:
+        """Return a curve at speeds (...) [rad/s]; the last line goes on beyond the last knot."""
+        x, y = np.array(self.speeds), np.array(values)
+        beyond = np.maximum(speed - x[-1], 0.0) * (y[-1] - y[-2]) / (x[-1] - x[-2])
+        return np.asarray(np.interp(speed, x, y) + beyond)
+
+    def free(self, side: ShaftSeries) -> FloatArray:
+        """Return levels and asymmetry, (N, J) [N*m]; they take energy out at every speed."""
+        v, s = side.velocity, self.sense(side)
+        speed = np.abs(v)
+        level = np.maximum(self.at(self.levels, speed), -self.viscous * speed)
+        most = level + self.viscous * speed
+        skew = np.clip(self.at(self.asymmetries, speed), -most, most)
+        # Towards standstill the asymmetry goes with the sense of motion, as dry friction does.
+        return np.asarray(level * s + skew * np.abs(s) + self.viscous * v)
+
+    def share(self, side: ShaftSeries, sign: FloatArray) -> FloatArray:
+        """Return friction per transmitted torque, (N, J)."""
+        return np.clip(self.at(self.shares, np.abs(side.velocity)), 0.0, _MOST_SHARE)
+
+    def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
+        """Return the curves at standstill."""
+        level, skew, share = self.levels[0], self.asymmetries[0], self.shares[0]
+        return max(level - skew, 0.0), max(level + skew, 0.0), share, share

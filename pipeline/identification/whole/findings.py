@@ -1,0 +1,290 @@
+"""From a regression's result to findings: effects of the catalogue, like ones told as one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pipeline.effects.bodies.rigid_body_parameters import NAMES, UNITS
+from pipeline.effects.drive.rotor_inertia import RotorInertia
+from pipeline.effects.friction.joint_friction import JointFrictionLaw
+from pipeline.effects.registry import effect_named
+from pipeline.identification import results as limits
+from pipeline.identification.results import Estimate, Found, Member
+from pipeline.machine.machine import MachineModel
+from pipeline.regression import Friction, Level, Result, Term
+from pipeline.regression.laws.coupling import Coupling
+
+NAN: Final = float("nan")
+LAW: Final = (
+    "no law of the catalogue predicts validation data as well as a smooth curve over speed and load"
+)
+
+
+@dataclass(frozen=True)
+class Told:
+    """One finding before it is held against the log.
+
+    Attributes:
+        effect: Name.
+        law: Which of its laws.
+        reason: Why it is not confirmed.
+        members: Where, with estimates.
+    """
+
+    effect: str
+    law: str
+    reason: str
+    members: tuple[Member, ...]
+
+    def found(self, order: int, unit: str) -> Found:
+        """As something found, its proof still open."""
+        levels = {m.level for m in self.members}
+        level = limits.CONFIRMED if levels == {limits.CONFIRMED} else limits.APPROXIMATE
+        one = self.members[0]
+        several = len(self.members) > 1
+        return Found(
+            order=order,
+            effect=self.effect,
+            place=tuple(p for m in self.members for p in m.place),
+            parameters=() if several else one.parameters,
+            rivals=(),
+            valid_before=NAN,
+            valid_after=NAN,
+            unit=unit,
+            noise_floor=NAN,
+            excitation=effect_named(self.effect).excitation,
+            level=level if levels != {limits.SUSPECTED} else limits.SUSPECTED,
+            reason=self.reason if level != limits.CONFIRMED else "",
+            share=min(m.share for m in self.members),
+            law=self.law,
+            members=self.members if several else (),
+        )
+
+
+def told(result: Result, model: MachineModel) -> list[Told]:
+    """Findings of a result in the order in which they are applied: bodies first."""
+    out = bodies(result, model)
+    out += couplings(result)
+    out += frictions(result)
+    return out + inertias(result, model) + offsets(result, model)
+
+
+def bodies(result: Result, model: MachineModel) -> list[Told]:
+    """Inertial parameters of every link that has any."""
+    if not result.refit:
+        return []
+    links = {joint: link for link, joint in model.links.items()}
+    members = []
+    for k, joint in enumerate(list(result.model.names)[1:]):
+        ten, half = result.bodies[10 * k : 10 * k + 10], result.bodies_half[10 * k : 10 * k + 10]
+        if ten[0] <= 0.0 or str(joint) not in links:
+            continue
+        parameters = tuple(
+            _estimate(n, float(x), float(h), unit, low=0.0 if n in ("mass", *_DIAGONAL) else -1e6)
+            for n, x, h, unit in zip(NAMES, ten, half, UNITS, strict=True)
+        )
+        place = (links[str(joint)],)
+        members.append(Member(place, parameters, limits.CONFIRMED, result.refit_share))
+    return [Told("rigid_body_parameters", "", "", tuple(members))]
+
+
+_DIAGONAL: Final = ("Ixx", "Iyy", "Izz")
+
+
+def couplings(result: Result) -> list[Told]:
+    """Motors that turn with another joint."""
+    names = [f.joint for f in result.friction]
+    out = []
+    for c in result.couplings:
+        terms = {t.term.split(":")[-1]: t for t in result.terms if t.term in c.names}
+        terms = {n: t for n, t in terms.items() if t.level is not Level.SUSPECTED}
+        if not terms:
+            continue
+        parameters = (
+            Estimate("ratio", c.ratio, c.ratio, c.ratio, "1"),
+            *(_of_term(n, terms.get(n), u) for n, u in _SHAFT.items()),
+            Estimate("rise", *(3 * (_rise(result, c),)), unit="rad/s"),
+        )
+        place = (names[c.motor], names[c.other])
+        share = max(t.share for t in terms.values())
+        sure = any(t.level is Level.CONFIRMED for t in terms.values())
+        level = limits.CONFIRMED if sure else limits.APPROXIMATE
+        reason = "" if sure else "its size scatters from block to block"
+        out.append(
+            Told("transmission_coupling", "", reason, (Member(place, parameters, level, share),))
+        )
+    return out
+
+
+_SHAFT: Final = {"inertia": "kg*m^2", "viscous": "N*m*s/rad", "coulomb": "N*m"}
+
+
+def _rise(result: Result, c: Coupling) -> float:
+    return result.friction[c.motor].shape.rise
+
+
+def frictions(result: Result) -> list[Told]:
+    """Friction of every joint that has any, joints with the same law together."""
+    groups: dict[tuple[str, str], list[Member]] = {}
+    for friction in result.friction:
+        if not friction.terms:
+            continue
+        share = friction.share
+        if any(t.startswith("odd@") for t in friction.terms):
+            effect, law = "friction_curve", ""
+            member = Member((friction.joint,), curve(friction, result), limits.APPROXIMATE, share)
+        else:
+            effect = JointFrictionLaw.name
+            parameters = named(friction, result.at(friction.joint))
+            level = str(friction.level)
+            member = Member((friction.joint,), parameters, level, share)
+            law = effect_named(effect).law(member.values)
+        groups.setdefault((effect, law), []).append(member)
+    return [
+        Told(
+            effect,
+            law,
+            LAW if effect == "friction_curve" else "other laws win in some draws of the blocks",
+            tuple(members),
+        )
+        for (effect, law), members in groups.items()
+    ]
+
+
+def named(friction: Friction, terms: Sequence[Term]) -> tuple[Estimate, ...]:
+    """Parameters of a law with a name, from the sizes of its terms."""
+    by = {t.term: t for t in terms}
+    units = {p.name: p.unit for p in effect_named(JointFrictionLaw.name).parameters}
+    shape, out = friction.shape, []
+
+    def of(term: str, name: str, factor: float = 1.0) -> Estimate:
+        t = by[term]
+        low = -1e3 if name == "asymmetry" else 0.0
+        value, half = factor * t.value, factor * max(t.high - t.value, t.value - t.low)
+        return _estimate(name, value, half, units[name], low=low)
+
+    for term in friction.terms:
+        kind, _, number = term.partition("@")
+        k = int(number or 0)
+        if kind == "stribeck":
+            out += [of(term, "excess"), _exact("stribeck_speed", shape.stribeck_speed(k))]
+        elif kind == "saturating":
+            out += [of(term, "saturating"), _exact("saturation_speed", shape.saturation_speed(k))]
+        elif kind == "motor":
+            mu = shape.motor_share(k)
+            out += [of(term, "driving", 1 / (1 - mu)), of(term, "driven", 1 / (1 + mu))]
+        elif kind == "even":
+            out.append(of(term, "asymmetry"))
+        else:
+            out.append(of(term, kind))
+    if shape.rise:
+        out.append(_exact("rise", shape.rise))
+    return _passive(out)
+
+
+def _passive(parameters: Sequence[Estimate]) -> tuple[Estimate, ...]:
+    """With an asymmetry that gives no energy."""
+    by = {p.name: p for p in parameters}
+    if "asymmetry" in by:
+        most = by["viscous"].value if "viscous" in by else 0.0
+        p = by["asymmetry"]
+        value = float(np.clip(p.value, -most, most))
+        by["asymmetry"] = Estimate(p.name, value, min(p.low, value), max(p.high, value), p.unit)
+    return tuple(by.values())
+
+
+def curve(friction: Friction, result: Result) -> tuple[Estimate, ...]:
+    """Knots of the general member: levels, asymmetries and shares, none of which gives energy."""
+    joint = [f.joint for f in result.friction].index(friction.joint)
+    terms, shape = friction.terms, friction.shape
+    half = {t: result.halves.get((str(joint), t), 0.0) for t in terms}
+
+    def sized(table: Mapping[str, float], *names: str) -> float:
+        return sum(table.get(n, 0.0) for n in names)
+
+    speeds, levels, skews, shares = [], [], [], []
+    viscous = max(terms.get("viscous", 0.0), 0.0)
+    lost = min(terms.get("viscous", 0.0), 0.0)
+    load = np.array([terms.get(f"loaded@{k}", 0.0) for k in range(len(shape.knots))])
+    for k, speed in enumerate(shape.knots.tolist()):
+        number = k + 1
+        level = sized(terms, "coulomb", f"odd@{k}") + lost * speed
+        level = max(level, -viscous * speed)
+        most = level + viscous * speed
+        skew = float(np.clip(terms.get(f"evenly@{k}", 0.0), -most, most))
+        share = float(np.clip(terms.get("load", 0.0) + load[k], 0.0, 0.99))
+        speeds.append(_exact(f"speed_{number}", speed))
+        spread = float(np.hypot(half.get("coulomb", 0.0), half.get(f"odd@{k}", 0.0)))
+        levels.append(_estimate(f"level_{number}", level, spread, "N*m"))
+        spread = half.get(f"evenly@{k}", 0.0)
+        skews.append(_estimate(f"asymmetry_{number}", skew, spread, "N*m"))
+        spread = float(np.hypot(half.get("load", 0.0), half.get(f"loaded@{k}", 0.0)))
+        shares.append(_estimate(f"share_{number}", share, spread, "1", low=0.0, high=0.99))
+    last = (
+        _estimate("viscous", viscous, half.get("viscous", 0.0), "N*m*s/rad", low=0.0),
+        _exact("rise", shape.rise),
+    )
+    return (*speeds, *levels, *skews, *shares, *last)
+
+
+def inertias(result: Result, model: MachineModel) -> list[Told]:
+    """Rotor inertia at the motors."""
+    members = []
+    for t in result.terms:
+        if t.term != "rotor" or t.level is Level.SUSPECTED:
+            continue
+        ratio = model.actuator(t.place).ratio
+        half = max(t.high - t.value, t.value - t.low) / ratio**2
+        estimate = _estimate("added", t.value / ratio**2, half, "kg*m^2", low=0.0)
+        members.append(Member((t.place,), (estimate,), str(t.level), t.share))
+    if not members:
+        return []
+    reason = "beside the bodies' inertia its size is not sure at every joint"
+    return [Told(RotorInertia.name, "", reason, tuple(members))]
+
+
+def offsets(result: Result, model: MachineModel) -> list[Told]:
+    """A torque that is always there, as the zero of the sensor that shows it."""
+    members = []
+    for t in result.terms:
+        if t.term != "offset" or t.level is Level.SUSPECTED:
+            continue
+        factor, unit = 1.0, "N*m"
+        estimate = _estimate(
+            "offset", factor * t.value, factor * max(t.high - t.value, t.value - t.low), unit
+        )
+        members.append(Member((t.place,), (estimate,), str(t.level), t.share))
+    if not members or any(a.motor is not None for a in model.actuators):
+        return []
+    return [Told("effort_offset", "", "its size scatters from block to block", tuple(members))]
+
+
+def suspected(result: Result) -> list[str]:
+    """What was looked at and is not in the model, in words."""
+    return [
+        f"{t.kind} at {t.place} is suspected, not written: {t.value:.3g} {t.unit} closes "
+        f"{100 * max(t.closes, 0.0):.1f} % of what stays unexplained there"
+        for t in result.terms
+        if t.level is Level.SUSPECTED
+    ]
+
+
+def _estimate(
+    name: str, value: float, half: float, unit: str, low: float = -1e6, high: float = 1e6
+) -> Estimate:
+    value = float(value)
+    return Estimate(name, value, max(value - half, low), min(value + half, high), unit)
+
+
+def _exact(name: str, value: float) -> Estimate:
+    return Estimate(name, float(value), float(value), float(value), "rad/s")
+
+
+def _of_term(name: str, term: Term | None, unit: str) -> Estimate:
+    if term is None:
+        return Estimate(name, 0.0, 0.0, 0.0, unit)
+    return _estimate(name, max(term.value, 0.0), term.high - term.value, unit, low=0.0)

@@ -1,0 +1,91 @@
+"""A whole machine fitted to what may be learnt from: bodies, friction, couplings at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import reduce
+
+import numpy as np
+
+from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.effects.registry import effect_named
+from pipeline.identification.results import Found
+from pipeline.identification.whole.errors import NotWholeError
+from pipeline.identification.whole.findings import suspected, told
+from pipeline.identification.whole.rigid import rigid_model
+from pipeline.identification.whole.training import training_runs, without_known
+from pipeline.identification.workflow.locate import Whereabouts
+from pipeline.machine.machine import MachineModel
+from pipeline.regression import Result, Run, identify, prepare
+from pipeline.regression.errors import RegressionError
+
+#: Effects that the regression decides about: they are not offered again.
+FAMILIES = frozenset(
+    {
+        "coulomb_friction",
+        "viscous_friction",
+        "stribeck_friction",
+        "load_dependent_friction",
+        "direction_dependent_friction",
+        "backdrive_loss",
+        "rotor_inertia",
+        "transmission_coupling",
+    }
+)
+#: ... and of bodies, where they were fitted.
+OF_BODIES = frozenset({"link_mass", "center_of_mass_offset", "base_tilt"})
+
+
+@dataclass(frozen=True, eq=False)
+class Whole:
+    """What a regression of the whole machine found.
+
+    Attributes:
+        found: In the order in which a model file applies it.
+        model: The machine with it.
+        result: Of the regression.
+        decided: Names of effects that need not be offered again.
+        notes: What else a reader should know.
+    """
+
+    found: tuple[Found, ...]
+    model: MachineModel
+    result: Result
+    decided: frozenset[str]
+    notes: tuple[str, ...]
+
+
+def with_found(model: MachineModel, found: Found) -> MachineModel:
+    """A machine with a finding, all its members."""
+    effect = effect_named(found.effect)
+    return reduce(lambda m, one: effect.apply(m, one.place, one.values), found.each, model)
+
+
+def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
+    """Fit a machine on a fixed base as a whole.
+
+    Args:
+        model: As its files say.
+        where: Logs and their parts; what proves is not looked at.
+
+    Raises:
+        NotWholeError: The machine or its log does not allow it.
+    """
+    rigid = rigid_model(model)
+    names = list(rigid.names)[1:]
+    order = np.array([model.index(str(n)) for n in names])
+    runs = [
+        Run(r.time, r.q[:, order], r.tau[:, order], None if r.v is None else r.v[:, order])
+        for r in training_runs(where.intake.prepared, where.parts, model)
+    ]
+    try:
+        rows = prepare(runs, rigid)
+        rows = replace(rows, tau=without_known(rows, model, rigid))
+        result = identify(rows, rigid)
+    except RegressionError as error:
+        raise NotWholeError(str(error)) from None
+    unit = CHANNEL_UNITS[where.measurements[0].channels[0]]
+    found = tuple(t.found(k, unit) for k, t in enumerate(told(result, model), start=1))
+    kept = [f for f in found if f.kept]
+    decided = FAMILIES | OF_BODIES if result.refit else FAMILIES
+    return Whole(found, reduce(with_found, kept, model), result, decided, tuple(suspected(result)))
