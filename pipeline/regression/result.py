@@ -190,8 +190,7 @@ class Result:
                 if size is not None:
                     out[:, j] += size * filtered(name, column)
         for c in self.couplings:
-            rise = self.friction[c.motor].shape.rise
-            for name, actions in c.columns(v, a, self.sigma_v, rise).items():
+            for name, actions in c.columns(v, a, self.sigma_v).items():
                 size = self.sizes.get(("shared", name))
                 if size is not None:
                     for i, action in actions.items():

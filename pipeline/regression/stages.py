@@ -7,21 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.regression.laws.coupling import every_pair
+from pipeline.regression.laws.coupling import Coupling, every_pair
 from pipeline.regression.laws.friction import (
     BESIDE,
     TRANSITIONS,
-    Law,
+    Shape,
     general_terms,
 )
 from pipeline.regression.state import State
 from pipeline.regression.statistics.gram import Columns, Key, System
 from pipeline.regression.statistics.noise import Colour, colour
-from pipeline.regression.statistics.selection import (
-    Choice,
-    find_coupling,
-    general,
-)
+from pipeline.regression.statistics.selection import find_coupling, general
 from pipeline.regression.statistics.solve import Eliminated
 
 
@@ -92,37 +88,44 @@ class Stages(State):
         self.sigma = self.options.uncertainties[int(np.argmin(losses))]
 
     def _rise(self) -> None:
-        """Speed over which friction rises after a reversal, per joint: what predicts best."""
+        """Speed over which friction rises after a reversal: what predicts best.
+
+        That of coupled motors first, beside friction of any shape at the joints; the joint of such
+        a motor has the same, since the two could take each other's part.
+        """
+        for number, c in enumerate(self.couplings):
+            speed = Shape.of(c.speed(self.rows.v), 0.0).speed
+            tried = [replace(c, rise=share * speed) for share in TRANSITIONS]
+            others = [o for k, o in enumerate(self.couplings) if k != number]
+            losses = [self._loss_with([*others, one]) for one in tried]
+            self.couplings[number] = tried[int(np.argmin(losses))]
         columns = self._columns(self.couplings)
         fit = self._fit(self._system(columns), columns, self.sigma)
         rich = [general(j).keys(j) for j in range(self.model.nv)]
         shared: list[Key] = [("shared", n) for c in self.couplings for n in c.names]
-        coupled = {c.motor for c in self.couplings}
         shapes = list(self.design.shapes)
+        coupled = {c.motor: c.rise for c in self.couplings}
         for j in range(self.model.nv):
             if j in coupled:
-                losses = [self._with_rise(j, share) for share in TRANSITIONS]
-            else:
-                common = [k for i, ks in enumerate(rich) if i != j for k in ks] + shared
-                names = ["viscous", *BESIDE]
-                for k in range(len(TRANSITIONS)):
-                    names += [f"rising@{k}", f"rising_load@{k}"]
-                own = fit.system.index([(str(j), t) for t in names])
-                e = Eliminated(fit, self.folds, self.weight, fit.columns(common), own)
-                losses = [
-                    float(e.losses([0, 1, 2, 3 + 2 * k, 4 + 2 * k]).sum())
-                    for k in range(len(TRANSITIONS))
-                ]
+                shapes[j] = replace(shapes[j], rise=coupled[j])
+                continue
+            common = [k for i, ks in enumerate(rich) if i != j for k in ks] + shared
+            names = ["viscous", *BESIDE]
+            for k in range(len(TRANSITIONS)):
+                names += [f"rising@{k}", f"rising_load@{k}"]
+            own = fit.system.index([(str(j), t) for t in names])
+            e = Eliminated(fit, self.folds, self.weight, fit.columns(common), own)
+            losses = [
+                float(e.losses([0, 1, 2, 3 + 2 * k, 4 + 2 * k]).sum())
+                for k in range(len(TRANSITIONS))
+            ]
             share = TRANSITIONS[int(np.argmin(losses))]
             shapes[j] = replace(shapes[j], rise=share * shapes[j].speed)
         self.design = replace(self.design, shapes=tuple(shapes))
 
-    def _with_rise(self, joint: int, share: float) -> float:
-        """Predictive loss with the friction of one joint and of its coupled motor rising so."""
-        shapes = list(self.design.shapes)
-        shapes[joint] = replace(shapes[joint], rise=share * shapes[joint].speed)
-        columns = replace(self.design, shapes=tuple(shapes)).columns(self.load, self.couplings)
+    def _loss_with(self, couplings: Sequence[Coupling]) -> float:
+        """Predictive loss beside friction of any shape with some couplings."""
+        columns = self._columns(couplings)
         fit = self._fit(self._system(columns), columns, self.sigma)
-        simple = Choice(Law("", ("coulomb", "viscous", "load")), BESIDE, 0.0)
-        choices = [simple if j == joint else general(j) for j in range(self.model.nv)]
-        return float(fit.losses(self.folds, self.weight, fit.columns(self._keys(choices))).sum())
+        keys = self._keys([general(j) for j in range(self.model.nv)])
+        return float(fit.losses(self.folds, self.weight, fit.columns(keys)).sum())

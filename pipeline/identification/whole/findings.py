@@ -16,7 +16,6 @@ from pipeline.identification import results as limits
 from pipeline.identification.results import Estimate, Found, Member
 from pipeline.machine.machine import MachineModel
 from pipeline.regression import Friction, Level, Result, Term
-from pipeline.regression.laws.coupling import Coupling
 
 NAN: Final = float("nan")
 LAW: Final = (
@@ -107,7 +106,7 @@ def couplings(result: Result) -> list[Told]:
         parameters = (
             Estimate("ratio", c.ratio, c.ratio, c.ratio, "1"),
             *(_of_term(n, terms.get(n), u) for n, u in _SHAFT.items()),
-            Estimate("rise", *(3 * (_rise(result, c),)), unit="rad/s"),
+            _exact("rise", c.rise),
         )
         place = (names[c.motor], names[c.other])
         share = max(t.share for t in terms.values())
@@ -121,10 +120,6 @@ def couplings(result: Result) -> list[Told]:
 
 
 _SHAFT: Final = {"inertia": "kg*m^2", "viscous": "N*m*s/rad", "coulomb": "N*m"}
-
-
-def _rise(result: Result, c: Coupling) -> float:
-    return result.friction[c.motor].shape.rise
 
 
 def frictions(result: Result) -> list[Told]:

@@ -34,11 +34,13 @@ class Coupling:
         motor: Joint whose motor it is.
         other: Joint it turns with.
         ratio: Speed of the motor per speed of the other joint, both at the joint's side.
+        rise: Speed of the motor over which its dry friction rises after a reversal [rad/s].
     """
 
     motor: int
     other: int
     ratio: float
+    rise: float = 0.0
 
     def name(self, term: str) -> str:
         """Name of one of its columns."""
@@ -49,15 +51,17 @@ class Coupling:
         """Names of its columns."""
         return [self.name(t) for t in TERMS]
 
-    def columns(
-        self, v: Array, a: Array, sigma_v: Array, rise: float = 0.0
-    ) -> dict[str, dict[int, Array]]:
+    def speed(self, v: Array) -> Array:
+        """Of the motor at the joint's side, (N,) [rad/s]."""
+        return np.asarray(v[:, self.motor] + self.ratio * v[:, self.other])
+
+    def columns(self, v: Array, a: Array, sigma_v: Array) -> dict[str, dict[int, Array]]:
         """Torque per size of every term on both joints, (N,) each."""
-        speed = v[:, self.motor] + self.ratio * v[:, self.other]
+        speed = self.speed(v)
         change = a[:, self.motor] + self.ratio * a[:, self.other]
         noise = float(np.hypot(sigma_v[self.motor], self.ratio * sigma_v[self.other]))
         values = {
-            "coulomb": sense(speed, noise, rise).sign,
+            "coulomb": sense(speed, noise, self.rise).sign,
             "viscous": speed,
             "inertia": change,
         }
@@ -65,11 +69,9 @@ class Coupling:
             self.name(t): {self.motor: x, self.other: self.ratio * x} for t, x in values.items()
         }
 
-    def halves(
-        self, v: Array, a: Array, sigma_v: Array, rise: float = 0.0
-    ) -> dict[str, dict[int, Array]]:
+    def halves(self, v: Array, a: Array, sigma_v: Array) -> dict[str, dict[int, Array]]:
         """The same columns with the action on either joint apart: what no coupling would be."""
-        whole = self.columns(v, a, sigma_v, rise)
+        whole = self.columns(v, a, sigma_v)
         out = {}
         for name, parts in whole.items():
             out[f"{name}|motor"] = {self.motor: parts[self.motor]}

@@ -68,10 +68,10 @@ class Design:
             doubt.append(r.thin(unsure))
         shared: dict[str, dict[int, Array]] = {}
         for c in couplings:
-            whole = c.columns(v, a, r.sigma_v, self.shapes[c.motor].rise)
+            whole = c.columns(v, a, r.sigma_v)
             shared.update({n: self._actions(n, parts) for n, parts in whole.items()})
         for c in halves:
-            apart = c.halves(v, a, r.sigma_v, self.shapes[c.motor].rise)
+            apart = c.halves(v, a, r.sigma_v)
             shared.update({n: self._actions(n, parts) for n, parts in apart.items()})
         return Columns(self.bodies, local, shared, np.column_stack(doubt))
 
