@@ -81,15 +81,15 @@ class Reporting(Standing):
             have = tuple(key[1] for key in keys if key[0] == str(j) and key[1] not in BESIDE)
             mine = [u for u in terms if u.place == self.names[j] and u.term not in BESIDE]
             unnamed = choice.law is UNNAMED
-            sure = laws[j] >= o.sure and not unnamed
-            sure = sure and all(u.level is Level.CONFIRMED for u in mine)
+            sure = not unnamed and all(u.level is Level.CONFIRMED for u in mine)
+            named = min((u.share for u in mine), default=laws[j])
             frictions.append(
                 Friction(
                     self.names[j],
                     UNNAMED.name if unnamed else name_of(have),
                     {u: float(x[fit.system.where[(str(j), u)]]) for u in have},
                     self.design.shapes[j],
-                    laws[j],
+                    laws[j] if unnamed else named,
                     Level.CONFIRMED if sure else Level.APPROXIMATE,
                     choice.short,
                 )

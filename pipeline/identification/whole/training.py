@@ -21,6 +21,7 @@ from pipeline.identification.whole.errors import NotWholeError
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
+from pipeline.logs.quality.skew import skew
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.regression import Rows, Run
@@ -29,6 +30,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: A gap in time of more than this many steps ends a run.
 LONGEST_GAP: Final = 5.0
+#: A velocity that comes later than its position by this share of the cut-off's period is left out,
+#: looked for up to so long [s].
+LATE: Final = 0.05
+LATEST: Final = 0.1
 #: Shortest run worth filtering, in samples.
 SHORTEST: Final = 64
 
@@ -44,9 +49,7 @@ def training_runs(prepared: Sequence[Prepared], parts: Parts, model: MachineMode
         log = one.log
         torque, known = joint_torque(log, model)
         good = known & np.isfinite(log.position).all(axis=1) & _inside(one, part)
-        velocity = log.velocity
-        if velocity is not None and not np.isfinite(velocity[good]).all():
-            velocity = None
+        velocity = _velocity(one, good)
         for rows in _stretches(log.time, good):
             out.append(
                 Run(
@@ -59,6 +62,21 @@ def training_runs(prepared: Sequence[Prepared], parts: Parts, model: MachineMode
     if not out:
         raise NotWholeError("no stretch of the log is long enough to learn from")
     return out
+
+
+def _velocity(one: Prepared, good: Mask) -> Array | None:
+    """The logged velocity, where it is one and comes with the position, (N, J)."""
+    log = one.log
+    if log.velocity is None or not np.isfinite(log.velocity[good]).all():
+        return None
+    step = float(np.median(np.diff(log.time)))
+    for k in range(len(log.joints)):
+        rate = one.lowpass(np.gradient(np.interp(one.time, log.time, log.position[:, k]), one.time))
+        told = one.lowpass(np.interp(one.time, log.time, log.velocity[:, k]))
+        found = skew(told, rate, step, longest=LATEST)
+        if found is not None and abs(found.lag) * one.cutoff > LATE:
+            return None
+    return log.velocity
 
 
 def _inside(one: Prepared, part: NDArray[np.int8]) -> Mask:

@@ -94,7 +94,7 @@ def find_where(
         GapError: The model does not predict what the log measures, or betrays a wrong unit.
     """
     seen = observe(model, intake.prepared, parts)
-    measurements = with_encoder_noise(model, intake.prepared, seen)
+    measurements = with_encoder_noise(given.bare, intake.prepared, seen)
     predictions = predict(model, measurements)
     findings = [
         finding

@@ -289,7 +289,8 @@ def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
         logs, given.expected, cutoff=options.cutoff, largest=largest, contact=contact
     )
     if options.cutoff is None and options.step != "read":
-        cutoff = naming_cutoff(given.model, intake.prepared)
+        # By the machine as its files say: what a model file adds changes no bandwidth.
+        cutoff = naming_cutoff(given.bare, intake.prepared)
         intake = intake.at(lowered(intake.prepared, cutoff))
     prepared = intake.prepared
     last = None if surveys else options.prove_last

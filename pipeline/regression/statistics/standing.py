@@ -17,9 +17,7 @@ from pipeline.regression.result import Level, Term
 from pipeline.regression.statistics.choosing import Choosing
 from pipeline.regression.statistics.gram import Key
 from pipeline.regression.statistics.jackknife import standard_error
-from pipeline.regression.statistics.selection import (
-    choose_laws,
-)
+from pipeline.regression.statistics.selection import UNNAMED, choose_laws
 from pipeline.regression.statistics.solve import Fit, compare
 
 Array = NDArray[np.float64]
@@ -165,7 +163,9 @@ class Standing(Choosing):
             done += 1
             for j, c in enumerate(drawn):
                 laws[j] += c.law.name == self.choices[j].law.name
-                for k in {kind(t) for t in c.terms}:
+                # The general member holds every term: it is a vote for none of their names.
+                terms = c.beside if c.law is UNNAMED else c.terms
+                for k in {kind(t) for t in terms}:
                     kinds[j][k] = kinds[j].get(k, 0.0) + 1.0
             self._drawn_couplings(fit, weight)
         done = max(done, 1)

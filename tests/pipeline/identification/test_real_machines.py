@@ -54,7 +54,7 @@ def rms(values: Array) -> float:
 def tx40(shared_data: Path) -> Run:
     folder = shared_data / "tx40"
     log, robot = str(folder / "tx40_log.csv"), str(folder / "tx40.urdf")
-    arguments = ["--cutoff", "100", "--prove-last", "0.4", "--keep-doubtful"]
+    arguments = ["--cutoff", "100", "--prove-last", "0.4"]
     return run([log, "--robot", robot, *arguments])
 
 
@@ -109,7 +109,7 @@ def xl330_arguments(folder: Path) -> list[str]:
     files = ("--robot", "xl330.urdf", "--mapping", "xl330.toml", "--actuators", "xl330_actuators")
     where = [f if f.startswith("--") else str(FILES / f) for f in files]
     # At 8 Hz, which the encoder's noise asks for, the free swing hardly has a row off reversals.
-    more = ("--alternative", "servo", "--cutoff", "12", "--keep-doubtful")
+    more = ("--alternative", "servo", "--cutoff", "12")
     return [*learn, "--holdout", *held, *where, *more]
 
 
@@ -145,7 +145,7 @@ def test_xl330_moves_as_the_machine_does_under_its_servos_law(
     xl330: Run, shared_data: Path, tmp_path: Path
 ) -> None:
     """Mean position error on gain 200; the authors' ladder gives 62, 44 and 31 mrad."""
-    edits = edits_of(xl330.weighed.found, "logs of gains 100 and 800", keep_doubtful=True)
+    edits = edits_of(xl330.weighed.found, "logs of gains 100 and 800")
     found = tmp_path / "found.toml"
     found.write_text(model_text(xl330.given.file.with_edits(edits), tmp_path), encoding="utf-8")
     out = tmp_path / "out"
