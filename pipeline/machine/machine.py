@@ -36,12 +36,15 @@ class BodyChange:
         shift: Displacement of the centre of mass in the frame of the body's joint [m].
         scale: Factor on mass and rotational inertia [1].
         inertia_scale: Further factor on the rotational inertia about the centre of mass [1].
+        carried: Mass [kg] and first moments [kg*m] of what is carried besides, a point mass, in the
+            frame of the body's joint.
     """
 
     payload: float = 0.0
     shift: Vector = (0.0, 0.0, 0.0)
     scale: float = 1.0
     inertia_scale: float = 1.0
+    carried: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

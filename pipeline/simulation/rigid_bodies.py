@@ -45,16 +45,32 @@ def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
     for joint, change in bodies.changes:
         index = model.getJointId(joint)
         body = model.inertias[index]
-        model.inertias[index] = pin.Inertia(
+        changed = pin.Inertia(
             change.scale * body.mass + change.payload,
             body.lever + np.array(change.shift),
             change.scale * change.inertia_scale * body.inertia,
         )
+        if any(change.carried):
+            ten = np.asarray(changed.toDynamicParameters()) + point_mass(change.carried)
+            changed = pin.Inertia.FromDynamicParameters(ten)
+        model.inertias[index] = changed
     roll, pitch = bodies.tilt
     if roll or pitch:
         tilt = pin.rpy.rpyToMatrix(roll, pitch, 0.0)  # ground to level
         model.gravity.linear = tilt.T @ rigid.gravity.linear
     return model
+
+
+def point_mass(carried: Sequence[float]) -> Array:
+    """Inertial parameters (10,) of a point mass about the origin of its first moments.
+
+    Args:
+        carried: Mass [kg] and first moments [kg*m]; without a mass the moments alone.
+    """
+    mass, *moments = carried
+    m = np.array(moments)
+    turning = (m @ m * np.eye(3) - np.outer(m, m)) / mass if mass else np.zeros((3, 3))
+    return np.array([mass, *m, *turning[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
 
 
 class RigidBodies:

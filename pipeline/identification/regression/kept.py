@@ -21,12 +21,14 @@ class EffectKey:
         effect: Its name.
         place: Where.
         shape: Its nonlinear parameters.
+        coordinates: In which it is fitted; an effect may have several forms.
     """
 
     log: int
     effect: str
     place: Place
     shape: tuple[tuple[str, float], ...]
+    coordinates: tuple[str, ...]
 
     @property
     def of_body(self) -> bool:

@@ -268,7 +268,8 @@ class Problem:
         self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
     ) -> list[dict[int, Array]]:
         """Columns of a candidate in one log, kept until a joint they touch changes."""
-        key = EffectKey(log, effect.name, place, tuple(sorted(shape.items())))
+        form = tuple(c.name for c in effect.coordinates)
+        key = EffectKey(log, effect.name, place, tuple(sorted(shape.items())), form)
         if key not in self._columns:
             for sibling, columns in self._columns_of_legs(log, effect, place, shape):
                 self._columns[replace(key, place=sibling)] = columns

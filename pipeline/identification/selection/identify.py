@@ -309,8 +309,11 @@ def _candidates(start: Problem, selection: Selection) -> tuple[Candidate, ...]:
     old, rows = errors(base, (CHOOSE,), by=(FIT,))
     new, _ = errors(selection.problem, (CHOOSE,), by=(FIT,))
     old[rows == 0], new[rows == 0] = np.nan, np.nan
+    best: dict[tuple[str, Place], Score] = {}
+    for s in selection.first:  # an effect may compete in several forms
+        best.setdefault((s.effect.name, s.place), s)
     out = [
-        _candidate(start, s, accepted, rivals, last, selection, (old, new)) for s in selection.first
+        _candidate(start, s, accepted, rivals, last, selection, (old, new)) for s in best.values()
     ]
     return tuple(sorted(out, key=lambda c: c.verdict != limits.ACCEPTED))
 

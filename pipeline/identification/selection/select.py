@@ -283,7 +283,7 @@ def _reconsidered(
             if not good:
                 continue
             best = _preferred(rest, good)
-            if best.key in chosen:
+            if best.key in chosen and (best.key != key or best.score.effect is a.effect):
                 continue
             accepted = [*others[:number], _accepted(best), *others[number:]]
             candidate = refit(rest.with_accepted(accepted))

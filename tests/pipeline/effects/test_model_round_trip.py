@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from pipeline.effects.base import Effect, Place
+from pipeline.effects.bodies.link_mass import PlacedPayload
 from pipeline.effects.drive.transmission_coupling import BareCoupling
 from pipeline.effects.drive.winding_heating import SensedHeating
 from pipeline.effects.model_file import apply_edits, base_model, new_model_file, read_model_file
@@ -20,7 +21,12 @@ from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.logs.errors import ModelFileError
 from pipeline.machine.machine import MachineModel
 
-FORMS = (*(e for e in EFFECTS.values() if e.competes), BareCoupling(), SensedHeating())
+FORMS = (
+    *(e for e in EFFECTS.values() if e.competes),
+    BareCoupling(),
+    SensedHeating(),
+    PlacedPayload(),
+)
 EVERY = (*EFFECTS.values(), BareCoupling(), SensedHeating())
 #: Places of the leg, by kind.
 PLACES: Mapping[str, Place] = {

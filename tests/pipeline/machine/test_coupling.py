@@ -15,6 +15,7 @@ import pytest
 from actuators.chain import Chain
 from actuators.elements.friction import Friction
 from actuators.elements.inertia import Inertia
+from actuators.elements.joint_friction import JointFriction
 from actuators.elements.motor import DCMotor
 from actuators.elements.ratio import Ratio
 from actuators.shaft import ShaftSeries
@@ -150,3 +151,48 @@ def test_standing_with_a_coupling_the_friction_of_a_motor_is_its_own() -> None:
         ends = (load[k] - friction) / RATIO, (load[k] + friction) / RATIO
         np.testing.assert_allclose((held.low[k], held.high[k]), ends, atol=1e-12)
     assert held.motor_torque[0] == pytest.approx((3.0 - 2.3) / RATIO)
+
+
+def test_friction_at_the_joints_own_side_does_not_turn_with_the_coupled_motor(
+    motion: Measurement, machine: MachineModel
+) -> None:
+    """Its loss is its own law on the joint's own speed, and the balance of power says so."""
+    seal = JointFriction("seal", coulomb=0.2, viscous=0.3, when_driving=0.1, when_driven=0.1)
+    rubbing = machine.with_actuator(machine.actuators[2].with_output(seal))
+    plain, dry = (Simulator(motion).predict(m) for m in (machine, rubbing))
+    more = dry.motor_torque - plain.motor_torque
+    speed = motion.v @ C.T
+    # Virtual work of the motors, less that without it, is what the seal loses.
+    power = (more * speed).sum(axis=1)
+    v, load = motion.v[:, 2], plain.torque[:, 2]
+    direction = np.tanh(v / motion.rest_speed[2])
+    torque = 0.2 * direction + 0.3 * v + 0.1 * np.abs(load) * direction
+    assert np.allclose(power, torque * v, atol=1e-9)
+
+
+def test_walking_tells_what_friction_at_a_coupled_joints_own_side_loses(
+    machine: MachineModel,
+) -> None:
+    rng = np.random.default_rng(2)
+    names = machine.joints
+    motion = [rng.normal(size=(40, 3)) for _ in range(3)]
+    side = ShaftSeries.at_joint(names, np.arange(40.0), *motion, rng.normal(size=(40, 3)))
+    seal = JointFriction("seal", coulomb=0.2, viscous=0.3)
+    rubbing = machine.with_actuator(machine.actuators[2].with_output(seal))
+    plain, dry = (Drivetrains("d", m.actuators) for m in (machine, rubbing))
+    lost = dry.moving(side).losses["seal"]
+    expected = 0.2 * np.abs(side.velocity[:, 2]) + 0.3 * side.velocity[:, 2] ** 2
+    assert np.allclose(lost[:, 2], expected)
+    assert not lost[:, :2].any()
+    before, after = plain.moving(side).motor.power, dry.moving(side).motor.power
+    assert np.allclose((after - before).sum(axis=1), lost.sum(axis=1))
+
+
+def test_at_standstill_it_carries_what_it_can(machine: MachineModel) -> None:
+    seal = JointFriction("seal", coulomb=0.5)
+    rubbing = Drivetrains(
+        "d", machine.with_actuator(machine.actuators[2].with_output(seal)).actuators
+    )
+    held = rubbing.holding(np.array([1.0, 1.0, 0.4]))
+    without = Drivetrains("d", machine.actuators).holding(np.array([1.0, 1.0, 0.0]))
+    assert np.allclose(held.motor_torque, without.motor_torque)
