@@ -80,6 +80,8 @@ class Estimate:
         low: Of the 95 % interval.
         high: Of the 95 % interval.
         unit: Unit.
+        level: Of a term by itself, where its effect has several; empty for that of the effect.
+        share: Likewise, of draws of the log's blocks in which the term wins.
     """
 
     name: str
@@ -87,6 +89,8 @@ class Estimate:
     low: float
     high: float
     unit: str
+    level: str = ""
+    share: float = float("nan")
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -160,7 +160,8 @@ def named(friction: Friction, terms: Sequence[Term]) -> tuple[Estimate, ...]:
         t = by[term]
         low = -1e3 if name == "asymmetry" else 0.0
         value, half = factor * t.value, factor * max(t.high - t.value, t.value - t.low)
-        return _estimate(name, value, half, units[name], low=low)
+        own = _estimate(name, value, half, units[name], low=low)
+        return replace(own, level=str(t.level), share=t.share)
 
     for term in friction.terms:
         kind, _, number = term.partition("@")

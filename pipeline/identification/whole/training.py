@@ -28,8 +28,8 @@ from pipeline.regression import Rows, Run
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-#: A gap in time of more than this many steps ends a run.
-LONGEST_GAP: Final = 5.0
+#: A gap in time of more than this share of the cut-off's period ends a run.
+LONGEST_GAP: Final = 0.25
 #: A velocity that comes later than its position by this share of the cut-off's period is left out,
 #: looked for up to so long [s].
 LATE: Final = 0.05
@@ -50,7 +50,7 @@ def training_runs(prepared: Sequence[Prepared], parts: Parts, model: MachineMode
         torque, known = joint_torque(log, model)
         good = known & np.isfinite(log.position).all(axis=1) & _inside(one, part)
         velocity = _velocity(one, good)
-        for rows in _stretches(log.time, good):
+        for rows in _stretches(log.time, good, LONGEST_GAP / one.cutoff):
             out.append(
                 Run(
                     log.time[rows],
@@ -98,17 +98,14 @@ def _inside(one: Prepared, part: NDArray[np.int8]) -> Mask:
     return np.asarray(both & (time >= one.time[0]) & (time <= one.time[-1]))
 
 
-def _stretches(time: Array, good: Mask) -> list[slice]:
+def _stretches(time: Array, good: Mask, longest: float) -> list[NDArray[np.intp]]:
+    """Rows of the log without a gap of more than `longest` [s]."""
     step = float(np.median(np.diff(time)))
     rows = np.flatnonzero(good)
     if rows.size == 0:
         return []
-    cuts = np.flatnonzero(np.diff(time[rows]) > LONGEST_GAP * step) + 1
-    out = []
-    for piece in np.split(rows, cuts):
-        if piece.size >= SHORTEST:
-            out.append(slice(int(piece[0]), int(piece[-1]) + 1))
-    return out
+    cuts = np.flatnonzero(np.diff(time[rows]) > max(longest, 2.0 * step)) + 1
+    return [piece for piece in np.split(rows, cuts) if piece.size >= SHORTEST]
 
 
 def joint_torque(log: Log, model: MachineModel) -> tuple[Array, Mask]:
