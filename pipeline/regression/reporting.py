@@ -42,8 +42,42 @@ class Reporting(Standing):
         laws: Sequence[float],
         suspected: Sequence[Term],
     ) -> Result:
+        t, error = self._quantile(self.options.coverage), standard_error(replicas)
+        terms = self._terms(fit, keys, x, error, shares)
+        frictions = [self._friction(j, fit, keys, x, terms, laws[j]) for j in range(len(laws))]
+        base, condition, lost = self._base(x, replicas, t)
+        nb = fit.n_bodies
+        return Result(
+            with_parameters(self.model, x[:nb]) if self.sigma > 0 else self.model.copy(),
+            self.sigma > 0,
+            self.sigma,
+            base,
+            condition,
+            lost,
+            (*terms, *suspected),
+            tuple(frictions),
+            tuple(self.couplings),
+            {key: float(x[fit.system.where[key]]) for key in keys},
+            {key: float(t * error[fit.system.where[key]]) for key in keys},
+            x[:nb],
+            self._bodies_half(fit, keys, error, t),
+            self.refit_share,
+            tuple(self.noise),
+            self.rows.cutoff,
+            len(self.blocks),
+            self.rows.sigma_v,
+        )
+
+    def _terms(
+        self,
+        fit: Fit,
+        keys: Sequence[Key],
+        x: Array,
+        error: Array,
+        shares: Sequence[dict[str, float]],
+    ) -> list[Term]:
+        """Every size with a name, with its level."""
         o, t = self.options, self._quantile(self.options.coverage)
-        error = standard_error(replicas)
         strict = self._quantile(1 - o.error_rate / max(len(keys), 1))
         terms = []
         for key, (closes, gain) in self._closing(fit, keys).items():
@@ -76,45 +110,32 @@ class Reporting(Standing):
                     level,
                 )
             )
-        frictions = []
-        for j, choice in enumerate(self.choices):
-            have = tuple(key[1] for key in keys if key[0] == str(j) and key[1] not in BESIDE)
-            mine = [u for u in terms if u.place == self.names[j] and u.term not in BESIDE]
-            unnamed = choice.law is UNNAMED
-            sure = not unnamed and all(u.level is Level.CONFIRMED for u in mine)
-            named = min((u.share for u in mine), default=laws[j])
-            frictions.append(
-                Friction(
-                    self.names[j],
-                    UNNAMED.name if unnamed else name_of(have),
-                    {u: float(x[fit.system.where[(str(j), u)]]) for u in have},
-                    self.design.shapes[j],
-                    laws[j] if unnamed else named,
-                    Level.CONFIRMED if sure else Level.APPROXIMATE,
-                    choice.short,
-                )
-            )
-        base, condition, lost = self._base(x, replicas, t)
-        nb = fit.n_bodies
-        return Result(
-            with_parameters(self.model, x[:nb]) if self.sigma > 0 else self.model.copy(),
-            self.sigma > 0,
-            self.sigma,
-            base,
-            condition,
-            lost,
-            (*terms, *suspected),
-            tuple(frictions),
-            tuple(self.couplings),
-            {key: float(x[fit.system.where[key]]) for key in keys},
-            {key: float(t * error[fit.system.where[key]]) for key in keys},
-            x[:nb],
-            self._bodies_half(fit, keys, error, t),
-            self.refit_share,
-            tuple(self.noise),
-            self.rows.cutoff,
-            len(self.blocks),
-            self.rows.sigma_v,
+        return terms
+
+    def _friction(
+        self,
+        j: int,
+        fit: Fit,
+        keys: Sequence[Key],
+        x: Array,
+        terms: Sequence[Term],
+        drawn: float,
+    ) -> Friction:
+        """Friction of one joint, whose law was drawn in a share of draws."""
+        choice = self.choices[j]
+        have = tuple(key[1] for key in keys if key[0] == str(j) and key[1] not in BESIDE)
+        mine = [u for u in terms if u.place == self.names[j] and u.term not in BESIDE]
+        unnamed = choice.law is UNNAMED
+        sure = not unnamed and all(u.level is Level.CONFIRMED for u in mine)
+        named = min((u.share for u in mine), default=drawn)
+        return Friction(
+            self.names[j],
+            UNNAMED.name if unnamed else name_of(have),
+            {u: float(x[fit.system.where[(str(j), u)]]) for u in have},
+            self.design.shapes[j],
+            drawn if unnamed else named,
+            Level.CONFIRMED if sure else Level.APPROXIMATE,
+            choice.short,
         )
 
     def _bodies_half(self, fit: Fit, keys: Sequence[Key], error: Array, t: float) -> Array:

@@ -101,23 +101,18 @@ def select(
     refused: set[Key] = set()
     made: list[Trial] = []
     problem = refit(problem)
-
-    def offered() -> list[Effect]:
-        return [e for e in catalogue(problem.current()) if e.name not in without]
-
     while True:
         screen = Screen(problem)
         held = [(a.effect.name, a.place) for a in problem.accepted]
-        scores = score_all(screen, offered(), skip=held)
+        scores = score_all(screen, offered(problem, without), skip=held)
         if not first:
-            first = tuple(scores)
             noise = problem.richest()
             if (noise > _RESCALED * problem.sigma).any():
                 # The log holds more than noise and the catalogue: judge against what is left.
                 problem = refit(problem.rescaled(noise))
                 screen = Screen(problem)
-                scores = score_all(screen, offered(), skip=held)
-                first = tuple(scores)
+                scores = score_all(screen, offered(problem, without), skip=held)
+            first = tuple(scores)
         tried = len(first)
         if len(problem.accepted) >= limits.MOST_EFFECTS * len(problem.model.joints):
             break
@@ -126,14 +121,7 @@ def select(
         # A coupling brings a shaft with friction and inertia along: each joint's own come first.
         own = [s for s in open_ if not isinstance(s.effect, BareCoupling)]
         coupled = [s for s in open_ if isinstance(s.effect, BareCoupling)]
-        good: list[Trial] = []
-        made = []
-        for group in (own, coupled):
-            tries = [try_candidate(problem, refine(screen, s)) for s in group[:_TRIED]]
-            made += tries
-            good = [t for t in tries if acceptable(problem, t, tried)]
-            if good:
-                break
+        made, good = _in_earnest(problem, screen, (own, coupled), tried)
         for t in made:
             trials.setdefault(t.key, t)
         if not good:
@@ -147,10 +135,9 @@ def select(
         added = _accepted(winner)
         candidate = refit(problem.with_accepted([*problem.accepted, added]).remasked())
         candidate = pruned(candidate)
-        if runs_away(candidate):
-            refused.add(winner.key)
-            continue
-        if not any(a.effect is added.effect and a.place == added.place for a in candidate.accepted):
+        if runs_away(candidate) or not any(
+            a.effect is added.effect and a.place == added.place for a in candidate.accepted
+        ):
             refused.add(winner.key)
             continue
         rounds.append(Round(winner.key, winner, rivals))
@@ -165,6 +152,25 @@ def select(
     kept = {(a.effect.name, a.place) for a in problem.accepted}
     rounds = [r for r in rounds if r.winner in kept]
     return Selection(problem, tuple(rounds), first, tuple(scores), trials, tried, nearest)
+
+
+def offered(problem: Problem, without: Collection[str]) -> list[Effect]:
+    """Effects that compete for what a problem leaves."""
+    return [e for e in catalogue(problem.current()) if e.name not in without]
+
+
+def _in_earnest(
+    problem: Problem, screen: Screen, groups: Sequence[Sequence[Score]], tried: int
+) -> tuple[list[Trial], list[Trial]]:
+    """Candidates tried group by group until some are acceptable: all tried, and those."""
+    made: list[Trial] = []
+    for group in groups:
+        tries = [try_candidate(problem, refine(screen, s)) for s in group[:_TRIED]]
+        made += tries
+        good = [t for t in tries if acceptable(problem, t, tried)]
+        if good:
+            return made, good
+    return made, []
 
 
 def _accepted(t: Trial) -> Accepted:
@@ -335,8 +341,7 @@ def _again(
     held = [(o.effect.name, o.place) for o in others]
     problem = screen.problem
     if others:
-        offered = [e for e in catalogue(problem.current()) if e.name not in without]
-        scores = score_all(screen, offered, skip=held, near=a.place)
+        scores = score_all(screen, offered(problem, without), skip=held, near=a.place)
         return [s for s in scores[:_TRIED] if s.gain > 0.7 * least_gain(problem, s)]
     every = [(a.effect, a.shape), *((effect_named(name), {}) for name in a.effect.contains)]
     scored = [screen.score(effect, a.place, shape) for effect, shape in every]

@@ -190,6 +190,6 @@ def test_level_and_share_of_a_finding_are_written_and_read_back(tmp_path: Path, 
     assert (edit.level, edit.share) == ("approximate", 0.8)
     for old, new in (('"approximate"', '"doubtful"'), ("share = 0.8", "share = 1.2")):
         path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-        with pytest.raises(ModelFileError, match="edit 1: (level|share)"):
+        with pytest.raises(ModelFileError, match=r"edit 1\.(level|share)"):
             read_model_file(path)
         path.write_text(path.read_text(encoding="utf-8").replace(new, old), encoding="utf-8")
