@@ -48,7 +48,10 @@ def voltage_per_speed(actuator: JointModel, naming: Naming) -> tuple[float, floa
         if place == actuator.name
     }
     found: dict[str, Mapping[str, float]] = {
-        f.effect: f.values for f in naming.found if f.place == (actuator.name,)
+        f.effect: one.values
+        for f in naming.found
+        for one in f.each
+        if one.place == (actuator.name,)
     }
     factor = 1.0 + tolerance.get("torque_constant", 0.0)
     factor *= 1.0 + found.get("torque_constant_error", {}).get("relative", 0.0)
@@ -56,6 +59,8 @@ def voltage_per_speed(actuator: JointModel, naming: Naming) -> tuple[float, floa
     resistance = float(np.asarray(actuator.motor.resistance))
     resistance *= 1.0 + tolerance.get("resistance", 0.0)
     viscous, speed = found.get("viscous_friction", {}).get("coefficient", 0.0), 1.0
+    for effect in ("joint_friction", "friction_curve"):
+        viscous += found.get(effect, {}).get("viscous", 0.0)
     for element in actuator.elements:
         speed *= float(np.asarray(element.gearing))
         if isinstance(element, Friction):

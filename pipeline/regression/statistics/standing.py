@@ -163,9 +163,9 @@ class Standing(Choosing):
             done += 1
             for j, c in enumerate(drawn):
                 laws[j] += c.law.name == self.choices[j].law.name
-                # The general member holds every term: it is a vote for none of their names.
-                terms = c.beside if c.law is UNNAMED else c.terms
-                for k in {kind(t) for t in terms}:
+                # The general member holds every term: what has a name next to it has the vote.
+                law = c.best if c.law is UNNAMED else c.law
+                for k in {kind(t) for t in (*(law.terms if law else ()), *c.beside)}:
                     kinds[j][k] = kinds[j].get(k, 0.0) + 1.0
             self._drawn_couplings(fit, weight)
         done = max(done, 1)
