@@ -65,8 +65,8 @@ class Friction:
         law: Name of the law.
         terms: Sizes of its columns, offset and rotor inertia not among them.
         shape: What the columns depend on.
-        share: Of draws in which the best law with a name has its terms, by the rarest of them; where
-            it has none, in which no law with a name is near the best.
+        share: Of draws in which the best law with a name has its terms, by the rarest of them;
+            where it has none, in which no law with a name is near the best.
         level: Of the name.
         short: By how many standard errors the general member predicts better.
     """
