@@ -38,6 +38,7 @@ class Named:
         written: Whether the model file holds it.
         level: ``"confirmed"``, ``"approximate"`` or ``"suspected"``.
         share: How often the name wins on redrawn blocks; NaN where the answer states none.
+        amounts_to: Effects of one term each that it is the sum of.
     """
 
     effect: str
@@ -51,6 +52,7 @@ class Named:
     written: bool = True
     level: str = ""
     share: float = float("nan")
+    amounts_to: tuple[str, ...] = ()
 
     @property
     def confident(self) -> bool:
@@ -157,8 +159,9 @@ def read_answer(run: dict[str, Any], out: Path) -> Answer:
                 gap_after=_number(first["gap_after"]),
                 noise_floor=_number(first["noise_floor"]),
                 written=first["written"] == "true",
-                level=first.get("level") or ("suspected" if first["doubt"] else "confirmed"),
-                share=_number(first.get("share", "")),
+                level=first["level"],
+                share=_number(first["share"]),
+                amounts_to=tuple(filter(None, first["amounts_to"].split("+"))),
             )
         )
     return Answer(run["code"], run["seconds"], tuple(named))

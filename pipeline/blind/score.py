@@ -131,7 +131,7 @@ def _excused(one: HiddenTruth, judged: Identifiability) -> set[Key]:
 
 def _meets(named: Named, members: set[Key]) -> bool:
     """Whether a name, or one it calls indistinguishable, is in a class."""
-    if (named.effect, named.place) in members:
+    if any((name, named.place) in members for name in (named.effect, *named.amounts_to)):
         return True
     return any(
         effect in named.rivals and all(part in named.rivals for part in place)

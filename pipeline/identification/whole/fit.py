@@ -82,7 +82,7 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
         rows = prepare(runs, rigid)
         rows = replace(rows, tau=without_known(rows, model, rigid))
         result = identify(rows, rigid)
-    except RegressionError as error:
+    except (RegressionError, np.linalg.LinAlgError) as error:
         raise NotWholeError(str(error)) from None
     unit = CHANNEL_UNITS[where.measurements[0].channels[0]]
     found = tuple(t.found(k, unit) for k, t in enumerate(told(result, model), start=1))

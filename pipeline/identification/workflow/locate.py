@@ -28,6 +28,7 @@ _BEGUN: Final = {
     "simulating": 0.1,
     "driving": 0.2,
     "letting": 0.2,
+    "fitting": 0.3,
     "weighing": 0.7,
     "writing": 0.9,
 }

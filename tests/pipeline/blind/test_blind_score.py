@@ -201,3 +201,11 @@ def test_wrong_names_count_where_the_catalogue_has_no_name_too() -> None:
     assert (found["wrong_name"].hits, found["wrong_name"].trials) == (1, 1)
     assert found["wrong_name_of_known"].trials == 0
     assert found["right_and_written"].trials == 0
+
+
+def test_a_law_that_is_the_sum_of_named_terms_names_each_of_them() -> None:
+    law = replace(named("joint_friction"), amounts_to=("coulomb_friction", "viscous_friction"))
+    for effect, outcome in (("coulomb_friction", "right"), ("rotor_inertia", "wrong name")):
+        one = score(1, [hidden(effect)], [clear()], answer(law))
+        assert one.outcome == outcome
+        assert bool(one.wrong) == (outcome != "right")
