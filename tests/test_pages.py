@@ -225,3 +225,12 @@ def test_how_to_works_to_the_letter(how_to: list[Block], tmp_path: Path) -> None
                 check=False,
             )
             assert run.returncode == 0, f"{block}: {shlex.join(words)}\n{run.stdout}{run.stderr}"
+    for check in (["check"], ["format", "--check"]):
+        run = subprocess.run(
+            [sys.executable, "-m", "ruff", *check, "--no-cache", "."],
+            cwd=tree,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert run.returncode == 0, f"{how_to[0]}: {run.stdout}{run.stderr}"

@@ -1,5 +1,6 @@
 """The alternatives as written in the catalogue: elements, laws and where arguments come from."""
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -17,6 +18,8 @@ from actuators.elements.ratio import Ratio
 from actuators.errors import CatalogError, closest, one_line
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
+#: Files and columns are called after alternatives.
+_NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
 
 # law -> class, arguments it must have, arguments it may have
 LAWS: Final[Mapping[str, tuple[Callable[..., Element], frozenset[str], frozenset[str]]]] = {
@@ -157,8 +160,14 @@ def read_alternative(name: str, entry: object) -> Alternative:
         entry: What stands under it.
 
     Raises:
-        CatalogError: A key, law or argument is unknown or missing, or a stage is named twice.
+        CatalogError: The name cannot be part of a file's, a key, law or argument is unknown or
+            missing, or a stage is named twice.
     """
+    if not _NAME.fullmatch(name):
+        raise CatalogError(
+            f"{ALTERNATIVES_FILE} [{one_line(name)}]: expected a name of letters a to z, digits, "
+            "'_' and '-'; tables and files are called after it"
+        )
     written = checked(_Written, entry, f"{ALTERNATIVES_FILE} [{one_line(name)}]", CatalogError)
     elements = tuple(
         ElementEntry(e.name, e.law, MappingProxyType(dict(e.arguments)), e.stage, e.shaft)

@@ -137,12 +137,15 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
 
     Raises:
         ParameterError: A file cannot be read, or a parameter is wrong.
-        CatalogError: A component, law, argument or reference is unknown, a ratio does not come
-            out, or an element leaves out a parameter that its law takes and no other uses.
+        CatalogError: There is no alternative, a component, law, argument or reference is unknown,
+            a ratio does not come out, or an element leaves out a parameter that its law takes and
+            no other uses.
         ActuatorError: A parameter is unphysical.
     """
     folder = Path(directory)
     contents = read_toml(folder / ALTERNATIVES_FILE)
+    if not contents:
+        raise CatalogError(f"{ALTERNATIVES_FILE}: no alternative, expected one table [NAME] each")
     files = sorted(p for p in folder.glob("*.toml") if p.name != ALTERNATIVES_FILE)
     components = {p.stem: load_component(p) for p in files}
     alternatives = {name: read_alternative(name, entry) for name, entry in contents.items()}

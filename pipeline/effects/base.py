@@ -24,6 +24,18 @@ CHANNEL_COLUMNS: Final = {
     "voltage": "voltage_V",
     "power": "power_W",
 }
+#: Variables against which an effect's residual may be drawn.
+SIGNATURES: Final = (
+    "position",
+    "velocity",
+    "velocity of the other joint",
+    "acceleration",
+    "load",
+    "support",
+    "torque rate",
+    "effort rate",
+    "time",
+)
 
 
 @dataclass(frozen=True)
@@ -78,7 +90,7 @@ class Effect(ABC):
         place_kind: What it acts on: joint, joint pair, link, ground, effort channels or column.
         parameters: As written to results and model files.
         coordinates: As fitted.
-        signature: Variable against which its residual shows, a key of `signature.VARIABLES`.
+        signature: Variable against which its residual shows, one of `SIGNATURES`.
         excitation: The motion that shows it, in words.
         is_tolerance: Whether every machine has it in small, as a tolerance that is always free.
         reaches: Multiples of the coordinates' steps to look across, where the prediction bends.
@@ -98,6 +110,13 @@ class Effect(ABC):
     contains: ClassVar[tuple[str, ...]] = ()
     rescales: ClassVar[bool] = False
     competes: ClassVar[bool] = True
+
+    def __init_subclass__(cls) -> None:
+        """Refuse a signature that nothing can be drawn against, where the effect is written."""
+        super().__init_subclass__()
+        if cls.signature not in SIGNATURES:
+            hint = closest(cls.signature, list(SIGNATURES))
+            raise EffectError(f"{cls.__name__}: no signature '{cls.signature}'; {hint}")
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Where in this machine and log the effect could be."""

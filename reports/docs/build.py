@@ -148,7 +148,10 @@ def _write_api(folder: Path) -> None:
 
 
 def _api_page(name: str, own: list[str], inner: list[str]) -> str:
-    lines = [name, "=" * len(name), "", f".. automodule:: {name}", ""]
+    lines = [name, "=" * len(name), "", f".. automodule:: {name}"]
+    # What a package passes on is described where it stands; `pipeline` itself is the API.
+    lines += ["   :ignore-module-all:"] if "." in name else []
+    lines += [""]
     if inner:
         lines += [".. toctree::", "   :maxdepth: 1", "", *(f"   {p}" for p in inner), ""]
     for module in own:

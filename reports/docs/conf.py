@@ -31,6 +31,9 @@ autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_default_options = {"members": True, "show-inheritance": True}
 add_module_names = False
+# Types in signatures are found by their short names, which several rooms may use; the site then
+# links the first.
+suppress_warnings = ["ref.python"]
 python_maximum_signature_line_length = 88
 toc_object_entries_show_parents = "hide"
 

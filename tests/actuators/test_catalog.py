@@ -160,6 +160,21 @@ def test_an_alternative_can_be_taken_out_by_itself(copy):
         assert catalog == load_catalog().only(catalog.alternatives)
 
 
+@pytest.mark.parametrize("name", ["../up", "a/b", "two words", "x.y", ""])
+def test_an_alternative_after_which_no_file_can_be_called_is_refused(copy, name):
+    path = copy / "alternatives.toml"
+    text = path.read_text()
+    path.write_text(re.sub(r"^(\[+)rotor\b", rf'\1"{name}"', text, flags=re.M))
+    with pytest.raises(CatalogError, match=r"expected a name of letters a to z, digits"):
+        load_catalog(copy)
+
+
+def test_a_catalogue_without_an_alternative_is_refused(copy):
+    (copy / "alternatives.toml").write_text("# none yet\n")
+    with pytest.raises(CatalogError, match=r"alternatives\.toml: no alternative, expected one"):
+        load_catalog(copy)
+
+
 def test_some_alternatives_come_with_what_they_use():
     only = load_catalog().only(["reversible", "no_such"])
     assert list(only.alternatives) == ["reversible"]

@@ -88,7 +88,8 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
     Raises:
         PipelineError: The robot file or URDF cannot be used.
         ActuatorError: The catalogue cannot be used, or has no such alternative.
-        GapError: `--base` does not fit the robot, or the model file cannot be used.
+        GapError: `--base` does not fit the robot, nothing says how it is driven, or the model file
+            cannot be used.
     """
     given_file = read_model_file(options.model, options.actuators) if options.model else known
     path: Path = options.robot or (given_file.robot if given_file else DEFAULT_ROBOT)
@@ -108,7 +109,7 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         refuse_impossible(robot)
         robot = with_payload(robot)
         # Motor-side positions need a ratio whatever channel is compared.
-        usual = alternative or own.usual or DEFAULT_ALTERNATIVE
+        usual = alternative or own.usual or _default(catalog)
         actuators = own.actuators(catalog, usual)
         expected = expected_of_robot(robot, ratio=_ratio(actuators, robot.joints))
         if not alternative and _channel(options, expected) != AT_JOINT:
@@ -188,6 +189,21 @@ def _alternative(options: Options, file: ModelFile | None) -> str:
             f"--alternative {asked} contradicts; leave one of the two out"
         )
     return asked or file.alternative
+
+
+def _default(catalog: Catalog) -> str:
+    """The alternative of a machine of which nobody says how it is built.
+
+    Raises:
+        GapError: The catalogue does not have it.
+    """
+    if DEFAULT_ALTERNATIVE not in catalog.alternatives:
+        known = ", ".join(f"'{name}'" for name in catalog.alternatives)
+        raise GapError(
+            f"nothing says how the machine's joints are driven, and there is no alternative "
+            f"'{DEFAULT_ALTERNATIVE}' to assume: name one with --alternative: {known}"
+        )
+    return DEFAULT_ALTERNATIVE
 
 
 def _channel(options: Options, expected: Expected) -> str:

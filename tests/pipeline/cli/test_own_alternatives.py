@@ -11,6 +11,9 @@ import pytest
 
 from actuators.loading.build import CATALOG
 from pipeline.cli.main import main
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup
+from pipeline.logs.errors import GapError
 
 PAPERS = ("ideal", "rotor", "reversible", "irreversible")
 
@@ -78,3 +81,14 @@ def test_every_verb_runs_on_any_list_of_alternatives(
     assert ("'ideal'" in said) == ("ideal" not in names)
     assert (reports / "index.html").exists()
     assert (reports / "readings.csv").exists() == (kind == "fifth")
+
+
+def test_a_log_of_a_machine_whose_actuator_nobody_names_asks_for_it(
+    root: Path, tmp_path: Path
+) -> None:
+    _catalogue("only_reversible", tmp_path / "actuators")
+    log = root / "pipeline" / "identification" / "demo" / "walk.parquet"
+    robot = root / "urdf" / "hexapod.toml"
+    options = Options(logs=(log,), robot=robot, actuators=tmp_path / "actuators")
+    with pytest.raises(GapError, match=r"no alternative 'rotor' .* --alternative: 'reversible'$"):
+        setup(options)
