@@ -8,7 +8,7 @@ its level: a class of effects that look alike excuses nothing.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -29,6 +29,12 @@ BODIES: Final = frozenset(
 HALVES: Final[Mapping[str, frozenset[str]]] = {
     "direction_dependent_friction": frozenset({"coulomb_friction", "effort_offset"}),
 }
+#: Effects of which others are a part.
+PARTS: Final[Mapping[str, frozenset[str]]] = {
+    "stribeck_friction": frozenset({"coulomb_friction"}),
+}
+#: Sizes of single laws, and what a law of several terms calls them.
+TERMS: Final = {"torque": "coulomb", "coefficient": "viscous", "share": "load"}
 #: Parameters that are compared only up to conventions, or depend on what is beside them.
 NOT_COVERED: Final = frozenset({"phase", "rest", "velocity", "x", "y", "z"})
 CONFIRMED: Final = "confirmed"
@@ -90,13 +96,7 @@ def score_straight(truth: Mapping[str, Any], answer: Answer) -> StandardScore:
         if h["effect"] in halves or any(_is(n, h) and n.written for n in counted)
     )
     first = bool(counted) and counted[0].written and any(_is(counted[0], h) for h in hidden)
-    wrong = tuple(
-        n
-        for n in counted
-        if n.written
-        and not any(_is(n, h) for h in hidden)
-        and not any(n.effect in HALVES[e] for e in halves)
-    )
+    wrong = tuple(n for n in counted if n.written and _astray(n, hidden, halves))
     intervals, covered = _coverage(hidden, counted)
     return StandardScore(
         truth, answer, counted, right, first or bool(halves), wrong, intervals, covered
@@ -104,7 +104,18 @@ def score_straight(truth: Mapping[str, Any], answer: Answer) -> StandardScore:
 
 
 def _is(named: Named, hidden: Mapping[str, Any]) -> bool:
-    return named.effect == hidden["effect"] and list(named.place) == list(hidden["place"])
+    """Whether a name is that of a hidden effect, or its law has the hidden one among its terms."""
+    told = (named.effect, *named.amounts_to)
+    return hidden["effect"] in told and list(named.place) == list(hidden["place"])
+
+
+def _astray(named: Named, hidden: Sequence[Mapping[str, Any]], halves: Collection[str]) -> bool:
+    """Whether a name, or a term of its law, is that of nothing hidden."""
+    own = {h["effect"] for h in hidden if list(h["place"]) == list(named.place)}
+    own |= {half for effect in own & set(halves) for half in HALVES[effect]}
+    told = set(named.amounts_to) or {named.effect}
+    own |= {part for effect in own & told for part in PARTS.get(effect, ())}
+    return not told <= own
 
 
 def _background(named: Named, truth: Mapping[str, Any]) -> bool:
@@ -114,6 +125,8 @@ def _background(named: Named, truth: Mapping[str, Any]) -> bool:
         # Where a joint's friction is what is hidden, its law has to be right.
         own = {p for h in hidden if h["effect"] in FRICTION for p in h["place"]}
         return bool(truth["friction"]) and not own & set(named.place)
+    if named.effect == "effort_offset":  # as any friction that one direction has more of
+        return set(named.place) <= set(truth["uneven"]) - {p for h in hidden for p in h["place"]}
     if named.effect in BODIES:
         return not any(h["effect"] in BODIES for h in hidden) or named.effect != "link_mass"
     return (
@@ -129,7 +142,8 @@ def _halves(hidden: Sequence[Mapping[str, Any]], named: Sequence[Named]) -> set[
     for h in hidden:
         halves = HALVES.get(h["effect"], frozenset())
         place = list(h["place"])
-        given = {n.effect for n in named if n.written and list(n.place) == place}
+        own = [n for n in named if n.written and list(n.place) == place]
+        given = {name for n in own for name in (n.effect, *n.amounts_to)}
         if halves and halves <= given:
             out.add(h["effect"])
     return out
@@ -141,6 +155,8 @@ def _coverage(hidden: Sequence[Mapping[str, Any]], counted: Sequence[Named]) -> 
         truth = next((h["values"] for h in hidden if _is(n, h)), None)
         if truth is None or not n.written:
             continue
+        terms = {TERMS.get(name, name): value for name, value in truth.items()}
+        truth = terms if n.amounts_to else truth
         for parameter, (_, low, high) in n.intervals.items():
             if parameter in truth and parameter not in NOT_COVERED and low < high:
                 count += 1

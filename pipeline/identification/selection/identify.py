@@ -210,6 +210,12 @@ def _doubt(problem: Problem, number: int, certain: bool) -> str:
 
     The scatter of the gradient over blocks is compared with what noise of the final misfit gives.
     """
+    a = problem.accepted[number]
+    further = {name: 1.1 * value for name, value in a.x.items()}
+    if not a.effect.plausible(problem.model, a.place, further, a.shape):
+        return limits.BOUND
+    if not certain:
+        return limits.NOTHING
     ratio, excess = fit_quality(problem, number)
     contradicts = ratio > limits.LARGEST_SCATTER and excess > limits.LARGEST_EXCESS
     suspect = ratio > limits.SUSPECT_SCATTER and excess > limits.UNEXPLAINED
@@ -219,12 +225,6 @@ def _doubt(problem: Problem, number: int, certain: bool) -> str:
             f"noise allows, and {excess:.1f} times the noise is left: its law is not that of the "
             "machine"
         )
-    a = problem.accepted[number]
-    further = {name: 1.1 * value for name, value in a.x.items()}
-    if not a.effect.plausible(problem.model, a.place, further, a.shape):
-        return limits.BOUND
-    if not certain:
-        return limits.NOTHING
     return ""
 
 

@@ -34,6 +34,10 @@ FAMILIES = frozenset(
 )
 #: ... and of bodies, where they were fitted.
 OF_BODIES = frozenset({"link_mass", "center_of_mass_offset", "base_tilt"})
+#: ... and of torque columns, whose zero is a term of every joint's friction.
+OF_COLUMNS = frozenset({"effort_offset"})
+#: What only bodies that are known can tell: the scale of a torque is that of the masses it moves.
+SCALES = frozenset({"effort_gain", "torque_constant_error"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,5 +91,9 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
     unit = CHANNEL_UNITS[where.measurements[0].channels[0]]
     found = tuple(t.found(k, unit) for k, t in enumerate(told(result, model), start=1))
     kept = [f for f in found if f.kept]
-    decided = FAMILIES | OF_BODIES if result.refit else FAMILIES
+    decided = FAMILIES
+    if where.measurements[0].channels[0] == "torque":
+        decided |= OF_COLUMNS
+    if result.refit:
+        decided |= OF_BODIES | SCALES
     return Whole(found, reduce(with_found, kept, model), result, decided, tuple(suspected(result)))

@@ -1,9 +1,11 @@
 """Which explanation: a few effects in an otherwise true model, or a machine fitted as a whole.
 
 The simplest one first. Where at most a few effects bring the gap down to noise, they are the
-answer. Where more would be needed, or more than noise is left, bodies, friction of every joint and
-couplings are fitted together, and the other effects of the catalogue are looked for in what that
-leaves. The whole machine is kept where it takes a large part of what the few effects leave.
+answer; of a bare URDF, which does not say how well its bodies are known, only where these and
+friction do not explain the log with fewer claims. Where more would be needed, or more than noise is
+left, bodies, friction of every joint and couplings are fitted together, and the other effects of
+the catalogue are looked for in what that leaves. The whole machine is kept where it takes a large
+part of what the few effects leave.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from pipeline.identification import results as limits
 from pipeline.identification.results import Found, Naming
 from pipeline.identification.selection.identify import Identified, estimated_alone, identify
 from pipeline.identification.whole.errors import NotWholeError
-from pipeline.identification.whole.fit import Whole, fit_whole
+from pipeline.identification.whole.fit import FAMILIES, OF_BODIES, Whole, fit_whole
 from pipeline.identification.workflow.locate import Progress, Whereabouts
 from pipeline.identification.workflow.setup import Setup
 
@@ -55,7 +57,8 @@ def explain(given: Setup, where: Whereabouts, progress: Progress) -> Explanation
     if given.file.edits:
         return _alone(identify(given.model, where.measurements))
     few = identify(given.model, where.measurements, most=limits.FEW)
-    if few.enough and not (few.excess > limits.UNEXPLAINED).any():
+    explained = few.enough and not (few.excess > limits.UNEXPLAINED).any()
+    if explained and (given.robot is not None or not _claims(few)):
         return _alone(few)
     progress.step("fitting the whole machine")
     try:
@@ -67,7 +70,12 @@ def explain(given: Setup, where: Whereabouts, progress: Progress) -> Explanation
         return _alone(few if few.enough else identify(given.model, where.measurements))
     progress.step("letting effects compete")
     rest = identify(whole.model, where.measurements, without=whole.decided)
-    if few.enough and not _takes_a_large_part(few, rest):
+    if explained:
+        # A URDF alone vouches for no mass: what its bodies and friction explain as well, with fewer
+        # claims about sensors and springs, is theirs.
+        if (rest.excess > limits.UNEXPLAINED).any() or _claims(rest) >= _claims(few):
+            return _alone(few)
+    elif few.enough and not _takes_a_large_part(few, rest):
         return _alone(few)
     found = [
         replace(f, order=number)
@@ -79,6 +87,11 @@ def explain(given: Setup, where: Whereabouts, progress: Progress) -> Explanation
 
 def _alone(named: Identified, *notes: str) -> Explanation:
     return Explanation(replace(named.naming, notes=(*named.naming.notes, *notes)), named)
+
+
+def _claims(named: Identified) -> int:
+    """Findings that are neither friction nor bodies, which no URDF states as they are."""
+    return sum(f.kept and f.effect not in FAMILIES | OF_BODIES for f in named.naming.found)
 
 
 def _takes_a_large_part(few: Identified, whole: Identified) -> bool:

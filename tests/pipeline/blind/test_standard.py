@@ -19,6 +19,7 @@ NAN = float("nan")
 def truth(*hidden: tuple[str, str, dict[str, float]], **more: Any) -> dict[str, Any]:
     return {
         "friction": ["joint_1", "joint_2"],
+        "uneven": [],
         "delays_s": [0.0, 0.0],
         "sides": "joint",
         "hidden": [
@@ -51,6 +52,30 @@ def test_friction_and_bodies_of_the_machine_are_neither_right_nor_wrong() -> Non
     assert score.first
     assert score.right == ("parallel_spring",)
     assert not score.wrong
+
+
+def law(place: str, *terms: str) -> Named:
+    return named("joint_friction", place, amounts_to=terms)
+
+
+def test_a_law_of_several_terms_is_right_by_the_term_that_is_hidden_and_wrong_by_any_other() -> (
+    None
+):
+    hidden = truth(("viscous_friction", "joint_1", {"coefficient": 0.2}))
+    score = judged(hidden, law("joint_1", "viscous_friction"))
+    assert score.first
+    assert not score.wrong
+    score = judged(hidden, law("joint_1", "coulomb_friction", "viscous_friction"))
+    assert score.right == ("viscous_friction",)
+    assert [n.effect for n in score.wrong] == ["joint_friction"]
+    rising = truth(("stribeck_friction", "joint_1", {"coulomb": 0.2}))
+    assert not judged(rising, law("joint_1", "coulomb_friction", "stribeck_friction")).wrong
+
+
+def test_an_offset_where_friction_is_uneven_is_the_machines_own() -> None:
+    offset = named("effort_offset", "joint_1")
+    assert judged(truth(SPRING), offset).wrong
+    assert not judged(truth(SPRING, uneven=["joint_1"]), offset).wrong
 
 
 def test_friction_named_on_a_machine_without_any_is_wrong() -> None:

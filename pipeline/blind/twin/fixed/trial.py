@@ -84,6 +84,11 @@ def make_fixed_trial(seed: int, name: str, effects: tuple[str, ...], background:
         "background": background,
         "bodies": bodies,
         "friction": [] if background == "bare" else list(machine.joints),
+        "uneven": [
+            joint
+            for joint, size in zip(machine.joints, empty.truth.friction.asymmetry, strict=True)
+            if size
+        ],
         "delays_s": case.sensors.delay.tolist(),
         "sides": case.sensors.sides,
         "hidden": [
