@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,10 +11,12 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.errors import one_line
+from pipeline.dynamics.gait_check import check_gait
 from pipeline.dynamics.stability import support_margin
 from pipeline.errors import RobotFileError
 from pipeline.robot.check import Finding, check_robot
 from pipeline.robot.guess.guess import Guess, guess_robot
+from pipeline.robot.guess.pace import shorter
 from pipeline.robot.guess.writer import robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -66,13 +68,31 @@ def init(
         raise RobotFileError(f"--out {one_line(path)}: a robot file's name ends in .toml")
     if path.exists():
         raise RobotFileError(f"{path}: there is such a file; give another name with --out")
-    text = robot_text(guess, path)
     with replacing(path) as (temporary,):
-        temporary.write_text(text, encoding="utf-8")
-        robot = load_robot(load_robot_file(temporary))
-        findings = tuple(check_robot(robot))
+        guess, robot, walked = _walked(guess, path, temporary)
+        findings = (*check_robot(robot), *walked)
     picture = _draw(robot, path)
     return Init(path, picture, guess, findings)
+
+
+def _walked(guess: Guess, path: Path, temporary: Path) -> tuple[Guess, Robot, list[Finding]]:
+    """Write the file with the longest stroke with which its gait can be walked, sway and all.
+
+    Where none can, the first stays and the finding says why.
+    """
+    first = None
+    for pace in [guess.pace, *shorter(guess.pace)]:
+        tried = replace(guess, pace=pace)
+        temporary.write_text(robot_text(tried, path), encoding="utf-8")
+        robot = load_robot(load_robot_file(temporary))
+        findings = [replace(f, subject=guess.source.name) for f in check_gait(robot)]
+        if first is None:
+            first = tried, robot, findings
+        if all(finding.passed for finding in findings):
+            return tried, robot, findings
+    assert first is not None
+    temporary.write_text(robot_text(first[0], path), encoding="utf-8")
+    return first
 
 
 def _draw(robot: Robot, path: Path) -> Path:

@@ -23,7 +23,7 @@ def run_init(
         The exit code: 1 where `check` fails or no stroke was found.
     """
     from pipeline.api.init import init
-    from pipeline.robot.urdf_check import MERGED
+    from pipeline.cli.findings import told
 
     done = init(source, out, feet=feet, base=base)
     guess, stance = done.guess, done.guess.stance
@@ -53,10 +53,8 @@ def run_init(
         f"then at [assumed] in {done.path}, which says why each guess was made"
     )
     failed = [finding for finding in done.findings if not finding.passed]
-    for finding in done.findings:
-        if not finding.passed or (finding.note and finding.check != MERGED):
-            mark = "note" if finding.passed else "FAIL"
-            print(f"{mark} {finding.subject}: {finding.check}: {finding.detail}")
+    for line in told(done.findings, merged=False):
+        print(line)
     passed = len(done.findings) - len(failed)
     print(f"check: {passed} of {len(done.findings)} passed")
     return _NEGATIVE if failed or guess.pace is None else _OK

@@ -162,15 +162,13 @@ def _run_init(options: argparse.Namespace) -> int:
 
 
 def _run_check(options: argparse.Namespace) -> int:
-    from pipeline.robot.check import check_file
+    from pipeline.cli.findings import told
+    from pipeline.dynamics.gait_check import check_with_gait
 
-    findings = check_file(options.file)
+    findings = check_with_gait(options.file)
     failed = [finding for finding in findings if not finding.passed]
-    for finding in findings:
-        if finding.passed and not finding.note and not options.verbose:
-            continue
-        mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
-        print(f"{mark} {finding.subject}: {finding.check}: {finding.detail}")
+    for line in told(findings, all_of_them=options.verbose):
+        print(line)
     print(f"{options.file}: {len(findings) - len(failed)} of {len(findings)} checks passed")
     return EXIT_NEGATIVE if failed else EXIT_OK
 

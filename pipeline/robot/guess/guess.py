@@ -118,7 +118,7 @@ def _refuse_stuck(model: pin.Model, joints: Sequence[str], where: str) -> None:
 
 
 def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
-    """The first stance, from the largest margin down, that leaves a stroke to walk with.
+    """The first stance, from the best mark down, that leaves a stroke to walk with.
 
     Raises:
         RobotFileError: No stance was found.

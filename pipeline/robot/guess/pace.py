@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ Array = NDArray[np.float64]
 _FIRST = 0.3  # stroke over the height of the hips, if the legs allow
 _SHRINK = 0.85
 _TRIES = 20
+_HALVED, _SHORTER = 0.7, 4  # of a stroke that the gait does not allow, and how often
 _LIFT = 0.4  # over the stroke
 _SIDE = 0.25  # room to the sides, over the stroke: the body sways
 #: Over the stroke: how far the foot of a leg that lacks a direction may leave its path.
@@ -69,6 +71,14 @@ def find_pace(chains: LegChains, stance: Stance, lower: Array, upper: Array) -> 
             # Robots of one shape walk alike where the period goes with the root of their height.
             return Pace(stroke, lift, _rounded(_PERIOD * (height / _HEIGHT) ** 0.5))
     return None
+
+
+def shorter(pace: Pace | None) -> Iterator[Pace]:
+    """Shorter and shorter strokes and lifts, for a gait that asks more than feet alone do."""
+    for k in range(1, _SHORTER + 1 if pace else 0):
+        assert pace is not None
+        stroke = _rounded(pace.stroke * _HALVED**k)
+        yield Pace(stroke, _rounded(_LIFT * stroke), pace.period)
 
 
 def _rounded(value: float) -> float:
