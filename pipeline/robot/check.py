@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -65,11 +66,13 @@ def check_robot(robot: Robot) -> list[Finding]:
 def _sliding(robot: Robot) -> list[Finding]:
     """Joints whose numbers are metres and newtons under headings for those that turn."""
     detail = (
-        "it slides: where columns are called rad, rad_s and Nm its numbers are m, m/s and N, and "
-        "its actuator's ratio is turned radians per metre"
+        "it slides: metres and newtons, also in tables of one row a joint, under headings in rad "
+        "and Nm; its actuator's ratio is turned radians per metre"
     )
-    names = [joint for joint, slides in zip(robot.joints, robot.sliding, strict=True) if slides]
-    return [Finding(joint, "unit of the joint", True, detail, note=True) for joint in names]
+    return [
+        Finding(joint, "unit of the joint", True, detail, note=True)
+        for joint in robot.sliding_joints
+    ]
 
 
 def source_of(robot: Robot) -> str:
@@ -138,9 +141,25 @@ def refused(findings: list[Finding], where: str, file: str) -> tuple[str, ...]:
             + (f", and {more} more" if more else "")
             + f"; `python -m pipeline check {file}` lists all"
         )
-    return tuple(
-        f"{f.subject}: {f.check}: {f.detail}" for f in findings if f.note and f.check != MERGED
-    )
+    notes = [finding for finding in findings if finding.note and finding.check != MERGED]
+    return tuple(f"{subjects}: {said.check}: {said.detail}" for subjects, said in together(notes))
+
+
+#: Subjects that one line names of those of which the same is said, where they are more.
+_SHOWN = 3
+
+
+def together(findings: Iterable[Finding]) -> Iterator[tuple[str, Finding]]:
+    """Findings that say the same as one: their subjects, and the first of them."""
+    same: dict[tuple[bool, bool, str, str], list[Finding]] = {}
+    for finding in findings:
+        key = (finding.passed, finding.note, finding.check, finding.detail)
+        same.setdefault(key, []).append(finding)
+    for group in same.values():
+        names = [finding.subject for finding in group]
+        shown = names if len(names) <= _SHOWN + 1 else names[:_SHOWN]
+        more = f" and {len(names) - len(shown)} more" if len(shown) < len(names) else ""
+        yield ", ".join(shown) + more, group[0]
 
 
 def _symmetry(robot: Robot, spec: RobotSpec) -> list[Finding]:

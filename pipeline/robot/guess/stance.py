@@ -4,9 +4,9 @@ The search draws postures of every leg inside its limits, keeps those that stand
 every joint of its leg, away from singular postures and from limits), and of feet on one level takes
 those of the best mark, a product of four marks from 0 to 1 of which none may be bad:
 
-- torque: 1 / (1 + (lever / (height / 2))^2), with the lever of a weight on the foot about the joints
-  that turn (root of the sum of squares) and the height of the hip over the foot. A foot under its
-  joints has 1; the largest margin taken for itself would put feet as far out as legs reach;
+- torque: 1 / (1 + (lever / (height / 2))^2), with the lever of a weight on the foot about the
+  joints that turn (root of the sum of squares) and the height of the hip over the foot. A foot
+  under its joints has 1; the largest margin for itself would put feet as far out as legs reach;
 - limits: the joint nearest to a limit, in half ranges from it;
 - singularity: the smallest singular value of the foot's Jacobian over the largest that the leg has;
 - margin of static stability: s / (1 + s), with s its share of that of feet below their hips.
