@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,6 +76,26 @@ def init(
         findings = (*check_robot(robot), *walked)
     picture = _draw(robot, path)
     return Init(path, picture, guess, findings)
+
+
+@cache
+def robot_file_of(name: str) -> Path:
+    """The robot file that `init` would write for a published robot, kept while Python runs.
+
+    Args:
+        name: Of a robot in ``example-robot-data``.
+    """
+    folder = _kept()
+    path = folder / f"{name}.toml"
+    _walked(guess_robot(name, support_margin), path, path)
+    return path
+
+
+@cache
+def _kept() -> Path:
+    folder = TemporaryDirectory(prefix="legwatt_")
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
 
 
 def _walked(guess: Guess, path: Path, temporary: Path) -> tuple[Guess, Robot, list[Finding]]:
