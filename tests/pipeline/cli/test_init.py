@@ -78,7 +78,7 @@ def test_a_gait_that_cannot_be_walked_fails_the_check(
     text = (root / "urdf" / "solo12.toml").read_text(encoding="utf-8")
     assert main(["check", str(root / "urdf" / "solo12.toml"), "-v"]) == 0
     assert "gait can be walked: crawl gait: least margin of static stab" in capsys.readouterr().out
-    long = text.replace("[gait]", '[gait]\nstroke = "400 mm"')
+    long = text.replace("[gait]", '[gait]\nstroke = "900 mm"')
     (tmp_path / "long.toml").write_text(long, encoding="utf-8")
     assert main(["check", str(tmp_path / "long.toml")]) == 1
     told = capsys.readouterr().out
