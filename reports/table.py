@@ -22,7 +22,8 @@ Column = Sequence[Any] | NDArray[Any]
 Meaning = tuple[str, str] | tuple[str, str, str]
 _NAME = re.compile(r"[A-Za-z0-9_.-]+")
 _SEE = "see "
-_HEADER = re.compile(r"[A-Za-z0-9_]+")
+#: A quantity in plain words, after its owner, whose name a URDF may write as it likes.
+_HEADER = re.compile(r"""(?:[^/\\,;"\x00-\x1f\x7f]+__)?[A-Za-z0-9_]+""")
 
 
 @dataclass(frozen=True)

@@ -21,15 +21,20 @@ class Quantity:
 
     Attributes:
         name: As it stands in the header, e.g. ``"torque"``.
-        unit: As people write it, e.g. ``"N*m"``; ``"1"`` leaves the header without a unit.
+        unit: As people write it, e.g. ``"N*m"``; ``"1"`` leaves the header without a unit. One for
+            each owner, in a tuple, where they differ.
         meaning: One clause with the sign, e.g. ``"torque the actuator applies to the joint"``.
         values: Shape (N, J).
     """
 
     name: str
-    unit: str
+    unit: str | tuple[str, ...]
     meaning: str
     values: Array
+
+    def unit_of(self, owner: int) -> str:
+        """Of the owner's column, counted from 0."""
+        return self.unit if isinstance(self.unit, str) else self.unit[owner]
 
 
 def header(owner: str, quantity: str, unit: str) -> str:
@@ -74,9 +79,10 @@ def wide_series(
             )
     for j, joint in enumerate(joints):
         for quantity in quantities:
-            key = header(joint, quantity.name, quantity.unit)
+            unit = quantity.unit_of(j)
+            key = header(joint, quantity.name, unit)
             if key in columns:
                 raise TableError(f"table '{name}': header '{key}' occurs twice; rename one")
             columns[key] = quantity.values[:, j]
-            meanings[key] = (f"{joint}: {quantity.meaning}", quantity.unit)
+            meanings[key] = (f"{joint}: {quantity.meaning}", unit)
     return Table(name, columns, meanings, description)

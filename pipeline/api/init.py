@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import atexit
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 
 from actuators.errors import one_line
+from pipeline.dynamics.gait_check import check_gait
 from pipeline.dynamics.stability import support_margin
 from pipeline.errors import RobotFileError
 from pipeline.robot.check import Finding, check_robot
 from pipeline.robot.guess.guess import Guess, guess_robot
+from pipeline.robot.guess.pace import shorter
 from pipeline.robot.guess.writer import robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -66,13 +71,51 @@ def init(
         raise RobotFileError(f"--out {one_line(path)}: a robot file's name ends in .toml")
     if path.exists():
         raise RobotFileError(f"{path}: there is such a file; give another name with --out")
-    text = robot_text(guess, path)
     with replacing(path) as (temporary,):
-        temporary.write_text(text, encoding="utf-8")
-        robot = load_robot(load_robot_file(temporary))
-        findings = tuple(check_robot(robot))
+        guess, robot, walked = _walked(guess, path, temporary)
+        findings = (*check_robot(robot), *walked)
     picture = _draw(robot, path)
     return Init(path, picture, guess, findings)
+
+
+@cache
+def robot_file_of(name: str) -> Path:
+    """The robot file that `init` would write for a published robot, kept while Python runs.
+
+    Args:
+        name: Of a robot in ``example-robot-data``.
+    """
+    folder = _kept()
+    path = folder / f"{name}.toml"
+    _walked(guess_robot(name, support_margin), path, path)
+    return path
+
+
+@cache
+def _kept() -> Path:
+    folder = TemporaryDirectory(prefix="legwatt_")
+    atexit.register(folder.cleanup)
+    return Path(folder.name)
+
+
+def _walked(guess: Guess, path: Path, temporary: Path) -> tuple[Guess, Robot, list[Finding]]:
+    """Write the file with the longest stroke with which its gait can be walked, sway and all.
+
+    Where none can, the first stays and the finding says why.
+    """
+    first = None
+    for pace in [guess.pace, *shorter(guess.pace)]:
+        tried = replace(guess, pace=pace)
+        temporary.write_text(robot_text(tried, path), encoding="utf-8")
+        robot = load_robot(load_robot_file(temporary))
+        findings = [replace(f, subject=guess.source.name) for f in check_gait(robot)]
+        if first is None:
+            first = tried, robot, findings
+        if all(finding.passed for finding in findings):
+            return tried, robot, findings
+    assert first is not None
+    temporary.write_text(robot_text(first[0], path), encoding="utf-8")
+    return first
 
 
 def _draw(robot: Robot, path: Path) -> Path:

@@ -6,11 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.api.init import robot_file_of
 from pipeline.effects.model_file import ModelFile, read_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.model_writer import model_text
 from pipeline.robot.published import published_names
-from pipeline.robot.robot_file import DEFAULT_ROBOT, load_robot_file
+from pipeline.robot.robot_file import DEFAULT_ROBOT
 from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import PAPER_FORCES, Settings, settings
 from reports.atomic import write_text
@@ -86,8 +87,9 @@ def load(
     """Name a machine by its files, and refuse what cannot be used.
 
     Args:
-        robot: Robot file (.toml), or the URDF of a robot on a fixed base; the model file's or the
-            project's hexapod by default.
+        robot: Robot file (.toml), the URDF of a robot on a fixed base, or the name of a robot in
+            ``example-robot-data``, with the stance and gait that `init` guesses for it; the model
+            file's or the project's hexapod by default.
         model: Model file with effects that `identify` found.
         actuators: Folder of actuator files; the project's catalogue by default.
         gait: File with a table ``[gait]`` to walk instead of the robot file's.
@@ -105,12 +107,12 @@ def load(
     if model is not None:
         file = read_model_file(Path(model), folder)
     path = Path(robot) if robot is not None else file.robot if file else DEFAULT_ROBOT
+    if not path.exists() and str(robot) in published_names():
+        path = robot_file_of(str(robot))
     texts = tuple(f"{name}={value}" for name, value in (changes or {}).items())
     machine = Machine(path, folder, texts, file, Path(gait) if gait else None)
     if path.suffix.lower() == ".toml":
         machine.settings(samples=51, walks=False)
     elif not path.is_file():
-        if str(robot) in published_names():
-            load_robot_file(path)  # says how to make one
         raise RobotFileError(f"{path}: no such robot file; name a robot file or URDF")
     return machine

@@ -77,7 +77,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
     chains = given.chains()
     p, gait = given.robot.spec.parameters, gait_of(given.robot.spec)
     tables = [
-        walking_tables.walking_joint_demand(walking.demand),
+        walking_tables.walking_joint_demand(walking.demand, given.robot.sliding_joints),
         walking_tables.walking_contact_forces(walking.demand),
         walking_gait(gait),
         walking_base(walking.motion),

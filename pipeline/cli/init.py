@@ -1,9 +1,13 @@
-"""The verb `init`: a robot file from a URDF, and what to look at in it."""
+"""The verbs `init` and `check`: a robot file from a URDF, and what is to be said of one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pipeline.robot.check import Finding
 
 _OK, _NEGATIVE = 0, 1
 
@@ -23,7 +27,6 @@ def run_init(
         The exit code: 1 where `check` fails or no stroke was found.
     """
     from pipeline.api.init import init
-    from pipeline.robot.urdf_check import MERGED
 
     done = init(source, out, feet=feet, base=base)
     guess, stance = done.guess, done.guess.stance
@@ -53,10 +56,49 @@ def run_init(
         f"then at [assumed] in {done.path}, which says why each guess was made"
     )
     failed = [finding for finding in done.findings if not finding.passed]
-    for finding in done.findings:
-        if not finding.passed or (finding.note and finding.check != MERGED):
-            mark = "note" if finding.passed else "FAIL"
-            print(f"{mark} {finding.subject}: {finding.check}: {finding.detail}")
+    for line in told(done.findings, merged=False):
+        print(line)
     passed = len(done.findings) - len(failed)
     print(f"check: {passed} of {len(done.findings)} passed")
     return _NEGATIVE if failed or guess.pace is None else _OK
+
+
+def run_check(path: Path, *, verbose: bool = False) -> int:
+    """Say what fails and what the reader should know; with `verbose` what passes, too.
+
+    Returns:
+        The exit code: 1 where anything fails.
+    """
+    from pipeline.dynamics.gait_check import check_with_gait
+
+    findings = check_with_gait(path)
+    failed = [finding for finding in findings if not finding.passed]
+    for line in told(findings, all_of_them=verbose):
+        print(line)
+    print(f"{path}: {len(findings) - len(failed)} of {len(findings)} checks passed")
+    return _NEGATIVE if failed else _OK
+
+
+def told(
+    findings: Sequence[Finding], *, all_of_them: bool = False, merged: bool = True
+) -> Iterator[str]:
+    """Lines for what failed and what the reader should know.
+
+    Args:
+        findings: Of `check`.
+        all_of_them: What passed, too, and each in a line of its own.
+        merged: Whether to tell which links move as one.
+
+    Yields:
+        One line for each, or for all of which the same is said.
+    """
+    from pipeline.robot.check import MERGED, together
+
+    if all_of_them:
+        rows = [(finding.subject, finding) for finding in findings]
+    else:
+        worth = [f for f in findings if not f.passed or (f.note and (merged or f.check != MERGED))]
+        rows = list(together(worth))
+    for subjects, finding in rows:
+        mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
+        yield f"{mark} {subjects}: {finding.check}: {finding.detail}"

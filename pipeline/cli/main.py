@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -162,17 +163,9 @@ def _run_init(options: argparse.Namespace) -> int:
 
 
 def _run_check(options: argparse.Namespace) -> int:
-    from pipeline.robot.check import check_file
+    from pipeline.cli.init import run_check
 
-    findings = check_file(options.file)
-    failed = [finding for finding in findings if not finding.passed]
-    for finding in findings:
-        if finding.passed and not finding.note and not options.verbose:
-            continue
-        mark = "FAIL" if not finding.passed else "note" if finding.note else "ok  "
-        print(f"{mark} {finding.subject}: {finding.check}: {finding.detail}")
-    print(f"{options.file}: {len(findings) - len(failed)} of {len(findings)} checks passed")
-    return EXIT_NEGATIVE if failed else EXIT_OK
+    return run_check(options.file, verbose=options.verbose)
 
 
 def _run_urdf(options: argparse.Namespace) -> int:
@@ -270,6 +263,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (PipelineError, ActuatorError, GapError, ReportError) as error:
         print(error, file=sys.stderr)
         return EXIT_UNUSABLE
+    except BrokenPipeError:  # who reads has enough: `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return EXIT_OK
     except KeyboardInterrupt:
         print("interrupted; nothing is half-written", file=sys.stderr)
         return 130

@@ -66,6 +66,11 @@ class Footfall:
             middle = (start + end) / 2
             stance = tuple(leg for leg in self.phase if self.stands(leg, middle))
             if len(stance) < LEAST_FEET:
+                if len(self.phase) == LEAST_FEET:
+                    raise GaitError(
+                        f"gait '{self.name}': none of {LEAST_FEET} legs can be lifted, a static "
+                        f"gait needs {LEAST_FEET} feet on the ground; `stand` has an answer"
+                    )
                 raise GaitError(
                     f"gait '{self.name}': from {100 * start:.4g} % to {100 * end:.4g} % of the "
                     f"period only {len(stance)} feet stand ({', '.join(stance) or 'none'}); a "

@@ -47,9 +47,14 @@ def refuse_beyond_limits(robot: Robot, q: Array, time: Array) -> None:
     beyond = np.maximum(flat - upper, lower - flat)
     if beyond.max() > 1e-9:
         sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
+        slides = robot.sliding[joint]
+        scale, digits, unit = (1.0, 4, "m") if slides else (180 / np.pi, 1, "deg")
+        there, low, high = (
+            f"{scale * float(x):.{digits}f}"
+            for x in (flat[sample, joint], lower[joint], upper[joint])
+        )
         raise GaitError(
-            f"joint '{robot.joints[joint]}' would have to reach "
-            f"{np.degrees(flat[sample, joint]):.1f} deg at t = {time[sample]:.4g} s, its "
-            f"limits are {np.degrees(lower[joint]):.1f} to {np.degrees(upper[joint]):.1f} deg; "
+            f"joint '{robot.joints[joint]}' would have to reach {there} {unit} at "
+            f"t = {time[sample]:.4g} s, its limits are {low} to {high} {unit}; "
             "change the stroke, the neutral foot or the limits"
         )

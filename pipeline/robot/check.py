@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from pipeline.errors import UnphysicalModelError
 from pipeline.robot.published import published_names, published_robot
@@ -16,6 +18,7 @@ from pipeline.robot.urdf_source import read_urdf
 
 __all__ = ["Finding", "check_file", "check_robot", "check_urdf", "refuse_impossible", "refuse_urdf"]
 
+Array = NDArray[np.float64]
 #: Relative, lengths to the leg's: left and right of CAD exports differ.
 SYMMETRY_TOLERANCE = 0.01
 #: Up to here a difference is one of parts and noted, beyond it is a mistake: a wrong sign makes 2.
@@ -63,11 +66,13 @@ def check_robot(robot: Robot) -> list[Finding]:
 def _sliding(robot: Robot) -> list[Finding]:
     """Joints whose numbers are metres and newtons under headings for those that turn."""
     detail = (
-        "it slides: where columns are called rad, rad_s and Nm its numbers are m, m/s and N, and "
-        "its actuator's ratio is turned radians per metre"
+        "it slides: metres and newtons, also in tables of one row a joint, under headings in rad "
+        "and Nm; its actuator's ratio is turned radians per metre"
     )
-    names = [joint for joint, slides in zip(robot.joints, robot.sliding, strict=True) if slides]
-    return [Finding(joint, "unit of the joint", True, detail, note=True) for joint in names]
+    return [
+        Finding(joint, "unit of the joint", True, detail, note=True)
+        for joint in robot.sliding_joints
+    ]
 
 
 def source_of(robot: Robot) -> str:
@@ -136,25 +141,42 @@ def refused(findings: list[Finding], where: str, file: str) -> tuple[str, ...]:
             + (f", and {more} more" if more else "")
             + f"; `python -m pipeline check {file}` lists all"
         )
-    return tuple(
-        f"{f.subject}: {f.check}: {f.detail}" for f in findings if f.note and f.check != MERGED
-    )
+    notes = [finding for finding in findings if finding.note and finding.check != MERGED]
+    return tuple(f"{subjects}: {said.check}: {said.detail}" for subjects, said in together(notes))
+
+
+#: Subjects that one line names of those of which the same is said, where they are more.
+_SHOWN = 3
+
+
+def together(findings: Iterable[Finding]) -> Iterator[tuple[str, Finding]]:
+    """Findings that say the same as one: their subjects, and the first of them."""
+    same: dict[tuple[bool, bool, str, str], list[Finding]] = {}
+    for finding in findings:
+        key = (finding.passed, finding.note, finding.check, finding.detail)
+        same.setdefault(key, []).append(finding)
+    for group in same.values():
+        names = [finding.subject for finding in group]
+        shown = names if len(names) <= _SHOWN + 1 else names[:_SHOWN]
+        more = f" and {len(names) - len(shown)} more" if len(shown) < len(names) else ""
+        yield ", ".join(shown) + more, group[0]
 
 
 def _symmetry(robot: Robot, spec: RobotSpec) -> list[Finding]:
-    """A leg and its counterpart must be mirror images in masses, places and inertias."""
-    partner = {"left": "right", "right": "left"}
+    """A leg and its counterpart must be mirror images in masses, places and inertias.
+
+    A robot none of whose hips has a counterpart, as in some stars, is made so, not by mistake.
+    """
     findings = []
     data = robot.model.createData()
     pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
     feet = np.array([leg.neutral_foot for leg in spec.legs])
-    for i, leg in enumerate(spec.legs):
-        if leg.side != "left":
-            continue
-        apart = np.linalg.norm(feet - feet[i] * [1, -1, 1], axis=1)
-        others = [k for k, other in enumerate(spec.legs) if other.side == partner[leg.side]]
-        near = min(others, key=lambda k: float(apart[k]), default=None)
-        if near is None or apart[near] > MIRRORED_FOOT * robot.chains.reach[i]:
+    if not any(near is not None for near in _counterparts(robot, robot.chains.offset[0]).values()):
+        detail = "no hip is the mirror image of another; left and right are not compared"
+        return [Finding(spec.name, "mirror symmetry", True, detail, note=True)]
+    for i, near in _counterparts(robot, feet).items():
+        leg = spec.legs[i]
+        if near is None:
             detail = "no right leg with the mirrored foot"
             findings.append(Finding(leg.name, "mirror symmetry", False, detail))
             continue
@@ -178,6 +200,32 @@ def _symmetry(robot: Robot, spec: RobotSpec) -> list[Finding]:
             )
         )
     return findings
+
+
+def _counterparts(robot: Robot, points: Array) -> dict[int, int | None]:
+    """Of every left leg the right leg whose point mirrors its own, if any does.
+
+    Args:
+        robot: With legs.
+        points: One of each leg in the base frame [m], shape (L, 3).
+
+    Returns:
+        Indices of legs; left out are those in the middle plane, their own counterparts.
+    """
+    legs = robot.spec.legs
+    right = [k for k, leg in enumerate(legs) if leg.side == "right"]
+    out: dict[int, int | None] = {}
+    for i, leg in enumerate(legs):
+        if leg.side != "left":
+            continue
+        near = MIRRORED_FOOT * float(robot.chains.reach[i])
+        apart = np.linalg.norm(points - points[i] * [1, -1, 1], axis=1)
+        partner = min(right, key=lambda k: float(apart[k]), default=None)
+        if partner is not None and apart[partner] <= near:
+            out[i] = partner
+        elif abs(points[i, 1]) > near:
+            out[i] = None
+    return out
 
 
 def _mirror_difference(robot: Robot, data: pin.Data, left: str, right: str) -> float:

@@ -107,6 +107,11 @@ class Robot:
         return np.array(["JointModelP" in kind for kind in kinds])
 
     @cached_property
+    def sliding_joints(self) -> tuple[str, ...]:
+        """Names of the prismatic ones among `joints`."""
+        return tuple(j for j, slides in zip(self.joints, self.sliding, strict=True) if slides)
+
+    @cached_property
     def start_posture(self) -> Array:
         """Postures that name each leg's branch, shape (L, K) [rad, m]; zero beyond its joints."""
         out = np.zeros(self.leg_columns.shape)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,9 +29,17 @@ ALTERNATIVE = ("actuator alternative", "")
 HELD = "held joints"
 
 
-def walking_joint_demand(demand: MotionDemand) -> Table:
-    """Motion and torque of every joint over the cycle."""
+def walking_joint_demand(demand: MotionDemand, sliding: Collection[str] = ()) -> Table:
+    """Motion and torque of every joint over the cycle.
+
+    Args:
+        demand: Of all joints.
+        sliding: Joints that slide: metres and newtons, not radians and newton metres.
+    """
     parts = demand.segments
+
+    def units(turns: str, slides: str) -> tuple[str, ...]:
+        return tuple(slides if joint in sliding else turns for joint in demand.joints)
 
     def joined(name: str) -> Array:
         return np.concatenate([getattr(part, name) for part in parts])
@@ -42,10 +50,18 @@ def walking_joint_demand(demand: MotionDemand) -> Table:
         joined("time"),
         demand.joints,
         [
-            Quantity("position", "rad", "position", joined("position")),
-            Quantity("velocity", "rad/s", "velocity", joined("velocity")),
-            Quantity("acceleration", "rad/s^2", "acceleration", joined("acceleration")),
-            Quantity("torque", "N*m", "torque the actuator applies to the joint", joined("torque")),
+            Quantity("position", units("rad", "m"), "position", joined("position")),
+            Quantity("velocity", units("rad/s", "m/s"), "velocity", joined("velocity")),
+            Quantity(
+                "acceleration", units("rad/s^2", "m/s^2"), "acceleration", joined("acceleration")
+            ),
+            Quantity(
+                "torque",
+                units("N*m", "N"),
+                "torque the actuator applies to the joint"
+                + (", a force where it slides" if sliding else ""),
+                joined("torque"),
+            ),
         ],
         labels={"segment": (labels, "which feet support")},
         description="One gait cycle; torque and velocity positive in the joint's direction.",

@@ -13,6 +13,7 @@ import pinocchio as pin
 from actuators.errors import closest, one_line
 from pipeline.errors import RobotFileError
 from pipeline.robot.check import refused
+from pipeline.robot.guess.frame import refuse_turned
 from pipeline.robot.guess.limbs import Limb, find_limbs
 from pipeline.robot.guess.pace import Pace, find_pace
 from pipeline.robot.guess.source import Source, source_of, standing_pose
@@ -88,11 +89,13 @@ def guess_robot(
     layout = leg_columns(joints, [limb.joints for limb in limbs])
     chains = leg_chains(model, [(limb.name, limb.joints, limb.foot) for limb in limbs], 1)
     _refuse_stuck(model, of_legs, where)
+    known = np.array([[pose.get(joint, 0.0) for joint in joints]])
+    refuse_turned(root, limbs, chains, layout.by_leg(known)[0], where)
     position = np.array([*[0.0] * len(of_legs), *[value for _, value, _ in held]])
     standing = Standing(model, chains, layout, columns, position, margin, where)
     stance = None
     if pose and all(joint in pose for joint in of_legs):
-        posture = layout.by_leg(np.array([[pose.get(j, 0.0) for j in joints]]))[0]
+        posture = layout.by_leg(known)[0]
         stance = standing.of_pose(posture, f"pose '{pose_name}' of {_name(source.srdf)}")
     if stance is not None:
         pace = find_pace(chains, stance, standing.lower, standing.upper)
@@ -118,7 +121,7 @@ def _refuse_stuck(model: pin.Model, joints: Sequence[str], where: str) -> None:
 
 
 def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
-    """The first stance, from the largest margin down, that leaves a stroke to walk with.
+    """The first stance, from the best mark down, that leaves a stroke to walk with.
 
     Raises:
         RobotFileError: No stance was found.

@@ -114,15 +114,17 @@ def _looked_for(model: pin.Model, data: pin.Data, where: str) -> tuple[list[int]
     leaves = [j for j in range(_ROOT + 1, model.njoints) if not list(model.children[j])]
     ends = _outermost(model, [k for k in _bodies(model) if model.frames[k].parentJoint in leaves])
     height = {k: float(data.oMf[k].translation[2]) for k in ends}
-    top = max(float(place.translation[2]) for place in data.oMi[_ROOT:])
     low = min(height.values())
-    lowest = [k for k in ends if height[k] <= low + _LOW * max(top - low, 1e-9)]
+    levels = [*height.values(), *(float(place.translation[2]) for place in data.oMi[_ROOT:])]
+    lowest = [k for k in ends if height[k] <= low + _LOW * max(np.ptp(levels), 1e-9)]
     bare = [k for k in lowest if np.linalg.norm(model.frames[k].placement.translation) < 1e-6]
     if len(lowest) >= _FEWEST and bare:
+        end = model.frames[bare[0]].name
         raise RobotFileError(
-            f"{where}: link '{model.frames[bare[0]].name}' ends a chain, but its frame lies in its "
-            "joint and not at a foot; add a link at the foot on a fixed joint, or name feet with "
-            f"--foot among {_some(model, _bodies(model))}"
+            f"{where}: link '{end}' ends a chain, but its frame lies in its joint "
+            f"'{model.names[model.frames[bare[0]].parentJoint]}' and not at a foot: the URDF does "
+            "not say where that leg touches the ground; add a link 'foot' there, on a fixed joint "
+            f'with <parent link="{end}"/> and its <origin>, and the same to the other legs'
         )
     return lowest, "the end of a chain that reaches as low as any"
 

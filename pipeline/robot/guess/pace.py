@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ Array = NDArray[np.float64]
 _FIRST = 0.3  # stroke over the height of the hips, if the legs allow
 _SHRINK = 0.85
 _TRIES = 20
+_CUT, _SHORTER = 0.7, 4  # of a stroke that the gait does not allow, and how often
 _LIFT = 0.4  # over the stroke
 _SIDE = 0.25  # room to the sides, over the stroke: the body sways
 #: Over the stroke: how far the foot of a leg that lacks a direction may leave its path.
@@ -55,20 +57,46 @@ def find_pace(chains: LegChains, stance: Stance, lower: Array, upper: Array) -> 
     height = float((chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
     about = replace(chains, nominal=stance.posture)
     follows = np.array([not own.lacks for own in freedoms(about)])
-    for k in range(_TRIES):
-        stroke = _rounded(_FIRST * height * _SHRINK**k)
-        lift = _rounded(_LIFT * stroke)
-        x, y, z = stroke / 2, _SIDE * stroke, lift
-        steps = [(a * x, b * y, c * z) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (0, 1)]
-        room = np.array(steps)[:, None, :] * np.where(follows[:, None], 1.0, [1.0, 0.0, 1.0])
-        target = stance.feet + room
-        q, miss = reach(about, target, stance.posture)
-        inside = (q >= lower) & (q <= upper) | ~chains.real
-        off = np.linalg.norm(foot_positions(about, q) - target, axis=-1)
-        if miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and inside.all():
-            # Robots of one shape walk alike where the period goes with the root of their height.
-            return Pace(stroke, lift, _rounded(_PERIOD * (height / _HEIGHT) ** 0.5))
+    # A leg that lacks a direction leaves its path when it lifts its foot: less lift, less of that.
+    shares = (_LIFT,) if follows.all() else (_LIFT, _LIFT / 2, _LIFT / 4)
+    strokes = [_rounded(_FIRST * height * _SHRINK**k) for k in range(_TRIES)]
+    least = strokes[-1], _rounded(shares[-1] * strokes[-1])
+    if not _can_do(about, stance, (lower, upper), least, follows):
+        return None
+    for stroke in strokes:
+        for share in shares:
+            lift = _rounded(share * stroke)
+            if _can_do(about, stance, (lower, upper), (stroke, lift), follows):
+                # Robots of one shape walk alike where the period goes with the root of height.
+                return Pace(stroke, lift, _rounded(_PERIOD * (height / _HEIGHT) ** 0.5))
     return None
+
+
+def _can_do(
+    about: LegChains,
+    stance: Stance,
+    limits: tuple[Array, Array],
+    step: tuple[float, float],
+    follows: NDArray[np.bool_],
+) -> bool:
+    """Whether feet reach all corners of a step, with room to the sides, within the limits."""
+    (stroke, lift), (lower, upper) = step, limits
+    x, y, z = stroke / 2, _SIDE * stroke, lift
+    corners = [(a * x, b * y, c * z) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (0, 1)]
+    room = np.array(corners)[:, None, :] * np.where(follows[:, None], 1.0, [1.0, 0.0, 1.0])
+    target = stance.feet + room
+    q, miss = reach(about, target, stance.posture)
+    inside = (q >= lower) & (q <= upper) | ~about.real
+    off = np.linalg.norm(foot_positions(about, q) - target, axis=-1)
+    return bool(miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and inside.all())
+
+
+def shorter(pace: Pace | None) -> Iterator[Pace]:
+    """Shorter and shorter strokes and lifts, for a gait that asks more than feet alone do."""
+    for k in range(1, _SHORTER + 1 if pace else 0):
+        assert pace is not None
+        stroke = _rounded(pace.stroke * _CUT**k)
+        yield Pace(stroke, _rounded(pace.lift * _CUT**k), pace.period)
 
 
 def _rounded(value: float) -> float:

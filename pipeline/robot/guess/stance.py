@@ -1,9 +1,19 @@
 """A stance to stand and walk about: from a pose that is known, else from a search.
 
 The search draws postures of every leg inside its limits, keeps those that stand (the foot below
-every joint of its leg, within a cone under the hip, away from singular postures and from limits),
-and of feet on one level takes those with the largest margin of static stability. Right legs mirror
-left ones where their hips do.
+every joint of its leg, away from singular postures and from limits), and of feet on one level takes
+those of the best mark, a product of four marks from 0 to 1 of which none may be bad:
+
+- torque: 1 / (1 + (lever / (height / 2))^2), with the lever of a weight on the foot about the
+  joints that turn (root of the sum of squares) and the height of the hip over the foot. A foot
+  under its joints has 1; the largest margin for itself would put feet as far out as legs reach;
+- limits: the joint nearest to a limit, in half ranges from it;
+- singularity: the smallest singular value of the foot's Jacobian over the largest that the leg has;
+- margin of static stability: s / (1 + s), with s its share of that of feet below their hips.
+
+Legs are chosen one after the other, each against the margin that the others leave, twice round.
+
+Right legs mirror left ones where their hips do.
 """
 
 from __future__ import annotations
@@ -31,10 +41,10 @@ _HEIGHTS = 25
 _CLEAR = 0.1  # share of a joint's range kept from either limit
 _ENDLESS = np.pi / 2  # [rad] a joint without limits is searched this far either way
 _BELOW = 0.05  # of the leg's reach, by which a foot is lower than its leg's joints
-_CONES = (1.0, 0.75, 0.5, 0.25)  # horizontal over vertical distance of a foot from its hip
 _SINGULAR = 0.25  # of the largest smallest singular value that the leg has
 _LEVEL = 0.03  # of the reach: feet within that are of one height, before they are levelled
 _MIRRORED = 0.02  # of the reach
+_ROUNDS = 2  # over the legs, at each height
 
 
 @dataclass(frozen=True)
@@ -115,7 +125,7 @@ class Standing:
         return np.array(pin.centerOfMass(self.model, self.model.createData(), q))
 
     def candidates(self) -> Iterator[Stance]:
-        """Stances among the postures drawn, those with the largest margin first.
+        """Stances among the postures drawn, those of the best mark first.
 
         Raises:
             RobotFileError: A leg has no posture that stands.
@@ -128,33 +138,41 @@ class Standing:
         feet = foot_positions(chains, q)
         smallest = self._smallest(q)
         regular = _SINGULAR * smallest.max(axis=0)
-        found: list[tuple[float, float, Array, Array]] = []
+        stands = self._stands(feet, origins) & (smallest >= regular)
+        if not stands.any(axis=0).all():
+            raise self._no_posture(int(stands.any(axis=0).argmin()))
+        marks = np.where(stands, self._marks(q, feet, smallest / smallest.max(axis=0)), -1.0)
+        heights = np.where(stands, feet[..., 2], np.nan)
+        lowest, highest = np.nanmin(heights, axis=0).max(), np.nanmax(heights, axis=0).min()
         centre = self._centre(np.where(chains.real, (low + high) / 2, 0.0))
-        for cone in _CONES:
-            stands = self._stands(feet, origins, cone) & (smallest >= regular)
-            if not stands.any(axis=0).all():
-                if cone == _CONES[0]:
-                    raise self._no_posture(int(stands.any(axis=0).argmin()))
-                break
-            heights = np.where(stands, feet[..., 2], np.nan)
-            lowest, highest = np.nanmin(heights, axis=0).max(), np.nanmax(heights, axis=0).min()
-            for height in np.linspace(lowest, highest, _HEIGHTS):
-                chosen = self._outermost(feet, stands, origins, float(height), centre)
-                if chosen is None:
-                    continue
-                posture = q[chosen, range(n_legs)]
-                level = feet[chosen, range(n_legs)].copy()
-                level[:, 2] = height
-                level = self._mirror(level)
-                found.append((self._margin(level, posture), -float(height), level, posture))
+        hips = float(self.margin(chains.offset[0][None], centre[None, :2])[0])
+        usual = max(hips, _LEVEL * chains.reach.min())  # hips may surround no area
+        found: list[tuple[float, Array, Array]] = []
+        for height in np.linspace(lowest, highest, _HEIGHTS):
+            stood = self._best(feet, origins, marks, float(height), (centre, usual))
+            if stood is not None:
+                mark, chosen, level = stood
+                found.append((mark, level, q[chosen, range(n_legs)]))
         reason = (
-            "the largest margin of static stability among level feet that leave a stroke, in a "
-            f"search of {_POSTURES} postures of each leg, {100 * _CLEAR:g} % clear of its limits"
+            "level feet under their joints, clear of limits and singular postures, that stand "
+            f"firmly and leave a stroke: the best of a search of {_POSTURES} postures of each leg"
         )
-        for _, _, level, posture in sorted(found, key=lambda one: one[:2], reverse=True):
+        for _, level, posture in sorted(found, key=lambda one: one[0], reverse=True):
             stance = self._reached(level, posture, reason, 0.0)
             if stance is not None and (self._smallest(stance.posture[None])[0] >= regular).all():
                 yield stance
+
+    def _marks(self, q: Array, feet: Array, regular: Array) -> Array:
+        """Of postures by leg: torque, limits and singularity, shape (M, L)."""
+        chains = self.chains
+        hips = np.maximum(chains.offset[0, :, 2] - feet[..., 2], 1e-9)
+        rise = foot_jacobians(chains, q)[1][..., 2, :]  # of the foot by every joint, (M, L, K)
+        lever = np.linalg.norm(np.where(chains.slides.T, 0.0, rise), axis=-1)
+        limited, low, high = self._limited()
+        half = np.where(limited, (high - low) / 2, 1.0)
+        clear = np.where(limited, np.minimum(q - low, high - q) / half, 1.0).min(axis=-1)
+        marks: Array = np.clip(clear, 0.0, 1.0) * regular / (1 + (lever / (hips / 2)) ** 2)
+        return marks
 
     def _no_posture(self, leg: int) -> RobotFileError:
         return RobotFileError(
@@ -163,23 +181,25 @@ class Standing:
             "pose 'standing' in an SRDF beside the URDF"
         )
 
-    def _range(self) -> tuple[Array, Array]:
-        """Where postures are drawn, each (L, K)."""
+    def _limited(self) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Which joints have limits that are any, and these within a turn, each (L, K)."""
         lower, upper = self.lower, self.upper
         limited = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < 4 * np.pi)
         limited &= upper > lower
+        return limited, np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+
+    def _range(self) -> tuple[Array, Array]:
+        """Where postures are drawn, each (L, K)."""
+        limited, lower, upper = self._limited()
         far = np.where(self.chains.slides.T, 0.2 * self.chains.reach[:, None], _ENDLESS)
-        lower = np.where(limited, np.maximum(lower, -np.pi), -far)
-        upper = np.where(limited, np.minimum(upper, np.pi), far)
+        lower, upper = np.where(limited, lower, -far), np.where(limited, upper, far)
         clear = _CLEAR * (upper - lower)
         return lower + clear, upper - clear
 
-    def _stands(self, feet: Array, origins: Array, cone: float) -> NDArray[np.bool_]:
-        """Which postures of which legs have the foot below the leg and the hip, shape (M, L)."""
+    def _stands(self, feet: Array, origins: Array) -> NDArray[np.bool_]:
+        """Which postures of which legs have the foot below all of the leg, shape (M, L)."""
         height = origins[..., 2].min(axis=2) - feet[..., 2]
-        hip = origins[:, :, 0] - feet
-        under = np.linalg.norm(hip[..., :2], axis=-1) <= cone * hip[..., 2]
-        return np.asarray((height >= _BELOW * self.chains.reach) & under)
+        return np.asarray(height >= _BELOW * self.chains.reach)
 
     def _smallest(self, q: Array) -> Array:
         """Smallest singular value among the directions that a leg has, shape (M, L)."""
@@ -187,37 +207,64 @@ class Standing:
         last = [own.directions - 1 for own in freedoms(self.chains)]
         return np.asarray(values[:, range(len(last)), last])
 
-    def _outermost(
+    def _best(
         self,
         feet: Array,
-        stands: NDArray[np.bool_],
         origins: Array,
+        marks: Array,
         height: float,
-        centre: Array,
-    ) -> NDArray[np.intp] | None:
-        """Of every leg the posture whose foot is furthest out at a height; None without one."""
-        chains, hips = self.chains, self.chains.offset[0]
+        about: tuple[Array, float],
+    ) -> tuple[float, NDArray[np.intp], Array] | None:
+        """The postures of the best mark with feet at a height; None where a leg has none.
+
+        Args:
+            feet: Of all postures, shape (M, L, 3) [m].
+            origins: Of their joints, shape (M, L, K, 3) [m].
+            marks: Of the postures by leg, shape (M, L); negative where they do not stand.
+            height: Of the feet in the base frame [m].
+            about: Centre of mass and margin of feet below their hips [m].
+
+        Returns:
+            The mark, of every leg a posture's index, and their feet, levelled (L, 3) [m].
+        """
+        chains, pairs = self.chains, self._pairs()
+        n_legs = len(chains.names)
+        near = (np.abs(feet[..., 2] - height) <= _LEVEL * chains.reach) & (marks > 0)
+        if not near.any(axis=0).all():
+            return None
+        centre, usual = about
+        chosen = np.where(near, marks, -1.0).argmax(axis=0)
+        level = self._mirror(feet[chosen, range(n_legs)])
+        level[:, 2] = height
+        mark = 0.0
+        for leg in [leg for leg in range(n_legs) if leg not in pairs] * _ROUNDS:
+            own = np.flatnonzero(near[:, leg])
+            tried = np.repeat(level[None], own.size, axis=0)
+            tried[:, leg, :2] = feet[own, leg, :2]
+            for other in (k for k, first in pairs.items() if first == leg):
+                tried[:, other, :2] = feet[own, leg, :2] * [1, -1]
+            share = self.margin(tried, np.repeat(centre[None, :2], own.size, axis=0)) / usual
+            share = np.maximum(share, 0.0)
+            rest = [k for k in range(n_legs) if k != leg and pairs.get(k) != leg]
+            others = np.log(marks[chosen[rest], rest]).sum()
+            legs = np.exp((others + (n_legs - len(rest)) * np.log(marks[own, leg])) / n_legs)
+            best = int((legs * share / (1 + share)).argmax())
+            mark = float((legs * share / (1 + share))[best])
+            chosen[leg], level = own[best], tried[best]
+        return mark, self._partners(chosen, feet, origins, near), level
+
+    def _partners(
+        self, chosen: NDArray[np.intp], feet: Array, origins: Array, near: NDArray[np.bool_]
+    ) -> NDArray[np.intp]:
+        """Right legs in the mirror image of their left ones, knee and all."""
         flip = np.array([1.0, -1.0, 1.0])
-        chosen = np.zeros(len(chains.names), dtype=np.intp)
-        done: dict[int, int] = self._pairs()
-        for leg in range(chosen.size):
-            at_height = np.abs(feet[:, leg, 2] - height) <= _LEVEL * chains.reach[leg]
-            own = np.flatnonzero(stands[:, leg] & at_height)
-            if own.size == 0:
-                return None
-            if leg in done:  # the mirror image of its partner, knee and all
-                partner = done[leg]
-                k = chosen[partner]
-                apart = np.linalg.norm(origins[own, leg] - flip * origins[k, partner], axis=-1)
-                apart = apart.sum(-1) + np.linalg.norm(
-                    feet[own, leg] - flip * feet[k, partner], axis=-1
-                )
-                chosen[leg] = own[int(apart.argmin())]
-                continue
-            out = hips[leg, :2] - centre[:2]
-            out /= max(float(np.linalg.norm(out)), 1e-9)
-            chosen[leg] = own[int((feet[own, leg, :2] @ out).argmax())]
-        return chosen
+        out = chosen.copy()
+        for leg, partner in self._pairs().items():
+            own, k = np.flatnonzero(near[:, leg]), out[partner]
+            apart = np.linalg.norm(origins[own, leg] - flip * origins[k, partner], axis=-1).sum(-1)
+            apart += np.linalg.norm(feet[own, leg] - flip * feet[k, partner], axis=-1)
+            out[leg] = own[int(apart.argmin())]
+        return out
 
     def _pairs(self) -> dict[int, int]:
         """Right legs whose hip mirrors an earlier leg's, and that leg."""

@@ -15,7 +15,9 @@ from pipeline.errors import PipelineError, RobotFileError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.standing import standing_posture
 from pipeline.robot.check import check_robot
+from pipeline.robot.guess.frame import quarter_turns
 from pipeline.robot.guess.guess import Guess, guess_robot
+from pipeline.robot.guess.limbs import Limb
 from pipeline.robot.guess.writer import robot_text
 from pipeline.robot.published import published_names, published_robot
 from pipeline.robot.robot import Robot, load_robot
@@ -53,7 +55,7 @@ def test_published_quadrupeds_are_found_and_stand(name: str, tmp_path: Path) -> 
     guess, robot = guessed(name, tmp_path)
     assert [len(limb.joints) for limb in guess.limbs] == [joints] * 4
     assert len(guess.held) == held
-    assert guess.stance.reason.startswith(f"pose '{pose}'" if pose else "the largest margin")
+    assert guess.stance.reason.startswith(f"pose '{pose}'" if pose else "level feet under")
     assert guess.pace is not None
     assert [f.detail for f in check_robot(robot) if not f.passed] == []
     sides = [leg.side for leg in robot.spec.legs]
@@ -80,7 +82,7 @@ def test_every_published_robot_is_guessed_or_told_in_one_line(name: str, tmp_pat
 
 
 def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_path: Path) -> None:
-    """Without an SRDF: the stance of a search, level, clear of limits, with the largest margin."""
+    """Without an SRDF: a search finds about the stance that the paper chose, femurs level."""
     guess, robot = guessed(str(root / "urdf" / "hexapod.urdf"), tmp_path)
     assert [(leg.name, leg.joints, leg.foot, leg.side) for leg in robot.spec.legs] == [
         (leg.name, leg.joints, leg.foot, leg.side) for leg in hexapod.spec.legs
@@ -94,12 +96,93 @@ def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_p
     lower, upper = (robot.layout.by_leg(limit[None])[0] for limit in robot.limits)
     assert (guess.stance.posture > lower).all()
     assert (guess.stance.posture < upper).all()
-    own = standing_posture(hexapod, hexapod.leg_names)
-    usual = support_margin(
-        np.array([[leg.neutral_foot for leg in hexapod.spec.legs]]), np.zeros((1, 2))
+    papers = np.array([leg.neutral_foot for leg in hexapod.spec.legs])
+    off = np.linalg.norm(feet - papers, axis=1)
+    assert (off < 0.25 * np.abs(papers[:, 2])).all()
+    assert guess.stance.margin > 0.8 * support_margin(papers[None], np.zeros((1, 2)))[0]
+
+
+#: Robots whose publisher states a pose for standing, which a search does not get to see.
+POSED = ("a1", "anymal_c", "go2", "hyq", "solo12", "solo8")
+
+
+@pytest.mark.parametrize("name", POSED)
+def test_the_search_stands_about_as_publishers_pose_their_robots(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Feet within half a height of the pose's, at a height within a quarter of its."""
+    published = guess_robot(name, support_margin).stance
+    monkeypatch.setattr("pipeline.robot.guess.guess.standing_pose", lambda source: None)
+    guess = guess_robot(name, support_margin)
+    sought = guess.stance
+    height = -published.feet[:, 2].mean()
+    off = np.linalg.norm((sought.feet - published.feet)[:, :2], axis=1)
+    assert (off < 0.5 * height).all()
+    np.testing.assert_allclose(-sought.feet[:, 2], height, rtol=0.25)
+    assert sought.margin > 0.6 * published.margin
+    assert guess.pace is not None
+
+
+def hung(text: str, rpy: str) -> str:
+    """A URDF's base on a new root, turned."""
+    return text.replace(
+        '<link name="base">',
+        '<link name="root"/><joint name="turned" type="fixed"><parent link="root"/>'
+        f'<child link="base"/><origin rpy="{rpy}"/></joint><link name="base">',
     )
-    assert own.stance == hexapod.leg_names
-    assert guess.stance.margin > usual[0]
+
+
+@pytest.mark.parametrize(
+    ("rpy", "message"),
+    [
+        ("0 0 1.5707963268", "as if y of 'root' pointed forward; x must"),
+        ("0 0 -1.5707963268", "as if -y of 'root' pointed forward; x must"),
+        ("0 0 3.1415926536", "as if -x of 'root' pointed forward; x must"),
+        ("3.1415926536 0 0", "feet lie above their hips, so that z of 'root' seems to point down"),
+    ],
+)
+def test_a_base_that_looks_elsewhere_is_told_with_the_turn_that_helps(
+    tmp_path: Path, rpy: str, message: str
+) -> None:
+    """What the line says is done, and then it works."""
+    text = urdf_text((MIXED[0],) * 4, turned=False)
+    for i, corner in enumerate(("lf", "rf", "lh", "rh")):
+        text = text.replace(f"leg{i}", corner)
+    (tmp_path / "walker.urdf").write_text(hung(text, rpy), encoding="utf-8")
+    with pytest.raises(RobotFileError, match=message) as caught:
+        guessed(str(tmp_path / "walker.urdf"), tmp_path)
+    said = re.search(r'rpy="(.*?)"', str(caught.value))
+    assert said is not None
+    again = hung(text, rpy).replace('name="root"', 'name="top"').replace('"root"', '"top"')
+    again = again.replace(
+        '<link name="top"/>',
+        '<link name="root"/><joint name="remedy" type="fixed"><parent link="root"/>'
+        f'<child link="top"/><origin rpy="{said[1]}"/></joint><link name="top"/>',
+    )
+    (tmp_path / "walker.urdf").write_text(again, encoding="utf-8")
+    guess, robot = guessed(str(tmp_path / "walker.urdf"), tmp_path)
+    assert guess.base_link == "root"
+    sides = {leg.name: leg.side for leg in robot.spec.legs}
+    assert sides == {"lf": "left", "rf": "right", "lh": "left", "rh": "right"}
+
+
+def test_names_that_say_too_little_turn_nothing() -> None:
+    limbs = [Limb(name, (name,), name, "") for name in ("leg1", "leg2", "l", "rear_thing")]
+    hips = np.array([[1.0, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
+    assert quarter_turns(limbs, hips) == 0
+    swapped = [Limb(name, (name,), name, "") for name in ("FR", "FL", "RR", "RL")]
+    assert quarter_turns(swapped, hips) == 0  # a mirror, which no turn undoes
+
+
+def test_a_link_that_ends_in_its_joint_is_no_foot(tmp_path: Path) -> None:
+    text = re.sub(
+        r'<joint name="leg\d_tip".*?</joint><link name="leg\d_foot">.*?</link>',
+        "",
+        urdf_text((MIXED[0],) * 4, turned=False),
+    )
+    (tmp_path / "walker.urdf").write_text(text, encoding="utf-8")
+    with pytest.raises(RobotFileError, match="'leg0_link2' ends a chain, but its frame lies in"):
+        guessed(str(tmp_path / "walker.urdf"), tmp_path)
 
 
 def test_every_guess_has_its_reason(tmp_path: Path) -> None:

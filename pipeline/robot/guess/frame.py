@@ -1,0 +1,111 @@
+"""Whether the base's frame points as conventions say: x forward, y left, z up.
+
+A URDF does not say which way its base looks. Legs that are called left and right, front and rear,
+do, and so do feet that hang above their hips.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import RobotFileError
+from pipeline.robot.guess.limbs import Limb
+from pipeline.robot.kinematics import foot_positions
+from pipeline.robot.leg_chains import LegChains
+
+Array = NDArray[np.float64]
+_AHEAD = {"front": 1, "fore": 1, "rear": -1, "hind": -1, "back": -1}
+_ASIDE = {"left": 1, "right": -1}
+#: Letters of two that name a corner; which of "rl" is the right and which the rear is usage.
+_CORNERS = {
+    **dict.fromkeys(("lf", "fl"), (1, 1)),
+    **dict.fromkeys(("rf", "fr"), (1, -1)),
+    **dict.fromkeys(("lh", "hl", "lr", "rl", "lb", "bl"), (-1, 1)),
+    **dict.fromkeys(("rh", "hr", "rr", "rb", "br"), (-1, -1)),
+    **dict.fromkeys(("lm", "ml"), (0, 1)),
+    **dict.fromkeys(("rm", "mr"), (0, -1)),
+}
+_AXES = {0: "x", 1: "-y", 2: "-x", 3: "y"}
+#: Of the reach, by which every foot is above its hip where z points down.
+_ABOVE = 0.5
+
+
+def refuse_turned(
+    root: str, limbs: Sequence[Limb], chains: LegChains, posture: Array, where: str
+) -> None:
+    """Stop where names or feet say that the base's axes point elsewhere.
+
+    Args:
+        root: The base's link.
+        limbs: Legs.
+        chains: The same.
+        posture: A pose that stands if any is known, else zero, shape (L, K) [rad, m].
+        where: File, for messages.
+
+    Raises:
+        RobotFileError: They do; says how to turn the root.
+    """
+    hips = chains.offset[0]
+    feet = foot_positions(chains, posture[None])[0]
+    if (feet[:, 2] - hips[:, 2] > _ABOVE * chains.reach).all():
+        raise RobotFileError(
+            f"{where}: all feet lie above their hips, so that z of '{root}' seems to point down; "
+            + _remedy(root, f"{np.pi:.6f} 0 0")
+            + ", or give a pose 'standing' in an SRDF beside the URDF if it is right"
+        )
+    turns = quarter_turns(limbs, hips)
+    if turns:
+        raise RobotFileError(
+            f"{where}: by their names legs are left and right, front and rear, as if "
+            f"{_AXES[turns]} of '{root}' pointed forward; x must: "
+            + _remedy(root, f"0 0 {(turns if turns < 3 else -1) * np.pi / 2:.6f}")
+        )
+
+
+def quarter_turns(limbs: Sequence[Limb], hips: Array) -> int:
+    """Quarter turns about z after which all legs stand where their names say.
+
+    Args:
+        limbs: Legs.
+        hips: In the base frame [m], shape (L, 3).
+
+    Returns:
+        0 where they do so already, where names say too little, or where no turn helps.
+    """
+    said = [_said(limb) for limb in limbs]
+    if len({one for one in said if one is not None and all(one)}) < 3:
+        return 0  # fewer than three corners tell no turn from a mirror
+    place = hips[:, :2] - hips[:, :2].mean(axis=0)
+
+    def agrees(turns: int) -> bool:
+        s, c = (round(f(turns * np.pi / 2)) for f in (np.sin, np.cos))
+        turned = place @ np.array([[c, s], [-s, c]])
+        return all(
+            wanted * there > 0 or wanted == 0
+            for one, at in zip(said, turned, strict=True)
+            if one is not None
+            for wanted, there in zip(one, at, strict=True)
+        )
+
+    return next((turns for turns in range(4) if agrees(turns)), 0)
+
+
+def _said(limb: Limb) -> tuple[int, int] | None:
+    """Signs of x and y that a leg's name means, 0 where it says neither; None without a word."""
+    ahead = aside = 0
+    parts = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", f"{limb.name} {limb.joints[0]} {limb.foot}")
+    for word in re.findall(r"[a-z]+", parts.lower()):
+        along, across = _CORNERS.get(word, (_AHEAD.get(word, 0), _ASIDE.get(word, 0)))
+        ahead, aside = ahead or along, aside or across
+    return (ahead, aside) if ahead or aside else None
+
+
+def _remedy(root: str, rpy: str) -> str:
+    return (
+        f"make a new root link and hang '{root}' on it with a fixed joint of "
+        f'<origin rpy="{rpy}"/>'
+    )
