@@ -21,7 +21,7 @@ from actuators.units import quantity
 from pipeline.errors import GaitError
 from pipeline.motion.footfall import GAITS
 from pipeline.motion.transfer_path import transfer_path
-from pipeline.robot.robot_file import FOOTFALLS, merged_gait
+from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 
 _HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -90.0}
 #: No walking robot is larger or steps further [m], none leans or climbs beyond [rad].
@@ -293,6 +293,21 @@ def read_gait_file(path: FilePath) -> dict[str, Any]:
         what = f"holds '{one_line(others[0])}'" if others else "has none"
         raise GaitError(f"{path}: {what}; a gait file holds one table, [gait]")
     return table
+
+
+def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
+    """A robot file with a gait file's table instead of its own.
+
+    Args:
+        robot: Robot file.
+        gait: Gait file; None for the robot file's own gait.
+
+    Raises:
+        RobotFileError: The robot file cannot be used.
+        GaitError: The gait file cannot be used.
+    """
+    spec = load_robot_file(robot)
+    return spec if gait is None else spec.with_gait(**read_gait_file(gait))
 
 
 def changed_table(table: Mapping[str, Any], key: str, value: str) -> dict[str, Any]:

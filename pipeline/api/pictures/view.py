@@ -35,7 +35,7 @@ def player(given: Settings, *, host: str = "127.0.0.1", port: int = 8080) -> Pla
 
     Raises:
         ReportError: The package viser is not installed.
-        TippingError: A foot would have to pull.
+        StanceError: A foot would have to pull or slide.
     """
     from pipeline.api.pictures.player import Player, viser_module
 
@@ -46,6 +46,7 @@ def player(given: Settings, *, host: str = "127.0.0.1", port: int = 8080) -> Pla
         samples=given.samples,
         quasi_static=given.quasi_static,
         adjust=given.adjust,
+        forces=given.ground,
     )
     return Player(cycle(Scenery(given.machine), walking), host, port)
 
