@@ -54,13 +54,13 @@ def _way(gait: Gait) -> str:
         way = _WAYS[quarter % 4]
     else:
         side = "left" if heading > 0 else "right"
-        way = f"{number_text(abs(heading))}° to the {side} of straight ahead"
+        way = f"{_degrees(heading)}° to the {side} of straight ahead"
     return ", ".join(words for words in (way, f"turning {turn}" if turn else "") if words)
 
 
 def _ground(forward: float, left: float) -> str:
     said = [
-        f"{number_text(abs(math.degrees(angle)))}° {ahead if angle > 0 else behind}"
+        f"{_degrees(math.degrees(angle))}° {ahead if angle > 0 else behind}"
         for angle, ahead, behind in (
             (forward, "ahead", "behind"),
             (left, "to the left", "to the right"),
@@ -68,3 +68,8 @@ def _ground(forward: float, left: float) -> str:
         if angle
     ]
     return f"on ground that rises {' and '.join(said)}" if said else ""
+
+
+def _degrees(angle: float) -> str:
+    """Without the dust of the way through radians."""
+    return number_text(round(abs(angle), 6))

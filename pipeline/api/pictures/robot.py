@@ -68,7 +68,11 @@ def robot_drawings(scenery: Scenery, standing: Standing, walking: Walking) -> li
             body=scenery.trunk_outline(),
             title=f"{robot.spec.name}: {gait_of(robot.spec).title}",
             subtitle="; ".join(
-                (f"transfer path '{gait_of(robot.spec).path}'", *conditions(robot.spec))
+                (
+                    f"transfer path '{gait_of(robot.spec).path}'",
+                    *conditions(robot.spec),
+                    *(["arrow: the robot's front"] if conditions(robot.spec) else []),
+                )
             ),
         )
 
