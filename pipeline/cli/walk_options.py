@@ -70,7 +70,8 @@ def add_force_options(sub: argparse.ArgumentParser) -> None:
         "--friction-coefficient",
         type=float,
         metavar="MU",
-        help="greatest tangential over normal force of a foot; no limit by default",
+        help="greatest tangential over normal force of a foot; gait.friction_coefficient, else no "
+        "limit, by default",
     )
 
 

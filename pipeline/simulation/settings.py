@@ -13,6 +13,7 @@ from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.drivetrains import Actuators
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
+from pipeline.motion.gait import gait_table
 from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
@@ -145,9 +146,13 @@ def settings(
         effects=_effects(file, path or Path("model.toml"), loaded, catalog, own) if file else None,
         model=path,
         gait=gait,
-        forces=forces.checked(catalog.alternatives),
+        forces=forces.on(_friction(spec)).checked(catalog.alternatives),
         compare_forces=compare_forces,
     )
+
+
+def _friction(spec: RobotSpec) -> float | None:
+    return gait_table(spec).friction_coefficient if spec.floating else None
 
 
 def _loaded(spec: RobotSpec) -> tuple[Robot, Sequence[str]]:
