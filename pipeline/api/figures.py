@@ -12,7 +12,6 @@ from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.gait import legs_stretches
 from pipeline.api.pictures.robot import robot_drawings, write_gait_steps
 from pipeline.api.pictures.scene import Scenery
-from pipeline.motion.gait import gait_of
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.simulation.edited import IDEAL
@@ -25,6 +24,7 @@ from reports.figures.energy.joint_demand import joint_demand_figure, stretches
 from reports.figures.energy.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.several import Drawing, save_figures
+from reports.pages.gait_words import gait_and_conditions
 from reports.pages.names import leg_words, short_titles, shown_leg
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def drawings(
 
 def _name(given: Settings) -> str:
     """Robot and gait, which every figure names."""
-    return f"{given.robot.spec.name}, {gait_of(given.robot.spec).title}"
+    return f"{given.robot.spec.name}, {gait_and_conditions(given.robot.spec)}"
 
 
 def _joints(given: Settings) -> tuple[str, dict[str, str]]:

@@ -16,7 +16,7 @@ PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 def inputs_of(options: Options, given: Setup) -> list[Path]:
     """Every file that was read."""
     files = [*options.logs, *options.holdout, *given.sources]
-    return files + [path for path in (options.mapping, options.model) if path]
+    return files + [path for path in (options.mapping, options.gait, options.model) if path]
 
 
 def metadata(options: Options, given: Setup) -> dict[str, Any]:

@@ -211,6 +211,7 @@ class _Run:
             tuple(map(_path, _several(logs))),
             holdout=tuple(map(_path, _several(test))),
             robot=machine.path,
+            gait=machine.gait,
             actuators=machine.actuators,
             changes=machine.changes,
             **named,

@@ -17,10 +17,10 @@ from pathlib import Path
 
 from pipeline.cli.blind_options import add_blind_options, add_twin_options
 from pipeline.cli.decimal_option import add_decimal_option
-from pipeline.cli.force_options import add_force_options
 from pipeline.cli.gap.options import add_gap_options
 from pipeline.cli.named_path import named_path
 from pipeline.cli.view import add_view_options
+from pipeline.cli.walk_options import add_force_options, add_machine_options
 from pipeline.errors import PipelineError, StanceError
 
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
@@ -111,47 +111,17 @@ def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
 
 
 def _run_options(sub: argparse.ArgumentParser) -> None:
-    sub.add_argument(
-        "--robot", type=named_path, help="robot file; the model file's or the hexapod by default"
-    )
-    sub.add_argument(
-        "--gait",
-        type=named_path,
-        metavar="FILE",
-        help="TOML with a table [gait] to walk instead of the robot file's",
-    )
-    sub.add_argument(
-        "--model", type=named_path, help="model file: include the effects that `gap` found"
-    )
-    sub.add_argument(
-        "--actuators",
-        type=named_path,
-        metavar="DIR",
-        help="folder of actuator files of your own; actuators/catalog by default",
-    )
+    add_machine_options(sub)
     sub.add_argument(
         "--out", type=named_path, default=DEFAULT_OUT, help="folder for CSV and figures"
     )
-    sub.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a number for this run: NAME=VALUE in the unit the robot file writes, "
-        "COMPONENT.NAME=VALUE for an actuator, gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
-        "standing.feet=LEG,LEG,LEG",
-    )
     sub.add_argument("--samples", type=int, default=751, help="samples per half period of the gait")
-    sub.add_argument(
-        "--quasi-static", action="store_true", help="leave out the links' inertial terms"
-    )
-    sub.add_argument(
-        "--regeneration",
-        default="none",
-        metavar="POLICY",
-        help="what becomes of returned electrical energy: none, bus, or a fraction such as 0.5",
-    )
     add_force_options(sub)
+    sub.add_argument(
+        "--compare-forces",
+        action="store_true",
+        help="write walking_force_rules.csv: what each rule costs in energy",
+    )
     add_decimal_option(sub)
     sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 

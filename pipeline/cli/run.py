@@ -6,7 +6,7 @@ import argparse
 
 from pipeline.api.reports import write
 from pipeline.cli.decimal_option import decimal_of
-from pipeline.simulation.force_choice import ForceChoice
+from pipeline.cli.walk_options import force_choice
 from pipeline.simulation.settings import Settings, settings
 
 
@@ -34,7 +34,7 @@ def settings_of(options: argparse.Namespace) -> Settings:
         quasi_static=options.quasi_static,
         regeneration=options.regeneration,
         actuators=options.actuators,
-        forces=ForceChoice(options.forces, options.power_of, options.friction_coefficient),
+        forces=force_choice(options),
         compare_forces=options.compare_forces,
         walks=options.verb != "stand",
     )

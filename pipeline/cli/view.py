@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from pipeline.cli.named_path import named_path
+from pipeline.cli.walk_options import add_force_options, add_machine_options, force_choice
 
 
 def add_view_options(sub: argparse.ArgumentParser) -> None:
     """The options of the verb."""
-    sub.add_argument(
-        "--robot", type=named_path, help="robot file; the model file's or the hexapod by default"
-    )
-    sub.add_argument("--model", type=named_path, help="model file whose effects are included")
-    sub.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="change a number"
-    )
-    sub.add_argument("--samples", type=int, default=201, help="samples per segment of the gait")
+    add_machine_options(sub)
+    add_force_options(sub)
+    sub.add_argument("--samples", type=int, default=201, help="samples per half period of the gait")
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
     sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
 
@@ -47,8 +42,13 @@ def run_view(options: argparse.Namespace) -> int:
     given = settings(
         robot=options.robot,
         model=options.model,
+        gait=options.gait,
         changes=options.set,
         samples=options.samples,
+        quasi_static=options.quasi_static,
+        regeneration=options.regeneration,
+        actuators=options.actuators,
+        forces=force_choice(options),
     )
     shown = player(given, host=options.host, port=options.port)
     print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.dynamics.internal_forces import held_by_friction, internal_basis, least_friction
 from pipeline.dynamics.stability import stability_margins
+from pipeline.dynamics.tipping import margin_and_remedy
 from pipeline.errors import SlidingError, TippingError
 from pipeline.motion.motion import Segment
 from pipeline.robot.robot import Robot
@@ -46,8 +47,8 @@ def refuse_falling(
         margin = stability_margins(robot, segment)[sample]
         raise TippingError(
             f"the robot tips at t = {segment.time[sample]:.4g} s ({segment.name}): the foot of leg "
-            f"'{segment.stance[foot]}' would have to pull with {-lowest:.1f} N, static margin "
-            f"{1e3 * margin:.1f} mm; spread the feet or shorten the stroke"
+            f"'{segment.stance[foot]}' would have to pull with {-lowest:.1f} N, "
+            f"{margin_and_remedy(robot, segment, int(sample), float(margin))}"
         )
     if friction_coefficient is None:
         return

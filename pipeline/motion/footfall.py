@@ -18,6 +18,8 @@ from pipeline.errors import GaitError
 from pipeline.robot.robot_file import LegSpec
 
 LEAST_FEET = 3
+#: Name of the user's own phases.
+OWN = "own"
 #: Shares of a period closer than this are one event.
 _SAME = 1e-9
 
@@ -184,4 +186,4 @@ def in_turn(sets: Sequence[Sequence[str]], duty: float | None, name: str) -> Foo
 
 def own(phase: Mapping[str, float], duty: Mapping[str, float]) -> Footfall:
     """The user's own phases (of any size: whole periods are dropped) and duty factors."""
-    return Footfall("own", {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, dict(duty))
+    return Footfall(OWN, {leg: float(np.mod(p, 1.0)) for leg, p in phase.items()}, dict(duty))

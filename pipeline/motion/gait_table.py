@@ -21,7 +21,7 @@ from actuators.units import quantity
 from pipeline.errors import GaitError
 from pipeline.motion.footfall import GAITS
 from pipeline.motion.transfer_path import transfer_path
-from pipeline.robot.robot_file import FOOTFALLS, merged_gait
+from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 
 _HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -90.0}
 #: No walking robot is larger or steps further [m], none leans or climbs beyond [rad].
@@ -100,6 +100,7 @@ _SHARE = _size(
     "a foot stands for a share above 0 and below 1 of the period: at 0 it never carries, at 1 it "
     "never steps; give a number such as 0.75",
 )
+_FRICTION = _size("ratio", 0, math.inf, "must lie above 0: give a number such as 0.6")
 _PHASE = _size("ratio", -math.inf, math.inf, "")
 Length = Annotated[float, BeforeValidator(_LENGTH)]
 Height = Annotated[float, BeforeValidator(_HEIGHT)]
@@ -129,6 +130,7 @@ Heights = Annotated[float | dict[str, float], BeforeValidator(_each(_HEIGHT))]
 Shares = Annotated[float | dict[str, float], BeforeValidator(_each(_SHARE))]
 Phases = Annotated[dict[str, float], BeforeValidator(_each(_PHASE))]
 Direction = Annotated[float, BeforeValidator(_direction)]
+Friction = Annotated[float, BeforeValidator(_FRICTION)]
 Path = Annotated[str, BeforeValidator(_path)]
 Name = Annotated[str, BeforeValidator(_name)]
 Legs = list[list[str]]
@@ -157,6 +159,8 @@ class GaitTable(BaseModel):
         body_pitch: Nose down [rad].
         slope_forward: Angle by which the ground rises ahead [rad].
         slope_left: By which it rises to the left [rad].
+        friction_coefficient: Of the ground: greatest tangential over normal force of a foot [1]; no
+            limit by default.
         payload_mass: Of a load on the body [kg].
         payload_x: Place of its centre of mass in the base's axes [m].
         payload_y: Likewise.
@@ -186,6 +190,7 @@ class GaitTable(BaseModel):
     body_pitch: Tilt = 0.0
     slope_forward: Tilt = 0.0
     slope_left: Tilt = 0.0
+    friction_coefficient: Friction | None = None
     payload_mass: Mass = 0.0
     payload_x: Offset = 0.0
     payload_y: Offset = 0.0
@@ -293,6 +298,21 @@ def read_gait_file(path: FilePath) -> dict[str, Any]:
         what = f"holds '{one_line(others[0])}'" if others else "has none"
         raise GaitError(f"{path}: {what}; a gait file holds one table, [gait]")
     return table
+
+
+def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
+    """A robot file with a gait file's table instead of its own.
+
+    Args:
+        robot: Robot file.
+        gait: Gait file; None for the robot file's own gait.
+
+    Raises:
+        RobotFileError: The robot file cannot be used.
+        GaitError: The gait file cannot be used.
+    """
+    spec = load_robot_file(robot)
+    return spec if gait is None else spec.with_gait(**read_gait_file(gait))
 
 
 def changed_table(table: Mapping[str, Any], key: str, value: str) -> dict[str, Any]:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import GaitError
 from pipeline.motion.feet import Course
-from pipeline.motion.gait import Gait
+from pipeline.motion.gait import Gait, gait_table
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.support import support_edges
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
@@ -179,7 +179,7 @@ def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway]
         if found is None:
             most = _attainable(matrix @ onto, bound)
             if gait.margin_stated or not most > 0 or margin < gait.margin:
-                raise GaitError(_unattainable(gait, margin, most))
+                raise GaitError(_unattainable(gait, margin, most, burdens(robot)))
             margin = most / 2
             found = _solved(cost, matrix @ onto, bound + margin)
             assert found is not None
@@ -255,9 +255,17 @@ def _attainable(matrix: Array, bound: Array) -> float:
     return np.nan if best.x is None else float(best.x[-1])
 
 
-def _unattainable(gait: Gait, margin: float, most: float) -> str:
+def burdens(robot: Robot) -> str:
+    """What of ``[gait]`` makes the body sway further, as ``--set`` names it; empty without."""
+    table = gait_table(robot.spec)
+    keys = ("slope_forward", "slope_left", "payload_mass", "body_x", "body_y")
+    return ", ".join(f"gait.{key}" for key in keys if getattr(table, key))
+
+
+def _unattainable(gait: Gait, margin: float, most: float, burden: str) -> str:
     """What to say where no path keeps the margin."""
     remedy = "raise gait.duty_factor or gait.period, or shorten the stroke"
+    remedy = f"lessen {burden}; {remedy}" if burden else remedy
     if not most > 0:
         return (
             f"{gait.source}: no sway of the body keeps the {gait.title} from tipping (margin "

@@ -8,13 +8,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.errors import GaitError
+from pipeline.errors import GaitError, OutOfReachError
 from pipeline.motion.base_motion import base_motion
 from pipeline.motion.feet import Course, support_course, transfer_course
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.postures import refuse_beyond_limits, start_postures
-from pipeline.motion.sway import Sway, least_sway
+from pipeline.motion.sway import Sway, burdens, least_sway
 from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.robot import Robot
 
@@ -47,13 +47,30 @@ def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     sway = None
     if gait.margin is not None:
         sway = least_sway(
-            robot, gait, start, lambda s: _motion(robot, gait, start, SWAY_SAMPLES, s)
+            robot, gait, start, lambda s: _swayed(robot, gait, start, SWAY_SAMPLES, s)
         )
-    return _motion(robot, gait, start, samples, sway)
+        return _swayed(robot, gait, start, samples, sway)
+    return _motion(robot, gait, start, samples, None)
 
 
 #: In half a period, while the sway is sought.
 SWAY_SAMPLES = 121
+
+
+def _swayed(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway) -> Motion:
+    """The motion with a sway; what the legs cannot follow is told with how far the body sways."""
+    try:
+        return _motion(robot, gait, start, samples, sway)
+    except (OutOfReachError, GaitError) as error:
+        path = sway.course(np.linspace(0.0, 1.0, samples)).position
+        far = 1e3 * float(np.hypot(path[:, 0], path[:, 1]).max())
+        if far < 1:
+            raise
+        burden = burdens(robot)
+        raise type(error)(
+            f"{error}; the body sways by {far:.0f} mm to keep its margin"
+            + (f": lessen {burden}" if burden else "")
+        ) from None
 
 
 def _motion(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway | None) -> Motion:

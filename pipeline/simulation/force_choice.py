@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -33,6 +33,15 @@ class ForceChoice:
     rule: str = LEAST_TANGENTIAL
     power_of: str | None = None
     friction_coefficient: float | None = None
+
+    def on(self, ground: float | None) -> ForceChoice:
+        """The same on a ground whose coefficient of friction holds where no option names one.
+
+        Args:
+            ground: Of ``[gait]`` [1]; None for no limit.
+        """
+        own = self.friction_coefficient
+        return replace(self, friction_coefficient=ground if own is None else own)
 
     def checked(self, alternatives: Mapping[str, object]) -> ForceChoice:
         """The same, refused where it asks for what there is not.

@@ -13,11 +13,12 @@ from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.drivetrains import Actuators
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
-from pipeline.motion.gait_table import read_gait_file
+from pipeline.motion.gait import gait_table
+from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.simulation.changes import changed
 from pipeline.simulation.edited import IDEAL, Effects, effects
 from pipeline.simulation.force_choice import ForceChoice
@@ -125,7 +126,7 @@ def settings(
     _refuse_few(samples)
     path = model if isinstance(model, Path) else None
     file = read_model_file(model, actuators) if isinstance(model, Path) else model
-    spec = _spec(robot or (file.robot if file else DEFAULT_ROBOT), gait)
+    spec = spec_with_gait(robot or (file.robot if file else DEFAULT_ROBOT), gait)
     actuators = actuators or actuator_folder(spec)
     spec, catalog, remarks = changed(spec, load_catalog(actuators or CATALOG), changes)
     catalog = (own := own_actuators(spec, catalog)).catalog(catalog)
@@ -145,14 +146,13 @@ def settings(
         effects=_effects(file, path or Path("model.toml"), loaded, catalog, own) if file else None,
         model=path,
         gait=gait,
-        forces=forces.checked(catalog.alternatives),
+        forces=forces.on(_friction(spec)).checked(catalog.alternatives),
         compare_forces=compare_forces,
     )
 
 
-def _spec(robot: Path, gait: Path | None) -> RobotSpec:
-    spec = load_robot_file(robot)
-    return spec if gait is None else spec.with_gait(**read_gait_file(gait))
+def _friction(spec: RobotSpec) -> float | None:
+    return gait_table(spec).friction_coefficient if spec.floating else None
 
 
 def _loaded(spec: RobotSpec) -> tuple[Robot, Sequence[str]]:

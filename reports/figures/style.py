@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import wraps
+from functools import cache, wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec
 
 from reports.typeset import number_text
@@ -73,6 +74,27 @@ RC: dict[Any, Any] = {
 _worn: ContextVar[bool] = ContextVar("house style", default=False)
 
 
+@cache
+def own_fonts() -> None:
+    """See that the letters are those that Matplotlib brings, before any other of the same name.
+
+    Matplotlib keeps a list of fonts in the user's cache, which every version and environment
+    shares. One that was made where its own files could not be read lacks them for good: figures
+    are then drawn with whatever the system calls by that name, and each font of formulas that is
+    not there is complained of on the terminal.
+    """
+    import matplotlib
+    from matplotlib import font_manager
+
+    folder = Path(matplotlib.get_data_path(), "fonts", "ttf")
+    brought = {str(path) for path in sorted(folder.glob("*.ttf"))}
+    manager = font_manager.fontManager
+    listed = {font.fname for font in manager.ttflist}
+    for path in sorted(brought - listed):
+        manager.addfont(path)
+    manager.ttflist.sort(key=lambda font: font.fname not in brought)
+
+
 @contextmanager
 def house_style() -> Iterator[None]:
     """Matplotlib's defaults with our changes, for the length of a block; blocks may be nested."""
@@ -81,6 +103,7 @@ def house_style() -> Iterator[None]:
     if _worn.get():
         yield
         return
+    own_fonts()
     token = _worn.set(True)
     try:
         with matplotlib.rc_context():

@@ -8,12 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from actuators.loading.build import Catalog
+from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.robot.robot import Robot
 from pipeline.simulation.settings import Settings
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
+from reports.pages.gait_words import conditions, gait_and_conditions, pace
 from reports.pages.names import leg_words, names_text, short_titles, shown_leg
 from reports.table import Table
 from reports.typeset import number_text
@@ -51,7 +53,7 @@ def robot_page(
     """The page; see `write_robot_page`."""
     robot, gait = given.robot, gait_of(given.robot.spec)
     return Page(
-        title=f"What it costs to actuate {robot.spec.name}, {gait.title}",
+        title=f"What it costs to actuate {robot.spec.name}, {gait_and_conditions(robot.spec)}",
         answer=_answer(given, gait, tables, remarks),
         sections=(
             gait_section(robot, out),
@@ -82,8 +84,8 @@ def _answer(
     outside = f" and {held} joint{'s' if held > 1 else ''} outside the legs" if held else ""
     what = (
         f"**{robot.spec.name}**, {number_text(given.machine.mass)} kg on {len(robot.leg_names)} "
-        f"legs of {' or '.join(map(str, joints))} joints{outside}, walks the {gait.title} at "
-        f"{number_text(gait.speed)} m/s with a period of {number_text(gait.period)} s."
+        f"legs of {' or '.join(map(str, joints))} joints{outside}, walks "
+        f"{_walk(given, gait)}."
     )
     titles = short_titles(given.catalog)
     costs = "; ".join(
@@ -101,6 +103,15 @@ def _answer(
         breaches_text(tables["motor_limits"], titles),
         *(f"**Note:** {remark}." for remark in remarks),
     )
+
+
+def _walk(given: Settings, gait: Gait) -> str:
+    """The gait, how fast, where to, on what ground, with what load, and whether it sways."""
+    article = "its" if gait.footfall.name == OWN else "the"
+    said = [f"{article} {gait.title} {pace(gait)}", *conditions(given.robot.spec)]
+    if gait.margin is not None:
+        said.append("its body swaying to keep its balance")
+    return ", ".join(said)
 
 
 def _missing(value: object) -> bool:

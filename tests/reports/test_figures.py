@@ -27,7 +27,7 @@ from reports.figures.energy.stage_energy import energy_limits, stage_energy_figu
 from reports.figures.robot.gait_view import GaitStretch, gait_figure
 from reports.figures.save import save_figure
 from reports.figures.several import Drawing, save_figures
-from reports.figures.style import BLUE, VERMILION, number
+from reports.figures.style import BLUE, VERMILION, house_style, number, own_fonts
 
 PARTS = (
     Stretch(np.linspace(0, 1.5, 5), np.full(5, -1.0), np.full(5, -30.0), True),
@@ -358,3 +358,20 @@ def test_drawing_leaves_global_settings_alone() -> None:
     joint_demand_figure("j", PARTS)
     assert matplotlib.rcParams.copy() == before
     assert "matplotlib.pyplot" not in sys.modules
+
+
+def test_letters_are_matplotlibs_own_whatever_list_of_fonts_the_user_keeps() -> None:
+    from matplotlib import font_manager
+
+    manager = font_manager.fontManager
+    brought = Path(matplotlib.get_data_path(), "fonts", "ttf")
+    kept = list(manager.ttflist)
+    try:
+        elsewhere = [replace(f, fname=f"/other/{i}.ttf") for i, f in enumerate(kept)]
+        manager.ttflist[:] = [f for f in elsewhere if f.name == "DejaVu Sans"]
+        own_fonts.cache_clear()
+        with house_style():
+            for family in ("DejaVu Sans", "STIXGeneral", "cmr10"):
+                assert Path(font_manager.findfont(family)).parent == brought.resolve()
+    finally:
+        manager.ttflist[:] = kept

@@ -126,23 +126,27 @@ def _bodies(scenery: Scenery, q: Array, follow: Array) -> list[Body]:
     data = model.createData()
     pin.forwardKinematics(model, data, q[0])
     at_first = [placement.copy() for placement in data.oMi]
-    by_body: dict[int, list[Array]] = {}
-    for solid in scenery.at(q[0])[0]:
-        by_body.setdefault(scenery.carrier[solid.link], []).append(solid.points)
+    placed = scenery.placements(q[0])
+    by_body: dict[tuple[int, bool], list[Array]] = {}
+    for solid in scenery.shapes.at(placed):
+        by_body.setdefault((scenery.carrier[solid.link], False), []).append(solid.points)
+    if scenery.load is not None:
+        ball = scenery.load.at(placed[scenery.load.link])
+        by_body[scenery.carrier[ball.link], True] = [ball.points]
     joined = {body: np.concatenate(points) for body, points in by_body.items()}
     if not joined:
         return []
     size = float(np.ptp(np.concatenate(list(joined.values())), axis=0).max())
     corners = {body: hull_points(points, _CELL * size) for body, points in joined.items()}
-    moved: dict[int, list[Array]] = {body: [] for body in corners}
+    moved: dict[tuple[int, bool], list[Array]] = {key: [] for key in corners}
     for row in q:
         pin.forwardKinematics(model, data, row)
-        for body, points in corners.items():
+        for (body, load), points in corners.items():
             motion = (data.oMi[body] * at_first[body].inverse()).homogeneous
-            moved[body].append(points @ motion[:3, :3].T + motion[:3, 3])
+            moved[body, load].append(points @ motion[:3, :3].T + motion[:3, 3])
     return [
-        Body(scenery.leg_of_body.get(body, ""), np.array(points) - follow[:, None])
-        for body, points in moved.items()
+        Body(scenery.leg_of_body.get(body, ""), np.array(points) - follow[:, None], load)
+        for (body, load), points in moved.items()
     ]
 
 

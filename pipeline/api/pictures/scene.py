@@ -10,13 +10,16 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from pipeline.motion.gait import gait_table
 from pipeline.robot.robot import Robot
 from reports.figures.robot.outline import outline
 from reports.figures.robot.solids import Leg, Solid, legs_of
 from reports.figures.robot.sticks import leg_sticks, trunk_centre
-from reports.figures.robot.visuals import Shapes, joint_marks, read_shapes
+from reports.figures.robot.visuals import Shape, Shapes, joint_marks, read_shapes
 
 Array = NDArray[np.float64]
+_STEEL = 7850.0  # [kg/m^3]
+_LOAD = (0.94, 0.89, 0.26)  # yellow, as no link of ours
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,17 @@ class Scenery:
     def shapes(self) -> Shapes:
         """Surfaces of its links, read once."""
         return read_shapes(self.robot.urdf, self.robot.spec.urdf.parent)
+
+    @cached_property
+    def load(self) -> Shape | None:
+        """The payload as a ball of steel of its mass about its place; None without one."""
+        table = gait_table(self.robot.spec)
+        if not table.payload_mass:
+            return None
+        origin = np.eye(4)
+        origin[:3, 3] = table.payload_x, table.payload_y, table.payload_z
+        size = np.full(3, np.cbrt(6 * table.payload_mass / (np.pi * _STEEL)))
+        return Shape(self.robot.spec.base_link, origin, _LOAD, size, sphere=True)
 
     @cached_property
     def carrier(self) -> dict[str, int]:
@@ -76,7 +90,10 @@ class Scenery:
     def at(self, configuration: Array) -> tuple[list[Solid], list[Leg]]:
         """Surfaces and legs in one configuration, shape (nq,)."""
         placed = self.placements(configuration)
-        return self.shapes.at(placed), self.legs_at(placed)
+        solids = self.shapes.at(placed)
+        if self.load is not None:
+            solids.append(self.load.at(placed[self.load.link]))
+        return solids, self.legs_at(placed)
 
     def sticks(self, leg: Leg, legs: Sequence[Leg]) -> list[tuple[int, Solid]]:
         """Sticks of a leg of which the URDF shows nothing, each with the body that carries it."""
@@ -88,7 +105,8 @@ class Scenery:
 
         Where the URDF shows nothing of it, the outline of the legs' first joints.
         """
-        solids, legs = self.at(self.zero)
+        placed = self.placements(self.zero)
+        solids, legs = self.shapes.at(placed), self.legs_at(placed)
         points = [s.points[:, :2] for s in solids if self.carrier[s.link] <= 1]
         points = points or [np.array([leg.joints[0].position[:2] for leg in legs])]
         return outline(np.concatenate(points))

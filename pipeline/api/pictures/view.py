@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from pipeline.api.pictures.cycle import Cycle, MovingBody
 from pipeline.api.pictures.gait import gait_steps_of, rows_of_steps
 from pipeline.api.pictures.scene import Scenery
-from pipeline.motion.gait import gait_of
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Walking, walk
 from reports.figures.robot.solids import Solid
 from reports.figures.robot.sticks import bare_legs
+from reports.pages.gait_words import gait_and_conditions
 
 if TYPE_CHECKING:
     from pipeline.api.pictures.player import Player
@@ -35,7 +35,7 @@ def player(given: Settings, *, host: str = "127.0.0.1", port: int = 8080) -> Pla
 
     Raises:
         ReportError: The package viser is not installed.
-        TippingError: A foot would have to pull.
+        StanceError: A foot would have to pull or slide.
     """
     from pipeline.api.pictures.player import Player, viser_module
 
@@ -46,6 +46,7 @@ def player(given: Settings, *, host: str = "127.0.0.1", port: int = 8080) -> Pla
         samples=given.samples,
         quasi_static=given.quasi_static,
         adjust=given.adjust,
+        forces=given.ground,
     )
     return Player(cycle(Scenery(given.machine), walking), host, port)
 
@@ -64,7 +65,7 @@ def cycle(scenery: Scenery, walking: Walking, count: int = STEPS) -> Cycle:
     joints = tuple(joint for leg in robot.spec.legs for joint in leg.joints)
     sliding = dict(zip(robot.joints, robot.sliding, strict=True))
     return Cycle(
-        title=f"{robot.spec.name}, {gait_of(robot.spec).title}",
+        title=f"{robot.spec.name}, {gait_and_conditions(robot.spec)}",
         bodies=tuple(_bodies(scenery, q, steps.origin)),
         steps=steps,
         joints=joints,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from pipeline.cli.decimal_option import add_decimal_option, decimal_of
 from pipeline.cli.named_path import named_path
+from pipeline.cli.walk_options import add_gait_option
 from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
 
 
@@ -26,6 +27,7 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         help="robot file, or URDF of a fixed robot; the model file's or the hexapod by default",
     )
     sub.add_argument("--model", type=named_path, help="model file with effects found earlier")
+    add_gait_option(sub)
     sub.add_argument(
         "--holdout",
         type=named_path,
@@ -44,7 +46,7 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         "--gait-start",
         type=float,
         metavar="SECONDS",
-        help="time in the log at which a period of the robot file's gait begins: tells which feet "
+        help="time in the log at which a period of the gait begins: tells which feet "
         "stand where the log has neither foot forces nor contacts; the lowest feet without it",
     )
     _machine_options(sub)

@@ -27,6 +27,7 @@ class Options:
         step: One of `STEPS`, or ``all``.
         robot: Robot file or URDF; the model file's or the hexapod by default.
         model: Model file with effects found earlier.
+        gait: File with a table ``[gait]`` that was walked instead of the robot file's.
         holdout: Logs that only prove.
         base: ``fixed``, ``level`` or ``measured``; as log and robot say by default.
         gait_start: Time in the log at which a period of the gait begins [s].
@@ -45,6 +46,7 @@ class Options:
     step: str = "all"
     robot: Path | None = None
     model: Path | None = None
+    gait: Path | None = None
     holdout: tuple[Path, ...] = ()
     base: str | None = None
     gait_start: float | None = None

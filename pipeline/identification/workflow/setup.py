@@ -29,10 +29,11 @@ from pipeline.logs.reading.table_file import sha256
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
+from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, load_robot_file
+from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.simulation.changes import changed
 
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
@@ -163,7 +164,7 @@ def _parts(path: Path, options: Options) -> _Parts:
         if options.changes
         else []
     )
-    spec = _spec(path, options.base)
+    spec = _spec(path, options.base, options.gait)
     if spec is None:
         folder = options.actuators or CATALOG
         _, catalog, _ = changed(None, load_catalog(folder), options.changes)
@@ -214,15 +215,19 @@ def _channel(options: Options, expected: Expected) -> str:
     return plan_reading(options.logs[0], expected, mapping).channel
 
 
-def _spec(path: Path, base: str | None) -> RobotSpec | None:
-    """A robot file, its base as asked for; None for a bare URDF."""
+def _spec(path: Path, base: str | None, gait: Path | None) -> RobotSpec | None:
+    """A robot file, base and gait as asked for; None for a bare URDF."""
     if path.suffix.lower() != ".toml":
         if base in ("level", "measured"):
             raise GapError(
                 f"{path}: a bare URDF stands on a fixed base; write a robot file for --base {base}"
             )
+        if gait is not None:
+            raise GapError(
+                f"{path}: a bare URDF walks no gait; write a robot file for --gait {gait}"
+            )
         return None
-    spec = load_robot_file(path)
+    spec = spec_with_gait(path, gait)
     if base == "fixed" and spec.floating:
         spec = replace(spec, floating=False)
     if base in ("level", "measured") and not spec.floating:

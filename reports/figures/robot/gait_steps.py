@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from reports.figures.robot.outline import outline
 from reports.figures.robot.projection import OBLIQUE, TOP, View
-from reports.figures.style import BLUE, FAINT, GREEN, INK, QUIET, SHADE, VERMILION, number
+from reports.figures.style import BLUE, FAINT, GREEN, INK, QUIET, SHADE, VERMILION, YELLOW, number
 
 Array = NDArray[np.float64]
 _WIDTH, _HEIGHT = 950.0, 560.0
@@ -38,10 +38,12 @@ class Body:
         leg: The leg it belongs to; empty for the trunk and what it carries.
         points: Corners of its hull in each step, in a frame that follows the robot without
             turning, z up, shape (S, P, 3) [m].
+        load: Whether it is no part of the robot but carried by it.
     """
 
     leg: str
     points: Array
+    load: bool = False
 
 
 @dataclass(frozen=True)
@@ -187,7 +189,7 @@ def _robot(steps: Steps, k: int, fit: _Fit) -> Iterable[str]:
             stands = bool(steps.stands[k, steps.legs.index(body.leg)])
             fill = BLUE if stands else VERMILION
         else:
-            fill = _GREY
+            fill = YELLOW if body.load else _GREY
         drawn.append((float(seen[:, 2].mean()), _polygon(outline(seen[:, :2]), fill)))
     yield '<g stroke="white" stroke-width="1" stroke-linejoin="round">'
     yield from (text for _, text in sorted(drawn))

@@ -140,3 +140,34 @@ def test_a_port_that_is_none_is_refused(port: str, capsys: pytest.CaptureFixture
 
 def test_the_lock_of_the_extra_is_where_the_message_says(root: Path) -> None:
     assert "viser==" in (root / "reports" / "view.lock").read_text(encoding="utf-8")
+
+
+def test_view_walks_what_walk_walks(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Gait file, changed numbers, rule and friction of the ground's forces reach the picture."""
+    monkeypatch.setitem(sys.modules, "viser", stub()[0])
+    monkeypatch.setattr(Player, "play", lambda _: None)
+    seen: list[Cycle] = []
+    begin = Player.__init__
+
+    def kept(player: Player, cycle: Cycle, host: str, port: int) -> None:
+        seen.append(cycle)
+        begin(player, cycle, host, port)
+
+    monkeypatch.setattr(Player, "__init__", kept)
+    gait = tmp_path / "wave.toml"
+    gait.write_text('[gait]\nname = "wave"\nheading = "left"\n', encoding="utf-8")
+    options = ["view", "--gait", str(gait), "--set", "gait.slope_forward=5 deg", "--samples", "51"]
+    assert exit_code(options) == 0
+    assert exit_code([*options, "--forces", "least_torque"]) == 0
+    paper, other = seen
+    assert "wave" in paper.title
+    assert paper.ground[0] == pytest.approx(-np.sin(np.radians(5)))
+    along = paper.steps.origin[-1] - paper.steps.origin[0]
+    assert along[1] > 10 * abs(along[0])
+    change = np.abs(other.steps.force - paper.steps.force).max()
+    assert change > 0.1 * np.abs(paper.steps.force).max()
+    capsys.readouterr()
+    assert exit_code([*options, "--friction-coefficient", "0.01"]) == 1
+    assert "slides" in capsys.readouterr().err

@@ -110,3 +110,16 @@ def test_python_takes_the_same(root: Path) -> None:
         lw.walk(machine, samples=51, forces="least_power")
     with pytest.raises(SlidingError, match="slides"):
         lw.walk(machine, samples=51, friction_coefficient=0.0001)
+
+
+def test_friction_of_the_ground_may_stand_with_the_gait_and_an_option_outdoes_it(
+    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    slippery = ["--samples", "51", "--set", "gait.friction_coefficient=0.003"]
+    assert command("walk", tmp_path, *slippery) == 1
+    assert "slides" in capsys.readouterr().err
+    assert command("walk", tmp_path, *slippery, "--friction-coefficient", "0.4") == 0
+    told = sidecar_of(tmp_path / "walking_contact_forces.csv")
+    assert told["options"]["friction_coefficient"] == 0.4
+    assert command("walk", tmp_path, "--samples", "51", "--set", "gait.friction_coefficient=0") == 2
+    assert "gait.friction_coefficient = 0" in capsys.readouterr().err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import combinations
 
@@ -21,6 +22,7 @@ from pipeline.dynamics.joint_demand import (
 from pipeline.dynamics.stability import stability_margins
 from pipeline.errors import GaitError, SlidingError, TippingError
 from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.payload import with_payload
 from pipeline.motion.standing import standing_posture
 from pipeline.motion.support import support_margin
 from pipeline.motion.walking import walking_motion
@@ -282,3 +284,43 @@ def test_a_robot_that_tips_says_where_and_when(hexapod: Robot) -> None:
     motion = walking_motion(robot, samples=51)
     with pytest.raises(TippingError, match=r"tips at t = .* leg '\w+' would have to pull"):
         motion_demand(robot, motion)
+
+
+def tips(robot: Robot, **gait: object) -> str:
+    changed = with_payload(load_robot(robot.spec.with_gait(**gait)))
+    with pytest.raises(TippingError) as refused:
+        motion_demand(changed, walking_motion(changed, samples=51))
+    return str(refused.value)
+
+
+def taken(said: str, what: str) -> float:
+    found = re.search(rf"{what} takes (\d+) mm", said)
+    assert found, said
+    return float(found[1]) / 1e3
+
+
+def test_what_brings_a_robot_to_tip_is_named_with_its_share_of_the_margin(hexapod: Robot) -> None:
+    slope = np.radians(40.0)
+    said = tips(hexapod, slope_forward="40 deg")
+    # The tripod's rear edge is oblique: along x the centre's height times the slope's sine.
+    assert 0 < taken(said, "the slope") < 0.296 * np.sin(slope)
+    assert "lessen gait.slope_forward)" in said
+    assert "payload" not in said
+    said = tips(hexapod, payload_mass="40 kg", payload_x="400 mm")
+    # Half of the mass at 400 mm: 200 mm along x, less along the normal of an oblique edge.
+    assert 0.1 < taken(said, "the payload") < 0.2
+    assert "change gait.payload_mass or gait.payload_x)" in said
+    assert 'gait.sway = "least"' in said
+    said = tips(hexapod, body_x="150 mm")
+    assert 0.1 < taken(said, "the body's shift") <= 0.15
+    assert "slope" not in said
+
+
+def test_margin_and_what_a_payload_takes_add_up_to_the_margin_without_it(hexapod: Robot) -> None:
+    said = tips(hexapod, payload_mass="20 kg", payload_x="400 mm")
+    found = re.search(r"t = ([\d.]+) s \((.*?)\).*static margin (-[\d.]+) mm", said)
+    assert found, said
+    (segment,) = (s for s in walking_motion(hexapod, samples=51).segments if s.name == found[2])
+    sample = int(np.abs(segment.time - float(found[1])).argmin())
+    bare = stability_margins(hexapod, segment)[sample]
+    assert float(found[3]) / 1e3 + taken(said, "the payload") == pytest.approx(bare, abs=1e-3)

@@ -16,8 +16,10 @@ import pytest
 
 from pipeline.blind.twin.trial import make_trial
 from pipeline.cli.demo import DEMO
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup, take_in
 from pipeline.machine.machine import machine_of_urdf
-from tests.command_line import exit_code, rows_of
+from tests.command_line import exit_code, rows_of, sidecar_of
 
 Columns = dict[str, np.ndarray]
 
@@ -175,6 +177,7 @@ def test_the_same_log_unspoilt_is_accepted(
         (["--cutoff", "100000"], "Hz"),
         (["--gait-start", "0.5"], "fixed"),
         (["--gait-start", "nan"], "--gait-start"),
+        (["--gait", "none.toml"], "none.toml"),
         (["--holdout", "none.csv"], "none.csv"),
         (["--model", "none.toml"], "none.toml"),
     ],
@@ -231,6 +234,37 @@ def test_a_start_of_the_gait_tells_contact_where_the_log_does_not(tmp_path: Path
     assert "lowest feet" in _contact_source(tmp_path, bare, [])
     assert "schedule" in _contact_source(tmp_path, bare, start)
     assert "forces" in _contact_source(tmp_path, DEMO, start)
+
+
+def test_a_gait_file_tells_the_schedule_that_the_log_was_walked_by(tmp_path: Path) -> None:
+    whole = pq.read_table(DEMO)
+    bare = tmp_path / "bare.parquet"
+    pq.write_table(whole.drop([n for n in whole.column_names if "force" in n]), bare)
+    gait = tmp_path / "wave.toml"
+    gait.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
+    own = ["--gait-start", "0.9", "--gait", str(gait)]
+    assert "schedule" in _contact_source(tmp_path, bare, own)
+    assert "wave.toml" in sidecar_of(tmp_path / "out" / "quality.csv")["inputs_sha256"]
+    feet: dict[Path | None, float] = {}
+    for file in (None, gait):
+        given = setup(Options((bare,), gait=file, gait_start=0.9))
+        intake, _, _ = take_in(given, Options((bare,), step="read", gait_start=0.9))
+        contact = intake.prepared[0].contact
+        assert contact is not None
+        feet[file] = float(np.median(contact.standing.sum(axis=1)))
+    assert feet == {None: 3, gait: 5}
+
+
+def test_a_bare_urdf_has_no_gait(
+    tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = write_log(tmp_path / "log.csv", leg_columns())
+    gait = tmp_path / "wave.toml"
+    gait.write_text('[gait]\nname = "wave"\n', encoding="utf-8")
+    robot = root / "urdf" / "leg.urdf"
+    arguments = ["gap", "read", str(log), "--robot", str(robot), "--out", str(tmp_path / "out")]
+    assert exit_code([*arguments, "--gait", str(gait)]) == 2
+    assert "walks no gait" in capsys.readouterr().err
 
 
 def test_vertical_foot_forces_alone_tell_contact_and_say_what_they_do_not(

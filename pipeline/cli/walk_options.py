@@ -1,0 +1,82 @@
+"""Options of everything that walks: the machine, its gait, the ground's forces."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from pipeline.cli.named_path import named_path
+
+if TYPE_CHECKING:
+    from pipeline.simulation.force_choice import ForceChoice
+
+
+def add_machine_options(sub: argparse.ArgumentParser) -> None:
+    """Robot, gait, effects, actuators, and numbers that differ."""
+    sub.add_argument(
+        "--robot", type=named_path, help="robot file; the model file's or the hexapod by default"
+    )
+    add_gait_option(sub)
+    sub.add_argument(
+        "--model", type=named_path, help="model file: include the effects that `gap` found"
+    )
+    sub.add_argument(
+        "--actuators",
+        type=named_path,
+        metavar="DIR",
+        help="folder of actuator files of your own; actuators/catalog by default",
+    )
+    sub.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a number for this run: NAME=VALUE in the unit the robot file writes, "
+        "COMPONENT.NAME=VALUE for an actuator, gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
+        "standing.feet=LEG,LEG,LEG",
+    )
+    sub.add_argument(
+        "--quasi-static", action="store_true", help="leave out the links' inertial terms"
+    )
+    sub.add_argument(
+        "--regeneration",
+        default="none",
+        metavar="POLICY",
+        help="what becomes of returned electrical energy: none, bus, or a fraction such as 0.5",
+    )
+
+
+def add_gait_option(sub: argparse.ArgumentParser) -> None:
+    """A gait of its own file."""
+    sub.add_argument(
+        "--gait",
+        type=named_path,
+        metavar="FILE",
+        help="TOML with a table [gait] to walk instead of the robot file's",
+    )
+
+
+def add_force_options(sub: argparse.ArgumentParser) -> None:
+    """Rule and friction."""
+    sub.add_argument(
+        "--forces",
+        default="least_tangential",
+        metavar="RULE",
+        help="how the ground's forces are chosen: least_tangential (the paper's rule), "
+        "least_torque (joint torques squared), least_power (of the actuator in --power-of)",
+    )
+    sub.add_argument("--power-of", metavar="ALTERNATIVE", help="actuator of --forces least_power")
+    sub.add_argument(
+        "--friction-coefficient",
+        type=float,
+        metavar="MU",
+        help="greatest tangential over normal force of a foot; gait.friction_coefficient, else no "
+        "limit, by default",
+    )
+
+
+def force_choice(options: argparse.Namespace) -> ForceChoice:
+    """What the command line says of the ground's forces."""
+    from pipeline.simulation.force_choice import ForceChoice
+
+    return ForceChoice(options.forces, options.power_of, options.friction_coefficient)

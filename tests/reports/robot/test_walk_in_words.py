@@ -1,0 +1,96 @@
+"""Words and pictures of a walk say where to, on what ground and with what load."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.api.pictures.gait import gait_steps_of
+from pipeline.api.pictures.robot import robot_drawings
+from pipeline.api.pictures.scene import Scenery
+from pipeline.motion.gait import gait_of
+from pipeline.motion.payload import with_payload
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.simulation.walk_stand import Walking, stand, walk
+from reports.figures.robot.solids import Primitive
+from reports.pages.gait_words import conditions, gait_and_conditions, pace
+
+LOADED = {
+    "slope_left": "10 deg",
+    "payload_mass": "4 kg",
+    "payload_x": "100 mm",
+    "payload_z": "150 mm",
+}
+
+
+@pytest.mark.parametrize(
+    ("gait", "said"),
+    [
+        ({}, ()),
+        ({"heading": "left"}, ("to the left",)),
+        ({"heading": "backward"}, ("backward",)),
+        ({"heading": "-30 deg"}, ("30° to the right of straight ahead",)),
+        ({"yaw_rate": "-0.2 rad/s"}, ("turning on the spot to the right",)),
+        ({"slope_forward": "-5 deg"}, ("on ground that rises 5° behind",)),
+        (
+            {"slope_forward": "5 deg", "slope_left": "2 deg", "payload_mass": "4 kg"},
+            ("on ground that rises 5° ahead and 2° to the left", "with a payload of 4 kg"),
+        ),
+        ({"speed": "0.1 m/s", "yaw_rate": "0.1 rad/s"}, ("turning to the left",)),
+    ],
+)
+def test_what_is_not_as_usual_is_said(
+    hexapod: Robot, gait: dict[str, str], said: tuple[str, ...]
+) -> None:
+    spec = hexapod.spec.with_gait(name="ripple", **gait)
+    assert conditions(spec) == said
+    assert gait_and_conditions(spec) == ", ".join(("ripple gait", *said))
+
+
+def test_pace_on_the_spot_is_a_rate_and_no_speed(hexapod: Robot) -> None:
+    spot = gait_of(hexapod.spec.with_gait(name="ripple", yaw_rate="0.2 rad/s"))
+    assert pace(spot).startswith("at 0.2 rad/s with a period of 4.80")
+    assert pace(gait_of(hexapod.spec)) == "at 0.16 m/s with a period of 3 s"
+
+
+@pytest.fixture(scope="module")
+def loaded(hexapod: Robot) -> Robot:
+    return with_payload(load_robot(hexapod.spec.with_gait(name="ripple", **LOADED)))
+
+
+@pytest.fixture(scope="module")
+def walking(loaded: Robot) -> Walking:
+    return walk(loaded, {}, samples=51)
+
+
+def test_a_payload_is_drawn_where_it_is_and_is_no_part_of_the_trunk(
+    hexapod: Robot, loaded: Robot, walking: Walking
+) -> None:
+    scenery = Scenery(loaded)
+    solids, _ = scenery.at(scenery.zero)
+    ball = solids[-1]
+    assert isinstance(ball, Primitive)
+    assert ball.sphere
+    np.testing.assert_allclose(ball.placement[:3, 3], [0.1, 0.0, 0.15])
+    volume = np.pi / 6 * ball.size[0] ** 3
+    assert volume * 7850 == pytest.approx(4.0)
+    np.testing.assert_array_equal(scenery.trunk_outline(), Scenery(hexapod).trunk_outline())
+    steps = gait_steps_of(scenery, walking, 4)
+    (load,) = (body for body in steps.bodies if body.load)
+    assert not load.leg
+    assert Scenery(hexapod).load is None
+
+
+def test_dimensions_are_measured_along_the_ground_on_a_slope_too(
+    loaded: Robot, walking: Walking
+) -> None:
+    (drawing,) = (
+        d for d in robot_drawings(Scenery(loaded), stand(loaded, {}), walking) if d.name == "robot"
+    )
+    figure = drawing.draw()
+    said = [t.get_text() for axes in figure.axes for t in axes.texts]
+    assert "520 mm" in said  # of the paper's Table I
+    assert "296 mm" in said
+    words = " ".join(t.get_text() for t in figure.texts)
+    assert "drawn along the ground" in words
+    assert "ball: payload" in words
