@@ -9,7 +9,13 @@ from typing import Any
 
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Where
-from pipeline.identification.results import INDISTINGUISHABLE, SUSPECTED, Candidate, Found
+from pipeline.identification.results import (
+    INDISTINGUISHABLE,
+    SUSPECTED,
+    Candidate,
+    Found,
+    Naming,
+)
 from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.logs.errors import EffectError
 from pipeline.logs.quality.finding import Finding
@@ -89,6 +95,11 @@ def found_table(found: Sequence[Found], model: MachineModel) -> Table:
                 for p in one.parameters
             ]
     return tables.found(rows)
+
+
+def base_table(naming: Naming) -> Table:
+    """Rows of `base_parameters.csv`."""
+    return tables.base_parameters([asdict(one) for one in naming.base])
 
 
 def _known(value: float) -> float | None:

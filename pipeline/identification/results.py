@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
+from pipeline.regression.result import BaseParameter
+
 #: How far a finding is to be trusted: name, law and size stand; it closes a large part though its
 #: law is not exactly the machine's or its size scatters; it is listed and not written.
 CONFIRMED: Final = "confirmed"
@@ -247,6 +249,7 @@ class Naming:
         channel: The compared channel.
         unit: Its unit.
         notes: Remarks for the report, in words.
+        base: Base parameters of refitted bodies; empty where bodies were not fitted.
     """
 
     found: tuple[Found, ...]
@@ -256,6 +259,7 @@ class Naming:
     channel: str
     unit: str
     notes: tuple[str, ...] = field(default=())
+    base: tuple[BaseParameter, ...] = field(default=())
 
 
 def named(found: Found) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from pipeline.errors import UnphysicalModelError
 from pipeline.robot.published import published_names, published_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
-from pipeline.robot.urdf_check import MERGED, Finding, check_urdf
+from pipeline.robot.urdf_check import MERGED, OWN_DRIVE, Finding, check_urdf
 from pipeline.robot.urdf_source import read_urdf
 
 __all__ = ["Finding", "check_file", "check_robot", "check_urdf", "refuse_impossible", "refuse_urdf"]
@@ -102,8 +102,12 @@ def _masses(robot: Robot) -> list[Finding]:
     return findings
 
 
-def refuse_impossible(robot: Robot) -> tuple[str, ...]:
+def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...]:
     """Stop before a body that cannot exist gives numbers that look like any other.
+
+    Args:
+        robot: Loaded.
+        tolerant: Go on where a finding is tolerable, for a comparison with a log.
 
     Returns:
         What was found and does no harm, for the run's record.
@@ -114,26 +118,39 @@ def refuse_impossible(robot: Robot) -> tuple[str, ...]:
     """
     where = source_of(robot)
     findings = [*check_urdf(robot.urdf, where), *_masses(robot), *_sliding(robot)]
-    return refused(findings, where, str(robot.spec.path))
+    return refused(findings, where, str(robot.spec.path), tolerant=tolerant)
 
 
-def refuse_urdf(text: str, where: str) -> tuple[str, ...]:
-    """The same for a bare URDF on a fixed base.
+def refuse_urdf(text: str, where: str) -> None:
+    """The same for a bare URDF on a fixed base, with which logs are compared and nothing else done.
 
     Raises:
         UnphysicalModelError: As for `refuse_impossible`.
         UrdfError: A fault of structure.
     """
-    return refused(check_urdf(text, where), where, where)
+    refused(check_urdf(text, where), where, where, tolerant=True)
 
 
-def refused(findings: list[Finding], where: str, file: str) -> tuple[str, ...]:
+def tolerated(findings: Sequence[Finding]) -> tuple[str, ...]:
+    """What failed and does not stop a comparison with a log, in words."""
+    out = []
+    for f in findings:
+        if not f.passed and f.tolerable:
+            mimics = "it mimics another joint: held still"
+            detail = mimics if f.check == OWN_DRIVE else f"{f.detail}: kept as stated"
+            out.append(f"{f.subject}: {f.check} fails ({detail})")
+    return tuple(out)
+
+
+def refused(
+    findings: Sequence[Finding], where: str, file: str, *, tolerant: bool = False
+) -> tuple[str, ...]:
     """Raise the first finding that failed; return the notes.
 
     Raises:
-        UnphysicalModelError: One failed.
+        UnphysicalModelError: One failed that is not tolerable, or that nothing tolerates.
     """
-    failed = [finding for finding in findings if not finding.passed]
+    failed = [f for f in findings if not f.passed and not (tolerant and f.tolerable)]
     if failed:
         first, more = failed[0], len(failed) - 1
         raise UnphysicalModelError(

@@ -26,6 +26,9 @@ from pipeline.robot.urdf_source import INERTIA_KEYS, MOVING, ends, numbers, read
 Array = NDArray[np.float64]
 
 TRIANGLE_TOLERANCE = 1e-6  # relative to the largest principal moment
+#: What moments written with two digits, or a density that CAD guessed, take a body beyond what is
+#: possible, relative to the largest principal moment: a log's comparison can go on with it.
+TOLERABLE_EXCESS = 0.05
 GEOMETRY_MARGIN = 1e-6  # [m]
 #: A link's impossible inertia counts from this share of the largest moment of the body it merges
 #: into, and its centre of mass from this share of that body's mass.
@@ -48,6 +51,8 @@ GYRATION = 10.0
 HEAVY = 1000.0
 #: What says which links move as one; no warning.
 MERGED = "merged over fixed joints"
+#: Of a joint that mimics none.
+OWN_DRIVE = "a drive of its own"
 _SHOWN = 8  # names in one line
 
 
@@ -61,6 +66,7 @@ class Finding:
         passed: Whether it holds.
         detail: Numbers, with the remedy where it fails.
         note: Passed, but the reader should know.
+        tolerable: Failed, but a comparison with a log goes on, with a warning.
     """
 
     subject: str
@@ -68,6 +74,7 @@ class Finding:
     passed: bool
     detail: str
     note: bool = False
+    tolerable: bool = False
 
 
 @dataclass(frozen=True)
@@ -225,7 +232,8 @@ def _body(body: Body) -> list[Finding]:
     findings.append(Finding(body.name, "mass positive", True, f"{mass:.6g} kg"))
     moments = np.linalg.eigvalsh(body.inertia.inertia)
     excess, detail = _excess(mass, moments)
-    findings.append(Finding(body.name, "inertia possible", excess == 0, detail))
+    slight = 0 < excess <= TOLERABLE_EXCESS * float(np.abs(moments).max())
+    findings.append(Finding(body.name, "inertia possible", excess == 0, detail, tolerable=slight))
     if excess == 0 and moments[2] <= mass * POINT**2 and body.joint:
         detail = f"{mass:.6g} kg without rotational inertia is computed as a point"
         findings.append(Finding(body.name, "rotational inertia", True, detail, note=True))
@@ -318,7 +326,7 @@ def _joints(root: ET.Element, where: str) -> list[Finding]:
                 f"it mimics '{mimic.get('joint')}': a drive that moves several joints is not "
                 "computed; make it fixed, or remove <mimic> if it has a drive of its own"
             )
-            findings.append(Finding(name, "a drive of its own", False, detail))
+            findings.append(Finding(name, OWN_DRIVE, False, detail, tolerable=True))
         findings += _limits(joint, kind, where)
     return findings
 

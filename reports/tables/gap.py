@@ -75,6 +75,16 @@ FOUND: dict[str, Meaning] = {
     "written": ("whether model.toml holds it; one that it leaves out: gap beside the file's", ""),
 }
 
+BASE_PARAMETERS: dict[str, Meaning] = {
+    "name": ("combination of bodies' parameters that the motion tells", "", "base parameter"),
+    "urdf": ("its value by the URDF", "see unit", "URDF"),
+    "value": ("fitted", "see unit", "fitted"),
+    "low": ("lower end of the 95 % interval", "see unit", "95 % from"),
+    "high": ("upper end of the 95 % interval", "see unit", "to"),
+    "unit": ("of the four", ""),
+    "far": ("fitted less URDF, per the URDF's uncertainty as validation chose it", "1"),
+}
+
 
 def quality(rows: Rows) -> Table:
     """The judgement on the logs."""
@@ -98,6 +108,13 @@ def candidates(rows: Rows) -> Table:
 def found(rows: Rows) -> Table:
     """Accepted effects."""
     return table_from_rows("found", rows, FOUND, "What the model lacked.")
+
+
+def base_parameters(rows: Rows) -> Table:
+    """What a log tells of the bodies, beside the URDF."""
+    return table_from_rows(
+        "base_parameters", rows, BASE_PARAMETERS, "Base parameters of the bodies: URDF and log."
+    )
 
 
 def deciding_motion(time: Array, joints: Sequence[str], position: Array) -> Table:

@@ -18,6 +18,7 @@ from pipeline.api.gap_figures import (
 from pipeline.api.gap_forward import forward_table, rollout_tables
 from pipeline.api.gap_meta import inputs_of, metadata
 from pipeline.api.gap_tables import (
+    base_table,
     candidates_table,
     found_table,
     motion_table,
@@ -100,6 +101,7 @@ def run(options: Options) -> int:
         tables += [
             candidates_table(naming.candidates, naming.found, given.model),
             found_table(naming.found, given.model),
+            *([base_table(naming)] if naming.base else []),
             *([motion_table(told.deciding, given.model.joints)] if told.deciding else []),
         ]
         progress.step("writing")
@@ -114,6 +116,7 @@ def run(options: Options) -> int:
                     _figures_and_page(told, tables, folder)
     _say_warnings(given, where.intake.findings)
     _say_answer(told.story, options.out)
+    logger.info("what took long: %s", progress.took())
     return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
 
 

@@ -7,16 +7,19 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from pipeline.effects.bodies.rigid_body_parameters import NAMES, UNITS
+from pipeline.effects.bodies.rigid_body_parameters import NAMES, UNITS, physical
 from pipeline.effects.drive.rotor_inertia import RotorInertia
 from pipeline.effects.friction.joint_friction import JointFrictionLaw
 from pipeline.effects.registry import effect_named
 from pipeline.identification import results as limits
 from pipeline.identification.results import Estimate, Found, Member
+from pipeline.identification.whole.errors import NotWholeError
 from pipeline.machine.machine import MachineModel
 from pipeline.regression import Friction, Level, Result, Term
 
+Array = NDArray[np.float64]
 NAN: Final = float("nan")
 LAW: Final = (
     "no law of the catalogue predicts validation data as well as a smooth curve over speed and load"
@@ -64,16 +67,25 @@ class Told:
         )
 
 
-def told(result: Result, model: MachineModel) -> list[Told]:
-    """Findings of a result in the order in which they are applied: bodies first."""
-    out = bodies(result, model)
+def told(result: Result, model: MachineModel, carried: Mapping[str, Array]) -> list[Told]:
+    """Findings of a result in the order in which they are applied: bodies first.
+
+    Args:
+        result: Of the regression.
+        model: Before it.
+        carried: Inertial parameters (10,) that hang on a joint behind others that were held.
+
+    Raises:
+        NotWholeError: A body as fitted is none without what hangs on it.
+    """
+    out = bodies(result, model, carried)
     out += couplings(result)
     out += frictions(result)
     return out + inertias(result, model) + offsets(result, model)
 
 
-def bodies(result: Result, model: MachineModel) -> list[Told]:
-    """Inertial parameters of every link that has any."""
+def bodies(result: Result, model: MachineModel, carried: Mapping[str, Array]) -> list[Told]:
+    """Inertial parameters of every link that has any; see `told`."""
     if not result.refit:
         return []
     links = {joint: link for link, joint in model.links.items()}
@@ -82,6 +94,12 @@ def bodies(result: Result, model: MachineModel) -> list[Told]:
         ten, half = result.bodies[10 * k : 10 * k + 10], result.bodies_half[10 * k : 10 * k + 10]
         if ten[0] <= 0.0 or str(joint) not in links:
             continue
+        if str(joint) in carried:
+            ten = ten - carried[str(joint)]
+            if not physical(ten):
+                raise NotWholeError(
+                    f"'{links[str(joint)]}' as fitted is no body without what hangs still on it"
+                )
         parameters = tuple(
             _estimate(n, float(x), float(h), unit, low=0.0 if n in ("mass", *_DIAGONAL) else -1e6)
             for n, x, h, unit in zip(NAMES, ten, half, UNITS, strict=True)

@@ -12,11 +12,11 @@ from pipeline.effects.registry import effect_named
 from pipeline.identification.results import Found
 from pipeline.identification.whole.errors import NotWholeError
 from pipeline.identification.whole.findings import suspected, told
-from pipeline.identification.whole.rigid import rigid_model
+from pipeline.identification.whole.rigid import held, rigid_model, still_joints
 from pipeline.identification.whole.training import training_runs, without_known
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.machine.machine import MachineModel
-from pipeline.regression import Result, Run, identify, prepare
+from pipeline.regression import Result, identify, prepare
 from pipeline.regression.errors import RegressionError
 
 #: Effects that the regression decides about: they are not offered again.
@@ -75,13 +75,10 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
     Raises:
         NotWholeError: The machine or its log does not allow it.
     """
-    rigid = rigid_model(model)
-    names = list(rigid.names)[1:]
-    order = np.array([model.index(str(n)) for n in names])
-    runs = [
-        Run(r.time, r.q[:, order], r.tau[:, order], None if r.v is None else r.v[:, order])
-        for r in training_runs(where.intake.prepared, where.parts, model)
-    ]
+    prepared = where.intake.prepared
+    rigid, carried = held(rigid_model(model), still_joints(model, [p.log for p in prepared]))
+    order = np.array([model.index(str(n)) for n in list(rigid.names)[1:]], dtype=np.intp)
+    runs = training_runs(prepared, where.parts, model, order)
     try:
         rows = prepare(runs, rigid)
         rows = replace(rows, tau=without_known(rows, model, rigid))
@@ -89,7 +86,7 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
     except (RegressionError, np.linalg.LinAlgError) as error:
         raise NotWholeError(str(error)) from None
     unit = CHANNEL_UNITS[where.measurements[0].channels[0]]
-    found = tuple(t.found(k, unit) for k, t in enumerate(told(result, model), start=1))
+    found = tuple(t.found(k, unit) for k, t in enumerate(told(result, model, carried), start=1))
     kept = [f for f in found if f.kept]
     decided = FAMILIES
     if where.measurements[0].channels[0] == "torque":

@@ -38,8 +38,16 @@ LATEST: Final = 0.1
 SHORTEST: Final = 64
 
 
-def training_runs(prepared: Sequence[Prepared], parts: Parts, model: MachineModel) -> list[Run]:
+def training_runs(
+    prepared: Sequence[Prepared], parts: Parts, model: MachineModel, columns: NDArray[np.intp]
+) -> list[Run]:
     """Recordings to learn from, one per stretch without a gap.
+
+    Args:
+        prepared: Logs.
+        parts: Of them.
+        model: The machine.
+        columns: Joints to learn, in order, (K,).
 
     Raises:
         NotWholeError: The channel does not tell a torque, or too little is left to learn from.
@@ -47,15 +55,16 @@ def training_runs(prepared: Sequence[Prepared], parts: Parts, model: MachineMode
     out = []
     for one, part in zip(prepared, parts.part, strict=True):
         log = one.log
-        torque, known = joint_torque(log, model)
-        good = known & np.isfinite(log.position).all(axis=1) & _inside(one, part)
-        velocity = _velocity(one, good)
+        torque, told = joint_torque(log, model)
+        known = told[:, columns].all(axis=1)
+        good = known & np.isfinite(log.position[:, columns]).all(axis=1) & _inside(one, part)
+        velocity = _velocity(one, good, columns)
         for rows in _stretches(log.time, good, LONGEST_GAP / one.cutoff):
             out.append(
                 Run(
                     log.time[rows],
-                    log.position[rows],
-                    torque[rows],
+                    log.position[np.ix_(rows, columns)],
+                    torque[np.ix_(rows, columns)],
                     None if velocity is None else velocity[rows],
                 )
             )
@@ -64,19 +73,19 @@ def training_runs(prepared: Sequence[Prepared], parts: Parts, model: MachineMode
     return out
 
 
-def _velocity(one: Prepared, good: Mask) -> Array | None:
-    """The logged velocity, where it is one and comes with the position, (N, J)."""
+def _velocity(one: Prepared, good: Mask, columns: NDArray[np.intp]) -> Array | None:
+    """The logged velocity, where it is one and comes with the position, (N, K)."""
     log = one.log
-    if log.velocity is None or not np.isfinite(log.velocity[good]).all():
+    if log.velocity is None or not np.isfinite(log.velocity[np.ix_(good, columns)]).all():
         return None
     step = float(np.median(np.diff(log.time)))
-    for k in range(len(log.joints)):
+    for k in map(int, columns):
         rate = one.lowpass(np.gradient(np.interp(one.time, log.time, log.position[:, k]), one.time))
         told = one.lowpass(np.interp(one.time, log.time, log.velocity[:, k]))
         found = skew(told, rate, step, longest=LATEST)
         if found is not None and abs(found.lag) * one.cutoff > LATE:
             return None
-    return log.velocity
+    return np.asarray(log.velocity[:, columns])
 
 
 def _inside(one: Prepared, part: NDArray[np.int8]) -> Mask:
@@ -109,7 +118,7 @@ def _stretches(time: Array, good: Mask, longest: float) -> list[NDArray[np.intp]
 
 
 def joint_torque(log: Log, model: MachineModel) -> tuple[Array, Mask]:
-    """Torque that motors give, at the joint side, (N, J) [N*m], and rows in which it is known.
+    """Torque that motors give, at the joint side, (N, J) [N*m], and where it is known, (N, J).
 
     Raises:
         NotWholeError: Neither torque, current nor voltage is compared.
@@ -131,7 +140,7 @@ def joint_torque(log: Log, model: MachineModel) -> tuple[Array, Mask]:
         free = np.full_like(log.torque_off, log.torque_off_bridge == "open")
         values = np.where(log.torque_off & free, 0.0, values)
         known = np.where(log.torque_off, free, known)
-    return values, np.asarray((known & log.valid).all(axis=1))
+    return values, np.asarray(known & log.valid)
 
 
 def _refuse_unknown(joint: str, motor: DCMotor, channel: str) -> None:

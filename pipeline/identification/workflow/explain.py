@@ -56,6 +56,7 @@ def explain(given: Setup, where: Whereabouts, progress: Progress) -> Explanation
         return _alone(identify(given.model, where.measurements))
     if given.file.edits:
         return _alone(identify(given.model, where.measurements))
+    progress.step("letting a few effects compete")
     few = identify(given.model, where.measurements, most=limits.FEW)
     explained = few.enough and not (few.excess > limits.UNEXPLAINED).any()
     if explained and (given.robot is not None or not _claims(few)):
@@ -64,6 +65,7 @@ def explain(given: Setup, where: Whereabouts, progress: Progress) -> Explanation
     try:
         whole = fit_whole(given.model, where)
     except NotWholeError as error:
+        progress.step("letting effects compete")
         note = f"the machine was not fitted as a whole: {error}"
         return _alone(identify(given.model, where.measurements), note)
     if not whole.found:
@@ -82,7 +84,8 @@ def explain(given: Setup, where: Whereabouts, progress: Progress) -> Explanation
         for number, f in enumerate((*whole.found, *rest.naming.found), start=1)
     ]
     notes = (*rest.naming.notes, *whole.notes)
-    return Explanation(replace(rest.naming, found=tuple(found), notes=notes), rest, whole)
+    naming = replace(rest.naming, found=tuple(found), notes=notes, base=whole.result.base)
+    return Explanation(naming, rest, whole)
 
 
 def _alone(named: Identified, *notes: str) -> Explanation:

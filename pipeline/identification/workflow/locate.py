@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from time import perf_counter
 from types import TracebackType
 from typing import Any, Final
 
@@ -21,6 +23,7 @@ from pipeline.logs.quality.finding import refuse
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 
+logger = logging.getLogger("legwatt")
 #: Share of a run's time that has usually passed when a step begins, by the first word of its text;
 #: shared out from where the demonstration and the blind trials spend theirs.
 _BEGUN: Final = {
@@ -35,9 +38,16 @@ _BEGUN: Final = {
 
 
 class Progress:
-    """Steps of a run as a bar with the time that is left, roughly; on a terminal only."""
+    """Steps of a run as a bar with the time that is left, roughly; on a terminal only.
+
+    Attributes:
+        seconds: What every step took so far, by its text [s].
+    """
 
     def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._running = ""
+        self._since = 0.0
         self._bar: Any = None
         if sys.stderr.isatty():
             from tqdm import tqdm
@@ -54,11 +64,26 @@ class Progress:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._stop()
         if self._bar is not None:
             self._bar.close()
 
+    def took(self) -> str:
+        """Every step and its seconds, the longest first, in words."""
+        longest = sorted(self.seconds.items(), key=lambda item: -item[1])
+        return ", ".join(f"{text} {seconds:.1f} s" for text, seconds in longest)
+
+    def _stop(self) -> None:
+        if self._running:
+            past = perf_counter() - self._since
+            self.seconds[self._running] = self.seconds.get(self._running, 0.0) + past
+            logger.info("%s took %.1f s", self._running, past)
+        self._running = ""
+
     def step(self, text: str) -> None:
         """Say what comes next."""
+        self._stop()
+        self._running, self._since = text, perf_counter()
         if self._bar is not None:
             self._bar.set_description_str(text)
             begun = _BEGUN.get(text.partition(" ")[0], self._bar.n)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,7 @@ from pipeline.errors import RobotFileError
 from pipeline.identification.compare.bandwidth import lowered, naming_cutoff
 from pipeline.identification.compare.intake import Intake, prepare_logs
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
+from pipeline.identification.workflow.mimics import mimics_in, refuse_moved
 from pipeline.identification.workflow.options import Options
 from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.logs.prepared.contact import Contact, find_contact
@@ -31,9 +32,10 @@ from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
 from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.payload import with_payload
-from pipeline.robot.check import refuse_impossible
+from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
+from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.changes import changed
 
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
@@ -59,6 +61,7 @@ class Setup:
         file: The model file whose edits are in `model`; without edits where none was given.
         bare: The model before those edits.
         warnings: What of the files a reader should know, in words.
+        mimics: Joints of the URDF that mimic another, to the other's name; no log may move them.
     """
 
     path: Path
@@ -72,6 +75,7 @@ class Setup:
     file: ModelFile
     bare: MachineModel
     warnings: tuple[str, ...] = ()
+    mimics: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def legged(self) -> bool:
@@ -100,6 +104,8 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
     if parts.spec is None:
         chain = catalog.chain(alternative) if alternative else None
         bare = machine_of_urdf(path, actuators=chain)
+        text = read_urdf(path)
+        odd = tolerated(check_urdf(text, str(path)))
         robot = None
         expected = expected_of_model(
             bare.rigid, bare.name, joints=bare.joints, ratio=_ratio(chain, bare.joints)
@@ -107,7 +113,8 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         sources: tuple[Path, ...] = (path,)
     else:
         robot = load_robot(parts.spec)
-        refuse_impossible(robot)
+        refuse_impossible(robot, tolerant=True)
+        text, odd = robot.urdf, tolerated(check_urdf(robot.urdf, source_of(robot)))
         robot = with_payload(robot)
         # Motor-side positions need a ratio whatever channel is compared.
         usual = alternative or own.usual or _default(catalog)
@@ -130,7 +137,8 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         alternative=alternative,
         file=file,
         bare=bare,
-        warnings=(*parts.remarks, *(given_file.changed if given_file else ())),
+        warnings=(*parts.remarks, *odd, *(given_file.changed if given_file else ())),
+        mimics=mimics_in(text, str(path)),
     )
 
 
@@ -305,6 +313,7 @@ def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
         surveys = tuple(survey(s, prove_last=t) for s, t in zip(streams, lasts, strict=True))
     logs = [s.log for s in surveys] or [stream.whole for stream in streams]
     refuse_repeats(logs)
+    refuse_moved(given.mimics, logs, given.expected)
     largest, contact = _largest(given), _contact(given, options.gait_start)
     intake = prepare_logs(
         logs, given.expected, cutoff=options.cutoff, largest=largest, contact=contact
