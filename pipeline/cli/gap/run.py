@@ -97,13 +97,7 @@ def run(options: Options) -> int:
         else:
             progress.step("letting effects compete")
             told = tell(given, where, options, progress)
-        naming = told.story.naming
-        tables += [
-            candidates_table(naming.candidates, naming.found, given.model),
-            found_table(naming.found, given.model),
-            *([base_table(naming)] if naming.base else []),
-            *([motion_table(told.deciding, given.model.joints)] if told.deciding else []),
-        ]
+        tables += _answer_tables(told, given)
         progress.step("writing")
         if options.step == "name":
             _write_tables(options, given, tables)
@@ -118,6 +112,16 @@ def run(options: Options) -> int:
     _say_answer(told.story, options.out)
     logger.info("what took long: %s", progress.took())
     return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
+
+
+def _answer_tables(told: Told, given: Setup) -> list[Table]:
+    naming = told.story.naming
+    return [
+        candidates_table(naming.candidates, naming.found, given.model),
+        found_table(naming.found, given.model),
+        *([base_table(naming)] if naming.base else []),
+        *([motion_table(told.deciding, given.model.joints)] if told.deciding else []),
+    ]
 
 
 def _drive(given: Setup, where: Whereabouts, options: Options) -> int:
