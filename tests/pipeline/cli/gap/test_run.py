@@ -64,7 +64,7 @@ def test_pictures_and_page_are_there(run: tuple[int, Path]) -> None:
         assert (out / f"{name}.svg").is_file()
     report = (out / "report.md").read_text(encoding="utf-8")
     first = report.split("##")[0]
-    for word in ("rm_joint_1", "coulomb_friction", "N*m", "95 %", "J", "noise"):
+    for word in ("rm_joint_1", "coulomb_friction", "N·m", "95 %", "J", "noise"):
         assert word in first
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "<script" not in page
