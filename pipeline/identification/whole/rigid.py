@@ -14,6 +14,8 @@ from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
 
 Array = NDArray[np.float64]
+#: Relative difference that comes of turning and adding alone.
+ROUNDING = 1e-9
 
 
 def rigid_model(model: MachineModel) -> pin.Model:
@@ -73,7 +75,7 @@ def held(rigid: pin.Model, still: Mapping[str, float]) -> tuple[pin.Model, dict[
         name = str(reduced.names[k])
         own = rigid.inertias[rigid.getJointId(name)].toDynamicParameters()
         more = reduced.inertias[k].toDynamicParameters() - own
-        if np.abs(more).max() > 0.0:
+        if np.abs(more).max() > ROUNDING * np.abs(own).max():
             carried[name] = more
     return reduced, carried
 
@@ -90,5 +92,6 @@ def _turning(rigid: pin.Model) -> pin.Model:
         own = out.addJoint(
             int(rigid.parents[k]), joint, rigid.jointPlacements[k], str(rigid.names[k])
         )
+        out.addJointFrame(own)  # reduction of a model without frames reads past their end
         out.appendBodyToJoint(own, rigid.inertias[k], pin.SE3.Identity())
     return out

@@ -9,7 +9,8 @@ import pinocchio as pin
 import pytest
 
 from pipeline.errors import UnphysicalModelError
-from pipeline.identification.whole.rigid import held
+from pipeline.identification.whole.rigid import held, rigid_model
+from pipeline.machine.machine import machine_of_urdf
 from pipeline.robot.check import check_urdf, refuse_urdf, tolerated
 from pipeline.robot.urdf_check import TOLERABLE_EXCESS
 from tests.command_line import exit_code, rows_of
@@ -46,6 +47,17 @@ def test_a_held_joint_leaves_the_torque_of_the_others() -> None:
     own = whole.inertias[whole.getJointId("joint_3")].toDynamicParameters()
     ten = reduced.inertias[reduced.getJointId("joint_3")].toDynamicParameters()
     np.testing.assert_allclose(ten - carried["joint_3"], own, atol=1e-12)
+
+
+def test_wheels_without_limits_can_be_held_too(tmp_path: Path) -> None:
+    robot = tmp_path / "arm.urdf"
+    endless = gripper().replace(
+        'name="left_joint" type="prismatic"', 'name="left_joint" type="continuous"'
+    )
+    robot.write_text(endless.replace(MIMIC, ""), encoding="utf-8")
+    rigid = rigid_model(machine_of_urdf(robot))
+    reduced, _ = held(rigid, {"left_joint": 0.0, "right_joint": 0.0})
+    assert list(reduced.names)[1:] == list(NAMES)
 
 
 @pytest.mark.parametrize(("share", "goes_on"), [(0.03, True), (0.3, False)])
