@@ -101,6 +101,7 @@ def select(
     refused: set[Key] = set()
     made: list[Trial] = []
     problem = refit(problem)
+    passed = {_names(problem)}
     while True:
         screen = Screen(problem)
         held = [(a.effect.name, a.place) for a in problem.accepted]
@@ -133,15 +134,13 @@ def select(
         winner = _preferred(problem, good)
         rivals = _rivals(problem, winner, made)
         added = _accepted(winner)
-        candidate = refit(problem.with_accepted([*problem.accepted, added]).remasked())
-        candidate = pruned(candidate)
-        if runs_away(candidate) or not any(
-            a.effect is added.effect and a.place == added.place for a in candidate.accepted
-        ):
+        candidate = _with(problem, added, passed)
+        if candidate is None:
             refused.add(winner.key)
             continue
         rounds.append(Round(winner.key, winner, rivals))
         problem = candidate
+        passed.add(_names(problem))
     problem, rounds = _reconsidered(problem, rounds, tried, without)
     problem, rounds = _dissolved(problem, rounds)
     nearest = None
@@ -152,6 +151,28 @@ def select(
     kept = {(a.effect.name, a.place) for a in problem.accepted}
     rounds = [r for r in rounds if r.winner in kept]
     return Selection(problem, tuple(rounds), first, tuple(scores), trials, tried, nearest)
+
+
+def _with(problem: Problem, added: Accepted, passed: Collection[frozenset[Key]]) -> Problem | None:
+    """The problem with one more effect, less what that makes superfluous; None if it cannot stay.
+
+    Args:
+        problem: Before.
+        added: The effect.
+        passed: What was accepted together before: of two effects each of which makes the other
+            superfluous, both stay, which would take turns for ever.
+    """
+    both = refit(problem.with_accepted([*problem.accepted, added]).remasked())
+    candidate = pruned(both)
+    if _names(candidate) in passed:
+        candidate = both
+    now = _names(candidate)
+    stays = (added.effect.name, added.place) in now and now not in passed
+    return candidate if stays and not runs_away(candidate) else None
+
+
+def _names(problem: Problem) -> frozenset[Key]:
+    return frozenset((a.effect.name, a.place) for a in problem.accepted)
 
 
 def offered(problem: Problem, without: Collection[str]) -> list[Effect]:
