@@ -132,7 +132,8 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
 
 
 def test_tables_have_the_promised_columns() -> None:
-    header = "order effect joint parameter value ci_low ci_high unit gap_before gap_after gap_unit"
-    assert list(found([]).columns) == [*header.split(), "noise_floor", "doubt", "written"]
+    what = "order effect law amounts_to joint place parameter value ci_low ci_high unit"
+    how = "gap_before gap_after gap_unit noise_floor level share reason written"
+    assert list(found([]).columns) == [*what.split(), *how.split()]
     table = deciding_motion(np.arange(3.0), ["a", "b"], np.zeros((3, 2)))
     assert list(table.columns) == ["time_s", "a__position_rad", "b__position_rad"]

@@ -100,7 +100,7 @@ URDFS = {
     "a mimic": (
         r'(<joint name="lf_joint_2"[^>]*>)',
         r'\1<mimic joint="lf_joint_1"/>',
-        r"lf_joint_2: a drive of its own fails \(it mimics 'lf_joint_1'",
+        r"lf_joint_2\b.* mimics 'lf_joint_1'",
     ),
     "millimetres": (
         r'(<joint name="lf_joint_2".*?<origin xyz=)"[^"]*"',
