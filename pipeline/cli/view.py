@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from pipeline.cli.walk_options import add_force_options, add_machine_options, force_choice
+from pipeline.cli.walk_options import add_force_options, add_machine_options
 
 
 def add_view_options(sub: argparse.ArgumentParser) -> None:
     """The options of the verb."""
     add_machine_options(sub)
     add_force_options(sub)
+    sub.set_defaults(compare_forces=False)
     sub.add_argument("--samples", type=int, default=201, help="samples per half period of the gait")
     sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
     sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
@@ -37,19 +38,9 @@ def run_view(options: argparse.Namespace) -> int:
 
     viser_module()  # before anything is computed
     from pipeline.api.pictures.view import player
-    from pipeline.simulation.settings import settings
+    from pipeline.cli.run import settings_of
 
-    given = settings(
-        robot=options.robot,
-        model=options.model,
-        gait=options.gait,
-        changes=options.set,
-        samples=options.samples,
-        quasi_static=options.quasi_static,
-        regeneration=options.regeneration,
-        actuators=options.actuators,
-        forces=force_choice(options),
-    )
+    given = settings_of(options)
     shown = player(given, host=options.host, port=options.port)
     print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)
     try:

@@ -24,7 +24,6 @@ from pipeline.robot.robot import Robot, parse_urdf
 from pipeline.robot.urdf_source import read_urdf
 
 Vector = tuple[float, float, float]
-BASE = "base"
 
 
 @dataclass(frozen=True)

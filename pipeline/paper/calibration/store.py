@@ -6,7 +6,6 @@ the old files as they were.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import shutil
@@ -319,8 +318,3 @@ def load_results(path: Path = RESULTS_FILE) -> dict[str, Any]:
             f"{path.name}: no calibration results; run `make calibrate`"
         ) from None
     return results
-
-
-def results_hash(path: Path = RESULTS_FILE) -> str:
-    """SHA-256 of the stored results."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()

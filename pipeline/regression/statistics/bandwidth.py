@@ -20,9 +20,6 @@ from pipeline.regression.preprocess import Rows, Run, rows, spectra
 
 Array = NDArray[np.float64]
 
-#: Bands per octave over which power is added up.
-PER_OCTAVE = 4
-
 
 def prepare(runs: Sequence[Run], model: pin.Model, cutoff: float | None = None) -> Rows:
     """Rows of a regression, the cut-off found from noise and from what a rigid model explains.
