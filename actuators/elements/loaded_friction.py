@@ -2,8 +2,8 @@
 
     friction = free(velocity) + share(torque, velocity) |torque| s(velocity)
 
-s is the sense of motion. Where friction rises over a small travel after a reversal (presliding), a
-speed over which it rises stands for it: s = erf(velocity / (sqrt(2) rise)) instead of a jump.
+s is the sense of motion. After a reversal it may rise instead of jumping: over a small travel
+(presliding, `actuators.presliding`), or over a speed, s = erf(velocity / (sqrt(2) rise)).
 """
 
 from abc import abstractmethod
@@ -14,6 +14,7 @@ import numpy as np
 
 from actuators.arrays import FloatArray, Scalars, require_non_negative
 from actuators.elements.element import Element
+from actuators.presliding import presliding
 from actuators.shaft import ShaftSeries
 
 #: Abramowitz and Stegun, Handbook of Mathematical Functions, 7.1.26; error below 1.5e-7.
@@ -34,15 +35,17 @@ class LoadedFriction(Element):
 
     Attributes:
         rise: Speed over which dry friction rises after a reversal; 0 for a jump [rad/s].
+        travel: Travel over which it does, in place of a speed; 0 for none [rad].
 
     Note:
         At standstill dry friction holds with its whole level, whatever the rise.
     """
 
     rise: Scalars = 0.0
+    travel: float = 0.0
 
     def __post_init__(self) -> None:
-        require_non_negative(self.name, rise=self.rise)
+        require_non_negative(self.name, rise=self.rise, travel=self.travel)
 
     @abstractmethod
     def free(self, side: ShaftSeries) -> FloatArray:
@@ -58,6 +61,9 @@ class LoadedFriction(Element):
 
     def sense(self, side: ShaftSeries) -> FloatArray:
         """Return the sense of motion, -1 to 1, (N, J)."""
+        if self.travel > 0.0:
+            columns = zip(side.position.T, side.direction.T, strict=True)
+            return np.stack([presliding(side.time, q, d, self.travel) for q, d in columns], axis=1)
         if not np.any(self.rise):
             return side.direction
         width = np.maximum(np.sqrt(2.0) * np.asarray(self.rise), 1e-300)

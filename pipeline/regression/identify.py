@@ -9,13 +9,16 @@ anew; sizes with intervals from leaving out blocks; shares from drawing blocks a
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pinocchio as pin
 
+from pipeline.regression.laws.extras import Kind
+from pipeline.regression.laws.friction import BESIDE
 from pipeline.regression.options import Options
 from pipeline.regression.preprocess import Rows
 from pipeline.regression.reporting import Reporting
-from pipeline.regression.result import Result, Term
+from pipeline.regression.result import Level, Result, Term
 from pipeline.regression.statistics.noise import Span
 
 __all__ = ["Options", "identify"]
@@ -57,8 +60,31 @@ class _Identification(Reporting):
         self._strengths()
         self._rise()
         self._rich(colours=True)
-        self._laws()
-        return self._finish()
+        self._search(self.options.extras)
+        out: list[Term] = []
+        while True:
+            self._strengths()
+            self._laws()
+            result = self._finish()
+            fallen = [e.extra for e in result.extras if e.level is Level.SUSPECTED]
+            unsure = self._unsure(result)
+            if not fallen and not unsure:
+                return replace(result, terms=(*result.terms, *out))
+            out += [replace(t, level=Level.SUSPECTED) for t in unsure]
+            self.barred |= {(str(self.names.index(t.place)), t.term) for t in unsure}
+            if fallen:
+                self._without(fallen)
+
+    def _unsure(self, result: Result) -> list[Term]:
+        """Offsets and rotor inertias that do not stand: beside bodies they name no friction."""
+        sprung = {self.names[e.joint] for e in self.extras if e.kind is Kind.SPRING}
+        return [
+            t
+            for t in result.terms
+            if t.level is Level.APPROXIMATE
+            and t.term in BESIDE
+            and not (t.term == "offset" and t.place in sprung)
+        ]
 
     def _finish(self) -> Result:
         suspected: list[Term] = []

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipeline.regression.laws.extras import Kind
+
 
 @dataclass(frozen=True)
 class Options:
@@ -20,6 +22,7 @@ class Options:
         bends: Of the general member: how far it may depart from Coulomb, viscous and
             load-dependent friction, as a share of the joint's torque; validation chooses.
         seed: Of the draws.
+        extras: Looked for beside bodies, friction and couplings.
     """
 
     error_rate: float = 0.05
@@ -30,3 +33,4 @@ class Options:
     closes: float = 0.01
     bends: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
     seed: int = 0
+    extras: frozenset[Kind] = frozenset()

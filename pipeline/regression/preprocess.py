@@ -8,13 +8,15 @@ which that share stays below `SHRINK` at every joint that moves.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+import scipy.interpolate
 import scipy.signal
 from numpy.typing import NDArray
 
+from actuators.presliding import presliding
 from pipeline.regression.errors import RegressionError
 
 Array = NDArray[np.float64]
@@ -23,6 +25,9 @@ Array = NDArray[np.float64]
 SHRINK: Final = 0.01
 #: Rows kept per second and hertz of the cut-off: what lies above half of it is filtered away.
 ROWS_PER_HERTZ: Final = 2.5
+#: Rows so many periods of the cut-off from either end of a run are left out: a filter invents
+#: what it does not see there, and an acceleration twice so.
+EDGE: Final = 1.0
 #: Samples of a spectrum, so many averages at least.
 AVERAGES: Final = 8
 
@@ -46,6 +51,8 @@ class Rows:
         fine_start: Index of the first fine row of every run.
         fine_rate: Fine rows per second [Hz].
         every: Fine rows per row.
+        fine_tau: Torque before thinning, (M, J) [N*m].
+        edge: Fine rows at either end of every run that are no rows.
     """
 
     time: Array
@@ -61,18 +68,69 @@ class Rows:
     fine_start: tuple[int, ...]
     fine_rate: float
     every: int
+    fine_tau: Array
+    edge: int
+
+    def corrected(self, zero: Array, gain: Array, late: Array) -> Rows:
+        """Rows without what sensors get wrong.
+
+        Args:
+            zero: By which positions read too much, (J,) [rad].
+            gain: How many times what they should torques read, (J,).
+            late: By which torques come after positions, (J,) [s].
+        """
+        q, v, a = self.fine
+        return replace(
+            self,
+            q=self.q - zero,
+            tau=(self.tau + self.thin(self._earlier(late) - self.fine_tau)) / gain,
+            fine=(q - zero, v, a),
+        )
+
+    def slid(self, joint: int | Array, travel: float, begun: float = 1.0) -> Array:
+        """Sense of friction that rises over a travel after every reversal, fine, (M,).
+
+        Args:
+            joint: Its column, or the angles of a shaft of its own, (M,) [rad].
+            travel: [rad].
+            begun: 1 where a run begins as it goes on, -1 where the other way.
+        """
+        q = joint if isinstance(joint, np.ndarray) else self.fine[0][:, joint]
+        ends = [*self.fine_start[1:], len(q)]
+        parts = []
+        for a, b in zip(self.fine_start, ends, strict=True):
+            t = np.arange(b - a) / self.fine_rate
+            first = np.sign(np.diff(q[a:b], prepend=q[a] - (q[min(a + 1, b - 1)] - q[a])))
+            first[0] *= begun
+            parts.append(presliding(t, q[a:b], first, travel))
+        return np.concatenate(parts)
+
+    def _earlier(self, late: Array) -> Array:
+        """Fine torque brought forward by a time per joint [s]; the last rows keep their value."""
+        out = self.fine_tau.copy()
+        ends = [*self.fine_start[1:], len(out)]
+        for a, b in zip(self.fine_start, ends, strict=True):
+            t = np.arange(b - a) / self.fine_rate
+            for j in np.flatnonzero(late):
+                spline = scipy.interpolate.CubicSpline(t, out[a:b, j])
+                out[a:b, j] = spline(np.clip(t + late[j], t[0], t[-1]))
+        return out
 
     def thin(self, x: Array) -> Array:
         """Rows of fine values, (M, ...) to (N, ...), without a filter."""
         ends = [*self.fine_start[1:], len(x)]
-        parts = [x[a:b][:: self.every] for a, b in zip(self.fine_start, ends, strict=True)]
+        parts = [self._inner(x[a:b]) for a, b in zip(self.fine_start, ends, strict=True)]
         return np.concatenate(parts)
+
+    def _inner(self, x: Array) -> Array:
+        """Rows of one run's fine values."""
+        return inner(x, self.edge, self.every)
 
     def filtered(self, x: Array) -> Array:
         """Rows of fine values through the low-pass that the torque went through."""
         ends = [*self.fine_start[1:], len(x)]
         parts = [
-            low_pass(x[a:b], self.fine_rate, self.cutoff)[:: self.every]
+            self._inner(low_pass(x[a:b], self.fine_rate, self.cutoff))
             for a, b in zip(self.fine_start, ends, strict=True)
         ]
         return np.concatenate(parts)
@@ -129,8 +187,9 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
     cutoff = min(cutoff, 0.49 * full)
     rate = min(rate or ROWS_PER_HERTZ * cutoff, full)
     every = max(1, round(full / rate))
+    edge = round(EDGE * full / cutoff)
     parts: list[tuple[Array, ...]] = []
-    whole: list[tuple[Array, Array, Array]] = []
+    whole: list[tuple[Array, Array, Array, Array]] = []
     start, n, fine_start, m = [], 0, [], 0
     for q, tau, v, t in grids:
         qs = low_pass(q, full, cutoff)
@@ -138,8 +197,9 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
             low_pass(v, full, cutoff) if v is not None and logged else np.gradient(qs, step, axis=0)
         )
         a = np.gradient(vs, step, axis=0)
-        part = tuple(x[::every] for x in (t, qs, vs, a, low_pass(tau, full, cutoff)))
-        whole.append((qs, vs, a))
+        taus = low_pass(tau, full, cutoff)
+        part = tuple(inner(x, edge, every) for x in (t, qs, vs, a, taus))
+        whole.append((qs, vs, a, taus))
         fine_start.append(m)
         m += len(t)
         start.append(n)
@@ -165,7 +225,15 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
         tuple(fine_start),
         full,
         every,
+        fine[3],
+        edge,
     )
+
+
+def inner(x: Array, edge: int, every: int) -> Array:
+    """One value in so many, edges left out; a quarter of a short series at most."""
+    edge = min(edge, len(x) // 4)
+    return x[edge : len(x) - edge : every]
 
 
 def _uniform(run: Run, step: float) -> tuple[Array, Array, Array | None, Array]:

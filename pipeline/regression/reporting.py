@@ -17,13 +17,13 @@ from pipeline.regression.laws.friction import (
     name_of,
     unit,
 )
-from pipeline.regression.result import BaseParameter, Friction, Level, Result, Term
+from pipeline.regression.result import BaseParameter, Beside, Friction, Level, Result, Term
 from pipeline.regression.statistics.gram import Key
 from pipeline.regression.statistics.jackknife import standard_error
 from pipeline.regression.statistics.selection import (
     UNNAMED,
 )
-from pipeline.regression.statistics.solve import Fit
+from pipeline.regression.statistics.solve import Fit, compare
 from pipeline.regression.statistics.standing import Standing
 
 Array = NDArray[np.float64]
@@ -57,6 +57,7 @@ class Reporting(Standing):
             (*terms, *suspected),
             tuple(frictions),
             tuple(self.couplings),
+            self._besides(fit, keys, x, replicas),
             {key: float(x[fit.system.where[key]]) for key in keys},
             {key: float(t * error[fit.system.where[key]]) for key in keys},
             x[:nb],
@@ -66,6 +67,8 @@ class Reporting(Standing):
             self.rows.cutoff,
             len(self.blocks),
             self.rows.sigma_v,
+            self.rows.rate,
+            1.0 + self.gain,
         )
 
     def _terms(
@@ -111,6 +114,33 @@ class Reporting(Standing):
                 )
             )
         return terms
+
+    def _besides(
+        self, fit: Fit, keys: Sequence[Key], x: Array, replicas: Array
+    ) -> tuple[Beside, ...]:
+        """Every extra with its level: what chance or a rival may be is suspected."""
+        o, error = self.options, standard_error(replicas)
+        blocks = len(self.blocks)
+        have = fit.losses(self.folds, self.weight, fit.columns(keys))
+        out = []
+        for e in self.extras:
+            at = fit.system.index(self._of(e))
+            rest = [k for k in keys if k not in self._of(e)]
+            without = fit.losses(self.folds, self.weight, fit.columns(rest))
+            mean, doubt = compare(without, have, self.weight)
+            joints = [j for n in e.names for j in self.actions[n]]
+            closes = mean * blocks / self._noise_power(fit, joints)
+            spread = np.cov(replicas[:, at].T) * (blocks - 1) ** 2 / blocks
+            size = float(x[at] @ np.linalg.pinv(np.atleast_2d(spread)) @ x[at]) / len(at)
+            chance = float(scipy.stats.f.sf(size, len(at), max(blocks - len(at), 1)))
+            won, level = self.won[e], Level.SUSPECTED
+            if mean > doubt and closes > o.closes and chance < 1.0 - o.coverage:
+                level = Level.APPROXIMATE
+                if won.share >= o.sure and chance < o.error_rate / max(len(keys), 1):
+                    level = Level.CONFIRMED
+            half = self._quantile(o.coverage) * error[at]
+            out.append(Beside(e, x[at], half, won.share, won.rivals, closes, level))
+        return tuple(out)
 
     def _friction(
         self,

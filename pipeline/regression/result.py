@@ -10,7 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.presliding import presliding
 from pipeline.regression.laws.coupling import Coupling
+from pipeline.regression.laws.extras import Extra, Kind
 from pipeline.regression.laws.friction import SMOOTH, Shape
 from pipeline.regression.preprocess import low_pass
 from pipeline.regression.statistics.noise import Colour
@@ -52,6 +54,29 @@ class Term:
     high: float
     unit: str
     share: float
+    closes: float
+    level: Level
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Something beside bodies, friction and couplings.
+
+    Attributes:
+        extra: What, and where.
+        values: Of its columns, (K,).
+        halves: Half of their 95 % intervals, (K,).
+        share: Of draws of the log's blocks in which it predicts better than all others tried.
+        rivals: Others that predict as well, within one standard error.
+        closes: Of what stays unexplained without it at its joints, on blocks that did not fit it.
+        level: Confirmed, approximate or suspected.
+    """
+
+    extra: Extra
+    values: Array
+    halves: Array
+    share: float
+    rivals: tuple[Extra, ...]
     closes: float
     level: Level
 
@@ -124,6 +149,7 @@ class Result:
         terms: Every size, those of the general member left out.
         friction: Of every joint.
         couplings: Found.
+        extras: Found beside them, those without a name among them.
         sizes: Of every column in the model: (place, term) to value.
         halves: Half of the 95 % interval of the same.
         bodies: Parameters of the bodies, (10 B,).
@@ -133,6 +159,9 @@ class Result:
         cutoff: Up to which the model was fitted [Hz].
         blocks: Number of blocks.
         sigma_v: Noise of the velocities [rad/s].
+        rate: Of the rows that were fitted [Hz].
+        gain: How many times what they should the torques read, (J,): noise is that of torques as
+            they should be.
     """
 
     model: pin.Model
@@ -144,6 +173,7 @@ class Result:
     terms: tuple[Term, ...]
     friction: tuple[Friction, ...]
     couplings: tuple[Coupling, ...]
+    extras: tuple[Beside, ...]
     sizes: Mapping[tuple[str, str], float]
     halves: Mapping[tuple[str, str], float]
     bodies: Array
@@ -153,6 +183,8 @@ class Result:
     cutoff: float
     blocks: int
     sigma_v: Array
+    rate: float
+    gain: Array
 
     def predict(
         self,
@@ -162,7 +194,7 @@ class Result:
         rate: float | None = None,
         cutoff: float | None = None,
     ) -> Array:
-        """Torque of the model, (N, J) [N*m].
+        """Torque of the model, (N, J) [N*m], what sensors get wrong not in it.
 
         Args:
             q: (N, J) [rad].
@@ -184,14 +216,30 @@ class Result:
             [pin.rnea(self.model, data, *row) for row in zip(q, v, a, strict=True)]
         ).reshape(q.shape)
         out = load.copy()
+        for e in self.extras:
+            angle = q[:, e.extra.joint]
+            if e.extra.kind is Kind.SPRING:
+                out[:, e.extra.joint] += e.values[0] * angle
+            elif e.extra.kind is Kind.RIPPLE:
+                turn = e.extra.order * angle
+                wave = e.values[0] * np.sin(turn) + e.values[1] * np.cos(turn)
+                out[:, e.extra.joint] += filtered(e.extra.kind, wave)
+
+        def slid(x: Array, travel: float) -> Array:
+            return presliding(np.arange(len(x), dtype=float), x, np.sign(np.gradient(x)), travel)
+
         for j, friction in enumerate(self.friction):
-            columns, _ = friction.shape.columns(v[:, j], a[:, j], load[:, j])
+            travel = friction.shape.travel
+            sense = {travel: slid(q[:, j], travel)} if travel else {}
+            columns, _ = friction.shape.columns(v[:, j], a[:, j], load[:, j], sense)
             for name, column in columns.items():
                 size = self.sizes.get((str(j), name))
                 if size is not None:
                     out[:, j] += size * filtered(name, column)
         for c in self.couplings:
-            for name, actions in c.columns(v, a, self.sigma_v).items():
+            angle = q[:, c.motor] + c.ratio * q[:, c.other]
+            way = slid(angle, c.travel) if c.travel else None
+            for name, actions in c.columns(v, a, self.sigma_v, way).items():
                 size = self.sizes.get(("shared", name))
                 if size is not None:
                     for i, action in actions.items():

@@ -8,32 +8,40 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.regression.laws.coupling import Coupling, every_pair
+from pipeline.regression.laws.design import folds_of
 from pipeline.regression.laws.friction import (
     BESIDE,
     TRANSITIONS,
+    TRAVELS,
     Shape,
     general_terms,
 )
 from pipeline.regression.state import State
 from pipeline.regression.statistics.gram import Columns, Key, System
 from pipeline.regression.statistics.noise import Colour, colour
-from pipeline.regression.statistics.selection import find_coupling, general
-from pipeline.regression.statistics.solve import Eliminated
+from pipeline.regression.statistics.selection import find_coupling
+from pipeline.regression.statistics.solve import Eliminated, compare
 
 
 class Stages(State):
     """Stages that need no law."""
 
-    def _rich(self, colours: bool) -> None:
-        """Fit everything; its residual is the noise, its bodies give the load."""
+    def _rich(self, colours: bool | None = None) -> None:
+        """Fit everything; its residual is the noise, its bodies give the load.
+
+        Args:
+            colours: Whether the noise has a colour; by default it stays as it was.
+        """
         columns = self._columns(self.couplings)
         fit = self._fit(self._system(columns), columns, self.sigma)
-        keys = self._keys([general(j) for j in range(self.model.nv)])
+        keys = self._keys(self._general())
         at = fit.columns(keys)
         x = fit.known.copy()
         x[at] = fit.solve(self.weight, at)
         self.load = self.design.load(x[: fit.n_bodies])
         residual = self._residual(columns, keys, x[fit.system.index(keys)])
+        self.sizes, self.fitted = dict(zip(fit.system.keys, x, strict=True)), x[: fit.n_bodies]
+        self.left, self.told = residual, self._torque(residual)
         size = np.empty(self.model.nv)
         for j in range(self.model.nv):
             parts = [
@@ -42,8 +50,9 @@ class Stages(State):
             size[j] = float(np.sqrt((np.sum(parts, axis=0) ** 2).mean()))
         self.friction = size
         if colours:
-            self.noise = [colour(residual[:, j], self.blocks) for j in range(self.model.nv)]
-        else:
+            seen = [residual[:, j] * self._sure(columns, j) for j in range(self.model.nv)]
+            self.noise = [colour(x, self.blocks) for x in seen]
+        elif colours is not None:
             self.noise = [Colour(np.zeros(0), s, s, 1.0) for s in residual.std(axis=0) + 1e-12]
 
     def _couple(self) -> None:
@@ -51,13 +60,14 @@ class Stages(State):
         while pairs:
             rest = [c for c in pairs if c not in self.couplings]
             columns = self.design.columns(self.load, self.couplings, rest)
+            columns = replace(columns, shared={**columns.shared, **self.actions})
             fit = self._fit(self._system(columns), columns, self.sigma)
             found = find_coupling(
                 fit,
                 self.folds,
                 self.weight,
-                [general(j) for j in range(self.model.nv)],
-                self.couplings,
+                self._general(),
+                self._shared,
                 rest,
                 self.options.error_rate,
             )
@@ -70,7 +80,7 @@ class Stages(State):
         """How far the general member bends and the URDF may be off, by validation blocks."""
         columns = self._columns(self.couplings)
         s = self._system(columns)
-        keys = self._keys([general(j) for j in range(self.model.nv)])
+        keys = self._keys(self._general())
         total = []
         for bend in self.options.bends:
             self.bend = bend
@@ -80,52 +90,70 @@ class Stages(State):
         self._strength(s, columns, keys)
 
     def _strength(self, s: System, columns: Columns, keys: Sequence[Key]) -> None:
-        """Uncertainty of the URDF that predicts best beside some columns."""
-        losses = []
+        """Least uncertainty of the URDF that predicts as well as the best beside some columns.
+
+        Judged by parts of the motion that are left out as a whole: what one motion does not tell of
+        bodies another needs.
+        """
+        losses, parts = [], folds_of(len(self.blocks))
         for sigma in self.options.uncertainties:
             fit = self._fit(s, columns, sigma)
-            losses.append(float(fit.losses(self.folds, self.weight, fit.columns(keys)).sum()))
-        self.sigma = self.options.uncertainties[int(np.argmin(losses))]
+            losses.append(fit.losses(parts, self.weight, fit.columns(keys)))
+        best = min(losses, key=lambda x: float(x.sum()))
+        for sigma, loss in zip(self.options.uncertainties, losses, strict=True):
+            more, error = compare(loss, best, self.weight)
+            if more <= error:
+                self.sigma = sigma
+                return
 
     def _rise(self) -> None:
-        """Speed over which friction rises after a reversal: what predicts best.
+        """Speed or travel over which friction rises after a reversal: what predicts best.
 
         That of coupled motors first, beside friction of any shape at the joints; the joint of such
         a motor has the same, since the two could take each other's part.
         """
         for number, c in enumerate(self.couplings):
             speed = Shape.of(c.speed(self.rows.v), 0.0).speed
-            tried = [replace(c, rise=share * speed) for share in TRANSITIONS]
+            tried = [replace(c, rise=share * speed, travel=0.0) for share in TRANSITIONS]
+            tried += [replace(c, rise=0.0, travel=travel) for travel in TRAVELS]
             others = [o for k, o in enumerate(self.couplings) if k != number]
             losses = [self._loss_with([*others, one]) for one in tried]
             self.couplings[number] = tried[int(np.argmin(losses))]
         columns = self._columns(self.couplings)
         fit = self._fit(self._system(columns), columns, self.sigma)
-        rich = [general(j).keys(j) for j in range(self.model.nv)]
-        shared: list[Key] = [("shared", n) for c in self.couplings for n in c.names]
+        rich = [c.keys(j) for j, c in enumerate(self._general())]
+        shared = self._shared
         shapes = list(self.design.shapes)
-        coupled = {c.motor: c.rise for c in self.couplings}
+        coupled = {c.motor: c for c in self.couplings}
         for j in range(self.model.nv):
             if j in coupled:
-                shapes[j] = replace(shapes[j], rise=coupled[j])
+                c = coupled[j]
+                shapes[j] = replace(shapes[j], rise=c.rise, travel=c.travel)
                 continue
             common = [k for i, ks in enumerate(rich) if i != j for k in ks] + shared
             names = ["viscous", *BESIDE]
             for k in range(len(TRANSITIONS)):
                 names += [f"rising@{k}", f"rising_load@{k}"]
+            for k in range(len(TRAVELS)):
+                names += [f"sliding@{k}", f"sliding_load@{k}"]
             own = fit.system.index([(str(j), t) for t in names])
             e = Eliminated(fit, self.folds, self.weight, fit.columns(common), own)
             losses = [
                 float(e.losses([0, 1, 2, 3 + 2 * k, 4 + 2 * k]).sum())
-                for k in range(len(TRANSITIONS))
+                for k in range(len(TRANSITIONS) + len(TRAVELS))
             ]
-            share = TRANSITIONS[int(np.argmin(losses))]
-            shapes[j] = replace(shapes[j], rise=share * shapes[j].speed)
+            best = int(np.argmin(losses))
+            if best < len(TRANSITIONS):
+                rise = TRANSITIONS[best] * shapes[j].speed
+                shapes[j] = replace(shapes[j], rise=rise, travel=0.0)
+            else:
+                travel = TRAVELS[best - len(TRANSITIONS)]
+                shapes[j] = replace(shapes[j], rise=0.0, travel=travel)
         self.design = replace(self.design, shapes=tuple(shapes))
 
     def _loss_with(self, couplings: Sequence[Coupling]) -> float:
         """Predictive loss beside friction of any shape with some couplings."""
         columns = self._columns(couplings)
         fit = self._fit(self._system(columns), columns, self.sigma)
-        keys = self._keys([general(j) for j in range(self.model.nv)])
+        keys = self._keys(self._general())
         return float(fit.losses(self.folds, self.weight, fit.columns(keys)).sum())

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -12,14 +13,15 @@ from numpy.typing import NDArray
 from pipeline.regression.errors import RegressionError
 from pipeline.regression.laws.bodies import Bodies
 from pipeline.regression.laws.coupling import Coupling
-from pipeline.regression.laws.design import Design, even_blocks, folds_of
+from pipeline.regression.laws.design import Design, even_blocks, turns_of
+from pipeline.regression.laws.extras import SENSORS, Extra, Kind
 from pipeline.regression.laws.friction import (
     bends,
 )
 from pipeline.regression.options import Options
 from pipeline.regression.preprocess import Rows
 from pipeline.regression.statistics.gram import Columns, Key, System, system
-from pipeline.regression.statistics.noise import Colour, Span
+from pipeline.regression.statistics.noise import Colour, Span, weights
 from pipeline.regression.statistics.selection import (
     UNNAMED,
     Choice,
@@ -41,11 +43,20 @@ class State:
                 f"the model has {model.nv} joints, the rows {rows.v.shape[1]}; expected the same"
             )
         self.rows, self.model, self.options, self.given = rows, model, options, blocks
+        self.logged = rows
         self.bodies = Bodies.of(model)
         self.design = Design.of(model, rows)
         self.names = tuple(model.names[1:])
         self.couplings: list[Coupling] = []
         self.coupled: dict[str, float] = {}
+        self.extras: list[Extra] = []
+        self.barred: set[Key] = set()
+        self.actions: dict[str, dict[int, Array]] = {}
+        self.points: dict[Extra, float] = {}
+        self.zero, self.gain = np.zeros(model.nv), np.zeros(model.nv)
+        self.sizes: dict[Key, float] = {}
+        self.fitted = self.bodies.nominal
+        self.left = self.told = rows.tau
         self.noise = [Colour(np.zeros(0), s, s, 1.0) for s in rows.tau.std(axis=0) + 1e-12]
         self.load = self.design.load(self.bodies.nominal)
         self.friction: Array | None = None
@@ -53,7 +64,7 @@ class State:
         self.bend = 0.1
         self.refit_share = 0.0
         self.bends = frozenset(bends())
-        self.choices = [general(j) for j in range(model.nv)]
+        self.choices = [general() for _ in range(model.nv)]
         self._block(5.0)
 
     def _block(self, correlation: float) -> None:
@@ -66,11 +77,28 @@ class State:
                 f"{len(self.rows.time)} rows at {self.rows.rate:g} Hz are {len(self.blocks)} "
                 "blocks that are longer than the noise is correlated; expected 4 or more"
             )
-        self.folds = folds_of(len(self.blocks))
+        self.folds = turns_of(len(self.blocks))
         self.weight = np.ones(len(self.blocks))
 
     def _columns(self, couplings: Sequence[Coupling]) -> Columns:
-        return self.design.columns(self.load, couplings)
+        columns = self.design.columns(self.load, couplings)
+        return replace(columns, shared={**columns.shared, **self.actions})
+
+    def _general(self, but: Collection[int] = ()) -> list[Choice]:
+        """Friction of any shape at every joint.
+
+        Args:
+            but: Joints whose friction is the same in all quadrants; those whose torque reads a
+                multiple are among them, since the two would look the same.
+        """
+        scaled = {e.joint for e in self.extras if e.kind is Kind.GAIN} | set(but)
+        return [general(j not in scaled) for j in range(self.model.nv)]
+
+    @property
+    def _shared(self) -> list[Key]:
+        """Columns of couplings and extras."""
+        names = [n for c in self.couplings for n in c.names]
+        return [("shared", n) for n in (*names, *(n for e in self.extras for n in e.names))]
 
     def _system(self, columns: Columns) -> System:
         return system(columns, self.rows.tau, self.blocks, self.noise, self.friction)
@@ -96,7 +124,7 @@ class State:
 
     def _keys(self, choices: Sequence[Choice] | None = None) -> list[Key]:
         keys = [k for j, c in enumerate(choices or self.choices) for k in c.keys(j)]
-        return keys + [("shared", n) for c in self.couplings for n in c.names]
+        return keys + self._shared
 
     def _residual(self, columns: Columns, keys: Sequence[Key], sizes: Array) -> Array:
         out = self.rows.tau.copy()
@@ -110,9 +138,28 @@ class State:
                 out[:, int(place)] -= size * columns.local[int(place)][term]
         return out - self.rows.thin(self.load)
 
+    def _sure(self, columns: Columns, joint: int) -> Array:
+        """Weight of rows by how sure a joint's dry friction is, (N,)."""
+        if self.friction is None:
+            return np.ones(len(self.rows.time))
+        level = self.noise[joint].level
+        return weights(columns.doubt[:, joint], float(self.friction[joint]), level)
+
+    def _torque(self, residual: Array) -> Array:
+        """Torque as predicted, without what sensors get wrong, (N, J)."""
+        out = self.rows.tau - residual
+        for e in self.extras:
+            if e.kind in SENSORS:
+                size = self.sizes[("shared", e.names[0])]
+                for j, x in self.actions[e.names[0]].items():
+                    out[:, j] -= size * x
+        return out
+
     def _curve(self, key: Key) -> bool:
-        """Whether a column is a part of a curve without a name, and none of its parts is judged."""
+        """Whether a column is no term that is judged by itself: a curve's, or an extra's."""
         place, term = key
+        if place == "shared":
+            return term in self.actions
         if not place.isdigit() or term not in UNNAMED.terms:
             return False
         return self.choices[int(place)].law is UNNAMED

@@ -32,6 +32,7 @@ class TransmissionCoupling(Effect):
         Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
         Parameter("coulomb", "N*m", 0.0, 1e3),
         Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
+        Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("ratio", 1e-3, signed=True),)
     signature = "velocity of the other joint"
@@ -106,11 +107,12 @@ def _refuse_circle(model: MachineModel, place: Place) -> None:
 
 def with_shaft(actuator: JointModel, values: Values) -> JointModel:
     """An actuator with inertia and friction at its shaft."""
-    name, rise = TransmissionCoupling.name, values.get("rise", 0.0)
+    name = TransmissionCoupling.name
+    rise, travel = values.get("rise", 0.0), values.get("travel", 0.0)
     coulomb, viscous = values["coulomb"], values["viscous"]
     actuator = actuator.with_element(
-        JointFriction(name=name, rise=rise, coulomb=coulomb, viscous=viscous)
-        if rise
+        JointFriction(name=name, rise=rise, travel=travel, coulomb=coulomb, viscous=viscous)
+        if rise or travel
         else Friction(name=name, coulomb=coulomb, viscous=viscous)
     )
     return actuator.with_element(Inertia(name=f"{name}_inertia", inertia=values["inertia"]))

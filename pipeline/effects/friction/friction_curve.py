@@ -24,6 +24,7 @@ class FrictionCurveEffect(Effect):
         *(Parameter(f"share_{k}", "1", 0.0, 0.99) for k in _NUMBERS),
         Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
         Parameter("rise", "rad/s", 0.0, 1e4),
+        Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
     coordinates: ClassVar = ()
     competes: ClassVar = False
@@ -43,6 +44,7 @@ class FrictionCurveEffect(Effect):
         element = FrictionCurve(
             name=self.name,
             rise=values["rise"],
+            travel=values.get("travel", 0.0),
             speeds=curve("speed"),
             levels=curve("level"),
             asymmetries=curve("asymmetry"),

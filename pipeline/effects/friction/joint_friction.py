@@ -42,6 +42,7 @@ class JointFrictionLaw(Effect):
         Parameter("driving", "1", 0.0, 10.0, optional=True),
         Parameter("driven", "1", 0.0, 0.99, optional=True),
         Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
+        Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
     coordinates: ClassVar = ()
     competes: ClassVar = False

@@ -13,8 +13,15 @@ from pipeline.machine.machine import MachineModel
 SKEW_TOLERANCE = 3e-4
 
 
+#: Place of a delay that all joints share.
+ALL: Place = ("effort channels",)
+
+
 class TimeDelay(Effect):
-    """One delay between position and effort, of all joints alike."""
+    """One delay between position and effort, of all joints alike or of one joint.
+
+    Only one of all joints competes by itself; a joint's own comes of a machine fitted as a whole.
+    """
 
     name = "time_delay"
     place_kind = "effort channels"
@@ -27,15 +34,20 @@ class TimeDelay(Effect):
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """All effort channels."""
-        return [("effort channels",)]
+        return [ALL]
 
     def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
         """The skew of the channels."""
         return (("skew", ""),)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Delay them further."""
-        changed = tuple(replace(a, delay=a.delay + x["delay"]) for a in model.actuators)
+        """Delay them further, or one joint's alone."""
+        if place != ALL:
+            model.index(place[0])  # refuses a joint that is not there
+        changed = tuple(
+            replace(a, delay=a.delay + x["delay"]) if place in (ALL, (a.name,)) else a
+            for a in model.actuators
+        )
         return replace(model, actuators=changed)
 
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -14,66 +14,29 @@ from pipeline.effects.drive.rotor_inertia import RotorInertia
 from pipeline.effects.friction.joint_friction import JointFrictionLaw
 from pipeline.effects.registry import effect_named
 from pipeline.identification import results as limits
-from pipeline.identification.results import Estimate, Found, Member
+from pipeline.identification.results import Estimate, Member
+from pipeline.identification.whole.beside import besides, preloads
 from pipeline.identification.whole.errors import NotWholeError
+from pipeline.identification.whole.told import Told, estimate, exact
 from pipeline.machine.machine import MachineModel
 from pipeline.regression import Friction, Level, Result, Term
 
 Array = NDArray[np.float64]
-NAN: Final = float("nan")
 LAW: Final = (
     "no law of the catalogue predicts validation data as well as a smooth curve over speed and load"
 )
 
 
-@dataclass(frozen=True)
-class Told:
-    """One finding before it is held against the log.
-
-    Attributes:
-        effect: Name.
-        law: Which of its laws.
-        reason: Why it is not confirmed.
-        members: Where, with estimates.
-    """
-
-    effect: str
-    law: str
-    reason: str
-    members: tuple[Member, ...]
-
-    def found(self, order: int, unit: str) -> Found:
-        """As something found, its proof still open."""
-        levels = {m.level for m in self.members}
-        level = limits.CONFIRMED if levels == {limits.CONFIRMED} else limits.APPROXIMATE
-        one = self.members[0]
-        several = len(self.members) > 1
-        return Found(
-            order=order,
-            effect=self.effect,
-            place=tuple(p for m in self.members for p in m.place),
-            parameters=() if several else one.parameters,
-            rivals=(),
-            valid_before=NAN,
-            valid_after=NAN,
-            unit=unit,
-            noise_floor=NAN,
-            excitation=effect_named(self.effect).excitation,
-            level=level if levels != {limits.SUSPECTED} else limits.SUSPECTED,
-            reason=self.reason if level != limits.CONFIRMED else "",
-            share=min(m.share for m in self.members),
-            law=self.law,
-            members=self.members if several else (),
-        )
-
-
-def told(result: Result, model: MachineModel, carried: Mapping[str, Array]) -> list[Told]:
+def told(
+    result: Result, model: MachineModel, carried: Mapping[str, Array], channel: str
+) -> list[Told]:
     """Findings of a result in the order in which they are applied: bodies first.
 
     Args:
         result: Of the regression.
         model: Before it.
         carried: Inertial parameters (10,) that hang on a joint behind others that were held.
+        channel: That is compared.
 
     Raises:
         NotWholeError: A body as fitted is none without what hangs on it.
@@ -81,7 +44,8 @@ def told(result: Result, model: MachineModel, carried: Mapping[str, Array]) -> l
     out = bodies(result, model, carried)
     out += couplings(result)
     out += frictions(result)
-    return out + inertias(result, model) + offsets(result, model)
+    out += inertias(result, model) + offsets(result, model)
+    return out + besides(result, model, channel)
 
 
 def bodies(result: Result, model: MachineModel, carried: Mapping[str, Array]) -> list[Told]:
@@ -101,7 +65,7 @@ def bodies(result: Result, model: MachineModel, carried: Mapping[str, Array]) ->
                     f"'{links[str(joint)]}' as fitted is no body without what hangs still on it"
                 )
         parameters = tuple(
-            _estimate(n, float(x), float(h), unit, low=0.0 if n in ("mass", *_DIAGONAL) else -1e6)
+            estimate(n, float(x), float(h), unit, low=0.0 if n in ("mass", *_DIAGONAL) else -1e6)
             for n, x, h, unit in zip(NAMES, ten, half, UNITS, strict=True)
         )
         place = (links[str(joint)],)
@@ -124,7 +88,7 @@ def couplings(result: Result) -> list[Told]:
         parameters = (
             Estimate("ratio", c.ratio, c.ratio, c.ratio, "1"),
             *(_of_term(n, terms.get(n), u) for n, u in _SHAFT.items()),
-            _exact("rise", c.rise),
+            *after_reversal(c.rise, c.travel),
         )
         place = (names[c.motor], names[c.other])
         share = max(t.share for t in terms.values())
@@ -178,16 +142,16 @@ def named(friction: Friction, terms: Sequence[Term]) -> tuple[Estimate, ...]:
         t = by[term]
         low = -1e3 if name == "asymmetry" else 0.0
         value, half = factor * t.value, factor * max(t.high - t.value, t.value - t.low)
-        own = _estimate(name, value, half, units[name], low=low)
+        own = estimate(name, value, half, units[name], low=low)
         return replace(own, level=str(t.level), share=t.share)
 
     for term in friction.terms:
         kind, _, number = term.partition("@")
         k = int(number or 0)
         if kind == "stribeck":
-            out += [of(term, "excess"), _exact("stribeck_speed", shape.stribeck_speed(k))]
+            out += [of(term, "excess"), exact("stribeck_speed", shape.stribeck_speed(k))]
         elif kind == "saturating":
-            out += [of(term, "saturating"), _exact("saturation_speed", shape.saturation_speed(k))]
+            out += [of(term, "saturating"), exact("saturation_speed", shape.saturation_speed(k))]
         elif kind == "motor":
             mu = shape.motor_share(k)
             out += [of(term, "driving", 1 / (1 - mu)), of(term, "driven", 1 / (1 + mu))]
@@ -195,9 +159,14 @@ def named(friction: Friction, terms: Sequence[Term]) -> tuple[Estimate, ...]:
             out.append(of(term, "asymmetry"))
         else:
             out.append(of(term, kind))
-    if shape.rise:
-        out.append(_exact("rise", shape.rise))
+    out += after_reversal(shape.rise, shape.travel)
     return _passive(out)
+
+
+def after_reversal(rise: float, travel: float) -> list[Estimate]:
+    """Over which speed or travel dry friction rises, where it does not jump."""
+    out = [exact("rise", rise)] if rise else []
+    return [*out, *([exact("travel", travel, "rad")] if travel else [])]
 
 
 def _passive(parameters: Sequence[Estimate]) -> tuple[Estimate, ...]:
@@ -231,16 +200,17 @@ def curve(friction: Friction, result: Result) -> tuple[Estimate, ...]:
         most = level + viscous * speed
         skew = float(np.clip(terms.get(f"evenly@{k}", 0.0), -most, most))
         share = float(np.clip(terms.get("load", 0.0) + load[k], 0.0, 0.99))
-        speeds.append(_exact(f"speed_{number}", speed))
+        speeds.append(exact(f"speed_{number}", speed))
         spread = float(np.hypot(half.get("coulomb", 0.0), half.get(f"odd@{k}", 0.0)))
-        levels.append(_estimate(f"level_{number}", level, spread, "N*m"))
+        levels.append(estimate(f"level_{number}", level, spread, "N*m"))
         spread = half.get(f"evenly@{k}", 0.0)
-        skews.append(_estimate(f"asymmetry_{number}", skew, spread, "N*m"))
+        skews.append(estimate(f"asymmetry_{number}", skew, spread, "N*m"))
         spread = float(np.hypot(half.get("load", 0.0), half.get(f"loaded@{k}", 0.0)))
-        shares.append(_estimate(f"share_{number}", share, spread, "1", low=0.0, high=0.99))
+        shares.append(estimate(f"share_{number}", share, spread, "1", low=0.0, high=0.99))
     last = (
-        _estimate("viscous", viscous, half.get("viscous", 0.0), "N*m*s/rad", low=0.0),
-        _exact("rise", shape.rise),
+        estimate("viscous", viscous, half.get("viscous", 0.0), "N*m*s/rad", low=0.0),
+        exact("rise", shape.rise),
+        *([exact("travel", shape.travel, "rad")] if shape.travel else []),
     )
     return (*speeds, *levels, *skews, *shares, *last)
 
@@ -253,8 +223,8 @@ def inertias(result: Result, model: MachineModel) -> list[Told]:
             continue
         ratio = model.actuator(t.place).ratio
         half = max(t.high - t.value, t.value - t.low) / ratio**2
-        estimate = _estimate("added", t.value / ratio**2, half, "kg*m^2", low=0.0)
-        members.append(Member((t.place,), (estimate,), str(t.level), t.share))
+        added = estimate("added", t.value / ratio**2, half, "kg*m^2", low=0.0)
+        members.append(Member((t.place,), (added,), str(t.level), t.share))
     if not members:
         return []
     reason = "beside the bodies' inertia its size is not sure at every joint"
@@ -263,15 +233,13 @@ def inertias(result: Result, model: MachineModel) -> list[Told]:
 
 def offsets(result: Result, model: MachineModel) -> list[Told]:
     """A torque that is always there, as the zero of the sensor that shows it."""
-    members = []
+    members, sprung = [], preloads(result)
     for t in result.terms:
-        if t.term != "offset" or t.level is Level.SUSPECTED:
+        if t.term != "offset" or t.level is Level.SUSPECTED or t.place in sprung:
             continue
-        factor, unit = 1.0, "N*m"
-        estimate = _estimate(
-            "offset", factor * t.value, factor * max(t.high - t.value, t.value - t.low), unit
-        )
-        members.append(Member((t.place,), (estimate,), str(t.level), t.share))
+        half = max(t.high - t.value, t.value - t.low)
+        zero = estimate("offset", t.value, half, "N*m")
+        members.append(Member((t.place,), (zero,), str(t.level), t.share))
     if not members or any(a.motor is not None for a in model.actuators):
         return []
     return [Told("effort_offset", "", "its size scatters from block to block", tuple(members))]
@@ -287,18 +255,7 @@ def suspected(result: Result) -> list[str]:
     ]
 
 
-def _estimate(
-    name: str, value: float, half: float, unit: str, low: float = -1e6, high: float = 1e6
-) -> Estimate:
-    value = float(value)
-    return Estimate(name, value, max(value - half, low), min(value + half, high), unit)
-
-
-def _exact(name: str, value: float) -> Estimate:
-    return Estimate(name, float(value), float(value), float(value), "rad/s")
-
-
 def _of_term(name: str, term: Term | None, unit: str) -> Estimate:
     if term is None:
         return Estimate(name, 0.0, 0.0, 0.0, unit)
-    return _estimate(name, max(term.value, 0.0), term.high - term.value, unit, low=0.0)
+    return estimate(name, max(term.value, 0.0), term.high - term.value, unit, low=0.0)

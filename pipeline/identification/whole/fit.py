@@ -6,19 +6,22 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.identification.results import Found
+from pipeline.identification.whole.beside import kinds_of, names_of, unnamed
 from pipeline.identification.whole.errors import NotWholeError
 from pipeline.identification.whole.findings import suspected, told
 from pipeline.identification.whole.rigid import held, rigid_model, still_joints
 from pipeline.identification.whole.training import training_runs, without_known
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.machine.machine import MachineModel
-from pipeline.regression import Result, identify, prepare
+from pipeline.regression import Options, Result, identify, prepare
 from pipeline.regression.errors import RegressionError
 
+Array = NDArray[np.float64]
 #: Effects that the regression decides about: they are not offered again.
 FAMILIES = frozenset(
     {
@@ -40,6 +43,10 @@ OF_COLUMNS = frozenset({"effort_offset"})
 SCALES = frozenset({"effort_gain", "torque_constant_error"})
 
 
+#: What an encoder at the joint does not feel: it is read off two positions, or not at all.
+BEFORE_THE_JOINT = frozenset({"joint_elasticity", "backlash"})
+
+
 @dataclass(frozen=True, eq=False)
 class Whole:
     """What a regression of the whole machine found.
@@ -50,6 +57,8 @@ class Whole:
         result: Of the regression.
         decided: Names of effects that need not be offered again.
         notes: What else a reader should know.
+        floor: Noise of the joints' torques by what the richest model leaves, at the bandwidth of
+            the comparison, (J,) [N*m]; NaN of joints that were held.
     """
 
     found: tuple[Found, ...]
@@ -57,12 +66,23 @@ class Whole:
     result: Result
     decided: frozenset[str]
     notes: tuple[str, ...]
+    floor: Array
 
 
 def with_found(model: MachineModel, found: Found) -> MachineModel:
     """A machine with a finding, all its members."""
     effect = effect_named(found.effect)
     return reduce(lambda m, one: effect.apply(m, one.place, one.values), found.each, model)
+
+
+def noise_floor(result: Result, bandwidth: float) -> Array:
+    """Noise below a bandwidth [Hz], by the richest model's colour, (K,) [N*m].
+
+    Read above the cut-off and taken for white, noise with a memory is several times too small.
+    """
+    rate, gain = result.rate, result.gain
+    band = min(bandwidth, result.cutoff)
+    return np.array([c.below(band, rate) for c in result.noise]) * gain
 
 
 def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
@@ -79,18 +99,24 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
     rigid, carried = held(rigid_model(model), still_joints(model, [p.log for p in prepared]))
     order = np.array([model.index(str(n)) for n in list(rigid.names)[1:]], dtype=np.intp)
     runs = training_runs(prepared, where.parts, model, order)
+    channel = where.measurements[0].channels[0]
+    kinds = kinds_of(channel, at_motor=where.measurements[0].at_motor)
     try:
         rows = prepare(runs, rigid)
         rows = replace(rows, tau=without_known(rows, model, rigid))
-        result = identify(rows, rigid)
+        result = identify(rows, rigid, options=Options(extras=kinds))
     except (RegressionError, np.linalg.LinAlgError) as error:
         raise NotWholeError(str(error)) from None
-    unit = CHANNEL_UNITS[where.measurements[0].channels[0]]
-    found = tuple(t.found(k, unit) for k, t in enumerate(told(result, model, carried), start=1))
+    unit = CHANNEL_UNITS[channel]
+    findings = told(result, model, carried, channel)
+    found = tuple(t.found(k, unit) for k, t in enumerate(findings, start=1))
     kept = [f for f in found if f.kept]
-    decided = FAMILIES
-    if where.measurements[0].channels[0] == "torque":
+    decided = FAMILIES | names_of(kinds) | BEFORE_THE_JOINT
+    if channel == "torque":
         decided |= OF_COLUMNS
     if result.refit:
         decided |= OF_BODIES | SCALES
-    return Whole(found, reduce(with_found, kept, model), result, decided, tuple(suspected(result)))
+    floor = np.full(len(model.joints), np.nan)
+    floor[order] = noise_floor(result, where.measurements[0].bandwidth)
+    notes = (*unnamed(result), *suspected(result))
+    return Whole(found, reduce(with_found, kept, model), result, decided, notes, floor)

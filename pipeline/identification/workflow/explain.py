@@ -1,11 +1,10 @@
 """Which explanation: a few effects in an otherwise true model, or a machine fitted as a whole.
 
-The simplest one first. Where at most a few effects bring the gap down to noise, they are the
-answer; of a bare URDF, which does not say how well its bodies are known, only where these and
-friction do not explain the log with fewer claims. Where more would be needed, or more than noise is
-left, bodies, friction of every joint and couplings are fitted together, and the other effects of
-the catalogue are looked for in what that leaves. The whole machine is kept where it takes a large
-part of what the few effects leave.
+A robot file vouches for its bodies: where at most a few effects bring the gap down to noise, they
+are the answer. Where more would be needed, or more than noise is left, and of a bare URDF, which
+does not say how well its bodies are known, everything is fitted together: bodies, friction of every
+joint, couplings, springs, ripple and what sensors get wrong. The whole machine is kept where it
+takes a large part of what the few effects leave.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from pipeline.identification import results as limits
 from pipeline.identification.results import Found, Naming
 from pipeline.identification.selection.identify import Identified, estimated_alone, identify
 from pipeline.identification.whole.errors import NotWholeError
-from pipeline.identification.whole.fit import FAMILIES, OF_BODIES, Whole, fit_whole
+from pipeline.identification.whole.fit import Whole, fit_whole
 from pipeline.identification.workflow.locate import Progress, Whereabouts
 from pipeline.identification.workflow.setup import Setup
 
@@ -30,11 +29,13 @@ class Explanation:
     Attributes:
         naming: All findings in the order in which they are applied.
         named: What competed by itself.
+        where: Logs with the noise floor that the explanation found.
         whole: What was fitted together before; None where a few effects are enough.
     """
 
     naming: Naming
     named: Identified
+    where: Whereabouts
     whole: Whole | None = None
 
     def estimated(self, found: tuple[Found, ...]) -> tuple[Found, ...]:
@@ -53,48 +54,51 @@ def explain(given: Setup, where: Whereabouts, progress: Progress) -> Explanation
         GapError: Nothing can be compared.
     """
     if given.robot is not None and given.robot.floating:
-        return _alone(identify(given.model, where.measurements))
+        return _alone(identify(given.model, where.measurements), where)
     if given.file.edits:
-        return _alone(identify(given.model, where.measurements))
-    progress.step("letting a few effects compete")
-    few = identify(given.model, where.measurements, most=limits.FEW)
-    explained = few.enough and not (few.excess > limits.UNEXPLAINED).any()
-    if explained and (given.robot is not None or not _claims(few)):
-        return _alone(few)
+        return _alone(identify(given.model, where.measurements), where)
+    few = None
+    if given.robot is not None:
+        progress.step("letting a few effects compete")
+        few = identify(given.model, where.measurements, most=limits.FEW)
+        if few.enough and not (few.excess > limits.UNEXPLAINED).any():
+            return _alone(few, where)
     progress.step("fitting the whole machine")
     try:
         whole = fit_whole(given.model, where)
     except NotWholeError as error:
         progress.step("letting effects compete")
         note = f"the machine was not fitted as a whole: {error}"
-        return _alone(identify(given.model, where.measurements), note)
-    if not whole.found:
-        return _alone(few if few.enough else identify(given.model, where.measurements))
+        return _alone(identify(given.model, where.measurements), where, note)
+    where = _with_floor(where, whole)
     progress.step("letting effects compete")
     rest = identify(whole.model, where.measurements, without=whole.decided)
-    if explained:
-        # A URDF alone vouches for no mass: what its bodies and friction explain as well, with fewer
-        # claims about sensors and springs, is theirs.
-        if (rest.excess > limits.UNEXPLAINED).any() or _claims(rest) >= _claims(few):
-            return _alone(few)
-    elif few.enough and not _takes_a_large_part(few, rest):
-        return _alone(few)
+    if few is not None and few.enough and not _takes_a_large_part(few, rest):
+        return _alone(few, where)
     found = [
         replace(f, order=number)
         for number, f in enumerate((*whole.found, *rest.naming.found), start=1)
     ]
     notes = (*rest.naming.notes, *whole.notes)
     naming = replace(rest.naming, found=tuple(found), notes=notes, base=whole.result.base)
-    return Explanation(naming, rest, whole)
+    return Explanation(naming, rest, where, whole)
 
 
-def _alone(named: Identified, *notes: str) -> Explanation:
-    return Explanation(replace(named.naming, notes=(*named.naming.notes, *notes)), named)
+def _alone(named: Identified, where: Whereabouts, *notes: str) -> Explanation:
+    return Explanation(replace(named.naming, notes=(*named.naming.notes, *notes)), named, where)
 
 
-def _claims(named: Identified) -> int:
-    """Findings that are neither friction nor bodies, which no URDF states as they are."""
-    return sum(f.kept and f.effect not in FAMILIES | OF_BODIES for f in named.naming.found)
+def _with_floor(where: Whereabouts, whole: Whole) -> Whereabouts:
+    """Logs whose floor is at least the noise that the richest model leaves."""
+    if where.measurements[0].channels[0] != "torque":
+        return where
+    least = np.nan_to_num(whole.floor)
+    measurements = []
+    for m in where.measurements:
+        noise = m.noise.copy()
+        noise[:, 0] = np.maximum(noise[:, 0], least)
+        measurements.append(replace(m, noise=noise))
+    return replace(where, measurements=tuple(measurements))
 
 
 def _takes_a_large_part(few: Identified, whole: Identified) -> bool:

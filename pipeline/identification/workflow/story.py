@@ -152,6 +152,7 @@ def tell(given: Setup, where: Whereabouts, options: Options, progress: Progress)
         GapError: Nothing can be compared.
     """
     explanation = explain(given, where, progress)
+    where = explanation.where
     progress.step("weighing what was found")
 
     def written(found: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:

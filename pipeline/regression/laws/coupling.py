@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.regression.laws.friction import sense
+from pipeline.regression.preprocess import Rows
 
 Array = NDArray[np.float64]
 
@@ -35,12 +36,14 @@ class Coupling:
         other: Joint it turns with.
         ratio: Speed of the motor per speed of the other joint, both at the joint's side.
         rise: Speed of the motor over which its dry friction rises after a reversal [rad/s].
+        travel: Travel of the motor over which it does, in place of a speed [rad].
     """
 
     motor: int
     other: int
     ratio: float
     rise: float = 0.0
+    travel: float = 0.0
 
     def name(self, term: str) -> str:
         """Name of one of its columns."""
@@ -55,13 +58,21 @@ class Coupling:
         """Of the motor at the joint's side, (N,) [rad/s]."""
         return np.asarray(v[:, self.motor] + self.ratio * v[:, self.other])
 
-    def columns(self, v: Array, a: Array, sigma_v: Array) -> dict[str, dict[int, Array]]:
-        """Torque per size of every term on both joints, (N,) each."""
+    def slid(self, rows: Rows) -> Array | None:
+        """Sense of its dry friction where that rises over a travel, fine, (M,)."""
+        q = rows.fine[0]
+        angle = q[:, self.motor] + self.ratio * q[:, self.other]
+        return rows.slid(angle, self.travel) if self.travel else None
+
+    def columns(
+        self, v: Array, a: Array, sigma_v: Array, slid: Array | None = None
+    ) -> dict[str, dict[int, Array]]:
+        """Torque per size of every term on both joints, (N,) each; see `slid`."""
         speed = self.speed(v)
         change = a[:, self.motor] + self.ratio * a[:, self.other]
         noise = float(np.hypot(sigma_v[self.motor], self.ratio * sigma_v[self.other]))
         values = {
-            "coulomb": sense(speed, noise, self.rise).sign,
+            "coulomb": sense(speed, noise, self.rise).sign if slid is None else slid,
             "viscous": speed,
             "inertia": change,
         }
@@ -69,9 +80,11 @@ class Coupling:
             self.name(t): {self.motor: x, self.other: self.ratio * x} for t, x in values.items()
         }
 
-    def halves(self, v: Array, a: Array, sigma_v: Array) -> dict[str, dict[int, Array]]:
+    def halves(
+        self, v: Array, a: Array, sigma_v: Array, slid: Array | None = None
+    ) -> dict[str, dict[int, Array]]:
         """The same columns with the action on either joint apart: what no coupling would be."""
-        whole = self.columns(v, a, sigma_v)
+        whole = self.columns(v, a, sigma_v, slid)
         out = {}
         for name, parts in whole.items():
             out[f"{name}|motor"] = {self.motor: parts[self.motor]}

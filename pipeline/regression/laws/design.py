@@ -12,12 +12,50 @@ from numpy.typing import NDArray
 
 from pipeline.regression.laws.bodies import regressor
 from pipeline.regression.laws.coupling import Coupling
-from pipeline.regression.laws.friction import SMOOTH, Shape
+from pipeline.regression.laws.friction import SMOOTH, TRAVELS, Shape
 from pipeline.regression.preprocess import Rows
 from pipeline.regression.statistics.gram import Columns
 from pipeline.regression.statistics.noise import Span
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Ways:
+    """Senses that one joint's dry friction may have at the rows.
+
+    Attributes:
+        slid: By the travel over which it rises, (N,) each.
+        turned: The same less what it were, had it begun the other way, (N,) each.
+    """
+
+    slid: dict[float, Array]
+    turned: dict[float, Array]
+
+    @classmethod
+    def of(cls, rows: Rows, joint: int, slid: dict[float, Array]) -> Ways:
+        """Filter them as the torque was."""
+        both = np.column_stack(
+            [*slid.values(), *(rows.slid(joint, d, begun=-1.0) for d in slid)],
+        )
+        out, n = rows.filtered(both), len(slid)
+        travels = list(slid)
+        return cls(
+            {d: out[:, k] for k, d in enumerate(travels)},
+            {d: out[:, k] - out[:, n + k] for k, d in enumerate(travels)},
+        )
+
+    def doubt(self, sense: Array, shape: Shape) -> Array:
+        """Variance of a sense (N,) from not knowing the travel, nor how a run begins, (N,).
+
+        A travel is known to the next one tried; where friction jumps, any of the small ones may be.
+        """
+        travels = list(self.slid)
+        at = travels.index(shape.travel) if shape.travel else 0
+        near = travels[max(at - 1, 0) : at + 2] if shape.travel else travels[:3]
+        off = [self.slid[d] - sense for d in near]
+        off.append(self.turned[travels[max(at, 1)]])
+        return np.asarray(np.max(np.square(off), axis=0))
 
 
 @dataclass(frozen=True)
@@ -29,12 +67,16 @@ class Design:
         bodies: Torque per body parameter of the rows, (N, J, P).
         fine: The same before rows are thinned, (M, J, P).
         shapes: Of every joint.
+        slid: Of every joint, travel to sense of friction that rises over it, (M,).
+        ways: The same at the rows, to tell how unsure it is there.
     """
 
     rows: Rows
     bodies: Array
     fine: Array
     shapes: tuple[Shape, ...]
+    slid: tuple[dict[float, Array], ...]
+    ways: tuple[Ways, ...]
 
     @classmethod
     def of(cls, model: pin.Model, rows: Rows) -> Design:
@@ -43,7 +85,10 @@ class Design:
             Shape.of(rows.v[:, j], float(rows.sigma_v[j])) for j in range(rows.v.shape[1])
         )
         fine = regressor(model, *rows.fine)
-        return cls(rows, rows.thin(fine), fine, shapes)
+        joints = range(rows.v.shape[1])
+        slid = tuple({d: rows.slid(j, d) for d in TRAVELS} for j in joints)
+        ways = tuple(Ways.of(rows, j, slid[j]) for j in joints)
+        return cls(rows, rows.thin(fine), fine, shapes, slid, ways)
 
     @property
     def joints(self) -> int:
@@ -63,15 +108,16 @@ class Design:
         _, v, a = r.fine
         local, doubt = [], []
         for j, shape in enumerate(self.shapes):
-            terms, unsure = shape.columns(v[:, j], a[:, j], load[:, j])
-            local.append(self._rows(terms))
-            doubt.append(r.thin(unsure))
+            terms, unsure = shape.columns(v[:, j], a[:, j], load[:, j], self.slid[j])
+            own = self._rows(terms)
+            local.append(own)
+            doubt.append(np.maximum(r.thin(unsure), self.ways[j].doubt(own["coulomb"], shape)))
         shared: dict[str, dict[int, Array]] = {}
         for c in couplings:
-            whole = c.columns(v, a, r.sigma_v)
+            whole = c.columns(v, a, r.sigma_v, c.slid(r))
             shared.update({n: self._actions(n, parts) for n, parts in whole.items()})
         for c in halves:
-            apart = c.halves(v, a, r.sigma_v)
+            apart = c.halves(v, a, r.sigma_v, c.slid(r))
             shared.update({n: self._actions(n, parts) for n, parts in apart.items()})
         return Columns(self.bodies, local, shared, np.column_stack(doubt))
 
@@ -109,6 +155,15 @@ def even_blocks(
         edges = np.linspace(a, b, k + 1).round().astype(int)
         out += [(int(x), int(y)) for x, y in pairwise(edges)]
     return out
+
+
+def turns_of(blocks: int, folds: int = 6) -> list[NDArray[np.intp]]:
+    """One block in so many: validation lies between what was learnt from.
+
+    Blocks are longer than noise is correlated, so that neighbours tell each other no noise; a part
+    of the motion that is left out as a whole would be judged by how well bodies extrapolate.
+    """
+    return [np.arange(k, blocks, folds) for k in range(min(folds, blocks))]
 
 
 def folds_of(blocks: int, folds: int = 6) -> list[NDArray[np.intp]]:

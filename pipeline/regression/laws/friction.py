@@ -7,7 +7,9 @@ jump or bend there are computed before rows are thinned and go through the filte
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -22,6 +24,8 @@ SATURATION_SPEEDS: Final = (0.3,)
 #: Speeds over which Coulomb friction may rise after a reversal (presliding), as such shares; a rise
 #: over more than that is saturation.
 TRANSITIONS: Final = (0.0, 0.003, 0.01, 0.03, 0.1)
+#: ... or the travel over which it does [rad].
+TRAVELS: Final = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 #: Shares of motor torque tried for the convention "per motor torque".
 MOTOR_SHARES: Final = (0.1, 0.25)
 #: Inner knots of the general member, as quantiles of the speed.
@@ -102,6 +106,9 @@ def _laws() -> tuple[Law, ...]:
         Law("Coulomb and quadratic", (c, "quadratic")),
         Law("quadratic", ("quadratic",)),
         Law("Coulomb, viscous and quadratic", (c, v, "quadratic")),
+        Law("load-dependent by quadrant", ("driving", "driven")),
+        Law("Coulomb and load-dependent by quadrant", (c, "driving", "driven")),
+        Law("viscous and load-dependent by quadrant", (v, "driving", "driven")),
         Law("Coulomb, viscous and load-dependent by quadrant", (c, v, "driving", "driven")),
         Law("Coulomb and viscous by direction", (c, v, "even")),
     ]
@@ -129,12 +136,14 @@ class Shape:
         knots: Of the general member, on the speed [rad/s].
         sigma_v: Noise of the velocity [rad/s].
         rise: Speed over which Coulomb friction rises after a reversal [rad/s].
+        travel: Travel over which it does, in place of a speed [rad].
     """
 
     speed: float
     knots: Array
     sigma_v: float
     rise: float = 0.0
+    travel: float = 0.0
 
     @classmethod
     def of(cls, v: Array, sigma_v: float) -> Shape:
@@ -160,16 +169,22 @@ class Shape:
         """Share of the motor's torque in the shape of a term "per motor torque"."""
         return MOTOR_SHARES[number]
 
-    def columns(self, v: Array, a: Array, load: Array) -> tuple[dict[str, Array], Array]:
+    def columns(
+        self, v: Array, a: Array, load: Array, slid: Mapping[float, Array] = MappingProxyType({})
+    ) -> tuple[dict[str, Array], Array]:
         """Columns of every term, (N,) each, and the doubt about the sign, (N,).
 
         Args:
             v: (N,) [rad/s].
             a: (N,) [rad/s^2].
             load: Torque of the rigid bodies, (N,) [N*m].
+            slid: Sense of dry friction where it rises over a travel, by travel, (N,) each; without
+                it such friction jumps.
         """
         felt = sense(v, self.sigma_v, self.rise)
         s, speed, heavy = felt.sign, np.abs(v), np.abs(load)
+        if self.travel:
+            s = slid.get(self.travel, s)
         power = np.sign(load) * s
         out = {
             "offset": np.ones_like(v),
@@ -182,10 +197,14 @@ class Shape:
             "driving": heavy * s * (0.5 + 0.5 * power),
             "driven": heavy * s * (0.5 - 0.5 * power),
         }
+        out[QUADRANT] = 0.5 * (out["driving"] - out["driven"])
         for k, share in enumerate(TRANSITIONS):
             rising = sense(v, self.sigma_v, share * self.speed).sign
             out[f"rising@{k}"] = rising
             out[f"rising_load@{k}"] = heavy * rising
+        for k, way in enumerate(slid.values()):
+            out[f"sliding@{k}"] = way
+            out[f"sliding_load@{k}"] = heavy * way
         for k, share in enumerate(STRIBECK_SPEEDS):
             out[f"stribeck@{k}"] = s * np.exp(-((v / (share * self.speed)) ** 2))
         for k, share in enumerate(SATURATION_SPEEDS):
@@ -217,6 +236,11 @@ def general_terms() -> tuple[str, ...]:
     return ("coulomb", "viscous", "load", *bends())
 
 
+#: By which friction per load is larger while the motor drives than while it is driven, its half:
+#: of the torque's own shape, as a wrong scale of the sensor is.
+QUADRANT: Final = "quadrant"
+
+
 def hats(x: Array, knots: Array) -> Array:
     """Linear B-splines on these knots, (N, knots); beyond the last the last segment goes on."""
     n = len(knots)
@@ -239,6 +263,7 @@ KINDS: Final = {
     "even": ("by direction", "N*m*s/rad"),
     "load": ("load-dependent", "1"),
     "driving": ("load-dependent", "1"),
+    "quadrant": ("load-dependent", "1"),
     "driven": ("load-dependent", "1"),
     "motor": ("load-dependent", "1"),
     "stribeck": ("Stribeck", "N*m"),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pipeline.regression.laws.bodies import Bodies
 from pipeline.regression.laws.design import Design
-from pipeline.regression.laws.friction import general_terms
+from pipeline.regression.laws.friction import TRAVELS, general_terms
 from pipeline.regression.preprocess import Rows, Run, rows, spectra
 
 Array = NDArray[np.float64]
@@ -57,7 +57,9 @@ def rich_residual(wide: Rows, model: pin.Model) -> Array:
     design, bodies = Design.of(model, wide), Bodies.of(model)
     columns = design.columns(design.load(bodies.nominal), ())
     joints = wide.tau.shape[1]
-    names = [*general_terms(), "rotor"]
+    # A reversal takes a travel: as a jump it would put power into a band where there is none.
+    sliding = [f"sliding{way}@{k}" for k in range(len(TRAVELS)) for way in ("", "_load")]
+    names = [*general_terms(), *sliding, "rotor"]
     nb = bodies.nominal.size
     level = wide.tau.std(axis=0) + 1e-12
     residual = wide.tau

@@ -9,13 +9,12 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from pipeline.regression.laws.design import folds_of
-from pipeline.regression.stages import Stages
+from pipeline.regression.searching import Searching
 from pipeline.regression.statistics.gram import Columns, System, system
 from pipeline.regression.statistics.noise import Colour
 from pipeline.regression.statistics.selection import (
     Choice,
     choose_laws,
-    general,
     upgrade,
 )
 from pipeline.regression.statistics.solve import Fit, compare
@@ -23,7 +22,7 @@ from pipeline.regression.statistics.solve import Fit, compare
 Array = NDArray[np.float64]
 
 
-class Choosing(Stages):
+class Choosing(Searching):
     """Laws and bodies."""
 
     def _laws(self) -> None:
@@ -46,11 +45,13 @@ class Choosing(Stages):
         if self.sigma != before:
             refit, loss = self._chosen(self._fit(normal, columns, self.sigma))
         wins = self._beyond_chance(kept_loss, loss)
-        for folds in (self.folds, folds_of(len(self.blocks), 2)):
-            wins = wins and self._beyond_chance(
-                self._plain_losses(normal, plain, columns, 0.0, kept, folds),
-                self._plain_losses(normal, plain, columns, self.sigma, refit, folds),
-            )
+        count = len(self.blocks)
+        for folds in (self.folds, folds_of(count), folds_of(count, 2)):
+            plainly = self._plain_losses(normal, plain, columns, 0.0, kept, folds)
+            fitted = self._plain_losses(normal, plain, columns, self.sigma, refit, folds)
+            # Parts of the motion left out as a whole are few: there it must not lose.
+            likely = self._beyond_chance(plainly, fitted) if folds is self.folds else True
+            wins = wins and likely and compare(plainly, fitted, self.weight)[0] > 0.0
         self.refit_share = self._share_of_draws(kept_loss - loss)
         if wins:
             self.choices = refit
@@ -90,8 +91,8 @@ class Choosing(Stages):
 
     def _chosen(self, fit: Fit) -> tuple[list[Choice], Array]:
         """Laws of all joints and the predictive loss of every block with them."""
-        rich = [general(j) for j in range(self.model.nv)]
-        found = choose_laws(fit, self.folds, self.weight, rich, self.couplings, passes=3)
-        found = upgrade(fit, self.folds, self.weight, found, self.couplings)
+        rich = self._general()
+        found = choose_laws(fit, self.folds, self.weight, rich, self._shared, 3, self.barred)
+        found = upgrade(fit, self.folds, self.weight, found, self._shared, self.barred)
         at = fit.columns(self._keys(found))
         return found, fit.losses(self.folds, self.weight, at)

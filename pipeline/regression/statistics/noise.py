@@ -46,6 +46,14 @@ class Colour:
         """Rows the whitening looks back."""
         return len(self.ar)
 
+    def below(self, frequency: float, rate: float) -> float:
+        """Standard deviation of the part below a frequency [Hz] of rows at a rate [Hz]."""
+        f = np.linspace(0.0, 0.5, 513)
+        turns = np.exp(-2j * np.pi * np.outer(f, np.arange(1, self.memory + 1)))
+        power = 1.0 / np.abs(1.0 - turns @ self.ar) ** 2
+        share = float(power[f <= frequency / rate].sum() / power.sum())
+        return self.level * float(np.sqrt(share))
+
     def whiten(self, x: Array) -> Array:
         """Filter a contiguous stretch, (N, ...) to (N - p, ...), and scale it to unit noise."""
         if len(x) <= self.memory:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import scipy.stats
 from numpy.typing import NDArray
 
 from pipeline.regression.laws.coupling import TERMS, Coupling
-from pipeline.regression.laws.friction import BESIDE, LAWS, SIGNED, Law, general_terms
+from pipeline.regression.laws.friction import BESIDE, LAWS, QUADRANT, SIGNED, Law, general_terms
 from pipeline.regression.statistics.gram import Key
 from pipeline.regression.statistics.solve import Eliminated, Fit, compare
 
@@ -51,12 +51,27 @@ class Choice:
         return [(str(joint), t) for t in self.terms]
 
 
-def general(joint: int) -> Choice:
-    """Everything at once: what other joints are allowed while one is looked at."""
-    return Choice(UNNAMED, BESIDE, 0.0)
+#: The general member, and friction by quadrant of power.
+ANYTHING = Law("anything", (*general_terms(), QUADRANT))
 
 
-def choose_law(fit: Fit, folds: Folds, weight: Array, joint: int, common: Sequence[Key]) -> Choice:
+def general(quadrant: bool = True) -> Choice:
+    """Everything at once: what other joints are allowed while one is looked at.
+
+    Args:
+        quadrant: Whether friction may differ by quadrant of power.
+    """
+    return Choice(ANYTHING if quadrant else UNNAMED, BESIDE, 0.0)
+
+
+def choose_law(
+    fit: Fit,
+    folds: Folds,
+    weight: Array,
+    joint: int,
+    common: Sequence[Key],
+    barred: Collection[Key] = (),
+) -> Choice:
     """Law of one joint beside everything else.
 
     Args:
@@ -65,6 +80,7 @@ def choose_law(fit: Fit, folds: Folds, weight: Array, joint: int, common: Sequen
         weight: How often every block was drawn, (B,).
         joint: Which.
         common: Columns of the other joints and of couplings.
+        barred: Terms beside friction that are not allowed.
     """
     names = [t for law in LAWS for t in law.terms]
     names = list(dict.fromkeys([*names, *UNNAMED.terms, *BESIDE]))
@@ -75,7 +91,8 @@ def choose_law(fit: Fit, folds: Folds, weight: Array, joint: int, common: Sequen
     def use(terms: Sequence[str]) -> list[int]:
         return [at[t] for t in terms]
 
-    beside = _beside(eliminated, at, weight)
+    allowed = tuple(t for t in BESIDE if (str(joint), t) not in barred)
+    beside = _beside(eliminated, at, weight, allowed)
     top = eliminated.losses(use((*UNNAMED.terms, *beside)))
     found: list[tuple[Law, Array]] = []
     for law in LAWS:
@@ -98,11 +115,13 @@ def choose_law(fit: Fit, folds: Folds, weight: Array, joint: int, common: Sequen
     return Choice(law, beside, mean / max(error, 1e-300), first)
 
 
-def _beside(eliminated: Eliminated, at: Mapping[str, int], weight: Array) -> tuple[str, ...]:
+def _beside(
+    eliminated: Eliminated, at: Mapping[str, int], weight: Array, allowed: tuple[str, ...]
+) -> tuple[str, ...]:
     """Offset and rotor inertia, each kept where validation blocks want it by a standard error."""
     rich = [at[t] for t in UNNAMED.terms]
-    kept = list(BESIDE)
-    for term in reversed(BESIDE):
+    kept = list(allowed)
+    for term in reversed(allowed):
         rest = [t for t in kept if t != term]
         with_it = [*rich, *(at[t] for t in kept)]
         size = eliminated.sizes(with_it)[len(rich) + kept.index(term)]
@@ -119,17 +138,17 @@ def choose_laws(
     folds: Folds,
     weight: Array,
     start: Sequence[Choice],
-    couplings: Sequence[Coupling],
+    shared: Sequence[Key],
     passes: int,
+    barred: Collection[Key] = (),
 ) -> list[Choice]:
     """Laws of all joints in turn, each beside what the others have, until nothing changes."""
-    shared: list[Key] = [("shared", n) for c in couplings for n in c.names]
     now = list(start)
     for _ in range(passes):
         before = list(now)
         for j in range(len(now)):
             others = [k for i, c in enumerate(now) if i != j for k in c.keys(i)]
-            now[j] = choose_law(fit, folds, weight, j, [*others, *shared])
+            now[j] = choose_law(fit, folds, weight, j, [*others, *shared], barred)
         if [c.terms for c in now] == [c.terms for c in before]:
             break
     return now
@@ -140,21 +159,21 @@ def upgrade(
     folds: Folds,
     weight: Array,
     choices: Sequence[Choice],
-    couplings: Sequence[Coupling],
+    shared: Sequence[Key],
+    barred: Collection[Key] = (),
 ) -> list[Choice]:
     """Forward and swap steps until the whole model is within one standard error of the best.
 
     A joint's law may stop one standard error short of its best; many joints' shortcomings add up.
     A step gives one joint a richer law, or gives or takes its offset or rotor inertia.
     """
-    shared: list[Key] = [("shared", n) for c in couplings for n in c.names]
 
     def losses(now: Sequence[Choice]) -> Array:
         keys = [k for j, c in enumerate(now) for k in c.keys(j)]
         return fit.losses(folds, weight, fit.columns([*keys, *shared]))
 
     uniform = [
-        losses([replace(c, law=UNNAMED, beside=beside) for c in choices])
+        losses([_unnamed(c, j, beside, barred) for j, c in enumerate(choices)])
         for beside in ((), ("rotor",), BESIDE)
     ]
     now = list(choices)
@@ -167,12 +186,22 @@ def upgrade(
         trials = []
         for j, c in enumerate(now):
             for step in _steps(c):
+                if any((str(j), t) in barred for t in step.beside):
+                    continue
                 trial = [*now[:j], step, *now[j + 1 :]]
                 trials.append((losses(trial), trial))
+        if not trials:
+            return now
         new, trial = min(trials, key=lambda x: float(weight @ x[0]))
         if weight @ new >= weight @ loss:
             return now
         loss, now = new, trial
+
+
+def _unnamed(c: Choice, joint: int, beside: Sequence[str], barred: Collection[Key]) -> Choice:
+    """The general member at a joint, with what is allowed beside it."""
+    allowed = tuple(t for t in beside if (str(joint), t) not in barred)
+    return replace(c, law=UNNAMED, beside=allowed)
 
 
 def _steps(c: Choice) -> list[Choice]:
@@ -194,7 +223,7 @@ def find_coupling(
     folds: Folds,
     weight: Array,
     joints: Sequence[Choice],
-    have: Sequence[Coupling],
+    have: Sequence[Key],
     candidates: Sequence[Coupling],
     error_rate: float,
 ) -> Coupling | None:
@@ -208,12 +237,12 @@ def find_coupling(
         folds: Blocks left out together.
         weight: How often every block was drawn, (B,).
         joints: What every joint has.
-        have: Couplings found before.
+        have: Columns of what was found before.
         candidates: Couplings looked at.
         error_rate: Chance that one of all candidates passes where none is there.
     """
     common: list[Key] = [k for j, c in enumerate(joints) for k in c.keys(j)]
-    common += [("shared", n) for c in have for n in c.names]
+    common += have
     own = fit.system.index([("shared", n) for c in candidates for n in c.half_names])
     eliminated = Eliminated(fit, folds, weight, fit.columns(common), own)
     without = eliminated.losses([])

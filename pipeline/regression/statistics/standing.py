@@ -157,9 +157,10 @@ class Standing(Choosing):
         kinds: list[dict[str, float]] = [{} for _ in range(self.model.nv)]
         laws = [0.0] * self.model.nv
         done = 0
+        self.coupled = {}
         for _ in range(self.options.draws):
             weight = np.bincount(rng.integers(0, n, n), minlength=n).astype(float)
-            drawn = choose_laws(fit, self.folds, weight, self.choices, self.couplings, passes=1)
+            drawn = choose_laws(fit, self.folds, weight, self.choices, self._shared, 1, self.barred)
             done += 1
             for j, c in enumerate(drawn):
                 laws[j] += c.law.name == self.choices[j].law.name
