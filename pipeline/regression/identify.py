@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
 import pinocchio as pin
 
 from pipeline.regression.laws.extras import Kind
@@ -19,6 +20,9 @@ from pipeline.regression.options import Options
 from pipeline.regression.preprocess import Rows
 from pipeline.regression.reporting import Reporting
 from pipeline.regression.result import Level, Result, Term
+from pipeline.regression.searching import ANY
+from pipeline.regression.statistics.gram import Key
+from pipeline.regression.statistics.jackknife import standard_error
 from pipeline.regression.statistics.noise import Span
 
 __all__ = ["Options", "identify"]
@@ -78,13 +82,31 @@ class _Identification(Reporting):
     def _unsure(self, result: Result) -> list[Term]:
         """Offsets and rotor inertias that do not stand: beside bodies they name no friction."""
         sprung = {self.names[e.joint] for e in self.extras if e.kind is Kind.SPRING}
-        return [
+        beside = [
             t
             for t in result.terms
-            if t.level is Level.APPROXIMATE
-            and t.term in BESIDE
-            and not (t.term == "offset" and t.place in sprung)
+            if t.term in BESIDE and not (t.term == "offset" and t.place in sprung)
         ]
+        stands = self._beside_any_bodies([(str(self.names.index(t.place)), t.term) for t in beside])
+        return [
+            t
+            for t, good in zip(beside, stands, strict=True)
+            if t.level is Level.APPROXIMATE or not good
+        ]
+
+    def _beside_any_bodies(self, claims: Sequence[Key]) -> list[bool]:
+        """Whether sizes hold no zero beside bodies that may be anything."""
+        columns = self._columns(self.couplings)
+        fit = self._fit(self._system(columns), columns, ANY)
+        keys = self._keys()
+        have = [k for k in claims if k in keys]
+        at = fit.columns(keys)
+        first = len(at) - len(keys)
+        size = fit.solve(self.weight, at)[first:]
+        error = standard_error(np.array([fit.solve(w, at)[first:] for w in self._leave_one_out()]))
+        t = self._quantile(self.options.coverage)
+        sure = {k: abs(x) > t * e for k, x, e in zip(keys, size, error, strict=True)}
+        return [k not in have or bool(sure[k]) for k in claims]
 
     def _finish(self) -> Result:
         suspected: list[Term] = []

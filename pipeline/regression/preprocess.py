@@ -21,8 +21,9 @@ from pipeline.regression.errors import RegressionError
 
 Array = NDArray[np.float64]
 
-#: Largest share of noise in an acceleration, so the largest shrinkage of a fitted inertia.
-SHRINK: Final = 0.01
+#: Largest share of noise in an acceleration, so the largest shrinkage of a fitted inertia: less
+#: than intervals are wide.
+SHRINK: Final = 0.001
 #: Rows kept per second and hertz of the cut-off: what lies above half of it is filtered away.
 ROWS_PER_HERTZ: Final = 2.5
 #: Rows so many periods of the cut-off from either end of a run are left out: a filter invents
@@ -183,7 +184,13 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
     logged = all(g[2] is not None for g in grids)
     noise_v = _noise([g[2] for g in grids if g[2] is not None], full, 1) if logged else noise
     if cutoff is None:
-        cutoff = _cutoff(grids, full, noise_v if logged else noise, logged)
+        # Of position and logged velocity the one that lets acceleration be known further up.
+        by_position = _cutoff(grids, full, noise, logged=False)
+        by_velocity = _cutoff(grids, full, noise_v, logged=True) if logged else 0.0
+        logged, cutoff = by_velocity >= by_position, max(by_position, by_velocity)
+    elif logged:
+        quieter = noise_v / 3 < noise * (2 * np.pi * cutoff) ** 2 / 5
+        logged = bool(np.median(quieter) > 0)
     cutoff = min(cutoff, 0.49 * full)
     rate = min(rate or ROWS_PER_HERTZ * cutoff, full)
     every = max(1, round(full / rate))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.regression.laws.base_parameters import base_set
 from pipeline.regression.laws.bodies import with_parameters
+from pipeline.regression.laws.extras import TOLERATED
 from pipeline.regression.laws.friction import (
     BESIDE,
     SIGNED,
@@ -61,6 +62,7 @@ class Reporting(Standing):
             {key: float(x[fit.system.where[key]]) for key in keys},
             {key: float(t * error[fit.system.where[key]]) for key in keys},
             x[:nb],
+            self._bodies_spread(fit, keys),
             self._bodies_half(fit, keys, error, t),
             self.refit_share,
             tuple(self.noise),
@@ -139,6 +141,8 @@ class Reporting(Standing):
                 if won.share >= o.sure and chance < o.error_rate / max(len(keys), 1):
                     level = Level.CONFIRMED
             half = self._quantile(o.coverage) * error[at]
+            if abs(x[at][0]) - half[0] < TOLERATED.get(e.kind, -np.inf):
+                level = Level.SUSPECTED
             out.append(Beside(e, x[at], half, won.share, won.rivals, closes, level))
         return tuple(out)
 
@@ -168,6 +172,20 @@ class Reporting(Standing):
             choice.short,
         )
 
+    def _bodies_spread(self, fit: Fit, keys: Sequence[Key]) -> Array:
+        """Covariance of body parameters by the curvature of the fit, (10 B, 10 B)."""
+        nb = fit.n_bodies
+        out = np.zeros((nb, nb))
+        if not fit.prior.refit:
+            return out
+        gram, _ = fit.normal(self.weight, fit.columns(keys))
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        inverse = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        count = len(fit.free_bodies)
+        own = inverse[:count, :count] / np.outer(scale[:count], scale[:count])
+        out[np.ix_(fit.free_bodies, fit.free_bodies)] = own
+        return out
+
     def _bodies_half(self, fit: Fit, keys: Sequence[Key], error: Array, t: float) -> Array:
         """Half of the intervals of body parameters, (10 B,).
 
@@ -177,13 +195,7 @@ class Reporting(Standing):
         nb = fit.n_bodies
         if not fit.prior.refit:
             return np.zeros(nb)
-        at = fit.columns(keys)
-        gram, _ = fit.normal(self.weight, at)
-        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-        inverse = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-12, hermitian=True)
-        own = np.zeros(nb)
-        count = len(fit.free_bodies)
-        own[fit.free_bodies] = np.sqrt(np.maximum(np.diag(inverse)[:count], 0.0)) / scale[:count]
+        own = np.sqrt(np.maximum(np.diag(self._bodies_spread(fit, keys)), 0.0))
         return np.asarray(np.maximum(t * error[:nb], scipy.stats.norm.ppf(0.975) * own))
 
     def _base(

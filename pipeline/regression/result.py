@@ -153,6 +153,8 @@ class Result:
         sizes: Of every column in the model: (place, term) to value.
         halves: Half of the 95 % interval of the same.
         bodies: Parameters of the bodies, (10 B,).
+        bodies_spread: Covariance of the same by the curvature of the fit, (10 B, 10 B): what the
+            log leaves open of them.
         bodies_half: Half of their 95 % intervals; what the motion does not tell has the URDF's.
         refit_share: Of draws of the log's blocks in which fitted bodies predict better.
         noise: Of every joint.
@@ -177,6 +179,7 @@ class Result:
     sizes: Mapping[tuple[str, str], float]
     halves: Mapping[tuple[str, str], float]
     bodies: Array
+    bodies_spread: Array
     bodies_half: Array
     refit_share: float
     noise: tuple[Colour, ...]

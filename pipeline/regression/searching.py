@@ -27,12 +27,13 @@ from pipeline.regression.laws.extras import (
     Kind,
     Seen,
     orders,
-    refined,
     strongest,
+    tuned,
 )
 from pipeline.regression.laws.friction import QUADRANT
 from pipeline.regression.stages import Stages
 from pipeline.regression.statistics.gram import Columns, Key
+from pipeline.regression.statistics.jackknife import standard_error
 from pipeline.regression.statistics.noise import colour
 from pipeline.regression.statistics.solve import Eliminated, Fit, compare
 
@@ -135,7 +136,6 @@ class Searching(Stages):
         fit = self._fit(self._system(columns), columns, ANY)
         keys = self._keys(self._general())
         at = fit.columns(keys)
-        gram, moment = fit.normal(self.weight, at)
         first = len(at) - len(keys)
         passive: dict[int, Array] = {}
         for j in range(self.model.nv):
@@ -150,12 +150,22 @@ class Searching(Stages):
             passive[j] = rows
         if len(passive) < 2:
             return []
+        normal = fit.normal(self.weight, at)
+        every, _ = least_cost(*normal, list(passive.values()))
         least = float(np.log(self.model.nv / self.options.error_rate))
-        costs = {
-            j: least_cost(gram, moment, [x for i, x in passive.items() if i != j]) for j in passive
-        }
-        every = least_cost(gram, moment, list(passive.values()))
-        return [j for j, cost in costs.items() if every - cost > least]
+        limit = self._chance(self.options.error_rate / self.model.nv)
+        out = []
+        for j, rows in passive.items():
+            others = [x for i, x in passive.items() if i != j]
+            cost, x = least_cost(*normal, others)
+            if every - cost <= least:
+                continue
+            drawn = [least_cost(*fit.normal(w, at), others)[1] for w in self._leave_one_out()]
+            side = rows[int(np.argmax(rows @ x))]
+            beyond, error = side @ x - GAIN, standard_error(np.array(drawn) @ side)
+            if beyond > limit * error:
+                out.append(j)
+        return out
 
     def _offered(self, kinds: Collection[Kind]) -> list[tuple[Extra, int]]:
         """What competes, with the number of looks that were taken to find it."""
@@ -299,11 +309,11 @@ class Searching(Stages):
             own = [self.sizes[k] * self.actions[k[1]][e.joint] for k in self._of(e)]
             series = self.left[:, e.joint] + np.sum(own, axis=0)
             step = float(grid[1] - grid[0])
-            tuned = replace(e, order=refined(series, self.rows.q[:, e.joint], e.order, step))
-            if abs(tuned.order - e.order) > 1e-3 * step:
-                moved = max(moved, abs(tuned.order - e.order) / step)
-                self.extras[number] = tuned
-                self.won[tuned] = self.won[e]
+            better = replace(e, order=tuned(series, self.rows, e.joint, e.order, step))
+            if abs(better.order - e.order) > 1e-3 * step:
+                moved = max(moved, abs(better.order - e.order) / step)
+                self.extras[number] = better
+                self.won[better] = self.won[e]
         return moved
 
     def _linearise(self) -> None:
@@ -366,14 +376,16 @@ def _columns(extras: Sequence[Extra]) -> int:
     return sum(len(e.names) for e in extras)
 
 
-def least_cost(gram: Array, moment: Array, passive: Sequence[Array]) -> float:
-    """Least x^T G x / 2 - m^T x under rows R x <= `GAIN`, (K, P) each."""
+def least_cost(gram: Array, moment: Array, passive: Sequence[Array]) -> tuple[float, Array]:
+    """Least x^T G x / 2 - m^T x under rows R x <= `GAIN`, (K, P) each, and where it is, (P,)."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
     scaled = gram * np.outer(scale, scale)
     scaled[np.diag_indices_from(scaled)] += 1e-9
     rows = np.concatenate(passive) * scale
     x = solve_qp(scaled, -moment * scale, rows, np.full(len(rows), GAIN), solver="quadprog")
-    return np.inf if x is None else float(0.5 * x @ scaled @ x - (moment * scale) @ x)
+    if x is None:
+        return np.inf, np.zeros(len(moment))
+    return float(0.5 * x @ scaled @ x - (moment * scale) @ x), np.asarray(x * scale)
 
 
 def _sensible(kind: Kind) -> tuple[float, float]:

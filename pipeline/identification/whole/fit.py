@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 from pipeline.effects.base import CHANNEL_UNITS
@@ -17,9 +18,11 @@ from pipeline.identification.whole.findings import suspected, told
 from pipeline.identification.whole.rigid import held, rigid_model, still_joints
 from pipeline.identification.whole.training import training_runs, without_known
 from pipeline.identification.workflow.locate import Whereabouts
+from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.regression import Options, Result, identify, prepare
 from pipeline.regression.errors import RegressionError
+from pipeline.regression.laws.bodies import regressor
 
 Array = NDArray[np.float64]
 #: Effects that the regression decides about: they are not offered again.
@@ -43,6 +46,8 @@ OF_COLUMNS = frozenset({"effort_offset"})
 SCALES = frozenset({"effort_gain", "torque_constant_error"})
 
 
+#: Rows over which a doubt is averaged.
+ROWS = 300
 #: What an encoder at the joint does not feel: it is read off two positions, or not at all.
 BEFORE_THE_JOINT = frozenset({"joint_elasticity", "backlash"})
 
@@ -59,6 +64,8 @@ class Whole:
         notes: What else a reader should know.
         floor: Noise of the joints' torques by what the richest model leaves, at the bandwidth of
             the comparison, (J,) [N*m]; NaN of joints that were held.
+        rigid: Bodies before, of the joints that were fitted.
+        order: Columns of these joints.
     """
 
     found: tuple[Found, ...]
@@ -67,6 +74,24 @@ class Whole:
     decided: frozenset[str]
     notes: tuple[str, ...]
     floor: Array
+    rigid: pin.Model
+    order: NDArray[np.intp]
+
+    def doubt(self, m: Measurement) -> Array:
+        """What is left open of fitted bodies, as torque along another motion, (J,) [N*m] RMS.
+
+        NaN of joints that were held.
+        """
+        out = np.full(len(m.joints), np.nan)
+        if not self.result.refit:
+            return out
+        rows = np.flatnonzero(m.mask.any(axis=1))
+        rows = rows[:: max(1, rows.size // ROWS)]
+        motion = (x[np.ix_(rows, self.order)] for x in (m.q, m.v, m.a))
+        y = regressor(self.rigid, *motion)
+        variance = np.einsum("njp,pq,njq->nj", y, self.result.bodies_spread, y)
+        out[self.order] = np.sqrt(variance.mean(axis=0)) if rows.size else 0.0
+        return out
 
 
 def with_found(model: MachineModel, found: Found) -> MachineModel:
@@ -119,4 +144,6 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
     floor = np.full(len(model.joints), np.nan)
     floor[order] = noise_floor(result, where.measurements[0].bandwidth)
     notes = (*unnamed(result), *suspected(result))
-    return Whole(found, reduce(with_found, kept, model), result, decided, notes, floor)
+    return Whole(
+        found, reduce(with_found, kept, model), result, decided, notes, floor, rigid, order
+    )

@@ -20,6 +20,7 @@ from pipeline.identification.whole.errors import NotWholeError
 from pipeline.identification.whole.fit import Whole, fit_whole
 from pipeline.identification.workflow.locate import Progress, Whereabouts
 from pipeline.identification.workflow.setup import Setup
+from pipeline.logs.prepared.measurement import CHOOSE, FIT
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,10 @@ def _alone(named: Identified, where: Whereabouts, *notes: str) -> Explanation:
 
 
 def _with_floor(where: Whereabouts, whole: Whole) -> Whereabouts:
-    """Logs whose floor is at least the noise that the richest model leaves."""
+    """Logs whose floor is at least the noise that the richest model leaves.
+
+    In another motion than that which was learnt from, what that left open of the bodies counts too.
+    """
     if where.measurements[0].channels[0] != "torque":
         return where
     least = np.nan_to_num(whole.floor)
@@ -97,6 +101,8 @@ def _with_floor(where: Whereabouts, whole: Whole) -> Whereabouts:
     for m in where.measurements:
         noise = m.noise.copy()
         noise[:, 0] = np.maximum(noise[:, 0], least)
+        if not np.isin(m.part, (FIT, CHOOSE)).any():
+            noise[:, 0] = np.hypot(noise[:, 0], np.nan_to_num(whole.doubt(m)))
         measurements.append(replace(m, noise=noise))
     return replace(where, measurements=tuple(measurements))
 

@@ -65,6 +65,8 @@ class Kind(StrEnum):
 
 #: What sensors get wrong: taken out of the rows.
 SENSORS: Final = frozenset({Kind.ZERO, Kind.GAIN, Kind.LATE})
+#: What sensors of every machine get wrong: less than so much is no finding.
+TOLERATED: Final[Mapping[Kind, float]] = {Kind.GAIN: 0.05, Kind.ZERO: 6e-3, Kind.LATE: 7.5e-4}
 #: What has no name in a catalogue: it keeps others from being named for it.
 UNNAMED: Final = frozenset({Kind.CURVE, Kind.DRAG})
 #: What cannot be negative.
@@ -207,6 +209,7 @@ def _over_angle(e: Extra, rows: Rows) -> list[Array]:
         return [wave[:, 0], wave[:, 1]]
     knots = angle_knots(q)
     curve = hats(np.clip(q, knots[0], knots[-1]), knots)
+    curve = curve - curve.mean(axis=0)  # the mean is an offset, or Coulomb friction
     if e.kind is Kind.DRAG:
         way = sense(rows.fine[1][:, e.joint], float(rows.sigma_v[e.joint])).sign
         curve = rows.filtered(curve * way[:, None])
@@ -258,6 +261,23 @@ def strongest(rest: Array, q: Array, grid: Array, known: Sequence[float]) -> lis
 
 def _power(rest: Array, q: Array, order: float) -> float:
     return float(abs(np.exp(-1j * order * q) @ rest))
+
+
+def tuned(series: Array, rows: Rows, joint: int, order: float, step: float) -> float:
+    """The order nearby whose sine, filtered as the torque was, fits a series (N,) best."""
+    q = rows.fine[0][:, joint]
+    for _ in range(3):
+        near = order + step * np.linspace(-1.0, 1.0, 9)
+        turns = np.outer(q, near)
+        waves = rows.filtered(np.concatenate([np.sin(turns), np.cos(turns)], axis=1))
+        left = []
+        for k in range(near.size):
+            x = waves[:, [k, near.size + k]]
+            solution, *_ = np.linalg.lstsq(x, series, rcond=None)
+            left.append(float(np.sum((series - x @ solution) ** 2)))
+        order = float(near[int(np.argmin(left))])
+        step /= 4.0
+    return order
 
 
 def refined(rest: Array, q: Array, order: float, step: float) -> float:

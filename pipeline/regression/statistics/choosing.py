@@ -49,9 +49,9 @@ class Choosing(Searching):
         for folds in (self.folds, folds_of(count), folds_of(count, 2)):
             plainly = self._plain_losses(normal, plain, columns, 0.0, kept, folds)
             fitted = self._plain_losses(normal, plain, columns, self.sigma, refit, folds)
-            # Parts of the motion left out as a whole are few: there it must not lose.
-            likely = self._beyond_chance(plainly, fitted) if folds is self.folds else True
-            wins = wins and likely and compare(plainly, fitted, self.weight)[0] > 0.0
+            # In torque itself, and from part to part of the motion, it must not lose beyond chance.
+            gain, error = compare(plainly, fitted, self.weight)
+            wins = wins and gain > -error
         self.refit_share = self._share_of_draws(kept_loss - loss)
         if wins:
             self.choices = refit
