@@ -19,6 +19,7 @@ class Options:
         draws: Of the log's blocks.
         uncertainties: Of the URDF that validation chooses from, beside no refit.
         closes: Share of what stays unexplained below which a size closes next to nothing.
+        worth: The same for what is beside bodies, friction and couplings: a claim of its own.
         bends: Of the general member: how far it may depart from Coulomb, viscous and
             load-dependent friction, as a share of the joint's torque; validation chooses.
         seed: Of the draws.
@@ -31,6 +32,7 @@ class Options:
     draws: int = 50
     uncertainties: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
     closes: float = 0.01
+    worth: float = 0.1
     bends: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
     seed: int = 0
     extras: frozenset[Kind] = frozenset()

@@ -136,7 +136,7 @@ class Reporting(Standing):
             size = float(x[at] @ np.linalg.pinv(np.atleast_2d(spread)) @ x[at]) / len(at)
             chance = float(scipy.stats.f.sf(size, len(at), max(blocks - len(at), 1)))
             won, level = self.won[e], Level.SUSPECTED
-            if mean > doubt and closes > o.closes and chance < 1.0 - o.coverage:
+            if mean > doubt and closes > o.worth and chance < 1.0 - o.coverage:
                 level = Level.APPROXIMATE
                 if won.share >= o.sure and chance < o.error_rate / max(len(keys), 1):
                     level = Level.CONFIRMED

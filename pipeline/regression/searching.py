@@ -225,7 +225,7 @@ class Searching(Stages):
             part = self._noise_power(fit, [j for n in extra.names for j in actions[n]])
             closes = mean * len(self.blocks) / part
             enough = mean * len(self.blocks) > least and mean > limit * error
-            if enough and closes > self.options.closes:
+            if enough and closes > self.options.worth:
                 tried.append((mean, extra, loss))
         return _chosen(tried, self.weight, self.options.draws, self.options.seed)
 

@@ -20,7 +20,7 @@ from pipeline.regression.state import State
 from pipeline.regression.statistics.gram import Columns, Key, System
 from pipeline.regression.statistics.noise import Colour, colour
 from pipeline.regression.statistics.selection import find_coupling
-from pipeline.regression.statistics.solve import Eliminated, compare
+from pipeline.regression.statistics.solve import Eliminated
 
 
 class Stages(State):
@@ -90,7 +90,7 @@ class Stages(State):
         self._strength(s, columns, keys)
 
     def _strength(self, s: System, columns: Columns, keys: Sequence[Key]) -> None:
-        """Least uncertainty of the URDF that predicts as well as the best beside some columns.
+        """Uncertainty of the URDF that predicts best beside some columns.
 
         Judged by parts of the motion that are left out as a whole: what one motion does not tell of
         bodies another needs.
@@ -98,13 +98,8 @@ class Stages(State):
         losses, parts = [], folds_of(len(self.blocks))
         for sigma in self.options.uncertainties:
             fit = self._fit(s, columns, sigma)
-            losses.append(fit.losses(parts, self.weight, fit.columns(keys)))
-        best = min(losses, key=lambda x: float(x.sum()))
-        for sigma, loss in zip(self.options.uncertainties, losses, strict=True):
-            more, error = compare(loss, best, self.weight)
-            if more <= error:
-                self.sigma = sigma
-                return
+            losses.append(float(fit.losses(parts, self.weight, fit.columns(keys)).sum()))
+        self.sigma = self.options.uncertainties[int(np.argmin(losses))]
 
     def _rise(self) -> None:
         """Speed or travel over which friction rises after a reversal: what predicts best.

@@ -16,6 +16,7 @@ from pipeline.identification.whole.beside import kinds_of, names_of, unnamed
 from pipeline.identification.whole.errors import NotWholeError
 from pipeline.identification.whole.findings import suspected, told
 from pipeline.identification.whole.rigid import held, rigid_model, still_joints
+from pipeline.identification.whole.sides import sides
 from pipeline.identification.whole.training import training_runs, without_known
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.logs.prepared.measurement import Measurement
@@ -127,13 +128,13 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
     channel = where.measurements[0].channels[0]
     kinds = kinds_of(channel, at_motor=where.measurements[0].at_motor)
     try:
-        rows = prepare(runs, rigid)
+        rows = prepare(runs, rigid, most=where.measurements[0].bandwidth)
         rows = replace(rows, tau=without_known(rows, model, rigid))
         result = identify(rows, rigid, options=Options(extras=kinds))
     except (RegressionError, np.linalg.LinAlgError) as error:
         raise NotWholeError(str(error)) from None
     unit = CHANNEL_UNITS[channel]
-    findings = told(result, model, carried, channel)
+    findings = [*told(result, model, carried, channel), *sides(where)]
     found = tuple(t.found(k, unit) for k, t in enumerate(findings, start=1))
     kept = [f for f in found if f.kept]
     decided = FAMILIES | names_of(kinds) | BEFORE_THE_JOINT

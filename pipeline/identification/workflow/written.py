@@ -21,6 +21,7 @@ from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Remaind
 from pipeline.identification.selection.residual import remainders
 from pipeline.identification.selection.weigh import Weighing, floor_of
 from pipeline.identification.whole.fit import with_found
+from pipeline.identification.whole.sides import READ_OFF
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.logs.prepared.measurement import PROVE
 from pipeline.machine.machine import MachineModel
@@ -194,8 +195,14 @@ def _worse(
     """
     out: set[tuple[str, tuple[str, ...]]] = set()
     for k, f in enumerate(found):
-        # What is fitted together for a whole machine is judged together.
-        if f.members or not effect_named(f.effect).competes or effect_named(f.effect).is_tolerance:
+        # What is fitted together for a whole machine is judged together; what two positions told
+        # has shown itself.
+        if (
+            f.members
+            or f.law == READ_OFF
+            or not effect_named(f.effect).competes
+            or effect_named(f.effect).is_tolerance
+        ):
             continue
         before, after = seen[k], seen[k + 1]
         j = effect_column(model, f, before, after)

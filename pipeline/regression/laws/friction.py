@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 #: Shapes tried, as shares of the joint's 95 % speed.
-STRIBECK_SPEEDS: Final = (0.03, 0.1, 0.3)
+STRIBECK_SPEEDS: Final = (0.03, 0.055, 0.1, 0.17, 0.3)
 SATURATION_SPEEDS: Final = (0.3,)
 #: Speeds over which Coulomb friction may rise after a reversal (presliding), as such shares; a rise
 #: over more than that is saturation.

@@ -21,17 +21,25 @@ from pipeline.regression.preprocess import Rows, Run, rows, spectra
 Array = NDArray[np.float64]
 
 
-def prepare(runs: Sequence[Run], model: pin.Model, cutoff: float | None = None) -> Rows:
+def prepare(
+    runs: Sequence[Run],
+    model: pin.Model,
+    cutoff: float | None = None,
+    most: float = float("inf"),
+) -> Rows:
     """Rows of a regression, the cut-off found from noise and from what a rigid model explains.
 
     Args:
         runs: Training recordings.
         model: By the URDF.
         cutoff: [Hz], where it is known.
+        most: Largest cut-off: beyond what will be compared nothing need be fitted [Hz].
     """
     if cutoff is not None:
         return rows(runs, cutoff)
     wide = rows(runs)
+    if wide.cutoff > most:
+        wide = rows(runs, most)
     narrow = explained_band(wide, model)
     return wide if narrow >= wide.cutoff else rows(runs, narrow)
 

@@ -19,6 +19,8 @@ Folds = Sequence[NDArray[np.intp]]
 
 #: Share of what two separate actions would gain that one and the same must reach.
 SAME = 0.9
+#: Friction per load that no law exceeds: no load could drive the shaft.
+MOST_SHARE = 0.9
 #: What a joint is told when no law of the catalogue comes near the general member.
 UNNAMED = Law("a law that is not in the catalogue", general_terms())
 #: The richest law whose every size has a name: what the general member departs from.
@@ -97,7 +99,7 @@ def choose_law(
     found: list[tuple[Law, Array]] = []
     for law in LAWS:
         sizes = eliminated.sizes(use((*law.terms, *beside)))
-        if any(x < 0 and t not in SIGNED for t, x in zip(law.terms, sizes, strict=False)):
+        if not all(possible(t, x) for t, x in zip(law.terms, sizes, strict=False)):
             continue
         found.append((law, eliminated.losses(use((*law.terms, *beside)))))
     candidates = [*found, (UNNAMED, top)]
@@ -113,6 +115,13 @@ def choose_law(
     _, _, law, loss = min(near, key=lambda x: x[:2])
     mean, error = compare(loss, top, weight)
     return Choice(law, beside, mean / max(error, 1e-300), first)
+
+
+def possible(term: str, size: float) -> bool:
+    """Whether friction takes energy out, and per load less than the load."""
+    if term.partition("@")[0] in ("load", "driving", "driven", "motor") and size >= MOST_SHARE:
+        return False
+    return size > 0 or term in SIGNED
 
 
 def _beside(

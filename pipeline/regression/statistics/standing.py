@@ -17,7 +17,7 @@ from pipeline.regression.result import Level, Term
 from pipeline.regression.statistics.choosing import Choosing
 from pipeline.regression.statistics.gram import Key
 from pipeline.regression.statistics.jackknife import standard_error
-from pipeline.regression.statistics.selection import UNNAMED, choose_laws
+from pipeline.regression.statistics.selection import UNNAMED, choose_laws, possible
 from pipeline.regression.statistics.solve import Fit, compare
 
 Array = NDArray[np.float64]
@@ -32,9 +32,7 @@ class Standing(Choosing):
         while True:
             x, replicas = self._final(fit, keys)
             where = fit.system.where
-            wrong = [
-                k for k in keys if not self._curve(k) and k[1] not in SIGNED and x[where[k]] <= 0
-            ]
+            wrong = [k for k in keys if not self._curve(k) and not possible(k[1], x[where[k]])]
             if not wrong:
                 return keys, x, replicas
             keys = [k for k in keys if k not in wrong]
