@@ -14,6 +14,7 @@ from pipeline.regression.laws.extras import TOLERATED
 from pipeline.regression.laws.friction import (
     BESIDE,
     SIGNED,
+    STRIBECK_SPEEDS,
     kind,
     name_of,
     unit,
@@ -28,6 +29,8 @@ from pipeline.regression.statistics.solve import Fit, compare
 from pipeline.regression.statistics.standing import Standing
 
 Array = NDArray[np.float64]
+#: Share of a size that its law leaves open, one standard deviation.
+LAW = 0.01
 
 
 class Reporting(Standing):
@@ -43,7 +46,7 @@ class Reporting(Standing):
         laws: Sequence[float],
         suspected: Sequence[Term],
     ) -> Result:
-        t, error = self._quantile(self.options.coverage), standard_error(replicas)
+        t, error = self._quantile(self.options.coverage), self._errors(fit, keys, x, replicas)
         terms = self._terms(fit, keys, x, error, shares)
         frictions = [self._friction(j, fit, keys, x, terms, laws[j]) for j in range(len(laws))]
         base, condition, lost = self._base(x, replicas, t)
@@ -58,7 +61,7 @@ class Reporting(Standing):
             (*terms, *suspected),
             tuple(frictions),
             tuple(self.couplings),
-            self._besides(fit, keys, x, replicas),
+            self._besides(fit, keys, x, replicas, error),
             {key: float(x[fit.system.where[key]]) for key in keys},
             {key: float(t * error[fit.system.where[key]]) for key in keys},
             x[:nb],
@@ -117,11 +120,46 @@ class Reporting(Standing):
             )
         return terms
 
+    def _errors(self, fit: Fit, keys: Sequence[Key], x: Array, replicas: Array) -> Array:
+        """Standard errors of all sizes, (P,).
+
+        The scatter over blocks, at least what the curvature of the fit allows (the URDF's
+        uncertainty is in it, which no block knows); what another Stribeck speed would make of a
+        size; and that no law of a textbook holds better than `LAW`.
+        """
+        out = standard_error(replicas)
+        gram, _ = fit.normal(self.weight, fit.columns(keys))
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        inverse = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        own = np.sqrt(np.maximum(np.diag(inverse), 0.0)) / scale
+        at = fit.system.index(keys)
+        out[at] = np.maximum(out[at], own[-len(keys) :] if keys else own[:0])
+        out[at] = np.hypot(np.hypot(out[at], self._shape_errors(fit, keys)), LAW * np.abs(x[at]))
+        return out
+
+    def _shape_errors(self, fit: Fit, keys: Sequence[Key]) -> Array:
+        """Half of what sizes change by at the next Stribeck speeds, (K,)."""
+        out = np.zeros(len(keys))
+        base = fit.solve(self.weight, fit.columns(keys))[-len(keys) :] if keys else out
+        for place, term in keys:
+            kind_, _, number = term.partition("@")
+            if kind_ != "stribeck" or self._curve((place, term)):
+                continue
+            for k in (int(number) - 1, int(number) + 1):
+                if 0 <= k < len(STRIBECK_SPEEDS):
+                    other = [
+                        (p, f"stribeck@{k}") if (p, u) == (place, term) else (p, u) for p, u in keys
+                    ]
+                    size = fit.solve(self.weight, fit.columns(other))[-len(keys) :]
+                    mine = np.array([p == place for p, _ in keys])
+                    out = np.maximum(out, 0.5 * np.abs(size - base) * mine)
+        return out
+
     def _besides(
-        self, fit: Fit, keys: Sequence[Key], x: Array, replicas: Array
+        self, fit: Fit, keys: Sequence[Key], x: Array, replicas: Array, error: Array
     ) -> tuple[Beside, ...]:
         """Every extra with its level: what chance or a rival may be is suspected."""
-        o, error = self.options, standard_error(replicas)
+        o = self.options
         blocks = len(self.blocks)
         have = fit.losses(self.folds, self.weight, fit.columns(keys))
         out = []

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 
 from pipeline.effects.base import CHANNEL_COLUMNS, Place
+from pipeline.identification.regression.intervals import LAW
 from pipeline.identification.results import Estimate, Member
 from pipeline.identification.whole.told import Told, estimate, exact
 from pipeline.machine.machine import MachineModel
@@ -26,6 +27,7 @@ EFFECTS: Final = {
 }
 #: Share of the largest torque within which play changes sides.
 _CROSSING: Final = 0.05
+_COVER: Final = 1.96
 _RIVALS: Final = "another effect predicts as well in some draws of the log's blocks"
 
 
@@ -115,6 +117,8 @@ def _parameters(one: Beside, result: Result, model: MachineModel) -> tuple[Estim
             estimate("rest", float(np.clip(rest, -1e3, 1e3)), spread, "rad", low=-1e3, high=1e3),
         )
     if kind is Kind.GAIN:
+        # That friction has the law it is told to have is a claim about the scale, too.
+        half = float(np.hypot(half, _COVER * LAW * (1.0 + x)))
         return (estimate("gain", 1.0 + x, half, "1", low=0.01, high=100.0),)
     if kind is Kind.LATE:
         return (estimate("delay", x, half, "s", low=-0.5, high=0.5),)

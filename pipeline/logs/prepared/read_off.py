@@ -15,6 +15,8 @@ from pipeline.logs.signals.two_sides import TwoSides, read_off
 
 #: Ripple is looked for above this frequency, or above the cut-off where that is lower [Hz].
 _ABOVE: Final = 30.0
+#: Share of what a filter sees that must have the torque's sign.
+_ONE_SIDE: Final = 0.98
 
 
 def signal_findings(one: Prepared) -> list[Finding]:
@@ -58,9 +60,10 @@ def two_sides(one: Prepared) -> dict[str, TwoSides]:
         filled = np.interp(one.time, one.time[good], motor[good, j])
         ahead = one.lowpass(filled[:, None])[:, 0] - one.q[:, j]
         rest = 3.0 * float(one.fusion.noise[0, j])
-        seen = read_off(
-            ahead, one.effort[:, j], one.v[:, j], one.mask[:, j], float(one.noise[j]), rest
-        )
+        # While the filter sees the torque change sides, a step is no step yet.
+        side = one.lowpass(np.sign(one.effort[:, [j]]))[:, 0]
+        good = one.mask[:, j] & (np.abs(side) > _ONE_SIDE)
+        seen = read_off(ahead, one.effort[:, j], one.v[:, j], good, float(one.noise[j]), rest)
         if seen is not None:
             out[joint] = seen
     return out

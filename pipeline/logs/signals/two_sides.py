@@ -25,6 +25,8 @@ Mask = NDArray[np.bool_]
 SEEN: Final = 4.0
 #: Torques below this many standard deviations do not tell their sign.
 _SURE: Final = 3.0
+#: ... nor below this share of its root mean square, which friction may be.
+_FRICTION: Final = 0.25
 _BLOCKS: Final = 24
 _LEAST_ROWS: Final = 60
 
@@ -83,7 +85,10 @@ def read_off(
         None where the torque hardly changes or too few rows are left.
     """
     good = ok & np.isfinite(ahead) & np.isfinite(torque) & (np.abs(velocity) > rest)
-    sure = _SURE * noise
+    # The torque that was logged has friction in it: the side is that of what passes the play.
+    sure = max(
+        _SURE * noise, _FRICTION * float(np.sqrt(np.mean(torque[good] ** 2))) if good.any() else 0.0
+    )
     found = None
     for _ in range(3):
         rows = np.flatnonzero(good & (np.abs(torque) > sure))
