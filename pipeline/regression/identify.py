@@ -87,11 +87,13 @@ class _Identification(Reporting):
             for t in result.terms
             if t.term in BESIDE and not (t.term == "offset" and t.place in sprung)
         ]
-        stands = self._beside_any_bodies([(str(self.names.index(t.place)), t.term) for t in beside])
+        claims = [(str(self.names.index(t.place)), t.term) for t in beside]
+        stands = self._beside_any_bodies(claims)
+        bent = self._bent(self._keys()) if beside and self.options.extras else set()
         return [
             t
-            for t, good in zip(beside, stands, strict=True)
-            if t.level is Level.APPROXIMATE or not good
+            for t, (j, _), good in zip(beside, claims, stands, strict=True)
+            if t.level is Level.APPROXIMATE or not good or (t.term == "offset" and int(j) in bent)
         ]
 
     def _beside_any_bodies(self, claims: Sequence[Key]) -> list[bool]:
@@ -104,7 +106,7 @@ class _Identification(Reporting):
         first = len(at) - len(keys)
         size = fit.solve(self.weight, at)[first:]
         error = standard_error(np.array([fit.solve(w, at)[first:] for w in self._leave_one_out()]))
-        t = self._quantile(self.options.coverage)
+        t = self._quantile(1.0 - self.options.error_rate / max(len(keys), 1))
         sure = {k: abs(x) > t * e for k, x, e in zip(keys, size, error, strict=True)}
         return [k not in have or bool(sure[k]) for k in claims]
 

@@ -22,6 +22,7 @@ class Options:
         worth: The same for what is beside bodies, friction and couplings: a claim of its own.
         bends: Of the general member: how far it may depart from Coulomb, viscous and
             load-dependent friction, as a share of the joint's torque; validation chooses.
+        fewest: Blocks below which nothing is confirmed: too few to know their own scatter.
         seed: Of the draws.
         extras: Looked for beside bodies, friction and couplings.
     """
@@ -34,5 +35,6 @@ class Options:
     closes: float = 0.01
     worth: float = 0.1
     bends: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
+    fewest: int = 12
     seed: int = 0
     extras: frozenset[Kind] = frozenset()

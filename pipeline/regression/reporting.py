@@ -74,6 +74,7 @@ class Reporting(Standing):
             self.rows.sigma_v,
             self.rows.rate,
             1.0 + self.gain,
+            frozenset(self._structured),
         )
 
     def _terms(
@@ -102,6 +103,7 @@ class Reporting(Standing):
                 and gain > 1.0
                 and closes > o.closes
                 and (x[k] > 0 or term in SIGNED)
+                and self._confirms([int(place)] if place != "shared" else [])
             )
             level = Level.CONFIRMED if stands else Level.APPROXIMATE
             terms.append(
@@ -159,7 +161,7 @@ class Reporting(Standing):
         self, fit: Fit, keys: Sequence[Key], x: Array, replicas: Array, error: Array
     ) -> tuple[Beside, ...]:
         """Every extra with its level: what chance or a rival may be is suspected."""
-        o = self.options
+        o, bent = self.options, self._bent(keys) if self.extras else set()
         blocks = len(self.blocks)
         have = fit.losses(self.folds, self.weight, fit.columns(keys))
         out = []
@@ -181,6 +183,9 @@ class Reporting(Standing):
             half = self._quantile(o.coverage) * error[at]
             if abs(x[at][0]) - half[0] < TOLERATED.get(e.kind, -np.inf):
                 level = Level.SUSPECTED
+            doubted = e.joint in bent or self._harmonic(e) or not self._confirms(joints)
+            if level is Level.CONFIRMED and doubted:
+                level = Level.APPROXIMATE
             out.append(Beside(e, x[at], half, won.share, won.rivals, closes, level))
         return tuple(out)
 

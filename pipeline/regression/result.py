@@ -164,6 +164,7 @@ class Result:
         rate: Of the rows that were fitted [Hz].
         gain: How many times what they should the torques read, (J,): noise is that of torques as
             they should be.
+        structured: Joints whose remainder stays alike for longer than a block, and is no noise.
     """
 
     model: pin.Model
@@ -188,6 +189,7 @@ class Result:
     sigma_v: Array
     rate: float
     gain: Array
+    structured: frozenset[int]
 
     def predict(
         self,

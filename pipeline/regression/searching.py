@@ -260,6 +260,42 @@ class Searching(Stages):
         place, term = key
         return joint in columns.shared[term] if place == "shared" else place == str(joint)
 
+    def _bent(self, keys: Sequence[Key]) -> set[int]:
+        """Joints at which a curve over the angle says more than what is in the model.
+
+        There a spring, an offset or a ripple is at best a part of what is.
+        """
+        joints = range(self.model.nv)
+        curves = [Extra(kind, j) for j in joints for kind in UNNAMED]
+        curves = [e for e in curves if e not in self.extras]
+        actions = self._seen().columns(curves)
+        columns = self._columns(self.couplings)
+        columns = replace(columns, shared={**columns.shared, **actions})
+        fit = self._fit(self._system(columns), columns, self.sigma)
+        own = fit.system.index([("shared", n) for n in actions])
+        e = Eliminated(fit, self.folds, self.weight, fit.columns(keys), own)
+        at = {name: k for k, name in enumerate(actions)}
+        without = e.losses([])
+        least = float(np.log(1.0 / self.options.error_rate))
+        out = set()
+        for curve in curves:
+            loss = e.losses([at[n] for n in curve.names])
+            mean, error = compare(without, loss, self.weight)
+            if mean > error and mean * len(self.blocks) > least:
+                out.add(curve.joint)
+        return out
+
+    def _harmonic(self, e: Extra) -> bool:
+        """Whether a ripple is one of several whose orders are multiples: no sine, but its parts."""
+        others = [x.order for x in self.extras if x.same == e.same and x is not e]
+        for order in others if e.kind is Kind.RIPPLE else ():
+            low, high = sorted((order, e.order))
+            step = float(np.diff(orders(self.rows, e.joint)[:2])[0])
+            whole = round(high / low)
+            if whole > 1 and abs(high - whole * low) < step * whole:
+                return True
+        return False
+
     def _chance(self, rate: float) -> float:
         """Quantile of t that chance passes so rarely."""
         return float(scipy.stats.t.isf(rate, max(len(self.blocks) - 1, 1)))

@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.regression.laws.coupling import Coupling, every_pair
-from pipeline.regression.laws.design import folds_of
 from pipeline.regression.laws.friction import (
     BESIDE,
     TRANSITIONS,
@@ -20,7 +19,7 @@ from pipeline.regression.state import State
 from pipeline.regression.statistics.gram import Columns, Key, System
 from pipeline.regression.statistics.noise import Colour, colour
 from pipeline.regression.statistics.selection import find_coupling
-from pipeline.regression.statistics.solve import Eliminated
+from pipeline.regression.statistics.solve import RIDGE, Eliminated
 
 
 class Stages(State):
@@ -90,16 +89,31 @@ class Stages(State):
         self._strength(s, columns, keys)
 
     def _strength(self, s: System, columns: Columns, keys: Sequence[Key]) -> None:
-        """Uncertainty of the URDF that predicts best beside some columns.
+        """Uncertainty of the URDF of most evidence beside some columns.
 
-        Judged by parts of the motion that are left out as a whole: what one motion does not tell of
-        bodies another needs.
+        With P the prior's precision, which grows with 1 / sigma^2, and H = G + P,
+
+            ln E = m^T H^-1 m / 2 - ln det H / 2 + ln det P / 2
+
+        (MacKay, "Bayesian interpolation", Neural Computation 4, 1992).
         """
-        losses, parts = [], folds_of(len(self.blocks))
+        found = []
         for sigma in self.options.uncertainties:
             fit = self._fit(s, columns, sigma)
-            losses.append(float(fit.losses(parts, self.weight, fit.columns(keys)).sum()))
-        self.sigma = self.options.uncertainties[int(np.argmin(losses))]
+            at = fit.columns(keys)
+            gram, moment = fit.normal(self.weight, at)
+            # About the URDF, so that the prior pulls nowhere.
+            off = np.zeros(len(at))
+            off[: len(fit.free_bodies)] = self.bodies.centre[fit.free_bodies]
+            prior = fit.prior_moment[at] - fit.prior_gram[np.ix_(at, at)] @ off
+            moment = moment - gram @ off - prior
+            scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+            scaled = gram / np.outer(scale, scale)
+            scaled[np.diag_indices_from(scaled)] += RIDGE
+            fall = (moment / scale) @ np.linalg.solve(scaled, moment / scale)
+            size = np.linalg.slogdet(scaled)[1] + 2.0 * np.log(scale).sum()
+            found.append(0.5 * fall - 0.5 * size - len(fit.free_bodies) * np.log(sigma))
+        self.sigma = self.options.uncertainties[int(np.argmax(found))]
 
     def _rise(self) -> None:
         """Speed or travel over which friction rises after a reversal: what predicts best.

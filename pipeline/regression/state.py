@@ -138,6 +138,16 @@ class State:
                 out[:, int(place)] -= size * columns.local[int(place)][term]
         return out - self.rows.thin(self.load)
 
+    @property
+    def _structured(self) -> set[int]:
+        """Joints whose remainder stays alike for longer than a block: that is no noise."""
+        length = len(self.rows.time) / len(self.blocks)
+        return {j for j, c in enumerate(self.noise) if c.correlation > length}
+
+    def _confirms(self, joints: Collection[int]) -> bool:
+        """Whether anything at these joints can be confirmed."""
+        return len(self.blocks) >= self.options.fewest and not self._structured & set(joints)
+
     def _sure(self, columns: Columns, joint: int) -> Array:
         """Weight of rows by how sure a joint's dry friction is, (N,)."""
         if self.friction is None:

@@ -105,11 +105,14 @@ def with_found(model: MachineModel, found: Found) -> MachineModel:
 def noise_floor(result: Result, bandwidth: float) -> Array:
     """Noise below a bandwidth [Hz], by the richest model's colour, (K,) [N*m].
 
-    Read above the cut-off and taken for white, noise with a memory is several times too small.
+    Read above the cut-off and taken for white, noise with a memory is several times too small. NaN
+    where the model leaves more than noise.
     """
     rate, gain = result.rate, result.gain
     band = min(bandwidth, result.cutoff)
-    return np.array([c.below(band, rate) for c in result.noise]) * gain
+    level = np.array([c.below(band, rate) for c in result.noise]) * gain
+    level[list(result.structured)] = np.nan
+    return level
 
 
 def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
