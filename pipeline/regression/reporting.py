@@ -66,6 +66,7 @@ class Reporting(Standing):
             {key: float(t * error[fit.system.where[key]]) for key in keys},
             x[:nb],
             self._bodies_spread(fit, keys),
+            self._bodies_scatter(replicas[:, :nb]),
             self._bodies_half(fit, keys, error, t),
             self.refit_share,
             tuple(self.noise),
@@ -214,6 +215,16 @@ class Reporting(Standing):
             Level.CONFIRMED if sure else Level.APPROXIMATE,
             choice.short,
         )
+
+    def _bodies_scatter(self, replicas: Array) -> Array:
+        """Covariance of body parameters by leaving out blocks (B, 10 B), (10 B, 10 B).
+
+        With as many degrees of freedom as there are blocks, a normal one that covers as much.
+        """
+        b = len(replicas)
+        off = replicas - replicas.mean(axis=0)
+        wide = self._quantile(self.options.coverage) / scipy.stats.norm.ppf(0.975)
+        return np.asarray(off.T @ off * ((b - 1) / b) * wide**2)
 
     def _bodies_spread(self, fit: Fit, keys: Sequence[Key]) -> Array:
         """Covariance of body parameters by the curvature of the fit, (10 B, 10 B)."""

@@ -155,6 +155,7 @@ class Result:
         bodies: Parameters of the bodies, (10 B,).
         bodies_spread: Covariance of the same by the curvature of the fit, (10 B, 10 B): what the
             log leaves open of them.
+        bodies_scatter: The same by leaving out blocks: what the parts of the log disagree about.
         bodies_half: Half of their 95 % intervals; what the motion does not tell has the URDF's.
         refit_share: Of draws of the log's blocks in which fitted bodies predict better.
         noise: Of every joint.
@@ -181,6 +182,7 @@ class Result:
     halves: Mapping[tuple[str, str], float]
     bodies: Array
     bodies_spread: Array
+    bodies_scatter: Array
     bodies_half: Array
     refit_share: float
     noise: tuple[Colour, ...]

@@ -196,6 +196,7 @@ class Searching(Stages):
         seen = self._seen()
         actions = seen.columns([e for e, _ in offered])
         offered = [(e, n) for e, n in offered if all(actions.get(name) for name in e.names)]
+        actions = {name: actions[name] for e, _ in offered for name in e.names}
         if not offered:
             return None
         columns = self._columns(self.couplings)
@@ -235,6 +236,7 @@ class Searching(Stages):
         Of what is not in the model yet a part would pass for noise in colour, and be whitened away.
         """
         actions = self._seen().columns([e for e, _ in offered])
+        actions = {name: x for name, x in actions.items() if x}  # nothing feels some
         columns = self._columns(self.couplings)
         columns = replace(columns, shared={**columns.shared, **actions})
         system = self._system(columns)

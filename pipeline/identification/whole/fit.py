@@ -91,7 +91,8 @@ class Whole:
         rows = rows[:: max(1, rows.size // ROWS)]
         motion = (x[np.ix_(rows, self.order)] for x in (m.q, m.v, m.a))
         y = regressor(self.rigid, *motion)
-        variance = np.einsum("njp,pq,njq->nj", y, self.result.bodies_spread, y)
+        open_ = self.result.bodies_spread + self.result.bodies_scatter
+        variance = np.einsum("njp,pq,njq->nj", y, open_, y)
         out[self.order] = np.sqrt(variance.mean(axis=0)) if rows.size else 0.0
         return out
 
