@@ -155,7 +155,7 @@ def test_a_scale_in_the_machine_is_that_of_the_column(machine) -> None:
 
 
 def test_a_sensors_zero_stands_behind_its_scale(machine) -> None:
-    """Regression tells torques as they should be: 2 N*m there are 1.5 on a sensor that reads 75 %."""
+    """Regression tells torques as they should be: 2 N*m are 1.5 on a sensor that reads 75 %."""
     fit = result((Extra(Kind.GAIN, 1), [-0.25]), offset={"joint_2": 2.0}, gain=(1.0, 0.75, 1.0))
     told = [*offsets(fit, machine), *besides(fit, machine, "torque")]
     np.testing.assert_allclose(
