@@ -24,7 +24,8 @@ def presliding(
     """Return the sense of dry friction, -1 to 1, (N,).
 
     Args:
-        time: (N,) [s], not decreasing; a repeated stamp or a gap is a break.
+        time: (N,) [s], not decreasing; a gap is a break, and so is a repeated stamp at another
+            angle: where the angle stays, as where a series is split at a reversal, motion goes on.
         position: (N,) [rad].
         direction: Sense of motion as far as it is known, -1 to 1, (N,): where a block begins.
         travel: Positive [rad].
@@ -32,9 +33,10 @@ def presliding(
     if position.size < 2:
         return np.asarray(direction, dtype=float)
     step = np.diff(time)
-    usual = float(np.median(step))
-    broken = (step <= 0.0) | (step > GAP * max(usual, 1e-300))
-    way = np.sign(np.diff(position))
+    usual = float(np.median(step[step > 0.0])) if (step > 0.0).any() else 0.0
+    moved = np.diff(position)
+    way = np.sign(moved)
+    broken = ((step <= 0.0) & (moved != 0.0)) | (step > GAP * max(usual, 1e-300))
     edges = np.concatenate([[True], (way[1:] != way[:-1]) | broken[1:] | broken[:-1]])
     starts = np.flatnonzero(edges)
     stops = np.append(starts[1:], way.size)
@@ -48,7 +50,7 @@ def presliding(
         if d == 0.0:
             out[a + 1 : b + 1] = now
             continue
-        moved = np.abs(position[a + 1 : b + 1] - position[a])
-        out[a + 1 : b + 1] = d + (now - d) * np.exp(-moved / travel)
+        slid = np.abs(position[a + 1 : b + 1] - position[a])
+        out[a + 1 : b + 1] = d + (now - d) * np.exp(-slid / travel)
         now = float(out[b])
     return out

@@ -16,7 +16,6 @@ LONGER = {
     "pipeline/identification/compare/model_check.py:compare_with_prediction": 73,
     "pipeline/identification/selection/select.py:select": 68,
     "pipeline/logs/prepared/prepare.py:prepare": 70,
-    "pipeline/regression/preprocess.py:rows": 61,
     "pipeline/robot/urdf_builder.py:_leg": 71,
     "reports/figures/gap/waterfall.py:gap_waterfall_figure": 62,
     "reports/pages/summary.py:_reproduction": 75,

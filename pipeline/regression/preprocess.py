@@ -183,15 +183,7 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
     noise = _noise([g[0] for g in grids], full, derivative=0)
     logged = all(g[2] is not None for g in grids)
     noise_v = _noise([g[2] for g in grids if g[2] is not None], full, 1) if logged else noise
-    if cutoff is None:
-        # Of position and logged velocity the one that lets acceleration be known further up.
-        by_position = _cutoff(grids, full, noise, logged=False)
-        by_velocity = _cutoff(grids, full, noise_v, logged=True) if logged else 0.0
-        logged, cutoff = by_velocity >= by_position, max(by_position, by_velocity)
-    elif logged:
-        quieter = noise_v / 3 < noise * (2 * np.pi * cutoff) ** 2 / 5
-        logged = bool(np.median(quieter) > 0)
-    cutoff = min(cutoff, 0.49 * full)
+    cutoff, logged = _band(grids, full, (noise, noise_v if logged else None), cutoff)
     rate = min(rate or ROWS_PER_HERTZ * cutoff, full)
     every = max(1, round(full / rate))
     edge = round(EDGE * full / cutoff)
@@ -213,10 +205,7 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
         n += len(part[0])
         parts.append(part)
     time, q, v, a, tau = (np.concatenate(x) for x in zip(*parts, strict=True))
-    if logged:
-        sigma_v = np.sqrt(noise_v * cutoff)
-    else:
-        sigma_v = np.sqrt(noise * (2 * np.pi) ** 2 * cutoff**3 / 3)
+    of_speed = noise_v * cutoff if logged else noise * (2 * np.pi) ** 2 * cutoff**3 / 3
     fine = tuple(np.concatenate(x) for x in zip(*whole, strict=True))
     return Rows(
         time,
@@ -227,7 +216,7 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
         tuple(start),
         full / every,
         cutoff,
-        sigma_v,
+        np.sqrt(of_speed),
         (fine[0], fine[1], fine[2]),
         tuple(fine_start),
         full,
@@ -235,6 +224,34 @@ def rows(runs: Sequence[Run], cutoff: float | None = None, rate: float | None = 
         fine[3],
         edge,
     )
+
+
+def _band(
+    grids: Sequence[tuple[Array, Array, Array | None, Array]],
+    rate: float,
+    noise: tuple[Array, Array | None],
+    cutoff: float | None,
+) -> tuple[float, bool]:
+    """Cut-off [Hz], and whether speed is the logged one.
+
+    Args:
+        grids: Position, torque, velocity and time of recordings.
+        rate: [Hz].
+        noise: Densities of position and logged velocity, (J,) each; None where none is logged.
+        cutoff: Where it is known [Hz].
+    """
+    of_position, of_velocity = noise
+    logged = of_velocity is not None
+    if cutoff is None:
+        # Of the two the one that lets acceleration be known further up.
+        cutoff = _cutoff(grids, rate, of_position, logged=False)
+        if of_velocity is not None:
+            by_velocity = _cutoff(grids, rate, of_velocity, logged=True)
+            logged, cutoff = by_velocity >= cutoff, max(cutoff, by_velocity)
+    elif of_velocity is not None:
+        quieter = of_velocity / 3 < of_position * (2 * np.pi * cutoff) ** 2 / 5
+        logged = bool(np.median(quieter) > 0)
+    return min(cutoff, 0.49 * rate), logged
 
 
 def inner(x: Array, edge: int, every: int) -> Array:

@@ -85,6 +85,8 @@ class Searching(Stages):
             self.extras.append(extra)
             self.won[extra] = won
             self._settle()
+            if extra.kind in SENSORS:
+                self._rise_again()
             self._prune()
             now = frozenset((*e.same, round(e.order)) for e in self.extras)
             if now in refused:
@@ -134,7 +136,7 @@ class Searching(Stages):
         """
         columns = self._columns(self.couplings)
         fit = self._fit(self._system(columns), columns, ANY)
-        keys = self._keys(self._general())
+        keys = self._keys(self._general(scaled=True))
         at = fit.columns(keys)
         first = len(at) - len(keys)
         passive: dict[int, Array] = {}
@@ -193,10 +195,7 @@ class Searching(Stages):
         """What predicts best beside everything else, if chance would not."""
         # Beside bodies of any size: what freeing them would explain is no extra's.
         free = ANY
-        seen = self._seen()
-        actions = seen.columns([e for e, _ in offered])
-        offered = [(e, n) for e, n in offered if all(actions.get(name) for name in e.names)]
-        actions = {name: actions[name] for e, _ in offered for name in e.names}
+        offered, actions = self._acting(offered)
         if not offered:
             return None
         columns = self._columns(self.couplings)
@@ -230,13 +229,23 @@ class Searching(Stages):
                 tried.append((mean, extra, loss))
         return _chosen(tried, self.weight, self.options.draws, self.options.seed)
 
+    def _acting(
+        self, offered: Sequence[tuple[Extra, int]]
+    ) -> tuple[list[tuple[Extra, int]], dict[str, dict[int, Array]]]:
+        """What is offered and felt at some joint, and its columns: not all of it is.
+
+        The zero of an encoder whose axis is upright changes no torque.
+        """
+        actions = self._seen().columns([e for e, _ in offered])
+        felt = [(e, n) for e, n in offered if all(actions[name] for name in e.names)]
+        return felt, {name: actions[name] for e, _ in felt for name in e.names}
+
     def _colour(self, offered: Sequence[tuple[Extra, int]]) -> None:
         """Noise as what everything that is offered would leave together.
 
         Of what is not in the model yet a part would pass for noise in colour, and be whitened away.
         """
-        actions = self._seen().columns([e for e, _ in offered])
-        actions = {name: x for name, x in actions.items() if x}  # nothing feels some
+        _, actions = self._acting(offered)
         columns = self._columns(self.couplings)
         columns = replace(columns, shared={**columns.shared, **actions})
         system = self._system(columns)
@@ -336,6 +345,23 @@ class Searching(Stages):
             if moved < SETTLED:
                 break
         self._rich()
+
+    def _rise_again(self) -> None:
+        """How friction rises and what sensors get wrong in turn, until neither changes.
+
+        A torque that comes late looks like friction that rises over a travel: a part of it was
+        taken for that as long as nothing else was known.
+        """
+        tried = [[(s.rise, s.travel) for s in self.design.shapes]]
+        for _ in range(ROUNDS):
+            self._rise()
+            now = [(s.rise, s.travel) for s in self.design.shapes]
+            done = now in tried
+            if now != tried[-1]:
+                self._settle()
+            if done:
+                return
+            tried.append(now)
 
     def _tune(self) -> float:
         """Orders of ripples where they fit best; the largest relative change."""

@@ -84,15 +84,21 @@ class State:
         columns = self.design.columns(self.load, couplings)
         return replace(columns, shared={**columns.shared, **self.actions})
 
-    def _general(self, but: Collection[int] = ()) -> list[Choice]:
+    def _general(self, but: Collection[int] = (), *, scaled: bool = False) -> list[Choice]:
         """Friction of any shape at every joint.
 
+        Where a torque reads a multiple, friction is the same in all quadrants at every joint: by
+        quadrant it has the torque's own shape, and beside bodies of any size a scale at each of
+        them would leave none to be told.
+
         Args:
-            but: Joints whose friction is the same in all quadrants; those whose torque reads a
-                multiple are among them, since the two would look the same.
+            but: Joints whose friction is the same in all quadrants.
+            scaled: Whether it may differ at joints besides those that read a multiple.
         """
-        scaled = {e.joint for e in self.extras if e.kind is Kind.GAIN} | set(but)
-        return [general(j not in scaled) for j in range(self.model.nv)]
+        found = {e.joint for e in self.extras if e.kind is Kind.GAIN}
+        joints = range(self.model.nv)
+        same = {*but, *(found if scaled or not found else joints)}
+        return [general(j not in same) for j in joints]
 
     @property
     def _shared(self) -> list[Key]:

@@ -232,13 +232,17 @@ def inertias(result: Result, model: MachineModel) -> list[Told]:
 
 
 def offsets(result: Result, model: MachineModel) -> list[Told]:
-    """A torque that is always there, as the zero of the sensor that shows it."""
+    """A torque that is always there, as the zero of the sensor that shows it.
+
+    A sensor's zero is added behind its scale, and the regression tells torques as they should be.
+    """
     members, sprung = [], preloads(result)
+    gain = dict(zip((f.joint for f in result.friction), result.gain, strict=True))
     for t in result.terms:
         if t.term != "offset" or t.level is Level.SUSPECTED or t.place in sprung:
             continue
         half = max(t.high - t.value, t.value - t.low)
-        zero = estimate("offset", t.value, half, "N*m")
+        zero = estimate("offset", gain[t.place] * t.value, gain[t.place] * half, "N*m")
         members.append(Member((t.place,), (zero,), str(t.level), t.share))
     if not members or any(a.motor is not None for a in model.actuators):
         return []
