@@ -30,7 +30,7 @@ class Options:
     error_rate: float = 0.05
     coverage: float = 0.95
     sure: float = 0.95
-    draws: int = 50
+    draws: int = 20
     uncertainties: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
     closes: float = 0.01
     worth: float = 0.1

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from qpsolvers import solve_qp
 
 from pipeline.regression.laws.bodies import with_parameters
-from pipeline.regression.laws.design import Design
 from pipeline.regression.laws.extras import (
     EVERY,
     SENSORS,
@@ -288,7 +287,7 @@ class Searching(Stages):
         at = {name: k for k, name in enumerate(actions)}
         without = e.losses([])
         least = float(np.log(1.0 / self.options.error_rate))
-        out = set()
+        out = {x.joint for x in self.extras if not x.named}
         for curve in curves:
             loss = e.losses([at[n] for n in curve.names])
             mean, error = compare(without, loss, self.weight)
@@ -393,8 +392,7 @@ class Searching(Stages):
         self.zero, self.gain = zero, gain
         self.rows = self.logged.corrected(zero, 1.0 + gain, late)
         if turned:
-            shapes = self.design.shapes
-            self.design = replace(Design.of(self.model, self.rows), shapes=shapes)
+            self.design = self.design.turned(self.model, self.rows)
             self.load = self.design.load(self.fitted)
         else:
             self.design = replace(self.design, rows=self.rows)

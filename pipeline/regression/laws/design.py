@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pipeline.regression.laws.bodies import regressor
 from pipeline.regression.laws.coupling import Coupling
-from pipeline.regression.laws.friction import SMOOTH, TRAVELS, Shape
+from pipeline.regression.laws.friction import BY_LOAD, SMOOTH, TRAVELS, Shape
 from pipeline.regression.preprocess import Rows
 from pipeline.regression.statistics.gram import Columns
 from pipeline.regression.statistics.noise import Span
@@ -69,6 +69,7 @@ class Design:
         shapes: Of every joint.
         slid: Of every joint, travel to sense of friction that rises over it, (M,).
         ways: The same at the rows, to tell how unsure it is there.
+        filtered_once: Columns that no load changes, by joint and what friction rises over.
     """
 
     rows: Rows
@@ -77,6 +78,7 @@ class Design:
     shapes: tuple[Shape, ...]
     slid: tuple[dict[float, Array], ...]
     ways: tuple[Ways, ...]
+    filtered_once: dict[tuple[int, float, float], dict[str, Array]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, model: pin.Model, rows: Rows) -> Design:
@@ -89,6 +91,11 @@ class Design:
         slid = tuple({d: rows.slid(j, d) for d in TRAVELS} for j in joints)
         ways = tuple(Ways.of(rows, j, slid[j]) for j in joints)
         return cls(rows, rows.thin(fine), fine, shapes, slid, ways)
+
+    def turned(self, model: pin.Model, rows: Rows) -> Design:
+        """The same about other zeros of the encoders: only bodies feel them."""
+        fine = regressor(model, *rows.fine)
+        return replace(self, rows=rows, bodies=rows.thin(fine), fine=fine)
 
     @property
     def joints(self) -> int:
@@ -109,7 +116,7 @@ class Design:
         local, doubt = [], []
         for j, shape in enumerate(self.shapes):
             terms, unsure = shape.columns(v[:, j], a[:, j], load[:, j], self.slid[j])
-            own = self._rows(terms)
+            own = self._rows(j, terms)
             local.append(own)
             doubt.append(np.maximum(r.thin(unsure), self.ways[j].doubt(own["coulomb"], shape)))
         shared: dict[str, dict[int, Array]] = {}
@@ -121,11 +128,16 @@ class Design:
             shared.update({n: self._actions(n, parts) for n, parts in apart.items()})
         return Columns(self.bodies, local, shared, np.column_stack(doubt))
 
-    def _rows(self, terms: dict[str, Array]) -> dict[str, Array]:
-        """Filter what jumps or bends, thin the rest."""
-        sharp = [n for n in terms if n not in SMOOTH]
+    def _rows(self, joint: int, terms: dict[str, Array]) -> dict[str, Array]:
+        """Filter what jumps or bends, thin the rest; what no load changes is filtered once."""
+        shape = self.shapes[joint]
+        key = (joint, shape.rise, shape.travel)
+        known = self.filtered_once.setdefault(key, {})
+        sharp = [n for n in terms if n not in SMOOTH and n not in known]
         filtered = self.rows.filtered(np.column_stack([terms[n] for n in sharp]))
         out = {n: filtered[:, k] for k, n in enumerate(sharp)}
+        known.update({n: x for n, x in out.items() if not n.startswith(BY_LOAD)})
+        out |= known
         return {n: out[n] if n in out else self.rows.thin(x) for n, x in terms.items()}
 
     def _actions(self, name: str, parts: dict[int, Array]) -> dict[int, Array]:

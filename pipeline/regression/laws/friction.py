@@ -88,6 +88,8 @@ class Law:
 SIGNED: Final = frozenset({"offset", "even"})
 #: Terms that are as smooth as the motion: it went through the filter already.
 SMOOTH: Final = frozenset({"offset", "rotor", "viscous", "quadratic", "inertia"})
+#: How terms begin that the load changes.
+BY_LOAD: Final = ("load", "driving", "driven", "quadrant", "motor", "rising_load", "sliding_load")
 #: Terms beside friction, decided on their own.
 BESIDE: Final = ("offset", "rotor")
 

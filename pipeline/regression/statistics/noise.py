@@ -13,7 +13,6 @@ from typing import Final
 
 import numpy as np
 import scipy.linalg
-import scipy.signal
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
@@ -58,9 +57,11 @@ class Colour:
         """Filter a contiguous stretch, (N, ...) to (N - p, ...), and scale it to unit noise."""
         if len(x) <= self.memory:
             return x[:0]
-        kernel = np.concatenate([[1.0], -self.ar])
-        out: Array = scipy.signal.lfilter(kernel, [1.0], x, axis=0)[self.memory :] / self.sigma
-        return out
+        p, n = self.memory, len(x)
+        out: Array = x[p:].copy()
+        for k, a in enumerate(self.ar, start=1):
+            out -= a * x[p - k : n - k]
+        return out / self.sigma
 
 
 def colour(residual: Array, spans: Sequence[Span], longest: int = LONGEST) -> Colour:
