@@ -15,7 +15,6 @@ from pipeline.identification.results import Found
 from pipeline.identification.whole.beside import kinds_of, names_of, unnamed
 from pipeline.identification.whole.errors import NotWholeError
 from pipeline.identification.whole.findings import suspected, told
-from pipeline.identification.whole.payload import find_payload, payloads, without
 from pipeline.identification.whole.rigid import held, rigid_model, still_joints
 from pipeline.identification.whole.sides import sides
 from pipeline.identification.whole.training import training_runs, without_known
@@ -139,11 +138,7 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
     except (RegressionError, np.linalg.LinAlgError) as error:
         raise NotWholeError(str(error)) from None
     unit = CHANNEL_UNITS[channel]
-    load = find_payload(result, rigid)
-    if load is not None:
-        result = replace(result, bodies=without(result.bodies, load))
-    findings = told(result, model, carried, channel)
-    findings = [*findings[:1], *payloads(load, model, rigid), *findings[1:], *sides(where)]
+    findings = [*told(result, model, carried, channel), *sides(where)]
     found = tuple(t.found(k, unit) for k, t in enumerate(findings, start=1))
     kept = [f for f in found if f.kept]
     decided = FAMILIES | names_of(kinds) | BEFORE_THE_JOINT
