@@ -71,7 +71,7 @@ class _Identification(Reporting):
             self._laws()
             result = self._finish()
             fallen = [e.extra for e in result.extras if e.level is Level.SUSPECTED]
-            unsure = self._unsure(result)
+            unsure = [*self._unsure(result), *self._unlikely(result)]
             if not fallen and not unsure:
                 return replace(result, terms=(*result.terms, *out))
             out += [replace(t, level=Level.SUSPECTED) for t in unsure]
@@ -94,6 +94,17 @@ class _Identification(Reporting):
             t
             for t, (j, _), good in zip(beside, claims, stands, strict=True)
             if t.level is Level.APPROXIMATE or not good or (t.term == "offset" and int(j) in bent)
+        ]
+
+    def _unlikely(self, result: Result) -> list[Term]:
+        """Terms of friction that most draws do without, and that close little."""
+        return [
+            t
+            for t in result.terms
+            if t.level is Level.APPROXIMATE
+            and t.place in self.names
+            and t.term not in BESIDE
+            and (t.share < 0.5 or t.closes < self.options.worth)
         ]
 
     def _beside_any_bodies(self, claims: Sequence[Key]) -> list[bool]:

@@ -13,6 +13,7 @@ from pipeline.regression.laws.bodies import with_parameters
 from pipeline.regression.laws.extras import TOLERATED
 from pipeline.regression.laws.friction import (
     BESIDE,
+    LAW,
     SIGNED,
     STRIBECK_SPEEDS,
     kind,
@@ -29,8 +30,6 @@ from pipeline.regression.statistics.solve import Fit, compare
 from pipeline.regression.statistics.standing import Standing
 
 Array = NDArray[np.float64]
-#: Share of a size that its law leaves open, one standard deviation.
-LAW = 0.01
 
 
 class Reporting(Standing):

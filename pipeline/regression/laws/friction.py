@@ -90,6 +90,9 @@ SIGNED: Final = frozenset({"offset", "even"})
 SMOOTH: Final = frozenset({"offset", "rotor", "viscous", "quadratic", "inertia"})
 #: How terms begin that the load changes.
 BY_LOAD: Final = ("load", "driving", "driven", "quadrant", "motor", "rising_load", "sliding_load")
+#: Share of a size, or of a torque, that no law of a textbook holds better than, one standard
+#: deviation.
+LAW: Final = 0.01
 #: Terms beside friction, decided on their own.
 BESIDE: Final = ("offset", "rotor")
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
 from pipeline.regression.laws.design import folds_of
+from pipeline.regression.laws.friction import LAW, LAWS
 from pipeline.regression.searching import Searching
 from pipeline.regression.statistics.gram import Columns, System, system
 from pipeline.regression.statistics.noise import Colour
 from pipeline.regression.statistics.selection import (
+    UNNAMED,
     Choice,
     choose_laws,
     upgrade,
@@ -53,10 +56,15 @@ class Choosing(Searching):
             gain, error = compare(plainly, fitted, self.weight)
             wins = wins and gain > -error
         self.refit_share = self._share_of_draws(kept_loss - loss)
-        if wins:
-            self.choices = refit
-        else:
-            self.choices, self.sigma = kept, 0.0
+        if not wins:
+            refit, self.sigma = kept, 0.0
+        self.choices = [self._worth(j, c) for j, c in enumerate(refit)]
+
+    def _worth(self, joint: int, choice: Choice) -> Choice:
+        """A curve only where friction takes more than a model of the rest holds to, `LAW`."""
+        torque = float(np.sqrt((self.rows.tau[:, joint] ** 2).mean()))
+        small = self.friction is not None and float(self.friction[joint]) < LAW * torque
+        return replace(choice, law=LAWS[0]) if choice.law is UNNAMED and small else choice
 
     def _share_of_draws(self, gain: Array) -> float:
         """Share of draws of the blocks in which their sum is a gain."""

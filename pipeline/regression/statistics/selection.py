@@ -82,7 +82,7 @@ def choose_law(
         weight: How often every block was drawn, (B,).
         joint: Which.
         common: Columns of the other joints and of couplings.
-        barred: Terms beside friction that are not allowed.
+        barred: Terms that are not allowed.
     """
     names = [t for law in LAWS for t in law.terms]
     names = list(dict.fromkeys([*names, *UNNAMED.terms, *BESIDE]))
@@ -98,6 +98,8 @@ def choose_law(
     top = eliminated.losses(use((*UNNAMED.terms, *beside)))
     found: list[tuple[Law, Array]] = []
     for law in LAWS:
+        if any((str(joint), t) in barred for t in law.terms):
+            continue
         sizes = eliminated.sizes(use((*law.terms, *beside)))
         if not all(possible(t, x) for t, x in zip(law.terms, sizes, strict=False)):
             continue

@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from pipeline.regression.laws.bodies import consistent
 from pipeline.regression.laws.friction import (
+    BESIDE,
+    LAW,
     SIGNED,
     kind,
     unit,
@@ -106,6 +108,16 @@ class Standing(Choosing):
             joints = 1
         return 0.5 * float(fit.system.rows.sum()) / self.model.nv * joints
 
+    def _told(self, fit: Fit, key: Key, x: Array) -> bool:
+        """Whether a term of friction takes more than a model of the rest holds to, `LAW`."""
+        place, term = key
+        if place == "shared" or term in BESIDE:
+            return True
+        column = self._columns(self.couplings).local[int(place)][term]
+        size = abs(float(x[fit.system.where[key]])) * float(np.sqrt((column**2).mean()))
+        torque = self.rows.tau[:, int(place)]
+        return size > LAW * float(np.sqrt((torque**2).mean()))
+
     def _small(
         self, fit: Fit, keys: Sequence[Key], x: Array, replicas: Array
     ) -> list[tuple[Key, Term]]:
@@ -113,7 +125,7 @@ class Standing(Choosing):
         error, t = standard_error(replicas), self._quantile(self.options.coverage)
         least: dict[str, tuple[float, Key]] = {}
         for key, (closes, gain) in self._closing(fit, keys).items():
-            if gain > 0 and closes > self.options.closes:
+            if gain > 0 and closes > self.options.closes and self._told(fit, key, x):
                 continue
             if key[0] not in least or closes < least[key[0]][0]:
                 least[key[0]] = (closes, key)
