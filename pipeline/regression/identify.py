@@ -25,6 +25,9 @@ from pipeline.regression.statistics.gram import Key
 from pipeline.regression.statistics.jackknife import standard_error
 from pipeline.regression.statistics.noise import Span
 
+#: A term that closes so much of the noise's power is needed, though its name may be another's.
+NEEDED = 1.0
+
 __all__ = ["Options", "identify"]
 
 
@@ -73,7 +76,8 @@ class _Identification(Reporting):
             fallen = [e.extra for e in result.extras if e.level is Level.SUSPECTED]
             unsure = [*self._unsure(result), *self._unlikely(result)]
             if not fallen and not unsure:
-                return replace(result, terms=(*result.terms, *out))
+                terms = self._without_claims(result)
+                return replace(result, terms=(*terms, *out))
             out += [replace(t, level=Level.SUSPECTED) for t in unsure]
             self.barred |= {(str(self.names.index(t.place)), t.term) for t in unsure}
             if fallen:
@@ -93,7 +97,23 @@ class _Identification(Reporting):
         return [
             t
             for t, (j, _), good in zip(beside, claims, stands, strict=True)
-            if t.level is Level.APPROXIMATE or not good or (t.term == "offset" and int(j) in bent)
+            # Where the URDF's bodies are kept they are no rival.
+            if t.closes < (NEEDED if result.refit else self.options.worth)
+            and (
+                t.level is Level.APPROXIMATE or not good or (t.term == "offset" and int(j) in bent)
+            )
+        ]
+
+    def _without_claims(self, result: Result) -> list[Term]:
+        """Terms, of which offsets and rotor inertias that bodies could be are approximate."""
+        beside = [t for t in result.terms if t.term in BESIDE]
+        stands = self._beside_any_bodies([(str(self.names.index(t.place)), t.term) for t in beside])
+        claimed = {id(t) for t, good in zip(beside, stands, strict=True) if not good}
+        return [
+            replace(t, level=Level.APPROXIMATE)
+            if id(t) in claimed and t.level is Level.CONFIRMED
+            else t
+            for t in result.terms
         ]
 
     def _unlikely(self, result: Result) -> list[Term]:
@@ -104,7 +124,7 @@ class _Identification(Reporting):
             if t.level is Level.APPROXIMATE
             and t.place in self.names
             and t.term not in BESIDE
-            and (t.share < 0.5 or t.closes < self.options.worth)
+            and (t.closes < self.options.worth or (t.share < 0.5 and t.closes < NEEDED))
         ]
 
     def _beside_any_bodies(self, claims: Sequence[Key]) -> list[bool]:
