@@ -23,13 +23,12 @@ from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.results import Estimate
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
 from pipeline.machine.machine import MachineModel
+from pipeline.regression.laws.friction import LAW
 
 Array = NDArray[np.float64]
 SAMPLES: Final = 300
 SEED: Final = 20240613
 _COVERED: Final = (0.025, 0.975)
-#: What a law of the literature leaves open about a machine, as a share of the value, one sigma.
-LAW: Final = 0.01
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from typing import Final
 import numpy as np
 
 from pipeline.effects.base import CHANNEL_COLUMNS, Place
-from pipeline.identification.regression.intervals import LAW
 from pipeline.identification.results import Estimate, Member
 from pipeline.identification.whole.told import Told, estimate, exact
 from pipeline.machine.machine import MachineModel
 from pipeline.regression import Result
 from pipeline.regression.laws.extras import EVERY, MECHANICAL, Extra, Kind
+from pipeline.regression.laws.friction import LAW
 from pipeline.regression.result import Beside, Level
 
 #: Effects of the catalogue by what a regression calls them.
@@ -26,7 +26,7 @@ EFFECTS: Final = {
     Kind.PLAY: "backlash",
 }
 #: Share of the largest torque within which play changes sides.
-_CROSSING: Final = 0.05
+CROSSING: Final = 0.05
 _COVER: Final = 1.96
 _RIVALS: Final = "another effect predicts as well in some draws of the log's blocks"
 
@@ -127,8 +127,7 @@ def _parameters(one: Beside, result: Result, model: MachineModel) -> tuple[Estim
     if kind is Kind.WIND:
         low, high = 1.0 / (x + half), 1.0 / max(x - half, 1e-12)
         return (Estimate("stiffness", min(1.0 / max(x, 1e-12), 1e12), low, high, "N*m/rad"),)
-    joint = result.friction[one.extra.joint].joint
-    crossing = _CROSSING * _largest(model, joint)
+    crossing = CROSSING * _largest(model)
     return (
         estimate("width", x, half, "rad", low=0.0, high=1.0),
         exact("stiffness", 1e12, "N*m/rad"),
@@ -136,8 +135,8 @@ def _parameters(one: Beside, result: Result, model: MachineModel) -> tuple[Estim
     )
 
 
-def _largest(model: MachineModel, joint: str) -> float:
-    """Torque with which a machine's gravity loads a joint at most, roughly [N*m]."""
+def _largest(model: MachineModel) -> float:
+    """Torque of a machine's weight at a tenth of a metre, for want of the log's own [N*m]."""
     mass = sum(float(i.mass) for i in list(model.rigid.inertias)[1:])
     return max(9.81 * mass * 0.1, 1e-3)
 

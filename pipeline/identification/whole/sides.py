@@ -10,6 +10,7 @@ import numpy as np
 
 from pipeline.identification import results as limits
 from pipeline.identification.results import Estimate, Member
+from pipeline.identification.whole.beside import CROSSING
 from pipeline.identification.whole.told import Told, estimate, exact
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.logs.prepared.measurement import PROVE
@@ -20,8 +21,6 @@ from pipeline.logs.signals.two_sides import TwoSides
 READ_OFF: Final = "read off two positions"
 #: Stiffness of what does not bend [N*m/rad].
 _RIGID: Final = 1e12
-#: Share of the joint's torque within which play changes sides.
-_CROSSING: Final = 0.05
 
 
 def sides(where: Whereabouts) -> list[Told]:
@@ -34,7 +33,7 @@ def sides(where: Whereabouts) -> list[Told]:
             parameters: tuple[Estimate, ...] = (
                 estimate("width", width, 1.96 * error, "rad", low=0.0, high=1.0),
                 stiffness,
-                exact("crossing", _CROSSING * torque, "N*m"),
+                exact("crossing", CROSSING * torque, "N*m"),
             )
             name = "backlash"
         elif seen.elastic:

@@ -73,17 +73,6 @@ UNNAMED: Final = frozenset({Kind.CURVE, Kind.DRAG})
 UNSIGNED: Final = frozenset({Kind.WIND, Kind.PLAY})
 #: Of a torque at the joint, whatever was logged to tell it.
 MECHANICAL: Final = frozenset({Kind.SPRING, Kind.RIPPLE, Kind.ZERO, Kind.LATE, *UNNAMED})
-UNITS: Final[Mapping[Kind, str]] = {
-    Kind.SPRING: "N*m/rad",
-    Kind.RIPPLE: "N*m",
-    Kind.ZERO: "rad",
-    Kind.GAIN: "1",
-    Kind.LATE: "s",
-    Kind.WIND: "rad/(N*m)",
-    Kind.PLAY: "rad",
-    Kind.CURVE: "N*m",
-    Kind.DRAG: "N*m",
-}
 
 
 @dataclass(frozen=True, order=True)
