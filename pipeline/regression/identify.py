@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
 import pinocchio as pin
 
 from pipeline.regression.laws.extras import Kind
@@ -20,9 +19,6 @@ from pipeline.regression.options import Options
 from pipeline.regression.preprocess import Rows
 from pipeline.regression.reporting import Reporting
 from pipeline.regression.result import Level, Result, Term
-from pipeline.regression.searching import ANY
-from pipeline.regression.statistics.gram import Key
-from pipeline.regression.statistics.jackknife import standard_error
 from pipeline.regression.statistics.noise import Span
 
 #: A term that closes so much of the noise's power is needed, though its name may be another's.
@@ -92,7 +88,7 @@ class _Identification(Reporting):
             if t.term in BESIDE and not (t.term == "offset" and t.place in sprung)
         ]
         claims = [(str(self.names.index(t.place)), t.term) for t in beside]
-        stands = self._beside_any_bodies(claims)
+        stands = self._beside_any_bodies(claims, self._keys())
         bent = self._bent(self._keys()) if beside and self.options.extras else set()
         return [
             t
@@ -107,7 +103,8 @@ class _Identification(Reporting):
     def _without_claims(self, result: Result) -> list[Term]:
         """Terms, of which offsets and rotor inertias that bodies could be are approximate."""
         beside = [t for t in result.terms if t.term in BESIDE]
-        stands = self._beside_any_bodies([(str(self.names.index(t.place)), t.term) for t in beside])
+        claims = [(str(self.names.index(t.place)), t.term) for t in beside]
+        stands = self._beside_any_bodies(claims, self._keys())
         claimed = {id(t) for t, good in zip(beside, stands, strict=True) if not good}
         return [
             replace(t, level=Level.APPROXIMATE)
@@ -126,20 +123,6 @@ class _Identification(Reporting):
             and t.term not in BESIDE
             and (t.closes < self.options.worth or (t.share < 0.5 and t.closes < NEEDED))
         ]
-
-    def _beside_any_bodies(self, claims: Sequence[Key]) -> list[bool]:
-        """Whether sizes hold no zero beside bodies that may be anything."""
-        columns = self._columns(self.couplings)
-        fit = self._fit(self._system(columns), columns, ANY)
-        keys = self._keys()
-        have = [k for k in claims if k in keys]
-        at = fit.columns(keys)
-        first = len(at) - len(keys)
-        size = fit.solve(self.weight, at)[first:]
-        error = standard_error(np.array([fit.solve(w, at)[first:] for w in self._leave_one_out()]))
-        t = self._quantile(1.0 - self.options.error_rate / max(len(keys), 1))
-        sure = {k: abs(x) > t * e for k, x, e in zip(keys, size, error, strict=True)}
-        return [k not in have or bool(sure[k]) for k in claims]
 
     def _finish(self) -> Result:
         suspected: list[Term] = []

@@ -19,7 +19,7 @@ from pipeline.regression.state import State
 from pipeline.regression.statistics.gram import Columns, Key, System
 from pipeline.regression.statistics.noise import Colour, colour
 from pipeline.regression.statistics.selection import find_coupling
-from pipeline.regression.statistics.solve import RIDGE, Eliminated
+from pipeline.regression.statistics.solve import RIDGE, Eliminated, compare
 
 
 class Stages(State):
@@ -147,11 +147,7 @@ class Stages(State):
                 names += [f"sliding@{k}", f"sliding_load@{k}"]
             own = fit.system.index([(str(j), t) for t in names])
             e = Eliminated(fit, self.folds, self.weight, fit.columns(common), own)
-            losses = [
-                float(e.losses([0, 1, 2, 3 + 2 * k, 4 + 2 * k]).sum())
-                for k in range(len(TRANSITIONS) + len(TRAVELS))
-            ]
-            best = int(np.argmin(losses))
+            best = self._likeliest(e, len(names))
             if best < len(TRANSITIONS):
                 rise = TRANSITIONS[best] * shapes[j].speed
                 shapes[j] = replace(shapes[j], rise=rise, travel=0.0)
@@ -159,6 +155,29 @@ class Stages(State):
                 travel = TRAVELS[best - len(TRANSITIONS)]
                 shapes[j] = replace(shapes[j], rise=0.0, travel=travel)
         self.design = replace(self.design, shapes=tuple(shapes))
+
+    def _likeliest(self, e: Eliminated, count: int) -> int:
+        """Which rise predicts best, without an offset where that predicts as well.
+
+        Of a joint that rests between moves in one direction an offset is dry friction that is held
+        at rest; beside it any rise would do.
+
+        Args:
+            e: Of viscous friction, what is beside friction, and pairs of columns by rise.
+            count: Of these columns.
+        """
+        first, offset = 1 + len(BESIDE), 1 + BESIDE.index("offset")
+        both = [
+            [
+                e.losses([*(n for n in range(first) if n not in out), k, k + 1])
+                for out in ((), (offset,))
+            ]
+            for k in range(first, count, 2)
+        ]
+        best, bare = (min((x[w] for x in both), key=lambda x: float(x.sum())) for w in (0, 1))
+        worse, error = compare(bare, best, self.weight)
+        sums = [float(x[int(worse <= error)].sum()) for x in both]
+        return int(np.argmin(sums))
 
     def _loss_with(self, couplings: Sequence[Coupling]) -> float:
         """Predictive loss beside friction of any shape with some couplings."""

@@ -126,7 +126,9 @@ def _background(named: Named, truth: Mapping[str, Any]) -> bool:
         own = {p for h in hidden if h["effect"] in FRICTION for p in h["place"]}
         return bool(truth["friction"]) and not own & set(named.place)
     if named.effect == "effort_offset":  # as any friction that one direction has more of
-        return set(named.place) <= set(truth["uneven"]) - {p for h in hidden for p in h["place"]}
+        own = FRICTION | {"effort_offset"}
+        gone = {p for h in hidden if h["effect"] in own for p in h["place"]}
+        return set(named.place) <= set(truth["uneven"]) - gone
     if named.effect in BODIES:
         return not any(h["effect"] in BODIES for h in hidden) or named.effect != "link_mass"
     return (

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from pipeline.regression.laws.design import folds_of
 from pipeline.regression.laws.friction import LAW, LAWS
-from pipeline.regression.searching import Searching
-from pipeline.regression.statistics.gram import Columns, System, system
+from pipeline.regression.searching import ANY, Searching
+from pipeline.regression.statistics.gram import Columns, Key, System, system
+from pipeline.regression.statistics.jackknife import standard_error
 from pipeline.regression.statistics.noise import Colour
 from pipeline.regression.statistics.selection import (
     UNNAMED,
@@ -23,6 +24,10 @@ from pipeline.regression.statistics.selection import (
 from pipeline.regression.statistics.solve import Fit, compare
 
 Array = NDArray[np.float64]
+#: Laws of all joints, and the predictive loss of every block with them.
+Found = tuple[list[Choice], Array]
+#: What is left by a refit that closes most of what is left without: less than this share.
+MOST = 0.5
 
 
 class Choosing(Searching):
@@ -32,33 +37,63 @@ class Choosing(Searching):
         """Laws beside the URDF's bodies and beside fitted ones; a refit has to win beyond chance.
 
         Rotor inertia and a link's inertia, or a load and friction, stand in for each other: either
-        way needs laws of its own before the two can be compared. A refit must carry over: from one
-        half of the log to the other as well, and in torque itself, not only in what whitening sees.
+        way needs laws of its own before the two can be compared. An offset that bodies could be as
+        well is no reason to keep the URDF's: bodies are looked at first.
         """
         columns = self._columns(self.couplings)
         normal = self._system(columns)
-        # The same rows with every joint's noise taken as white: what is promised is an error of
-        # torque, and whitening hardly looks at its slow part.
-        white = [Colour(np.zeros(0), c.level, c.level, 1.0) for c in self.noise]
-        plain = system(columns, self.rows.tau, self.blocks, white)
         kept, kept_loss = self._chosen(self._fit(normal, columns, 0.0))
-        refit, loss = self._chosen(self._fit(normal, columns, self.sigma))
-        before = self.sigma
-        self._strength(normal, columns, self._keys(refit))
-        if self.sigma != before:
-            refit, loss = self._chosen(self._fit(normal, columns, self.sigma))
-        wins = self._beyond_chance(kept_loss, loss)
-        count = len(self.blocks)
-        for folds in (self.folds, folds_of(count), folds_of(count, 2)):
-            plainly = self._plain_losses(normal, plain, columns, 0.0, kept, folds)
-            fitted = self._plain_losses(normal, plain, columns, self.sigma, refit, folds)
-            # In torque itself, and from part to part of the motion, it must not lose beyond chance.
-            gain, error = compare(plainly, fitted, self.weight)
-            wins = wins and gain > -error
+        refit, loss = self._refit(normal, columns)
+        wins = self._carries(normal, columns, (kept, kept_loss), (refit, loss))
+        claims = [(str(j), "offset") for j, c in enumerate(kept) if "offset" in c.beside]
+        stands = self._beside_any_bodies(claims, self._keys(kept))
+        claims = [c for c, good in zip(claims, stands, strict=True) if not good]
+        if not wins and claims:
+            barred, sigma = self.barred, self.sigma
+            self.barred = barred | set(claims)
+            first = self._chosen(self._fit(normal, columns, 0.0))
+            refit, loss = self._refit(normal, columns)
+            worse, error = compare(loss, kept_loss, self.weight)
+            wins = worse <= error and self._carries(normal, columns, first, (refit, loss))
+            if not wins:
+                self.barred, self.sigma = barred, sigma
         self.refit_share = self._share_of_draws(kept_loss - loss)
         if not wins:
             refit, self.sigma = kept, 0.0
         self.choices = [self._worth(j, c) for j, c in enumerate(refit)]
+
+    def _refit(self, normal: System, columns: Columns) -> Found:
+        """Laws beside fitted bodies, with the uncertainty of the URDF that has most evidence."""
+        found = self._chosen(self._fit(normal, columns, self.sigma))
+        before = self.sigma
+        self._strength(normal, columns, self._keys(found[0]))
+        if self.sigma == before:
+            return found
+        return self._chosen(self._fit(normal, columns, self.sigma))
+
+    def _carries(self, normal: System, columns: Columns, kept: Found, refit: Found) -> bool:
+        """Whether fitted bodies predict better beyond chance, and carry over.
+
+        In torque itself they must not lose, not only in what whitening sees; and where they do not
+        close most of what is left, not from one part of the motion to the others either: a part
+        that hardly moves a joint tells little of its bodies.
+        """
+        if not self._beyond_chance(kept[1], refit[1]):
+            return False
+        # The same rows with every joint's noise taken as white: what is promised is an error of
+        # torque, and whitening hardly looks at its slow part.
+        white = [Colour(np.zeros(0), c.level, c.level, 1.0) for c in self.noise]
+        plain = system(columns, self.rows.tau, self.blocks, white)
+        count = len(self.blocks)
+        for folds in (self.folds, folds_of(count), folds_of(count, 2)):
+            first = self._plain_losses(normal, plain, columns, 0.0, kept[0], folds)
+            second = self._plain_losses(normal, plain, columns, self.sigma, refit[0], folds)
+            gain, error = compare(first, second, self.weight)
+            if gain <= -error:
+                return False
+            if folds is self.folds and second.sum() < MOST * first.sum():
+                return True
+        return True
 
     def _worth(self, joint: int, choice: Choice) -> Choice:
         """A curve only where friction takes more than a model of the rest holds to, `LAW`."""
@@ -73,9 +108,30 @@ class Choosing(Searching):
         return float((gain[drawn].sum(axis=1) > 0).mean())
 
     def _beyond_chance(self, first: Array, second: Array) -> bool:
+        """Whether losses of blocks are less, by their sizes or by how many of them by how much.
+
+        A model that explains little fails at a few blocks by far more than at the rest: then the
+        mean has no error to speak of, and ranks tell more (Wilcoxon, Biometrics Bulletin 1, 1945).
+        """
         gain, error = compare(first, second, self.weight)
-        chance = scipy.stats.t.ppf(1 - self.options.error_rate, len(self.blocks) - 1)
-        return gain > float(chance) * error
+        rate = self.options.error_rate / 2
+        if gain > float(scipy.stats.t.ppf(1 - rate, len(self.blocks) - 1)) * error:
+            return True
+        ranks = scipy.stats.wilcoxon(first - second, alternative="greater")
+        return bool(gain > 0 and ranks.pvalue < rate)
+
+    def _beside_any_bodies(self, claims: Sequence[Key], keys: Sequence[Key]) -> list[bool]:
+        """Whether sizes hold no zero beside bodies that may be anything."""
+        columns = self._columns(self.couplings)
+        fit = self._fit(self._system(columns), columns, ANY)
+        have = [k for k in claims if k in keys]
+        at = fit.columns(keys)
+        first = len(at) - len(keys)
+        size = fit.solve(self.weight, at)[first:]
+        error = standard_error(np.array([fit.solve(w, at)[first:] for w in self._leave_one_out()]))
+        t = self._quantile(1.0 - self.options.error_rate / max(len(keys), 1))
+        sure = {k: abs(x) > t * e for k, x, e in zip(keys, size, error, strict=True)}
+        return [k not in have or bool(sure[k]) for k in claims]
 
     def _plain_losses(
         self,
@@ -97,7 +153,7 @@ class Choosing(Searching):
             out[fold] = [bare.loss(int(b), at, x) for b in fold]
         return out
 
-    def _chosen(self, fit: Fit) -> tuple[list[Choice], Array]:
+    def _chosen(self, fit: Fit) -> Found:
         """Laws of all joints and the predictive loss of every block with them."""
         rich = self._general()
         found = choose_laws(fit, self.folds, self.weight, rich, self._shared, 3, self.barred)

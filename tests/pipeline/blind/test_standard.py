@@ -76,6 +76,11 @@ def test_an_offset_where_friction_is_uneven_is_the_machines_own() -> None:
     offset = named("effort_offset", "joint_1")
     assert judged(truth(SPRING), offset).wrong
     assert not judged(truth(SPRING, uneven=["joint_1"]), offset).wrong
+    ripple = ("torque_ripple", "joint_1", {"amplitude": 0.2})
+    assert not judged(truth(ripple, uneven=["joint_1"]), offset).wrong
+    # A hidden law of friction takes the place of what was uneven.
+    law = ("stribeck_friction", "joint_1", {"coulomb": 0.2})
+    assert judged(truth(law, uneven=["joint_1"]), offset).wrong
 
 
 def test_friction_named_on_a_machine_without_any_is_wrong() -> None:
