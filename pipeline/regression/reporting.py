@@ -8,6 +8,7 @@ import numpy as np
 import scipy.stats
 from numpy.typing import NDArray
 
+from pipeline.regression.excluding import Excluding
 from pipeline.regression.laws.base_parameters import base_set
 from pipeline.regression.laws.bodies import with_parameters
 from pipeline.regression.laws.extras import TOLERATED
@@ -27,13 +28,15 @@ from pipeline.regression.statistics.selection import (
     UNNAMED,
 )
 from pipeline.regression.statistics.solve import Fit, compare
-from pipeline.regression.statistics.standing import Standing
 
 Array = NDArray[np.float64]
 
 
-class Reporting(Standing):
+class Reporting(Excluding):
     """Findings."""
+
+    #: Columns whose rivals the log excludes.
+    excluded: frozenset[Key] = frozenset()
 
     def _result(
         self,
@@ -46,6 +49,7 @@ class Reporting(Standing):
         suspected: Sequence[Term],
     ) -> Result:
         t, error = self._quantile(self.options.coverage), self._errors(fit, keys, x, replicas)
+        self.excluded = self._excluding(keys, dict(zip(fit.system.keys, x, strict=True)))
         terms = self._terms(fit, keys, x, error, shares)
         frictions = [self._friction(j, fit, keys, x, terms, laws[j]) for j in range(len(laws))]
         base, condition, lost = self._base(x, replicas, t)
@@ -104,6 +108,7 @@ class Reporting(Standing):
                 and closes > o.closes
                 and (x[k] > 0 or term in SIGNED)
                 and self._confirms([int(place)] if place != "shared" else [])
+                and key in self.excluded
             )
             level = Level.CONFIRMED if stands else Level.APPROXIMATE
             terms.append(
@@ -184,6 +189,7 @@ class Reporting(Standing):
             if abs(x[at][0]) - half[0] < TOLERATED.get(e.kind, -np.inf):
                 level = Level.SUSPECTED
             doubted = e.joint in bent or self._harmonic(e) or not self._confirms(joints)
+            doubted = doubted or not self.excluded.issuperset(self._of(e))
             if level is Level.CONFIRMED and doubted:
                 level = Level.APPROXIMATE
             out.append(Beside(e, x[at], half, won.share, won.rivals, closes, level))

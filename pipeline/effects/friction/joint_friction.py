@@ -8,17 +8,18 @@ from actuators.elements.joint_friction import JointFriction
 from pipeline.effects.base import Effect, Parameter, Place, Values
 from pipeline.machine.machine import MachineModel
 
-#: Terms of a law in words, and the effect of the catalogue that each is by itself.
-_TERMS: Final = {
-    "coulomb": ("Coulomb", "coulomb_friction"),
-    "viscous": ("viscous", "viscous_friction"),
-    "excess": ("Stribeck", "stribeck_friction"),
-    "quadratic": ("quadratic", ""),
-    "saturating": ("saturating", ""),
-    "load": ("load-dependent", "load_dependent_friction"),
-    "driving": ("load-dependent by quadrant", "backdrive_loss"),
-    "asymmetry": ("by direction", ""),
-}
+#: Terms of a law, any of which makes it so in words, and the effect of the catalogue that this is
+#: by itself.
+_TERMS: Final = (
+    (("coulomb",), "Coulomb", "coulomb_friction"),
+    (("viscous",), "viscous", "viscous_friction"),
+    (("excess",), "Stribeck", "stribeck_friction"),
+    (("quadratic",), "quadratic", ""),
+    (("saturating",), "saturating", ""),
+    (("load",), "load-dependent", "load_dependent_friction"),
+    (("driving", "driven"), "load-dependent by quadrant", "backdrive_loss"),
+    (("asymmetry",), "by direction", ""),
+)
 
 
 class JointFrictionLaw(Effect):
@@ -50,12 +51,14 @@ class JointFrictionLaw(Effect):
 
     def law(self, values: Values) -> str:
         """The terms there are, in words."""
-        words = [word for name, (word, _) in _TERMS.items() if values.get(name)]
+        words = [word for names, word, _ in _TERMS if any(map(values.get, names))]
         return _listed(words) if words else "none"
 
     def amounts_to(self, values: Values) -> tuple[str, ...]:
         """Effects of one term each that it is the sum of."""
-        return tuple(effect for name, (_, effect) in _TERMS.items() if values.get(name) and effect)
+        return tuple(
+            effect for names, _, effect in _TERMS if effect and any(map(values.get, names))
+        )
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert the law at the joint's side."""

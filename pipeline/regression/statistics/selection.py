@@ -1,4 +1,8 @@
-"""Which law: the simplest within one standard error of the best on blocks that did not fit it."""
+"""Which law: the simplest that predicts blocks that did not fit it as well as the best named one.
+
+As well is within one standard error; none of them is the law where a curve predicts better than all
+beyond chance.
+"""
 
 from __future__ import annotations
 
@@ -19,6 +23,8 @@ Folds = Sequence[NDArray[np.intp]]
 
 #: Share of what two separate actions would gain that one and the same must reach.
 SAME = 0.9
+#: At which a curve predicts better than every law with a name by chance.
+CHANCE = 0.05
 #: Friction per load that no law exceeds: no load could drive the shaft.
 MOST_SHARE = 0.9
 #: What a joint is told when no law of the catalogue comes near the general member.
@@ -104,19 +110,26 @@ def choose_law(
         if not all(possible(t, x) for t, x in zip(law.terms, sizes, strict=False)):
             continue
         found.append((law, eliminated.losses(use((*law.terms, *beside)))))
-    candidates = [*found, (UNNAMED, top)]
-    best = min(candidates, key=lambda c: float(weight @ c[1]))
+    if not found:
+        return Choice(UNNAMED, beside, np.inf, None)
+    first, best = min(found, key=lambda c: float(weight @ c[1]))
+    mean, error = compare(best, top, weight)
+    if mean > _limit(weight) * error:
+        return Choice(UNNAMED, beside, np.inf, first)
     near = []
     for law, loss in found:
-        mean, error = compare(loss, best[1], weight)
+        mean, error = compare(loss, best, weight)
         if mean <= error:
             near.append((law.shapes, float(weight @ loss), law, loss))
-    first = min(found, key=lambda c: float(weight @ c[1]))[0] if found else None
-    if not near:
-        return Choice(UNNAMED, beside, np.inf, first)
     _, _, law, loss = min(near, key=lambda x: x[:2])
     mean, error = compare(loss, top, weight)
     return Choice(law, beside, mean / max(error, 1e-300), first)
+
+
+def _limit(weight: Array) -> float:
+    """Standard errors beyond which one model predicts better than another, `CHANCE` apart."""
+    blocks = int((weight > 0).sum())
+    return float(scipy.stats.t.ppf(1 - CHANCE, max(blocks - 1, 1)))
 
 
 def possible(term: str, size: float) -> bool:
@@ -173,7 +186,7 @@ def upgrade(
     shared: Sequence[Key],
     barred: Collection[Key] = (),
 ) -> list[Choice]:
-    """Forward and swap steps until the whole model is within one standard error of the best.
+    """Forward and swap steps until the best is no better than the whole model beyond chance.
 
     A joint's law may stop one standard error short of its best; many joints' shortcomings add up.
     A step gives one joint a richer law, or gives or takes its offset or rotor inertia.
@@ -192,7 +205,7 @@ def upgrade(
     best = min([*uniform, loss], key=lambda x: float(weight @ x))
     while True:
         mean, error = compare(loss, best, weight)
-        if mean <= error:
+        if mean <= _limit(weight) * error:
             return now
         trials = []
         for j, c in enumerate(now):

@@ -1,0 +1,46 @@
+"""How large what is not told could be: a name stands only where the log excludes its rivals.
+
+That a richer law predicts no better is no evidence against it where the log could not tell: a name
+needs that what would make it another one is known to be small.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.regression.statistics.gram import Key
+from pipeline.regression.statistics.solve import Fit
+
+Array = NDArray[np.float64]
+
+
+def largest(fit: Fit, weight: Array, keys: Sequence[Key], rivals: Sequence[Key], t: float) -> Array:
+    """Largest size that each of some columns could have if it alone were added, (R,).
+
+    With the curvature of the fit G, a column u added to those that are told, K, has
+
+        s = G_uu - G_uK G_KK^-1 G_Ku,   x = (m_u - G_uK G_KK^-1 m_K) / s,   var x = 1 / s
+
+    (block inversion); s is no less than what is known of u beforehand.
+
+    Args:
+        fit: Regressions.
+        weight: How often every block counts, (B,).
+        keys: Columns that are told, free bodies beside them.
+        rivals: Columns that are not.
+        t: Half of the interval, in standard errors.
+    """
+    at = fit.columns([*keys, *rivals])
+    k = len(at) - len(rivals)
+    gram, moment = fit.normal(weight, at)
+    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    gram, moment = gram / np.outer(scale, scale), moment / scale
+    inner = np.linalg.pinv(gram[:k, :k], rcond=1e-12, hermitian=True)
+    across = gram[k:, :k] @ inner
+    left = np.diag(gram)[k:] - np.einsum("uk,uk->u", across, gram[k:, :k])
+    left = np.maximum(left, 1e-12)
+    size = (moment[k:] - across @ moment[:k]) / left
+    return np.asarray((np.abs(size) + t / np.sqrt(left)) / scale[k:])
