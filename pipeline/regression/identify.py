@@ -21,9 +21,6 @@ from pipeline.regression.reporting import Reporting
 from pipeline.regression.result import Level, Result, Term
 from pipeline.regression.statistics.noise import Span
 
-#: A term that closes so much of the noise's power is needed, though its name may be another's.
-NEEDED = 1.0
-
 __all__ = ["Options", "identify"]
 
 
@@ -94,7 +91,7 @@ class _Identification(Reporting):
             t
             for t, (j, _), good in zip(beside, claims, stands, strict=True)
             # Where the URDF's bodies are kept they are no rival.
-            if t.closes < (NEEDED if result.refit else self.options.worth)
+            if t.closes < (self.options.needed if result.refit else self.options.worth)
             and (
                 t.level is Level.APPROXIMATE or not good or (t.term == "offset" and int(j) in bent)
             )
@@ -121,7 +118,9 @@ class _Identification(Reporting):
             if t.level is Level.APPROXIMATE
             and t.place in self.names
             and t.term not in BESIDE
-            and (t.closes < self.options.worth or (t.share < 0.5 and t.closes < NEEDED))
+            and (
+                t.closes < self.options.worth or (t.share < 0.5 and t.closes < self.options.needed)
+            )
         ]
 
     def _finish(self) -> Result:

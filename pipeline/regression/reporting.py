@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.regression.excluding import Excluding
 from pipeline.regression.laws.base_parameters import base_set
 from pipeline.regression.laws.bodies import with_parameters
-from pipeline.regression.laws.extras import TOLERATED
+from pipeline.regression.laws.extras import TOLERATED, Kind, orders
 from pipeline.regression.laws.friction import (
     BESIDE,
     LAW,
@@ -180,10 +180,13 @@ class Reporting(Excluding):
             spread = np.cov(replicas[:, at].T) * (blocks - 1) ** 2 / blocks
             size = float(x[at] @ np.linalg.pinv(np.atleast_2d(spread)) @ x[at]) / len(at)
             chance = float(scipy.stats.f.sf(size, len(at), max(blocks - len(at), 1)))
+            if e.kind is Kind.RIPPLE:  # its order is the best of many
+                chance *= max(orders(self.rows, e.joint).size, 1)
             won, level = self.won[e], Level.SUSPECTED
             if mean > doubt and closes > o.worth and chance < 1.0 - o.coverage:
                 level = Level.APPROXIMATE
-                if won.share >= o.sure and chance < o.error_rate / max(len(keys), 1):
+                known = closes > o.needed and chance < o.error_rate / max(len(keys), 1)
+                if won.share >= o.sure and known:
                     level = Level.CONFIRMED
             half = self._quantile(o.coverage) * error[at]
             if abs(x[at][0]) - half[0] < TOLERATED.get(e.kind, -np.inf):

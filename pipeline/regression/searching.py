@@ -34,7 +34,7 @@ from pipeline.regression.stages import Stages
 from pipeline.regression.statistics.gram import Columns, Key
 from pipeline.regression.statistics.jackknife import standard_error
 from pipeline.regression.statistics.noise import colour
-from pipeline.regression.statistics.solve import Eliminated, Fit, compare
+from pipeline.regression.statistics.solve import Eliminated, Fit, beyond_chance, compare
 
 Array = NDArray[np.float64]
 #: Rounds of fitting about new values, and the relative change that ends them.
@@ -213,18 +213,17 @@ class Searching(Stages):
         # richest model leaves beyond its noise counts as noise, too.
         noise = max(float(without.sum()) / (0.5 * float(fit.system.rows.sum())), 1.0)
         least = noise * float(np.log(looks / self.options.error_rate))
-        limit = self._chance(1.0 - self.options.sure)
         tried: list[tuple[float, Extra, Array]] = []
         for extra, _ in offered:
             use = [at[n] for n in extra.names]
             if extra.kind in UNSIGNED and e.sizes(use)[0] <= 0:
                 continue
             loss = e.losses(use)
-            mean, error = compare(without, loss, self.weight)
+            mean, _ = compare(without, loss, self.weight)
             part = self._noise_power(fit, [j for n in extra.names for j in actions[n]])
             closes = mean * len(self.blocks) / part
-            enough = mean * len(self.blocks) > least and mean > limit * error
-            if enough and closes > self.options.worth:
+            sure = beyond_chance(without, loss, 1.0 - self.options.sure)
+            if sure and mean * len(self.blocks) > least and closes > self.options.worth:
                 tried.append((mean, extra, loss))
         return _chosen(tried, self.weight, self.options.draws, self.options.seed)
 

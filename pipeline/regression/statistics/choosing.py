@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import scipy.stats
 from numpy.typing import NDArray
 
 from pipeline.regression.laws.design import folds_of
@@ -21,7 +20,7 @@ from pipeline.regression.statistics.selection import (
     choose_laws,
     upgrade,
 )
-from pipeline.regression.statistics.solve import Fit, compare
+from pipeline.regression.statistics.solve import Fit, beyond_chance, compare
 
 Array = NDArray[np.float64]
 #: Laws of all joints, and the predictive loss of every block with them.
@@ -78,7 +77,7 @@ class Choosing(Searching):
         close most of what is left, not from one part of the motion to the others either: a part
         that hardly moves a joint tells little of its bodies.
         """
-        if not self._beyond_chance(kept[1], refit[1]):
+        if not beyond_chance(kept[1], refit[1], self.options.error_rate):
             return False
         # The same rows with every joint's noise taken as white: what is promised is an error of
         # torque, and whitening hardly looks at its slow part.
@@ -106,19 +105,6 @@ class Choosing(Searching):
         rng, n = np.random.default_rng(self.options.seed), len(gain)
         drawn = rng.integers(0, n, (max(self.options.draws, 1), n))
         return float((gain[drawn].sum(axis=1) > 0).mean())
-
-    def _beyond_chance(self, first: Array, second: Array) -> bool:
-        """Whether losses of blocks are less, by their sizes or by how many of them by how much.
-
-        A model that explains little fails at a few blocks by far more than at the rest: then the
-        mean has no error to speak of, and ranks tell more (Wilcoxon, Biometrics Bulletin 1, 1945).
-        """
-        gain, error = compare(first, second, self.weight)
-        rate = self.options.error_rate / 2
-        if gain > float(scipy.stats.t.ppf(1 - rate, len(self.blocks) - 1)) * error:
-            return True
-        ranks = scipy.stats.wilcoxon(first - second, alternative="greater")
-        return bool(gain > 0 and ranks.pvalue < rate)
 
     def _beside_any_bodies(self, claims: Sequence[Key], keys: Sequence[Key]) -> list[bool]:
         """Whether sizes hold no zero beside bodies that may be anything."""

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pipeline.regression.laws.coupling import TERMS, Coupling
 from pipeline.regression.laws.friction import BESIDE, LAWS, QUADRANT, SIGNED, Law, general_terms
 from pipeline.regression.statistics.gram import Key
-from pipeline.regression.statistics.solve import Eliminated, Fit, compare
+from pipeline.regression.statistics.solve import Eliminated, Fit, beyond_chance, compare
 
 Array = NDArray[np.float64]
 Folds = Sequence[NDArray[np.intp]]
@@ -270,9 +270,7 @@ def find_coupling(
     own = fit.system.index([("shared", n) for c in candidates for n in c.half_names])
     eliminated = Eliminated(fit, folds, weight, fit.columns(common), own)
     without = eliminated.losses([])
-    blocks = int((weight > 0).sum())
-    limit = float(scipy.stats.t.ppf(1 - error_rate / max(len(candidates), 1), max(blocks - 1, 1)))
-    side_limit = float(scipy.stats.t.ppf(1 - error_rate, max(blocks - 1, 1)))
+    rate = error_rate / max(len(candidates), 1)
     best: tuple[float, Coupling] | None = None
     for k, c in enumerate(candidates):
         first = 2 * len(TERMS) * k
@@ -284,13 +282,13 @@ def find_coupling(
         if not both.shape[1] or min(eliminated.mixed_sizes(both)) < 0:
             continue
         coupled = eliminated.mixed(both)
-        mean, error = compare(without, coupled, weight)
-        if mean <= limit * error or (best is not None and mean <= best[0]):
+        mean, _ = compare(without, coupled, weight)
+        if (best is not None and mean <= best[0]) or not beyond_chance(without, coupled, rate):
             continue
         halves = range(first, first + 2 * len(TERMS))
         apart = eliminated.losses(halves)
-        sides = [compare(eliminated.losses(halves[side::2]), apart, weight) for side in (0, 1)]
+        sides = [eliminated.losses(halves[side::2]) for side in (0, 1)]
         enough = mean >= SAME * compare(without, apart, weight)[0]
-        if enough and all(gain > side_limit * doubt for gain, doubt in sides):
+        if enough and all(beyond_chance(one, apart, error_rate) for one in sides):
             best = (mean, c)
     return None if best is None else best[1]

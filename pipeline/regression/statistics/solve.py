@@ -8,6 +8,7 @@ from typing import Final
 
 import numpy as np
 import scipy.linalg
+import scipy.stats
 from numpy.typing import NDArray
 
 from pipeline.regression.laws.bodies import Bodies
@@ -211,3 +212,21 @@ def compare(first: Array, second: Array, weight: Array) -> tuple[float, float]:
     mean = float(weight @ d) / n
     variance = float(weight @ (d - mean) ** 2) / max(n - 1.0, 1.0)
     return mean, float(np.sqrt(variance / n))
+
+
+def beyond_chance(first: Array, second: Array, rate: float) -> bool:
+    """Whether losses of blocks are less in the second, by their sizes or by their ranks.
+
+    A model that explains little fails at a few blocks by far more than at the rest: then the mean
+    has no error to speak of, and ranks tell more (Wilcoxon, Biometrics Bulletin 1, 1945).
+
+    Args:
+        first: (B,).
+        second: (B,).
+        rate: At which either says so by chance, half of it each.
+    """
+    gain, error = compare(first, second, np.ones(len(first)))
+    if gain > float(scipy.stats.t.isf(rate / 2, max(len(first) - 1, 1))) * error:
+        return True
+    ranks = scipy.stats.wilcoxon(first - second, alternative="greater")
+    return bool(gain > 0 and ranks.pvalue < rate / 2)
