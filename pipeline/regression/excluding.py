@@ -39,7 +39,8 @@ class Excluding(Standing):
             for j in range(self.model.nv)
             if kind in offered and (kind, j) not in have
         ]
-        actions = self._seen().columns(rivals) if rivals else {}
+        felt, actions = self._acting([(e, 1) for e in rivals])
+        rivals = [e for e, _ in felt]
         columns = self._columns(self.couplings)
         columns = replace(columns, shared={**columns.shared, **actions})
         fit = self._fit(self._system(columns), columns, self.sigma)
@@ -59,7 +60,6 @@ class Excluding(Standing):
                 for e in rivals
                 if e.joint == joint and e.kind is not but
                 for n in e.names
-                if actions.get(n)
             ]
 
         out: set[Key] = set()

@@ -67,12 +67,17 @@ class _Identification(Reporting):
             self._laws()
             result = self._finish()
             fallen = [e.extra for e in result.extras if e.level is Level.SUSPECTED]
-            unsure = [*self._unsure(result), *self._unlikely(result)]
+            beside, unlikely = self._unsure(result), self._unlikely(result)
+            unsure = [*beside, *unlikely]
             if not fallen and not unsure:
                 terms = self._without_claims(result)
-                return replace(result, terms=(*terms, *out))
+                told = {(t.place, t.term) for t in terms}
+                left = [t for t in out if (t.place, t.term) not in told]
+                return replace(result, terms=(*terms, *left))
             out += [replace(t, level=Level.SUSPECTED) for t in unsure]
-            self.barred |= {(str(self.names.index(t.place)), t.term) for t in unsure}
+            instead = self.bodies_instead if result.refit else self.barred
+            for terms, barred in ((beside, instead), (unlikely, self.barred)):
+                barred |= {(str(self.names.index(t.place)), t.term) for t in terms}
             if fallen:
                 self._without(fallen)
 

@@ -234,7 +234,7 @@ class Searching(Stages):
 
         The zero of an encoder whose axis is upright changes no torque.
         """
-        actions = self._seen().columns([e for e, _ in offered])
+        actions = self._seen().columns([e for e, _ in offered]) if offered else {}
         felt = [(e, n) for e, n in offered if all(actions[name] for name in e.names)]
         return felt, {name: actions[name] for e, _ in felt for name in e.names}
 

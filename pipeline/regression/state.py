@@ -51,6 +51,8 @@ class State:
         self.coupled: dict[str, float] = {}
         self.extras: list[Extra] = []
         self.barred: set[Key] = set()
+        #: Beside fitted bodies only, which could be the same.
+        self.bodies_instead: set[Key] = set()
         self.actions: dict[str, dict[int, Array]] = {}
         self.points: dict[Extra, float] = {}
         self.zero, self.gain = np.zeros(model.nv), np.zeros(model.nv)

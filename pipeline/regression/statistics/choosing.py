@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,16 +46,16 @@ class Choosing(Searching):
         wins = self._carries(normal, columns, (kept, kept_loss), (refit, loss))
         claims = [(str(j), "offset") for j, c in enumerate(kept) if "offset" in c.beside]
         stands = self._beside_any_bodies(claims, self._keys(kept))
-        claims = [c for c, good in zip(claims, stands, strict=True) if not good]
-        if not wins and claims:
-            barred, sigma = self.barred, self.sigma
-            self.barred = barred | set(claims)
-            first = self._chosen(self._fit(normal, columns, 0.0))
+        unsure = {c for c, good in zip(claims, stands, strict=True) if not good}
+        if not wins and unsure:
+            before, sigma = self.bodies_instead, self.sigma
+            self.bodies_instead = before | unsure
+            first = self._chosen(self._fit(normal, columns, 0.0), unsure)
             refit, loss = self._refit(normal, columns)
             worse, error = compare(loss, kept_loss, self.weight)
             wins = worse <= error and self._carries(normal, columns, first, (refit, loss))
             if not wins:
-                self.barred, self.sigma = barred, sigma
+                self.bodies_instead, self.sigma = before, sigma
         self.refit_share = self._share_of_draws(kept_loss - loss)
         if not wins:
             refit, self.sigma = kept, 0.0
@@ -63,12 +63,12 @@ class Choosing(Searching):
 
     def _refit(self, normal: System, columns: Columns) -> Found:
         """Laws beside fitted bodies, with the uncertainty of the URDF that has most evidence."""
-        found = self._chosen(self._fit(normal, columns, self.sigma))
+        found = self._chosen(self._fit(normal, columns, self.sigma), self.bodies_instead)
         before = self.sigma
         self._strength(normal, columns, self._keys(found[0]))
         if self.sigma == before:
             return found
-        return self._chosen(self._fit(normal, columns, self.sigma))
+        return self._chosen(self._fit(normal, columns, self.sigma), self.bodies_instead)
 
     def _carries(self, normal: System, columns: Columns, kept: Found, refit: Found) -> bool:
         """Whether fitted bodies predict better beyond chance, and carry over.
@@ -87,8 +87,8 @@ class Choosing(Searching):
         for folds in (self.folds, folds_of(count), folds_of(count, 2)):
             first = self._plain_losses(normal, plain, columns, 0.0, kept[0], folds)
             second = self._plain_losses(normal, plain, columns, self.sigma, refit[0], folds)
-            gain, error = compare(first, second, self.weight)
-            if gain <= -error:
+            gain, _ = compare(first, second, self.weight)
+            if gain <= 0.0:
                 return False
             if folds is self.folds and second.sum() < MOST * first.sum():
                 return True
@@ -139,10 +139,16 @@ class Choosing(Searching):
             out[fold] = [bare.loss(int(b), at, x) for b in fold]
         return out
 
-    def _chosen(self, fit: Fit) -> Found:
-        """Laws of all joints and the predictive loss of every block with them."""
+    def _chosen(self, fit: Fit, barred: Collection[Key] = ()) -> Found:
+        """Laws of all joints and the predictive loss of every block with them.
+
+        Args:
+            fit: Beside the bodies of which.
+            barred: Terms that are not allowed, with those that never are.
+        """
+        barred = self.barred.union(barred)
         rich = self._general()
-        found = choose_laws(fit, self.folds, self.weight, rich, self._shared, 3, self.barred)
-        found = upgrade(fit, self.folds, self.weight, found, self._shared, self.barred)
+        found = choose_laws(fit, self.folds, self.weight, rich, self._shared, 3, barred)
+        found = upgrade(fit, self.folds, self.weight, found, self._shared, barred)
         at = fit.columns(self._keys(found))
         return found, fit.losses(self.folds, self.weight, at)

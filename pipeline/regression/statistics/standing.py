@@ -168,9 +168,10 @@ class Standing(Choosing):
         laws = [0.0] * self.model.nv
         done = 0
         self.coupled = {}
+        barred = self.barred | (self.bodies_instead if fit.prior.refit else set())
         for _ in range(self.options.draws):
             weight = np.bincount(rng.integers(0, n, n), minlength=n).astype(float)
-            drawn = choose_laws(fit, self.folds, weight, self.choices, self._shared, 1, self.barred)
+            drawn = choose_laws(fit, self.folds, weight, self.choices, self._shared, 1, barred)
             done += 1
             for j, c in enumerate(drawn):
                 laws[j] += c.law.name == self.choices[j].law.name
