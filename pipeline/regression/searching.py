@@ -129,9 +129,9 @@ class Searching(Stages):
         """Joints whose friction by quadrant would give energy: the torque there reads a multiple.
 
         Friction that differs by quadrant has the shape of the torque itself, as a wrong scale has;
-        but it is no larger than what friction takes per load in both. Where that costs the fit, a
-        joint is named without which it costs much less. Bodies of any size take a scale that all
-        joints have in common.
+        but half of the difference is no larger than the mean of both, or the load would drive for
+        nothing. Where that costs the fit, a joint is named without which it costs much less. Bodies
+        of any size take a scale that all joints have in common.
         """
         columns = self._columns(self.couplings)
         fit = self._fit(self._system(columns), columns, ANY)
@@ -147,7 +147,8 @@ class Searching(Stages):
             row = np.zeros(len(at))
             row[mine["load"]], row[curve] = -1.0, -1.0 / len(curve)
             rows = np.stack([row, row])
-            rows[:, mine[QUADRANT]] = 1.0, -1.0
+            # Its column is half of what driving takes more: so much scales the torque.
+            rows[:, mine[QUADRANT]] = 0.5, -0.5
             passive[j] = rows
         if len(passive) < 2:
             return []
