@@ -140,5 +140,6 @@ class _Identification(Reporting):
                     gone = [k for k, _ in small]
                     keys, x, replicas = self._stand(fit, [k for k in keys if k not in gone])
             self.load = self.design.load(x[: fit.n_bodies])
+            self.sizes = dict(zip(fit.system.keys, x, strict=True))
         shares, laws = self._shares(fit)
         return self._result(fit, keys, x, replicas, shares, laws, suspected)

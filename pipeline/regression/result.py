@@ -222,15 +222,14 @@ class Result:
         load = np.array(
             [pin.rnea(self.model, data, *row) for row in zip(q, v, a, strict=True)]
         ).reshape(q.shape)
-        out = load.copy()
+        out, felt = load.copy(), load.copy()
         for e in self.extras:
-            angle = q[:, e.extra.joint]
-            if e.extra.kind is Kind.SPRING:
-                out[:, e.extra.joint] += e.values[0] * angle
-            elif e.extra.kind is Kind.RIPPLE:
-                turn = e.extra.order * angle
-                wave = e.values[0] * np.sin(turn) + e.values[1] * np.cos(turn)
-                out[:, e.extra.joint] += filtered(e.extra.kind, wave)
+            own = e.extra.torque(q[:, e.extra.joint], e.values)
+            felt[:, e.extra.joint] += own
+            spring = e.extra.kind is Kind.SPRING
+            out[:, e.extra.joint] += own if spring else filtered(e.extra.kind, own)
+            if spring:
+                felt[:, e.extra.joint] += self.sizes.get((str(e.extra.joint), "offset"), 0.0)
 
         def slid(x: Array, travel: float) -> Array:
             return presliding(np.arange(len(x), dtype=float), x, np.sign(np.gradient(x)), travel)
@@ -238,7 +237,7 @@ class Result:
         for j, friction in enumerate(self.friction):
             travel = friction.shape.travel
             sense = {travel: slid(q[:, j], travel)} if travel else {}
-            columns, _ = friction.shape.columns(v[:, j], a[:, j], load[:, j], sense)
+            columns, _ = friction.shape.columns(v[:, j], a[:, j], felt[:, j], sense)
             for name, column in columns.items():
                 size = self.sizes.get((str(j), name))
                 if size is not None:

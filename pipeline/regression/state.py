@@ -83,8 +83,18 @@ class State:
         self.weight = np.ones(len(self.blocks))
 
     def _columns(self, couplings: Sequence[Coupling]) -> Columns:
-        columns = self.design.columns(self.load, couplings)
+        columns = self.design.columns(self.load + self._over_angle(), couplings)
         return replace(columns, shared={**columns.shared, **self.actions})
+
+    def _over_angle(self) -> Array:
+        """Torque of springs and ripple before rows are thinned: friction is felt under it, too."""
+        out = np.zeros_like(self.load)
+        for e in self.extras:
+            x = [self.sizes.get(("shared", n), 0.0) for n in e.names]
+            out[:, e.joint] += e.torque(self.rows.fine[0][:, e.joint], x)
+            if e.kind is Kind.SPRING:
+                out[:, e.joint] += self.sizes.get((str(e.joint), "offset"), 0.0)
+        return out
 
     def _general(self, but: Collection[int] = (), *, scaled: bool = False) -> list[Choice]:
         """Friction of any shape at every joint.

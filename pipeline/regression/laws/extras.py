@@ -105,6 +105,20 @@ class Extra:
             parts = ("size",)
         return tuple(f"{self.kind}@{self.joint}/{self.order:.6g}/{part}" for part in parts)
 
+    def torque(self, q: Array, sizes: Sequence[float] | Array) -> Array:
+        """What a spring or a ripple adds at its joint's angles (N,) [rad], (N,) [N*m]; else zero.
+
+        Args:
+            q: (N,) [rad].
+            sizes: Of its columns.
+        """
+        if self.kind is Kind.SPRING:
+            return np.asarray(sizes[0] * q)
+        if self.kind is Kind.RIPPLE:
+            turn = self.order * q
+            return np.asarray(sizes[0] * np.sin(turn) + sizes[1] * np.cos(turn))
+        return np.zeros_like(q)
+
     @property
     def same(self) -> tuple[Kind, int]:
         """What another order of the same ripple has in common with it."""

@@ -73,11 +73,14 @@ class Choosing(Searching):
     def _carries(self, normal: System, columns: Columns, kept: Found, refit: Found) -> bool:
         """Whether fitted bodies predict better beyond chance, and carry over.
 
-        In torque itself they must not lose, not only in what whitening sees; and where they do not
-        close most of what is left, not from one part of the motion to the others either: a part
-        that hardly moves a joint tells little of its bodies.
+        What closes next to nothing is no finding. In torque itself they must not lose, not only in
+        what whitening sees; and where they do not close most of what is left, not from one part of
+        the motion to the others either: a part that hardly moves a joint tells little of its
+        bodies.
         """
-        if not beyond_chance(kept[1], refit[1], self.options.error_rate):
+        closes = 1.0 - float(refit[1].sum() / kept[1].sum())
+        by_chance = not beyond_chance(kept[1], refit[1], self.options.error_rate)
+        if by_chance or closes < self.options.closes:
             return False
         # The same rows with every joint's noise taken as white: what is promised is an error of
         # torque, and whitening hardly looks at its slow part.
