@@ -19,7 +19,7 @@ from pipeline.regression.state import State
 from pipeline.regression.statistics.gram import Columns, Key, System
 from pipeline.regression.statistics.noise import Colour, colour
 from pipeline.regression.statistics.selection import find_coupling
-from pipeline.regression.statistics.solve import RIDGE, Eliminated, compare
+from pipeline.regression.statistics.solve import RIDGE, Eliminated, beyond_chance
 
 
 class Stages(State):
@@ -157,7 +157,7 @@ class Stages(State):
         self.design = replace(self.design, shapes=tuple(shapes))
 
     def _likeliest(self, e: Eliminated, count: int) -> int:
-        """Which rise predicts best, without an offset where that predicts as well.
+        """Which rise predicts best, without an offset where one predicts no better beyond chance.
 
         Of a joint that rests between moves in one direction an offset is dry friction that is held
         at rest; beside it any rise would do.
@@ -175,8 +175,8 @@ class Stages(State):
             for k in range(first, count, 2)
         ]
         best, bare = (min((x[w] for x in both), key=lambda x: float(x.sum())) for w in (0, 1))
-        worse, error = compare(bare, best, self.weight)
-        sums = [float(x[int(worse <= error)].sum()) for x in both]
+        needed = beyond_chance(bare, best, self.options.error_rate)
+        sums = [float(x[int(not needed)].sum()) for x in both]
         return int(np.argmin(sums))
 
     def _loss_with(self, couplings: Sequence[Coupling]) -> float:

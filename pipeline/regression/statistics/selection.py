@@ -142,7 +142,7 @@ def possible(term: str, size: float) -> bool:
 def _beside(
     eliminated: Eliminated, at: Mapping[str, int], weight: Array, allowed: tuple[str, ...]
 ) -> tuple[str, ...]:
-    """Offset and rotor inertia, each kept where validation blocks want it by a standard error."""
+    """Offset and rotor inertia, each kept where blocks that did not fit want it beyond chance."""
     rich = [at[t] for t in UNNAMED.terms]
     kept = list(allowed)
     for term in reversed(allowed):
@@ -152,7 +152,7 @@ def _beside(
         mean, error = compare(
             eliminated.losses([*rich, *(at[t] for t in rest)]), eliminated.losses(with_it), weight
         )
-        if mean <= error or (size < 0 and term not in SIGNED):
+        if mean <= _limit(weight) * error or (size < 0 and term not in SIGNED):
             kept = rest
     return tuple(kept)
 

@@ -41,7 +41,7 @@ class Standing(Choosing):
 
     def _drop(self, fit: Fit, keys: list[Key]) -> list[Key]:
         """Backward: leave out what has the wrong sign, holds zero or predicts nothing."""
-        keys = list(keys)
+        keys = self._even(fit, keys)
         while True:
             at = fit.columns(keys)
             n = len(at) - len(keys)
@@ -60,6 +60,22 @@ class Standing(Choosing):
             if weakest is None:
                 return keys
             keys.remove(weakest[1])
+
+    def _even(self, fit: Fit, keys: Sequence[Key]) -> list[Key]:
+        """Friction per load that is no other while driving than while driven is one share."""
+        keys = list(keys)
+        for j in range(self.model.nv):
+            pair = [(str(j), "driving"), (str(j), "driven")]
+            if not all(k in keys for k in pair):
+                continue
+            at = fit.columns(keys)
+            mine = [len(at) - len(keys) + keys.index(k) for k in pair]
+            more, less = fit.solve(self.weight, at)[mine]
+            drawn = np.array([fit.solve(w, at)[mine] for w in self._leave_one_out()])
+            error = float(standard_error(drawn[:, 0] - drawn[:, 1]))
+            if abs(more - less) <= self._quantile(self.options.coverage) * error:
+                keys = [k for k in keys if k not in pair] + [(str(j), "load")]
+        return keys
 
     def _final(self, fit: Fit, keys: Sequence[Key]) -> tuple[Array, Array]:
         """Sizes of all columns with bodies that are bodies, and the same without each block."""
