@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.regression.laws.extras import Extra, Kind
 from pipeline.regression.laws.friction import BESIDE, QUADRANT
 from pipeline.regression.statistics.gram import Columns, Key
-from pipeline.regression.statistics.rivals import largest
+from pipeline.regression.statistics.rivals import added
 from pipeline.regression.statistics.solve import Fit, compare
 from pipeline.regression.statistics.standing import Standing
 
@@ -26,68 +26,91 @@ _BOTH = ("driving", "driven", "motor")
 BESIDES = (Kind.SPRING, Kind.ZERO, Kind.GAIN, Kind.LATE)
 
 
+def _have_at(have: Collection[tuple[Kind, int]], joint: int) -> set[Kind]:
+    """Kinds there are at a joint."""
+    return {kind for kind, j in have if j == joint}
+
+
+class Told:
+    """Friction that is told, and how large others at the same joint could be.
+
+    Attributes:
+        moved: By how much another would change the size of every column at most, (K,).
+    """
+
+    def __init__(
+        self, fit: Fit, columns: Columns, weight: Array, keys: Sequence[Key], t: float
+    ) -> None:
+        self.fit, self.columns, self.weight, self.keys, self.t = fit, columns, weight, keys, t
+        self.moved = np.zeros(len(keys))
+
+    def stand(self, joint: int, sizes: Mapping[Key, float], beside: Sequence[Extra]) -> set[Key]:
+        """Columns of a joint's law, and its offset and rotor inertia, whose rivals are small."""
+        mine = [k for k in self.keys if k[0] == str(joint)]
+        law = [k for k in mine if k[1] not in BESIDE]
+        parts = [sizes[k] * self.columns.local[joint][k[1]] for k in law]
+        size = _rms(np.sum(parts, axis=0)) if parts else 0.0
+        terms = {k[1].partition("@")[0] for k in mine}
+        gone = {"load", QUADRANT} if terms & set(_BOTH) else set()
+        others = [(str(joint), u) for u in LAWS if u.partition("@")[0] not in terms | gone]
+        out = set(law) if self._small(size, law, others) else set()
+        springs = [("shared", n) for e in beside if e.kind is Kind.SPRING for n in e.names]
+        for key in mine:
+            zero = key[1] == "offset"
+            if key[1] in BESIDE and (not zero or self._small(abs(sizes[key]), [key], springs)):
+                out.add(key)
+        return out
+
+    def _small(self, size: float, mine: Sequence[Key], others: Sequence[Key]) -> bool:
+        if not others or not mine:
+            return True
+        one = added(self.fit, self.weight, self.keys, others)
+        at = [self.keys.index(k) for k in mine]
+        self.moved[at] = np.maximum(self.moved[at], np.abs(one.moves[:, at]).max(axis=0))
+        most = np.abs(one.size) + self.t * one.error
+        return all(
+            x * _effect(self.columns, k) < OTHER * size for k, x in zip(others, most, strict=True)
+        )
+
+
 class Excluding(Standing):
     """How large rivals could be."""
 
-    def _excluding(self, keys: Sequence[Key], sizes: Mapping[Key, float]) -> frozenset[Key]:
-        """Columns beside which every rival is known to be small."""
+    #: Columns whose rivals the log excludes.
+    excluded: frozenset[Key] = frozenset()
+
+    def _exclude(self, keys: Sequence[Key], sizes: Mapping[Key, float]) -> Array:
+        """Find the columns beside which every rival is known to be small.
+
+        Returns:
+            By how much a rival of every column's own joint would change its size at most, (K,).
+        """
         offered = self.options.extras & set(BESIDES)
         have = {e.same for e in self.extras}
-        rivals = [
-            Extra(kind, j)
-            for kind in BESIDES
-            for j in range(self.model.nv)
-            if kind in offered and (kind, j) not in have
-        ]
-        felt, actions = self._acting([(e, 1) for e in rivals])
-        rivals = [e for e, _ in felt]
+        joints = range(self.model.nv)
+        felt, actions = self._acting(
+            [(Extra(k, j), 1) for k in BESIDES for j in joints if k in offered - _have_at(have, j)]
+        )
         columns = self._columns(self.couplings)
         columns = replace(columns, shared={**columns.shared, **actions})
         fit = self._fit(self._system(columns), columns, self.sigma)
-        t = self._quantile(self.options.coverage)
-
-        def small(told: float, others: list[Key]) -> bool:
-            if not others:
-                return True
-            sizes = largest(fit, self.weight, keys, others, t)
-            return all(
-                x * _effect(columns, k) < OTHER * told for k, x in zip(others, sizes, strict=True)
-            )
-
-        def beside(joint: int, but: Kind | None) -> list[Key]:
-            return [
-                ("shared", n)
-                for e in rivals
-                if e.joint == joint and e.kind is not but
-                for n in e.names
-            ]
-
-        out: set[Key] = set()
-        for j in range(self.model.nv):
-            mine = [k for k in keys if k[0] == str(j)]
-            law = [k for k in mine if k[1] not in BESIDE]
-            parts = [sizes[k] * columns.local[j][k[1]] for k in law]
-            told = _rms(np.sum(parts, axis=0)) if parts else 0.0
-            terms = {k[1].partition("@")[0] for k in mine}
-            gone = {"load", QUADRANT} if terms & set(_BOTH) else set()
-            others = [u for u in LAWS if u.partition("@")[0] not in terms | gone]
-            if small(told, [(str(j), u) for u in others]):
-                out.update(law)
-            for key in mine:
-                zero = key[1] == "offset"
-                spring = [k for k in beside(j, None) if k[1].startswith(Kind.SPRING)]
-                if key[1] in BESIDE and (not zero or small(abs(sizes[key]), spring)):
-                    out.add(key)
-        have_all = fit.losses(self.folds, self.weight, fit.columns(keys))
+        beside = [e for e, _ in felt]
+        told = Told(fit, columns, self.weight, keys, self._quantile(self.options.coverage))
+        out = {k for k in keys if k[0] == "shared" and k[1] not in self.actions}
+        for j in joints:
+            out |= told.stand(j, sizes, [e for e in beside if e.joint == j])
+        loss = fit.losses(self.folds, self.weight, fit.columns(keys))
         for e in self.extras:
-            own = [("shared", n) for n in e.names]
+            own = self._of(e)
             rest = [k for k in keys if k not in own]
-            joints = {j for n in e.names for j in self.actions[n]}
-            instead = [k for j in joints for k in beside(j, e.kind)]
-            if not any(self._as_good(fit, have_all, [*rest, k]) for k in instead):
+            acts = {j for n in e.names for j in self.actions[n]}
+            instead = [
+                k for x in beside if x.joint in acts and x.kind is not e.kind for k in self._of(x)
+            ]
+            if not any(self._as_good(fit, loss, [*rest, k]) for k in instead):
                 out.update(own)
-        out.update(k for k in keys if k[0] == "shared" and k[1] not in self.actions)
-        return frozenset(out)
+        self.excluded = frozenset(out)
+        return told.moved
 
     def _as_good(self, fit: Fit, have: Array, keys: Sequence[Key]) -> bool:
         """Whether other columns predict as well, within one standard error."""

@@ -35,9 +35,6 @@ Array = NDArray[np.float64]
 class Reporting(Excluding):
     """Findings."""
 
-    #: Columns whose rivals the log excludes.
-    excluded: frozenset[Key] = frozenset()
-
     def _result(
         self,
         fit: Fit,
@@ -49,7 +46,9 @@ class Reporting(Excluding):
         suspected: Sequence[Term],
     ) -> Result:
         t, error = self._quantile(self.options.coverage), self._errors(fit, keys, x, replicas)
-        self.excluded = self._excluding(keys, dict(zip(fit.system.keys, x, strict=True)))
+        moved = self._exclude(keys, dict(zip(fit.system.keys, x, strict=True)))
+        at = fit.system.index(keys)
+        error[at] = np.hypot(error[at], 0.5 * moved)
         terms = self._terms(fit, keys, x, error, shares)
         frictions = [self._friction(j, fit, keys, x, terms, laws[j]) for j in range(len(laws))]
         base, condition, lost = self._base(x, replicas, t)

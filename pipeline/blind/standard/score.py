@@ -97,7 +97,7 @@ def score_straight(truth: Mapping[str, Any], answer: Answer) -> StandardScore:
     )
     first = bool(counted) and counted[0].written and any(_is(counted[0], h) for h in hidden)
     wrong = tuple(n for n in counted if n.written and _astray(n, hidden, halves))
-    intervals, covered = _coverage(hidden, counted)
+    intervals, covered = _coverage(truth, counted)
     return StandardScore(
         truth, answer, counted, right, first or bool(halves), wrong, intervals, covered
     )
@@ -126,8 +126,8 @@ def _background(named: Named, truth: Mapping[str, Any]) -> bool:
         own = {p for h in hidden if h["effect"] in FRICTION for p in h["place"]}
         return bool(truth["friction"]) and not own & set(named.place)
     if named.effect == "effort_offset":  # as any friction that one direction has more of
-        own = FRICTION | {"effort_offset"}
-        gone = {p for h in hidden if h["effect"] in own for p in h["place"]}
+        alike = FRICTION | {"effort_offset"}
+        gone = {p for h in hidden if h["effect"] in alike for p in h["place"]}
         return set(named.place) <= set(truth["uneven"]) - gone
     if named.effect in BODIES:
         return not any(h["effect"] in BODIES for h in hidden) or named.effect != "link_mass"
@@ -151,16 +151,27 @@ def _halves(hidden: Sequence[Mapping[str, Any]], named: Sequence[Named]) -> set[
     return out
 
 
-def _coverage(hidden: Sequence[Mapping[str, Any]], counted: Sequence[Named]) -> tuple[int, int]:
+def _coverage(truth: Mapping[str, Any], counted: Sequence[Named]) -> tuple[int, int]:
+    """Intervals of hidden parameters, and those that hold what the machine has."""
     count = covered = 0
     for n in counted:
-        truth = next((h["values"] for h in hidden if _is(n, h)), None)
-        if truth is None or not n.written:
+        values = next((h["values"] for h in truth["hidden"] if _is(n, h)), None)
+        if values is None or not n.written:
             continue
-        terms = {TERMS.get(name, name): value for name, value in truth.items()}
-        truth = terms if n.amounts_to else truth
+        terms = {TERMS.get(name, name): value for name, value in values.items()}
+        values = terms if n.amounts_to else values
         for parameter, (_, low, high) in n.intervals.items():
-            if parameter in truth and parameter not in NOT_COVERED and low < high:
+            if parameter in values and parameter not in NOT_COVERED and low < high:
+                ends = _true(truth, n, values[parameter])
                 count += 1
-                covered += low <= truth[parameter] <= high
+                covered += low <= ends[1] and high >= ends[0]
     return count, covered
+
+
+def _true(truth: Mapping[str, Any], named: Named, value: float) -> tuple[float, float]:
+    """A hidden value, or the least and the largest that the machine has of it.
+
+    What hides a delay adds it to those that the sensors have, joint by joint.
+    """
+    delays = truth["delays_s"]
+    return (min(delays), max(delays)) if named.effect == "time_delay" else (value, value)

@@ -9,7 +9,8 @@ import pytest
 from pipeline.blind.answer import Answer, Named
 from pipeline.blind.standard.rows import by_effect, rates, read_rows, reliability, trial_row
 from pipeline.blind.standard.score import StandardScore, score_straight
-from pipeline.blind.twin.fixed.matrix import StandardSpec
+from pipeline.blind.twin.fixed.hidden import LAWS_OF_FRICTION
+from pipeline.blind.twin.fixed.matrix import StandardSpec, standard_matrix
 from reports.tables.blind import standard_trials
 from reports.writer import write_table
 
@@ -181,3 +182,19 @@ def test_a_run_that_is_read_back_gives_the_same_rates(tmp_path: Any) -> None:
     write_table(standard_trials(rows()), tmp_path, meta={})
     again = read_rows(tmp_path / "blind_standard_trials.csv")
     assert [(r.hits, r.trials) for r in rates(again)] == [(r.hits, r.trials) for r in rates(rows())]
+
+
+def test_a_delay_is_held_where_the_joints_delays_are() -> None:
+    late = ("time_delay", "effort channels", {"delay": 0.02})
+    hidden = truth(late, delays_s=[0.021, 0.023])
+    near = named("time_delay", "effort channels", intervals={"delay": (0.022, 0.0215, 0.0225)})
+    low = named("time_delay", "effort channels", intervals={"delay": (0.02, 0.0195, 0.0205)})
+    assert judged(hidden, near).covered == 1
+    assert judged(hidden, low).covered == 0
+
+
+def test_no_trial_hides_two_laws_of_friction() -> None:
+    several = [s for s in standard_matrix(5) if len(s.effects) > 1]
+    assert len(several) > 30
+    assert all(len(LAWS_OF_FRICTION.intersection(s.effects)) < 2 for s in several)
+    assert any(LAWS_OF_FRICTION.intersection(s.effects) for s in several)

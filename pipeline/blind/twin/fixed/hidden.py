@@ -310,6 +310,8 @@ def _ringing(rng: np.random.Generator, case: Case, j: int) -> Truth:
     return replace(case.truth, play=play, rings={j: (size, float(rng.uniform(12.0, 40.0)))})
 
 
+#: All of a joint's friction each: of two at one joint the later is the only one there.
+LAWS_OF_FRICTION: Final = frozenset(_LAWS)
 EFFECTS: Final[dict[str, Callable[[np.random.Generator, Case], Drawn]]] = {
     "coulomb_friction": _friction("coulomb_friction", lambda r, c, j, s: {"torque": s}),
     "viscous_friction": _friction("viscous_friction", _viscous),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from pipeline.blind.twin.fixed.hidden import EFFECTS, UNKNOWN
+import numpy as np
+
+from pipeline.blind.twin.fixed.hidden import EFFECTS, LAWS_OF_FRICTION, UNKNOWN
 from pipeline.blind.twin.fixed.machines import MACHINES
 from pipeline.blind.twin.setup import stream
 
@@ -53,6 +55,11 @@ def standard_matrix(seed: int = 1) -> tuple[StandardSpec, ...]:
     )
 
 
+def _together(rng: np.random.Generator, effects: Sequence[str], count: int) -> tuple[str, ...]:
+    """Some of them, none twice."""
+    return tuple(effects[k] for k in rng.choice(len(effects), count, replace=False))
+
+
 def _cases(seed: int) -> Iterator[tuple[str, tuple[str, ...], str]]:
     rng = stream(seed, "standard pairs")
     for machine in MACHINES:
@@ -66,8 +73,10 @@ def _cases(seed: int) -> Iterator[tuple[str, tuple[str, ...], str]]:
         for count, trials in ((2, pairs), (3, triples)):
             alike = [e for e in possible if e != "link_mass"]
             for _ in range(trials):
-                chosen = rng.choice(len(alike), count, replace=False)
-                yield machine, tuple(alike[k] for k in chosen), "machine"
+                chosen = _together(rng, alike, count)
+                while len(LAWS_OF_FRICTION.intersection(chosen)) > 1:
+                    chosen = _together(rng, alike, count)
+                yield machine, chosen, "machine"
         for effect in UNKNOWN:
             yield from [(machine, (effect,), "machine")] * unknowns
         yield from [(machine, (), "machine")] * (empty // 2)
