@@ -218,18 +218,11 @@ class Result:
                 return x
             return low_pass(x, rate, cutoff)
 
-        data = self.model.createData()
-        load = np.array(
-            [pin.rnea(self.model, data, *row) for row in zip(q, v, a, strict=True)]
-        ).reshape(q.shape)
-        out, felt = load.copy(), load.copy()
+        felt, out = self.passed(q, v, a), self._bodies_torque(q, v, a)
         for e in self.extras:
             own = e.extra.torque(q[:, e.extra.joint], e.values)
-            felt[:, e.extra.joint] += own
             spring = e.extra.kind is Kind.SPRING
             out[:, e.extra.joint] += own if spring else filtered(e.extra.kind, own)
-            if spring:
-                felt[:, e.extra.joint] += self.sizes.get((str(e.extra.joint), "offset"), 0.0)
 
         def slid(x: Array, travel: float) -> Array:
             return presliding(np.arange(len(x), dtype=float), x, np.sign(np.gradient(x)), travel)
@@ -251,6 +244,26 @@ class Result:
                     for i, action in actions.items():
                         out[:, i] += size * filtered(name.split(":")[-1], action)
         return out
+
+    def passed(self, q: Array, v: Array, a: Array) -> Array:
+        """Torque of bodies, springs and ripple, which goes through a joint's drive, (N, J) [N*m].
+
+        Args:
+            q: (N, J) [rad].
+            v: (N, J) [rad/s].
+            a: (N, J) [rad/s^2].
+        """
+        out = self._bodies_torque(q, v, a)
+        for e in self.extras:
+            out[:, e.extra.joint] += e.extra.torque(q[:, e.extra.joint], e.values)
+            if e.extra.kind is Kind.SPRING:
+                out[:, e.extra.joint] += self.sizes.get((str(e.extra.joint), "offset"), 0.0)
+        return out
+
+    def _bodies_torque(self, q: Array, v: Array, a: Array) -> Array:
+        data = self.model.createData()
+        rows = zip(q, v, a, strict=True)
+        return np.array([pin.rnea(self.model, data, *row) for row in rows]).reshape(q.shape)
 
     def at(self, place: str) -> Sequence[Term]:
         """Terms of one joint or pair."""

@@ -130,9 +130,10 @@ def _course(m: Measurement, prediction: Prediction, j: int) -> Course:
 def _of_another_motion(m: Measurement, predicted: Array) -> list[Finding]:
     """Efforts that do not belong to the motion beside them, by any reading.
 
-    Bodies, dry and viscous friction and an offset explain some of every joint's effort. Efforts
-    shifted against their motion are explained by chance alone: where they are explained as well as
-    the ones in place, those belong to another motion or robot.
+    Bodies, those of the robot and any that hang on the joint, dry and viscous friction and an
+    offset explain some of every joint's effort. Efforts shifted against their motion are explained
+    by chance alone: where they are explained as well as the ones in place, those belong to another
+    motion or robot.
     """
     columns = []
     for j in range(len(m.joints)):
@@ -142,7 +143,11 @@ def _of_another_motion(m: Measurement, predicted: Array) -> list[Finding]:
             continue
         v = m.v[rows, j]
         rest = max(float(m.rest_speed[j]), 1e-12) if m.rest_speed.size else 1e-12
-        readings = np.stack([np.ones_like(v), predicted[rows, j], np.tanh(v / rest), v], axis=1)
+        q, a = m.q[rows, j], m.a[rows, j]
+        own = [np.sin(q), np.cos(q), a]
+        readings = np.stack(
+            [np.ones_like(v), predicted[rows, j], np.tanh(v / rest), v, *own], axis=1
+        )
         basis = np.linalg.qr(readings / np.maximum(np.abs(readings).max(axis=0), 1e-300))[0]
         columns.append((x - x.mean(), basis))
     if not columns:
@@ -156,9 +161,9 @@ def _of_another_motion(m: Measurement, predicted: Array) -> list[Finding]:
             total -= float(np.log(max(rest, 1e-12)))
         return total
 
-    own = explained(0.0)
+    here = explained(0.0)
     others = [explained(share) for share in np.linspace(0.05, 0.95, _SHIFTS)]
-    chance = float(np.mean([other >= own for other in others]))
+    chance = float(np.mean([other >= here for other in others]))
     if chance <= _CHANCE:
         return []
     detail = (

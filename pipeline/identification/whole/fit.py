@@ -138,7 +138,7 @@ def fit_whole(model: MachineModel, where: Whereabouts) -> Whole:
     except (RegressionError, np.linalg.LinAlgError) as error:
         raise NotWholeError(str(error)) from None
     unit = CHANNEL_UNITS[channel]
-    findings = [*told(result, model, carried, channel), *sides(where)]
+    findings = [*told(result, model, carried, channel), *sides(where, result, order)]
     found = tuple(t.found(k, unit) for k, t in enumerate(findings, start=1))
     kept = [f for f in found if f.kept]
     decided = FAMILIES | names_of(kinds) | BEFORE_THE_JOINT

@@ -25,11 +25,13 @@ class Made:
 
     q: NDArray[np.float64]
     v: NDArray[np.float64]
+    a: NDArray[np.float64]
     effort: NDArray[np.float64]
     mask: NDArray[np.bool_]
     other: dict[str, NDArray[np.float64]]
     time: NDArray[np.float64]
     joints: tuple[str, ...] = ("a", "b")
+    friction: NDArray[np.float64] = field(default_factory=lambda: np.zeros((N, 2)))
     channel: str = "torque"
     noise: NDArray[np.float64] = field(default_factory=lambda: np.full(2, 0.01))
     log: Any = field(default_factory=lambda: SimpleNamespace(position_source="joint"))
@@ -39,25 +41,40 @@ class Made:
         return x
 
 
-def made(stiff: float = np.inf, width: float = 0.0, spoilt: slice = slice(0, 0)) -> Made:
+def made(
+    stiff: float = np.inf, width: float = 0.0, spoilt: slice = slice(0, 0), rubs: float = 0.0
+) -> Made:
     """Joint a is wound and plays; motor and joint b agree. Rows that are spoilt say nonsense."""
     t = np.arange(N) / 200.0
     rng = np.random.default_rng(0)
     q = np.column_stack([np.sin(1.3 * t), 0.5 * np.sin(0.9 * t)])
     v = np.column_stack([1.3 * np.cos(1.3 * t), 0.45 * np.cos(0.9 * t)])
     torque = np.column_stack([6.0 * np.sin(2.1 * t), 4.0 * np.cos(1.7 * t)])
+    friction = rubs * np.abs(torque) * np.sign(v)
     motor = q + 2e-5 * rng.standard_normal(q.shape)
     motor[:, 0] += torque[:, 0] / stiff + 0.5 * width * np.sign(torque[:, 0])
     motor[spoilt, 0] += torque[spoilt, 0] / 50.0
     mask = np.ones((N, 2), np.bool_)
-    return Made(q, v, torque, mask, {"motor_position": motor}, t)
+    return Made(
+        q,
+        v,
+        np.zeros_like(q),
+        torque + friction,
+        mask,
+        {"motor_position": motor},
+        t,
+        friction=friction,
+    )
 
 
 def told(*logs: Made, part: NDArray[np.int8] | None = None) -> list[Told]:
     parts = np.full(N, FIT, np.int8) if part is None else part
     intake = SimpleNamespace(prepared=logs)
     where = SimpleNamespace(intake=intake, parts=SimpleNamespace(part=(parts,) * len(logs)))
-    return sides(where)  # type: ignore[arg-type]
+    fit = SimpleNamespace(
+        predict=lambda q, v, a: logs[0].friction, passed=lambda q, v, a: np.zeros((N, 2))
+    )
+    return sides(where, fit, np.arange(2))  # type: ignore[arg-type]
 
 
 def estimates(found: Told) -> dict[str, tuple[float, float, float]]:
@@ -90,6 +107,19 @@ def test_play_and_elasticity_of_one_joint_are_one_finding_with_both() -> None:
     values = estimates(one)
     assert values["width"][1] == pytest.approx(WIDTH, rel=0.05)
     assert values["stiffness"][1] == pytest.approx(STIFF, rel=0.05)
+
+
+def test_friction_before_the_spring_winds_nothing_up() -> None:
+    log = made(stiff=STIFF, rubs=0.2)
+    (one,) = told(log)
+    low, value, high = estimates(one)["stiffness"]
+    assert value == pytest.approx(STIFF, rel=0.01)
+    # How far friction is from its law nobody knows: half of what it changes is in the interval.
+    log.friction = np.zeros((N, 2))
+    (plain,) = told(log)
+    changed = abs(estimates(plain)["stiffness"][1] - value)
+    assert changed > 0.01 * STIFF
+    assert high - low > 0.9 * changed
 
 
 def test_motor_and_joint_that_agree_have_neither() -> None:
