@@ -20,7 +20,8 @@ class Options:
         uncertainties: Of the URDF that validation chooses from, beside no refit.
         closes: Share of what stays unexplained below which a size closes next to nothing.
         needed: Share of the noise's power from which a size is needed, though its name may be
-            another's, and from which a name beside bodies and friction can be confirmed.
+            another's.
+        stands: Of the same, from which what is beside bodies and friction can be confirmed.
         worth: Of the same, below which there is no claim of what is beside bodies, friction and
             couplings.
         bends: Of the general member: how far it may depart from Coulomb, viscous and
@@ -37,6 +38,7 @@ class Options:
     uncertainties: tuple[float, ...] = (0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
     closes: float = 0.01
     needed: float = 1.0
+    stands: float = 0.5
     worth: float = 0.1
     bends: tuple[float, ...] = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
     fewest: int = 12

@@ -184,7 +184,7 @@ class Reporting(Excluding):
             won, level = self.won[e], Level.SUSPECTED
             if mean > doubt and closes > o.worth and chance < 1.0 - o.coverage:
                 level = Level.APPROXIMATE
-                known = closes > o.needed and chance < o.error_rate / max(len(keys), 1)
+                known = closes > o.stands and chance < o.error_rate / max(len(keys), 1)
                 if won.share >= o.sure and known:
                     level = Level.CONFIRMED
             half = self._quantile(o.coverage) * error[at]

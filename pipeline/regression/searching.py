@@ -317,7 +317,8 @@ class Searching(Stages):
     def _seen(self) -> Seen:
         """What extras are linear about."""
         model = with_parameters(self.model, self.fitted)
-        return Seen(self.rows, self.told, model, 1.0 + self._point(Kind.GAIN))
+        passed = self.rows.thin(self.load + self._over_angle())
+        return Seen(self.rows, self.told, model, 1.0 + self._point(Kind.GAIN), passed)
 
     def _point(self, kind: Kind) -> Array:
         """What is taken out of the rows already, (J,)."""

@@ -134,12 +134,14 @@ class Seen:
         torque: As predicted, without what sensors get wrong, (N, J) [N*m].
         model: Bodies as fitted.
         gain: Of the torques, as corrected so far, (J,).
+        passed: Of it what goes through the drive: friction before it winds nothing up, (N, J).
     """
 
     rows: Rows
     torque: Array
     model: pin.Model
     gain: Array
+    passed: Array
 
     def rate(self, x: Array) -> Array:
         """Rate of change of thin rows (N, J), run by run, by cubic splines."""
@@ -165,17 +167,18 @@ class Seen:
     def columns(self, extras: Sequence[Extra]) -> dict[str, dict[int, Array]]:
         """Torque per coordinate: column name to joint to thin rows, (N,) each."""
         kinds = {e.kind for e in extras}
-        rate = self.rate(self.torque) if kinds & {Kind.LATE, Kind.WIND} else np.empty(0)
-        bend = self.rate(rate) if Kind.WIND in kinds else np.empty(0)
+        rate = self.rate(self.torque) if Kind.LATE in kinds else np.empty(0)
+        wound = self.rate(self.passed) if Kind.WIND in kinds else np.empty(0)
+        bend = self.rate(wound) if Kind.WIND in kinds else np.empty(0)
         bent = kinds & {Kind.ZERO, Kind.WIND, Kind.PLAY}
         slopes = self.slopes() if bent else (np.empty(0),) * 3
         out: dict[str, dict[int, Array]] = {}
         for e in extras:
-            out |= self._columns(e, rate, bend, slopes)
+            out |= self._columns(e, rate, (wound, bend), slopes)
         return out
 
     def _columns(
-        self, e: Extra, rate: Array, bend: Array, slopes: tuple[Array, Array, Array]
+        self, e: Extra, rate: Array, wound: tuple[Array, Array], slopes: tuple[Array, Array, Array]
     ) -> dict[str, dict[int, Array]]:
         j, torque, rows = e.joint, self.torque, self.rows
         every = range(torque.shape[1]) if j == EVERY else (j,)
@@ -190,12 +193,12 @@ class Seen:
         if e.kind is Kind.ZERO:
             change = -slopes[0][:, :, j]
         elif e.kind is Kind.PLAY:
-            change = -0.5 * slopes[0][:, :, j] * np.sign(torque[:, j])[:, None]
+            change = -0.5 * slopes[0][:, :, j] * np.sign(self.passed[:, j])[:, None]
         else:
             change = -(
-                slopes[0][:, :, j] * torque[:, [j]]
-                + slopes[1][:, :, j] * rate[:, [j]]
-                + slopes[2][:, :, j] * bend[:, [j]]
+                slopes[0][:, :, j] * self.passed[:, [j]]
+                + slopes[1][:, :, j] * wound[0][:, [j]]
+                + slopes[2][:, :, j] * wound[1][:, [j]]
             )
         largest = float(np.abs(change).max(initial=0.0))
         felt = np.flatnonzero(np.abs(change).max(axis=0) > 1e-9 * max(largest, 1e-300))

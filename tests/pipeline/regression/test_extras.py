@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -42,7 +44,8 @@ def seen() -> Seen:
     t = np.arange(0, 8, 0.005)
     q, v, a = arms_motion(t)
     r = rows([Run(t, q, dynamics(model, q, v, a), v)], cutoff=20.0, rate=50.0)
-    return Seen(r, dynamics(model, r.q, r.v, r.a), model, np.ones(3))
+    torque = dynamics(model, r.q, r.v, r.a)
+    return Seen(r, torque, model, np.ones(3), torque)
 
 
 def column(seen: Seen, kind: Kind, joint: int) -> dict[int, np.ndarray]:
@@ -126,7 +129,7 @@ def test_a_scale_is_the_torque_itself_in_the_unit_of_what_was_corrected(seen) ->
     actions = column(seen, Kind.GAIN, 2)
     assert list(actions) == [2]
     np.testing.assert_array_equal(actions[2], seen.torque[:, 2])
-    again = Seen(seen.rows, seen.torque, seen.model, np.array([1.0, 1.0, 0.5]))
+    again = replace(seen, gain=np.array([1.0, 1.0, 0.5]))
     np.testing.assert_allclose(column(again, Kind.GAIN, 2)[2], 2.0 * seen.torque[:, 2])
 
 
