@@ -78,6 +78,7 @@ class Reporting(Excluding):
             self.rows.rate,
             1.0 + self.gain,
             frozenset(self._structured),
+            self.loaded,
         )
 
     def _terms(

@@ -14,6 +14,7 @@ from actuators.presliding import presliding
 from pipeline.regression.laws.coupling import Coupling
 from pipeline.regression.laws.extras import Extra, Kind
 from pipeline.regression.laws.friction import SMOOTH, Shape
+from pipeline.regression.laws.payload import Payload
 from pipeline.regression.preprocess import low_pass
 from pipeline.regression.statistics.noise import Colour
 
@@ -165,6 +166,7 @@ class Result:
         rate: Of the rows that were fitted [Hz].
         gain: How many times what they should the torques read, (J,): noise is that of torques as
             they should be.
+        loaded: What the one body carries that is far from its URDF; `bodies` have it in them.
         structured: Joints whose remainder stays alike for longer than a block, and is no noise.
     """
 
@@ -192,6 +194,7 @@ class Result:
     rate: float
     gain: Array
     structured: frozenset[int]
+    loaded: Payload | None = None
 
     def predict(
         self,

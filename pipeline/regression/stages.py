@@ -97,23 +97,26 @@ class Stages(State):
 
         (MacKay, "Bayesian interpolation", Neural Computation 4, 1992).
         """
-        found = []
-        for sigma in self.options.uncertainties:
-            fit = self._fit(s, columns, sigma)
-            at = fit.columns(keys)
-            gram, moment = fit.normal(self.weight, at)
-            # About the URDF, so that the prior pulls nowhere.
-            off = np.zeros(len(at))
-            off[: len(fit.free_bodies)] = self.bodies.centre[fit.free_bodies]
-            prior = fit.prior_moment[at] - fit.prior_gram[np.ix_(at, at)] @ off
-            moment = moment - gram @ off - prior
-            scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-            scaled = gram / np.outer(scale, scale)
-            scaled[np.diag_indices_from(scaled)] += RIDGE
-            fall = (moment / scale) @ np.linalg.solve(scaled, moment / scale)
-            size = np.linalg.slogdet(scaled)[1] + 2.0 * np.log(scale).sum()
-            found.append(0.5 * fall - 0.5 * size - len(fit.free_bodies) * np.log(sigma))
-        self.sigma = self.options.uncertainties[int(np.argmax(found))]
+        evidence = [self._evidence(s, columns, keys, u) for u in self.options.uncertainties]
+        self.sigma = self.options.uncertainties[int(np.argmax(evidence))]
+
+    def _evidence(self, s: System, columns: Columns, keys: Sequence[Key], sigma: float) -> float:
+        """Logarithm of the evidence for an uncertainty of the URDF, up to a constant."""
+        fit = self._fit(s, columns, sigma)
+        at = fit.columns(keys)
+        gram, moment = fit.normal(self.weight, at)
+        # About the URDF, so that the prior pulls nowhere.
+        off = np.zeros(len(at))
+        off[: len(fit.free_bodies)] = self.bodies.centre[fit.free_bodies]
+        prior = fit.prior_moment[at] - fit.prior_gram[np.ix_(at, at)] @ off
+        moment = moment - gram @ off - prior
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        scaled = gram / np.outer(scale, scale)
+        scaled[np.diag_indices_from(scaled)] += RIDGE
+        fall = (moment / scale) @ np.linalg.solve(scaled, moment / scale)
+        size = np.linalg.slogdet(scaled)[1] + 2.0 * np.log(scale).sum()
+        trust = 5.0 * float(np.log(self.bodies.trust[self.bodies.free]).sum())
+        return float(0.5 * fall - 0.5 * size + trust - len(fit.free_bodies) * np.log(sigma))
 
     def _rise(self) -> None:
         """Speed or travel over which friction rises after a reversal: what predicts best.

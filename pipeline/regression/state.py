@@ -18,6 +18,7 @@ from pipeline.regression.laws.extras import SENSORS, Extra, Kind
 from pipeline.regression.laws.friction import (
     bends,
 )
+from pipeline.regression.laws.payload import Payload
 from pipeline.regression.options import Options
 from pipeline.regression.preprocess import Rows
 from pipeline.regression.statistics.gram import Columns, Key, System, system
@@ -45,6 +46,8 @@ class State:
         self.rows, self.model, self.options, self.given = rows, model, options, blocks
         self.logged = rows
         self.bodies = Bodies.of(model)
+        #: What the one body carries that is far from its URDF.
+        self.loaded: Payload | None = None
         self.design = Design.of(model, rows)
         self.names = tuple(model.names[1:])
         self.couplings: list[Coupling] = []

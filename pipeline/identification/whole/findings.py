@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.effects.bodies.link_mass import AXES, FARTHEST, LinkMass
 from pipeline.effects.bodies.rigid_body_parameters import NAMES, UNITS, physical
 from pipeline.effects.drive.rotor_inertia import RotorInertia
 from pipeline.effects.friction.joint_friction import JointFrictionLaw
@@ -22,6 +23,8 @@ from pipeline.machine.machine import MachineModel
 from pipeline.regression import Friction, Level, Result, Term
 
 Array = NDArray[np.float64]
+#: Standard errors in half of a 95 % interval.
+COVER: Final = 1.96
 LAW: Final = (
     "no law of the catalogue predicts validation data as well as a smooth curve over speed and load"
 )
@@ -41,7 +44,7 @@ def told(
     Raises:
         NotWholeError: A body as fitted is none without what hangs on it.
     """
-    out = bodies(result, model, carried)
+    out = [*bodies(result, model, carried), *payload(result, model)]
     out += couplings(result)
     out += frictions(result)
     out += inertias(result, model) + offsets(result, model)
@@ -58,6 +61,8 @@ def bodies(result: Result, model: MachineModel, carried: Mapping[str, Array]) ->
         ten, half = result.bodies[10 * k : 10 * k + 10], result.bodies_half[10 * k : 10 * k + 10]
         if ten[0] <= 0.0 or str(joint) not in links:
             continue
+        if result.loaded is not None and result.loaded.body == k:
+            ten = ten - result.loaded.parameters
         if str(joint) in carried:
             ten = ten - carried[str(joint)]
             if not physical(ten):
@@ -71,6 +76,27 @@ def bodies(result: Result, model: MachineModel, carried: Mapping[str, Array]) ->
         place = (links[str(joint)],)
         members.append(Member(place, parameters, limits.CONFIRMED, result.refit_share))
     return [Told("rigid_body_parameters", "", "", tuple(members))]
+
+
+def payload(result: Result, model: MachineModel) -> list[Told]:
+    """What the one link carries that is far from its URDF, where all others are near theirs."""
+    one = result.loaded
+    if one is None:
+        return []
+    links = {joint: link for link, joint in model.links.items()}
+    link = links[str(list(result.model.names)[1 + one.body])]
+    t = COVER
+    parameters = (
+        estimate("mass", one.mass, t * one.mass_error, "kg", low=0.0),
+        *(
+            estimate(axis, float(c), t * float(e), "m", low=-FARTHEST, high=FARTHEST)
+            for axis, c, e in zip(AXES, one.place, one.place_error, strict=True)
+        ),
+    )
+    sure = one.mass > t * one.mass_error
+    level = limits.CONFIRMED if sure else limits.APPROXIMATE
+    member = Member((link,), parameters, level, result.refit_share)
+    return [Told(LinkMass.name, "", "its mass is not sure", (member,))]
 
 
 _DIAGONAL: Final = ("Ixx", "Iyy", "Izz")

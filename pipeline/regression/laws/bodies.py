@@ -16,7 +16,7 @@ has half of it as its second order, is convex in the parameters and infinite whe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -96,12 +96,14 @@ class Bodies:
         centre: The same where they are bodies, else the nearest that is thick enough, (10 B,).
         free: Which bodies may change (those with a mass), (B,).
         metric: Of the distance at the centre, (10 B, 10 B); zero for bodies that may not change.
+        trust: Weight of every body's distance, (B,).
     """
 
     nominal: Array
     centre: Array
     free: NDArray[np.bool_]
     metric: Array
+    trust: Array
 
     @classmethod
     def of(cls, model: pin.Model) -> Bodies:
@@ -127,7 +129,21 @@ class Bodies:
             g = np.einsum("ij,kjl->kil", inverse, _E)
             at = slice(10 * k, 10 * k + 10)
             metric[at, at] = np.einsum("kij,lji->kl", g, g)
-        return cls(nominal, centre.ravel(), free, metric)
+        return cls(nominal, centre.ravel(), free, metric, np.ones(free.size))
+
+    def trusting(self, body: int, trust: float) -> Bodies:
+        """The same with one body's distance at another weight than the others'."""
+        at = slice(10 * body, 10 * body + 10)
+        metric, weights = self.metric.copy(), self.trust.copy()
+        metric[at, at] *= trust / weights[body]
+        weights[body] = trust
+        return replace(self, metric=metric, trust=weights)
+
+    def carrying(self, model: pin.Model, body: int, ten: Array) -> Bodies:
+        """The same about a body that carries something, (10,); the URDF stays the URDF."""
+        more = self.nominal.copy()
+        more[10 * body : 10 * body + 10] += ten
+        return replace(Bodies.of(with_parameters(model, more)), nominal=self.nominal)
 
     @property
     def columns(self) -> NDArray[np.bool_]:
@@ -150,11 +166,13 @@ class Bodies:
             if sign <= 0 or np.linalg.eigvalsh(p / np.outer(scale, scale))[0] <= 0:
                 return np.inf, gradient, hessian
             inverse, inverse0 = np.linalg.inv(p), np.linalg.inv(p0)
-            total += float(np.trace(inverse0 @ p)) - log - 4.0
-            total += float(np.linalg.slogdet(p0 / np.outer(scale, scale))[1])
+            own = float(np.trace(inverse0 @ p)) - log - 4.0
+            own += float(np.linalg.slogdet(p0 / np.outer(scale, scale))[1])
+            total += self.trust[k] * own
             g = np.einsum("ij,kjl->kil", inverse, _E)
-            gradient[at] = np.einsum("ij,kji->k", inverse0, _E) - np.einsum("kii->k", g)
-            hessian[at, at] = np.einsum("kij,lji->kl", g, g)
+            slope = np.einsum("ij,kji->k", inverse0, _E) - np.einsum("kii->k", g)
+            gradient[at] = self.trust[k] * slope
+            hessian[at, at] = self.trust[k] * np.einsum("kij,lji->kl", g, g)
         return total, gradient, hessian
 
 

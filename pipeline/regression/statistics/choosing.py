@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.regression.laws.bodies import Bodies
 from pipeline.regression.laws.design import folds_of
 from pipeline.regression.laws.friction import LAW, LAWS
+from pipeline.regression.laws.payload import Payload, nearest
 from pipeline.regression.searching import ANY, Searching
 from pipeline.regression.statistics.gram import Columns, Key, System, system
 from pipeline.regression.statistics.jackknife import standard_error
@@ -25,6 +28,10 @@ from pipeline.regression.statistics.solve import Fit, beyond_chance, compare
 Array = NDArray[np.float64]
 #: Laws of all joints, and the predictive loss of every block with them.
 Found = tuple[list[Choice], Array]
+#: By how much nearer to their URDF all links are than with the one that carries something.
+NEARER = 4.0
+#: Uncertainties of a link that carries something, relative to what it is by its URDF.
+ANY_LINK = (5.0, 20.0, 100.0)
 #: What is left by a refit that closes most of what is left without: less than this share.
 MOST = 0.5
 
@@ -41,6 +48,7 @@ class Choosing(Searching):
         """
         columns = self._columns(self.couplings)
         normal = self._system(columns)
+        self.bodies, self.loaded = Bodies.of(self.model), None
         kept, kept_loss = self._chosen(self._fit(normal, columns, 0.0))
         refit, loss = self._refit(normal, columns)
         wins = self._carries(normal, columns, (kept, kept_loss), (refit, loss))
@@ -56,6 +64,8 @@ class Choosing(Searching):
             wins = worse <= error and self._carries(normal, columns, first, (refit, loss))
             if not wins:
                 self.bodies_instead, self.sigma = before, sigma
+        if wins:
+            refit, loss = self._one_link(normal, columns, (refit, loss))
         self.refit_share = self._share_of_draws(kept_loss - loss)
         if not wins:
             refit, self.sigma = kept, 0.0
@@ -69,6 +79,68 @@ class Choosing(Searching):
         if self.sigma == before:
             return found
         return self._chosen(self._fit(normal, columns, self.sigma), self.bodies_instead)
+
+    def _one_link(self, normal: System, columns: Columns, refit: Found) -> Found:
+        """Bodies of which one alone is far from its URDF: it carries something.
+
+        Where the URDF's uncertainty has to be large because of one link, evidence for a link of any
+        size beside others that are nearly as stated is far greater.
+        """
+        if int(self.bodies.free.sum()) < 2:
+            return refit
+        keys, before, bodies = self._keys(refit[0]), self.sigma, self.bodies
+        plain = max(self._evidence(normal, columns, keys, u) for u in self.options.uncertainties)
+        small = [u for u in self.options.uncertainties if u <= before / NEARER]
+        tried = []
+        for k, u, wide in product(map(int, np.flatnonzero(bodies.free)), small, ANY_LINK):
+            self.bodies = bodies.trusting(k, (u / wide) ** 2)
+            tried.append((self._evidence(normal, columns, keys, u), k, u, wide))
+        self.bodies = bodies
+        least = plain + float(np.log(bodies.free.sum() / self.options.error_rate))
+        if not tried or max(tried)[0] < least:
+            return refit
+        _, k, u, wide = max(tried)
+        self.loaded = self._payload(normal, columns, keys, k, (u, wide))
+        if self.loaded is not None:
+            self.bodies, self.sigma = bodies.carrying(self.model, k, self.loaded.parameters), u
+            found = self._chosen(self._fit(normal, columns, u), self.bodies_instead)
+            worse, error = compare(found[1], refit[1], self.weight)
+            if worse <= error:
+                return found
+        self.bodies, self.sigma, self.loaded = bodies, before, None
+        return refit
+
+    def _payload(
+        self,
+        normal: System,
+        columns: Columns,
+        keys: Sequence[Key],
+        k: int,
+        sigmas: tuple[float, float],
+    ) -> Payload | None:
+        """What a body carries, that alone is far from its URDF.
+
+        Args:
+            normal: Whitened normal equations.
+            columns: That they are of.
+            keys: Beside bodies.
+            k: Which.
+            sigmas: Uncertainty of the URDF, and of this body.
+        """
+        plain, (sigma, wide) = self.bodies, sigmas
+        self.bodies = plain.trusting(k, (sigma / wide) ** 2)
+        fit = self._fit(normal, columns, sigma)
+        self.bodies = plain
+        at = fit.columns(keys)
+        gram, _ = fit.normal(self.weight, at)
+        sizes = fit.solve(self.weight, at)
+        mine = np.flatnonzero(fit.free_bodies // 10 == k)
+        scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+        inverse = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+        spread = (inverse / np.outer(scale, scale))[np.ix_(mine, mine)]
+        own = slice(10 * k, 10 * k + 10)
+        spread = spread + np.linalg.inv(plain.metric[own, own]) * sigma**2
+        return nearest(k, sizes[mine] - plain.nominal[own], spread)
 
     def _carries(self, normal: System, columns: Columns, kept: Found, refit: Found) -> bool:
         """Whether fitted bodies predict better beyond chance, and carry over.
