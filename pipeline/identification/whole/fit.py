@@ -14,7 +14,7 @@ from pipeline.effects.registry import effect_named
 from pipeline.identification.results import Found
 from pipeline.identification.whole.beside import kinds_of, names_of, unnamed
 from pipeline.identification.whole.errors import NotWholeError
-from pipeline.identification.whole.findings import suspected, told
+from pipeline.identification.whole.findings import COVER, suspected, told
 from pipeline.identification.whole.rigid import held, rigid_model, still_joints
 from pipeline.identification.whole.sides import sides
 from pipeline.identification.whole.training import training_runs, without_known
@@ -79,20 +79,33 @@ class Whole:
     order: NDArray[np.intp]
 
     def doubt(self, m: Measurement) -> Array:
-        """What is left open of fitted bodies, as torque along another motion, (J,) [N*m] RMS.
+        """What is left open of bodies and friction, as torque along another motion, (J,) [N*m] RMS.
 
         NaN of joints that were held.
         """
         out = np.full(len(m.joints), np.nan)
-        if not self.result.refit:
-            return out
         rows = np.flatnonzero(m.mask.any(axis=1))
         rows = rows[:: max(1, rows.size // ROWS)]
-        motion = (x[np.ix_(rows, self.order)] for x in (m.q, m.v, m.a))
-        y = regressor(self.rigid, *motion)
-        open_ = self.result.bodies_spread + self.result.bodies_scatter
-        variance = np.einsum("njp,pq,njq->nj", y, open_, y)
-        out[self.order] = np.sqrt(variance.mean(axis=0)) if rows.size else 0.0
+        out[self.order] = 0.0
+        if not rows.size:
+            return out
+        q, v, a = (x[np.ix_(rows, self.order)] for x in (m.q, m.v, m.a))
+        variance = self._friction_open(q, v, a)
+        if self.result.refit:
+            y = regressor(self.rigid, q, v, a)
+            open_ = self.result.bodies_spread + self.result.bodies_scatter
+            variance += np.einsum("njp,pq,njq->nj", y, open_, y).mean(axis=0)
+        out[self.order] = np.sqrt(variance)
+        return out
+
+    def _friction_open(self, q: Array, v: Array, a: Array) -> Array:
+        """Variance of the torque of friction by the intervals of its sizes, (K,) [N^2*m^2]."""
+        felt, out = self.result.passed(q, v, a), np.zeros(q.shape[1])
+        for j, friction in enumerate(self.result.friction):
+            columns, _ = friction.shape.columns(v[:, j], a[:, j], felt[:, j])
+            for term in friction.terms:
+                error = self.result.halves.get((str(j), term), 0.0) / COVER
+                out[j] += error**2 * float((columns[term] ** 2).mean())
         return out
 
 
