@@ -53,20 +53,22 @@ class Told:
         terms = {k[1].partition("@")[0] for k in mine}
         gone = {"load", QUADRANT} if terms & set(_BOTH) else set()
         others = [(str(joint), u) for u in LAWS if u.partition("@")[0] not in terms | gone]
-        out = set(law) if self._small(size, law, others) else set()
+        out = set(law) if not law or self._small(size, others) else set()
+        at = [self.keys.index(k) for k in law]
+        if others and law:
+            moves = np.abs(added(self.fit, self.weight, self.keys, others).moves[:, at])
+            self.moved[at] = moves.max(axis=0)
         springs = [("shared", n) for e in beside if e.kind is Kind.SPRING for n in e.names]
         for key in mine:
             zero = key[1] == "offset"
-            if key[1] in BESIDE and (not zero or self._small(abs(sizes[key]), [key], springs)):
+            if key[1] in BESIDE and (not zero or self._small(abs(sizes[key]), springs)):
                 out.add(key)
         return out
 
-    def _small(self, size: float, mine: Sequence[Key], others: Sequence[Key]) -> bool:
-        if not others or not mine:
+    def _small(self, size: float, others: Sequence[Key]) -> bool:
+        if not others:
             return True
         one = added(self.fit, self.weight, self.keys, others)
-        at = [self.keys.index(k) for k in mine]
-        self.moved[at] = np.maximum(self.moved[at], np.abs(one.moves[:, at]).max(axis=0))
         most = np.abs(one.size) + self.t * one.error
         return all(
             x * _effect(self.columns, k) < OTHER * size for k, x in zip(others, most, strict=True)

@@ -67,19 +67,30 @@ class _Identification(Reporting):
             self._laws()
             result = self._finish()
             fallen = [e.extra for e in result.extras if e.level is Level.SUSPECTED]
-            beside, unlikely = self._unsure(result), self._unlikely(result)
-            unsure = [*beside, *unlikely]
-            if not fallen and not unsure:
+            new = self._bar(result)
+            if not fallen and not new:
                 terms = self._without_claims(result)
                 told = {(t.place, t.term) for t in terms}
                 left = [t for t in out if (t.place, t.term) not in told]
                 return replace(result, terms=(*terms, *left))
-            out += [replace(t, level=Level.SUSPECTED) for t in unsure]
-            instead = self.bodies_instead if result.refit else self.barred
-            for terms, barred in ((beside, instead), (unlikely, self.barred)):
-                barred |= {(str(self.names.index(t.place)), t.term) for t in terms}
+            out += [replace(t, level=Level.SUSPECTED) for t in new]
             if fallen:
                 self._without(fallen)
+
+    def _bar(self, result: Result) -> list[Term]:
+        """Allow no longer what does not stand; what is told again all the same is no news."""
+        instead = self.bodies_instead if result.refit else self.barred
+        new = []
+        for terms, barred in (
+            (self._unsure(result), instead),
+            (self._unlikely(result), self.barred),
+        ):
+            for t in terms:
+                key = (str(self.names.index(t.place)), t.term)
+                if key not in barred:
+                    barred.add(key)
+                    new.append(t)
+        return new
 
     def _unsure(self, result: Result) -> list[Term]:
         """Offsets and rotor inertias that do not stand: beside bodies they name no friction."""
@@ -116,17 +127,16 @@ class _Identification(Reporting):
         ]
 
     def _unlikely(self, result: Result) -> list[Term]:
-        """Terms of friction that most draws do without, and that close little."""
-        return [
-            t
-            for t in result.terms
-            if t.level is Level.APPROXIMATE
-            and t.place in self.names
-            and t.term not in BESIDE
-            and (
-                t.closes < self.options.worth or (t.share < 0.5 and t.closes < self.options.needed)
-            )
-        ]
+        """Terms of friction that most draws do without and that close little, or may be nothing."""
+        out = []
+        for t in result.terms:
+            if t.level is not Level.APPROXIMATE or t.place not in self.names:
+                continue
+            little = t.closes < self.options.worth
+            rare = t.share < 0.5 and t.closes < self.options.needed
+            if (t.term not in BESIDE and (little or rare)) or t.low <= 0.0 <= t.high:
+                out.append(t)
+        return out
 
     def _finish(self) -> Result:
         suspected: list[Term] = []

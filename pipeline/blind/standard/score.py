@@ -131,11 +131,12 @@ def _background(named: Named, truth: Mapping[str, Any]) -> bool:
         return set(named.place) <= set(truth["uneven"]) - gone
     if named.effect in BODIES:
         return not any(h["effect"] in BODIES for h in hidden) or named.effect != "link_mass"
-    return (
-        named.effect == "time_delay"
-        and any(d > 0 for d in truth["delays_s"])
-        and not any(h["effect"] == "time_delay" for h in hidden)
-    )
+    delays = truth["delays_s"]
+    if named.effect != "time_delay" or not any(h["effect"] == "time_delay" for h in hidden):
+        return named.effect == "time_delay" and any(d > 0 for d in delays)
+    # Beside a delay of all that is hidden, joints are late by themselves, none as the next.
+    alone = set(named.place).isdisjoint(p for h in hidden for p in h["place"])
+    return alone and max(delays) > min(delays)
 
 
 def _halves(hidden: Sequence[Mapping[str, Any]], named: Sequence[Named]) -> set[str]:

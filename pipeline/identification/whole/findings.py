@@ -21,6 +21,7 @@ from pipeline.identification.whole.errors import NotWholeError
 from pipeline.identification.whole.told import Told, estimate, exact
 from pipeline.machine.machine import MachineModel
 from pipeline.regression import Friction, Level, Result, Term
+from pipeline.regression.laws.payload import Payload
 
 Array = NDArray[np.float64]
 #: Standard errors in half of a 95 % interval.
@@ -61,8 +62,9 @@ def bodies(result: Result, model: MachineModel, carried: Mapping[str, Array]) ->
         ten, half = result.bodies[10 * k : 10 * k + 10], result.bodies_half[10 * k : 10 * k + 10]
         if ten[0] <= 0.0 or str(joint) not in links:
             continue
-        if result.loaded is not None and result.loaded.body == k:
-            ten = ten - result.loaded.parameters
+        weight = carries(result)
+        if weight is not None and weight.body == k:
+            ten = ten - weight.parameters
         if str(joint) in carried:
             ten = ten - carried[str(joint)]
             if not physical(ten):
@@ -78,9 +80,18 @@ def bodies(result: Result, model: MachineModel, carried: Mapping[str, Array]) ->
     return [Told("rigid_body_parameters", "", "", tuple(members))]
 
 
+def carries(result: Result) -> Payload | None:
+    """What a link carries, if what is left of it without is a body."""
+    one = result.loaded
+    if one is None:
+        return None
+    ten = result.bodies[10 * one.body : 10 * one.body + 10] - one.parameters
+    return one if ten[0] > 0.0 and (ten[[4, 6, 9]] >= 0.0).all() and physical(ten) else None
+
+
 def payload(result: Result, model: MachineModel) -> list[Told]:
     """What the one link carries that is far from its URDF, where all others are near theirs."""
-    one = result.loaded
+    one = carries(result)
     if one is None:
         return []
     links = {joint: link for link, joint in model.links.items()}

@@ -210,7 +210,8 @@ def upgrade(
         trials = []
         for j, c in enumerate(now):
             for step in _steps(c):
-                if any((str(j), t) in barred for t in step.beside):
+                named = () if step.law is UNNAMED else step.law.terms
+                if any((str(j), t) in barred for t in (*named, *step.beside)):
                     continue
                 trial = [*now[:j], step, *now[j + 1 :]]
                 trials.append((losses(trial), trial))

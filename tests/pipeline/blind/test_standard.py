@@ -198,3 +198,11 @@ def test_no_trial_hides_two_laws_of_friction() -> None:
     assert len(several) > 30
     assert all(len(LAWS_OF_FRICTION.intersection(s.effects)) < 2 for s in several)
     assert any(LAWS_OF_FRICTION.intersection(s.effects) for s in several)
+
+
+def test_joints_late_by_themselves_beside_a_hidden_delay_are_the_machines_own() -> None:
+    late = ("time_delay", "effort channels", {"delay": 0.02})
+    every, one = named("time_delay", "effort channels"), named("time_delay", "joint_1")
+    assert not judged(truth(late, delays_s=[0.021, 0.023]), every, one).wrong
+    assert judged(truth(late, delays_s=[0.02, 0.02]), every, one).wrong
+    assert judged(truth(late, delays_s=[0.021, 0.023]), every, one).first
