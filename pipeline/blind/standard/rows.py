@@ -65,8 +65,12 @@ def trial_row(spec: StandardSpec, s: StandardScore, sha256: str) -> Row:
 def _right(n: Any, s: StandardScore) -> str:
     if n not in s.counted:
         return "background"
-    hit = any(n.effect == h["effect"] and list(n.place) == list(h["place"]) for h in s.hidden)
-    return "right" if hit else "wrong"
+    if n in s.wrong:
+        return "wrong"
+    # A law of several terms is right by the one that is hidden, two halves by the whole.
+    told = (n.effect, *n.amounts_to)
+    hit = any(h["effect"] in told and list(n.place) == list(h["place"]) for h in s.hidden)
+    return "right" if hit or n.written else "wrong"
 
 
 def _payload(hidden: Any, s: StandardScore) -> str:
