@@ -134,8 +134,8 @@ def test_tx40_is_better_than_a_plain_ladder_on_the_last_part(
 ) -> None:
     """Every row, also those at rest, by the model file alone; a plain ladder reaches 3.15 N*m.
 
-    At joints 5 and 6 it reaches 1.01 and 1.09; the aims, 2.05 and 1.1, are not reached: what is left
-    is 2.19, 1.33 and 1.10.
+    At joints 5 and 6 it reaches 1.01 and 1.09. The aims, 2.05 and 1.1, are not reached: what is
+    left is 2.19, 1.33 and 1.10.
     """
     log = shared_data / "tx40" / "tx40_log.csv"
     left = score(written(tx40, tmp_path), log, 100.0, 500.0, last=0.4)
