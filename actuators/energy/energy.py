@@ -36,15 +36,18 @@ class StageEnergy:
 
 
 def duration(time: FloatArray) -> float:
-    """Return the time a series spans [s].
+    """Return the time a series spans, the shortest of its columns [s].
+
+    Args:
+        time: (N,) or (N, J) [s].
 
     Raises:
         EnergyError: It spans none.
     """
-    span = float(time[-1] - time[0])
+    span = float(np.min(time[-1] - time[0]))
     if span <= 0.0:
         raise EnergyError(
-            f"series of {time.size} samples spans no time: give at least two instants"
+            f"series of {len(time)} samples spans no time: give at least two instants"
         )
     return span
 
@@ -53,14 +56,26 @@ def integral(time: FloatArray, power: FloatArray) -> FloatArray:
     """Return the integral of a piecewise linear quantity over time, (J,).
 
     Args:
-        time: (N,) [s], repeated stamps are breaks.
+        time: (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
         power: (N, J), or (N,).
     """
-    half = 0.5 * np.diff(time)
-    weights = np.zeros(time.size)  # trapezoids as one product
+    half = 0.5 * np.diff(time, axis=0)
+    weights = np.zeros(time.shape)  # trapezoids as one product
     weights[:-1] += half
     weights[1:] += half
-    total: FloatArray = weights @ power
+    return weighted(weights, power)
+
+
+def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
+    """Return the weighted sum over the samples, (J,).
+
+    Args:
+        weights: (N,) or (N, J).
+        values: (N, J), or (N,).
+    """
+    total: FloatArray = (
+        weights @ values if weights.ndim == 1 else np.einsum("nj,nj->j", weights, values)
+    )
     return total
 
 
@@ -68,7 +83,7 @@ def split_integral(time: FloatArray, power: FloatArray) -> tuple[FloatArray, Flo
     """Return the integrals of the positive and of the negative part, both not negative, (J,).
 
     Args:
-        time: (N,) [s], repeated stamps are breaks.
+        time: (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
         power: (N, J) [W].
     """
     net = integral(time, power)
@@ -79,7 +94,7 @@ def split_integral(time: FloatArray, power: FloatArray) -> tuple[FloatArray, Flo
     a, b = np.abs(power[row, column]), np.abs(power[row + 1, column])
     real = (a > 0.0) & (b > 0.0)
     row, column, a, b = row[real], column[real], a[real], b[real]
-    step = time[row + 1] - time[row]
+    step = np.diff(time, axis=0)[(row, column) if time.ndim == 2 else row]
     np.subtract.at(magnitude, column, step * a * (b / (a + b)))
     return np.maximum(0.5 * (magnitude + net), 0.0), np.maximum(0.5 * (magnitude - net), 0.0)
 

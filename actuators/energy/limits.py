@@ -6,7 +6,7 @@ import numpy as np
 
 from actuators.arrays import FloatArray
 from actuators.chain import ChainResult
-from actuators.energy.energy import duration
+from actuators.energy.energy import duration, weighted
 
 
 @dataclass(frozen=True)
@@ -73,15 +73,16 @@ def rms_over_time(time: FloatArray, values: FloatArray) -> FloatArray:
     """Return the root mean square of a piecewise linear quantity, (J,).
 
     Args:
-        time: (N,) [s], repeated stamps are breaks.
+        time: (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
         values: (N, J).
 
     Raises:
         EnergyError: The series spans no time.
     """
     a, b = values[:-1], values[1:]
-    square = np.diff(time) @ (a * a + a * b + b * b) / 3.0  # exact for linear pieces
-    mean_square: FloatArray = square / duration(time)
+    square = weighted(np.diff(time, axis=0), a * a + a * b + b * b) / 3.0  # exact if linear
+    duration(time)
+    mean_square: FloatArray = square / (time[-1] - time[0])
     return np.sqrt(mean_square)
 
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from actuators.arrays import Scalars
 from actuators.chain import Chain
 from actuators.elements.motor import DCMotor
 from actuators.errors import ActuatorError, CatalogError, closest, one_line
@@ -66,8 +67,13 @@ class Catalog:
         components = {n: edited if n == component.name else c for n, c in self.components.items()}
         return dataclasses.replace(self, components=MappingProxyType(components))
 
-    def chain(self, name: str) -> Chain:
+    def chain(self, name: str, values: Mapping[str, Scalars] | None = None) -> Chain:
         """Return the chain of an alternative.
+
+        Args:
+            name: Of the alternative.
+            values: SI values that stand in for parameters, by `component.parameter`: one for all
+                joints or one per joint (J,).
 
         Raises:
             CatalogError: No such alternative, or its ratios do not multiply to what it promises.
@@ -77,11 +83,13 @@ class Catalog:
             raise CatalogError(
                 f"no alternative '{one_line(name)}': {closest(name, list(self.alternatives))}"
             )
-        alternative = self.alternatives[name]
+        alternative, own = self.alternatives[name], values or {}
+
+        def value(reference: str) -> Scalars:
+            return own[reference] if reference in own else self.parameter(reference).value
+
         elements = tuple(
-            LAWS[e.law][0](
-                name=e.name, **{a: self.parameter(r).value for a, r in e.arguments.items()}
-            )
+            LAWS[e.law][0](name=e.name, **{a: value(r) for a, r in e.arguments.items()})
             for e in alternative.elements
         )
         constants = self.components[alternative.motor].parameters
@@ -89,13 +97,14 @@ class Catalog:
             f"{name}_spread": constants.parameter(name).spread
             for name in ("torque_constant", "resistance")
         }
-        motor = DCMotor(name=WINDING, **constants, **spread)
+        numbers = {n: own.get(f"{alternative.motor}.{n}", v) for n, v in constants.items()}
+        motor = DCMotor(name=WINDING, **numbers, **spread)
         stages = {e.stage: e.name for e in alternative.elements if e.stage}
         chain = Chain(name=name, elements=elements, motor=motor, stages=MappingProxyType(stages))
-        total, promised = float(np.asarray(chain.ratio)), self.parameter(alternative.ratio).value
-        if abs(total / promised - 1.0) > _RATIO_TOLERANCE:
+        total, promised = np.asarray(chain.ratio, dtype=float), value(alternative.ratio)
+        if np.any(np.abs(total / promised - 1.0) > _RATIO_TOLERANCE):
             raise CatalogError(
-                f"alternative '{name}': its ratios multiply to {total:.10g}, "
+                f"alternative '{name}': its ratios multiply to {total.flat[0]:.10g}, "
                 f"'{alternative.ratio}' asks for {promised:.10g}: change them together"
             )
         return chain

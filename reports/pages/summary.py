@@ -308,9 +308,9 @@ def _number_words(numbers: Sequence[Calibrated]) -> list[str]:
         if n.at_bound >= AT_LEAST
     ]
     return [
-        "Driven out of what data sheets and literature believe (mean of the ensemble, in standard "
+        "Driven out of what data sheets and literature believe (mean of the posterior, in standard "
         f"deviations of that belief): {', '.join(against) or 'none'}.",
-        f"At a bound, in so many of the ensemble's sets: {', '.join(bound) or 'none'}.",
+        f"At a bound, in such a share of the posterior: {', '.join(bound) or 'none'}.",
         f"Not determined by the paper: {', '.join(free) or 'none'}.",
         f"Without a prior, drawn from all that give Tables IV to VI: {', '.join(fixed) or 'none'}.",
     ]

@@ -27,7 +27,7 @@ def answer(judged: Judged, tables: Mapping[str, Table]) -> tuple[str, ...]:
     if judged.by.results is None:
         return (_changed(judged), _energies(judged, tables), " ".join(_counted(judged)))
     others = (_changed(judged),) if judged.by.word else ()
-    return (first_paragraph(judged), _energies(judged, tables), _ensemble(judged), *others)
+    return (first_paragraph(judged), _energies(judged, tables), _posterior(judged), *others)
 
 
 def first_paragraph(judged: Judged) -> str:
@@ -78,29 +78,26 @@ def _counted(judged: Judged) -> tuple[str, ...]:
             f"**Reproduced:** {met} of the {total} printed numbers that can be computed with these "
             f"actuators; {len(judged.judgement.missing)} cannot and are left out.",
         )
-    met, of = count["prediction"]
+    predicted = [r for r in judged.judgement.reproduction if r.published.role == "prediction"]
+    named = _listed(_prediction(row, judged.by.results is not None) for row in predicted)
     text = (
-        f"**Predicted:** only {_word(of)} of the {total} printed numbers, both zeros: standing "
-        "still, friction alone holds the knee with reversible gears and the whole leg with "
-        f"irreversible ones. {'Both' if met == of == 2 else f'{met} of {of}'} come out"
-    )
-    shares = [
-        row.met
-        for row in judged.judgement.reproduction
-        if row.published.role == "prediction" and not math.isnan(row.met)
-    ]
-    if shares and judged.by.results is not None:
-        text += (
-            f" (in {_listed(percent(s) for s in shares)} of "
-            f"{len(judged.by.results['ensemble'])} sets of numbers that fit, see below)"
-        )
-    text += (
-        f". Of the rest {count['input'][1]} were put in, {count['target'][1]} "
+        f"**Predicted:** {_word(len(predicted))} of the {total} printed numbers: {named}. "
+        f"Of the rest {count['input'][1]} were put in, {count['target'][1]} "
         f"{'fitted' if judged.by.results is not None else 'are what was fitted'}, "
         f"{count['consequence'][1]} follow from those by Ohm's law and the like, "
         f"{count['symmetry'][1]} is zero by symmetry."
     )
     return tuple(part for part in (text, _against(judged), _missed(judged)) if part)
+
+
+def _prediction(row: ReproducedRow, known: bool) -> str:
+    """A prediction, whether it comes out, and in which share of the posterior."""
+    unit = "" if row.published.value == 0 else f" {row.published.unit}"
+    text = (
+        f"{_named(row)} is {row.published.value:g}{unit}, which "
+        f"{'comes' if row.verdict == REPRODUCED else 'does not come'} out"
+    )
+    return text + (f" (in {percent(row.met)} of the posterior)" if known else "")
 
 
 def _against(judged: Judged) -> str:
@@ -166,8 +163,8 @@ def _price(judged: Judged) -> str:
         '**The price of the fit:** "almost 15" needs a planetary gear with '
         f"{p.gear_friction:.1f} mN·m of constant friction, {p.gear_friction / p.gear_prior:.1f} "
         f"times what gear data suggest ({p.gear_prior:g} mN·m, at most {high:g}); it alone turns "
-        f"{p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle into heat. And "
-        f"{percent(p.no_load_share)} of the sets that fit ask for a motor that draws over "
+        f"{p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle into heat. In "
+        f"{percent(p.no_load_share, 1)} of the posterior the motor draws over "
         f"{percent(NOTABLE - 1)} more current without load than the "
         f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
     )
@@ -237,23 +234,31 @@ def _span(interval: Interval) -> str:
     return f"{interval[0]:.1f} to {interval[1]:.1f}"
 
 
-def _ensemble(judged: Judged) -> str:
-    """What the ensemble is."""
+def _posterior(judged: Judged) -> str:
+    """What is known of the numbers behind, and how well it was computed."""
     results = judged.by.results
     assert results is not None
     count = headline(judged.judgement.reproduction)
     unmet = judged.judgement.contradiction.best.unmet
+    known = results["posterior"]
+    numbers = known["numbers"].values()
+    paths = [
+        f"{name} {percent(p['share'])} ± {percent(1.96 * p['standard_error'])}"
+        for name, p in known["paths"].items()
+    ]
     return (
         "**How sure it is:** the paper does not print friction, inertia, masses or gear angles, "
         f"and {count['target'][1]} figures cannot determine {len(results['nearest']['z'])} "
         "numbers. The values here are the set nearest to data sheets and literature that fits. "
-        f"Beside it stand {len(results['ensemble'])} sets of numbers that fit as well, from "
-        f"{results['draws']} draws of prior knowledge, each moved as little as needed (the others "
-        "did not get there): every one gives every number that was put in, fitted or follows at "
-        f"printed precision, but for {_listed(_named(_rows(judged)[name]) for name in unmet)}; the "
-        "predictions were not asked for. That is by construction: the motor's torque constant, "
-        "resistance and rotor friction have no prior but are drawn from the narrow range in which "
-        "Tables IV to VI come out, finer than any data sheet resolves."
+        "Their intervals hold 95 % of the posterior: what data sheets and literature say of all "
+        "numbers together, where every target lies within half its last printed digit and no motor "
+        f"beyond its limits. It was sampled with {known['walkers']} walkers, which agree (R-hat at "
+        f"most {max(n['r_hat'] for n in numbers):.2f}) and are worth at least "
+        f"{min(n['effective'] for n in numbers):.0f} independent draws of each number. The foot's "
+        f"path through the air is one of the unknowns: {_listed(paths)}. The motor's torque "
+        "constant, resistance and rotor friction have no prior but are drawn from the narrow range "
+        "in which Tables IV to VI come out, finer than any data sheet resolves, but for "
+        f"{_listed(_named(_rows(judged)[name]) for name in unmet)}."
     )
 
 

@@ -73,7 +73,7 @@ def reproduction(rows: Sequence[ReproducedRow]) -> Table:
                 "other printed numbers leave no way to it",
                 "",
             ),
-            "met_share": ("share of the ensemble's sets that give it at printed precision", "1"),
+            "met_share": ("share of the posterior in which it comes out at printed precision", "1"),
             "prior_low": (
                 PRIOR_LOW + "; empty where it was put in or follows from that",
                 "see unit",
@@ -156,7 +156,7 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
                 "left_out_low": _known(row.left_out[0]),
                 "left_out_high": _known(row.left_out[1]),
                 "left_out_holds_share": _known(row.left_out_share),
-                "ensemble_holds_share": _known(row.ensemble_share),
+                "posterior_holds_share": _known(row.posterior_share),
             }
             for row in rows
         ],
@@ -168,8 +168,8 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
             "computed": ("ours", "see unit"),
             "holds": ("whether the sentence holds for ours", ""),
             "part": (
-                "in the calibration; fitted: asked for, so that it holds there says nothing; "
-                "follows: from fitted and put-in numbers; predicted: neither",
+                "in the calibration; put in, or fitted: asked for, so that it holds there says nothing; "
+                "follows: from fitted and put-in numbers",
                 "",
             ),
             "prior_low": (PRIOR_LOW, "see unit"),
@@ -178,8 +178,8 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
             "left_out_low": (LEFT_LOW, "see unit"),
             "left_out_high": (LEFT_HIGH, "see unit"),
             "left_out_holds_share": ("share of these sets in which it holds", "1"),
-            "ensemble_holds_share": (
-                "share of the ensemble in which it holds, where that was not asked for",
+            "posterior_holds_share": (
+                "share of the posterior in which it holds, where that was not asked for",
                 "1",
             ),
         },
@@ -216,11 +216,11 @@ def leave_one_out(rows: Sequence[Prediction]) -> Table:
             "unit": ("unit of the numbers", ""),
             "published": ("as printed; walking_extra_J: implied by the break-even", "see unit"),
             "half_width": ("of the published value", "see unit"),
-            "predicted": ("median over sets that meet all other targets", "see unit"),
-            "low": ("2.5 % quantile of these sets, or of the data sheet's rounding", "see unit"),
+            "predicted": ("median of the posterior without it", "see unit"),
+            "low": ("2.5 % quantile of the same, or of the data sheet's rounding", "see unit"),
             "high": ("97.5 % quantile of the same", "see unit"),
             "inside": ("whether prediction and published value overlap", ""),
-            "sets": ("how many sets met the others and have such a value", "1"),
+            "sets": ("how many draws of that posterior have such a value", "1"),
             "by": ("what predicts it", ""),
         },
     )
@@ -245,6 +245,8 @@ def calibration(rows: Sequence[Calibrated]) -> Table:
                 "at_lower_share": row.at_lower,
                 "at_upper_share": row.at_upper,
                 "verdict": row.verdict,
+                "r_hat": row.r_hat,
+                "effective_sample_size": row.effective,
             }
             for row in rows
         ],
@@ -255,19 +257,21 @@ def calibration(rows: Sequence[Calibrated]) -> Table:
             "prior_low": ("lower end of the 95 % belief", "see unit"),
             "prior_high": ("upper end of the 95 % belief", "see unit"),
             "calibrated": ("at the set nearest to the prior", "see unit"),
-            "low": ("2.5 % quantile over the ensemble", "see unit"),
-            "high": ("97.5 % quantile over the ensemble", "see unit"),
+            "low": ("2.5 % quantile of the posterior, or the calibrated number where that is less", "see unit"),
+            "high": ("97.5 % quantile of the posterior, or the calibrated number where that is greater", "see unit"),
             "shift_over_prior": (
-                "mean of the ensemble less the prior's centre, in prior standard deviations",
+                "mean of the posterior less the prior's centre, in prior standard deviations",
                 "1",
             ),
             "spread_over_prior": (
-                "standard deviation over the ensemble, in prior standard deviations",
+                "standard deviation of the posterior, in prior standard deviations",
                 "1",
             ),
-            "at_lower_share": ("share of the ensemble at the number's lower bound", "1"),
-            "at_upper_share": ("share of the ensemble at the number's upper bound", "1"),
+            "at_lower_share": ("share of the posterior at the number's lower bound", "1"),
+            "at_upper_share": ("share of the posterior at the number's upper bound", "1"),
             "verdict": ("; ".join(f"{v}: {meaning}" for v, meaning in VERDICTS.items()), ""),
+            "r_hat": ("rank-normalised split R-hat over the walkers; 1 where they agree", "1"),
+            "effective_sample_size": ("independent draws that say as much", "1"),
         },
     )
 

@@ -1,9 +1,10 @@
-"""The whole calibration: nearest point, ensemble, leave-one-out, readings, sensitivities."""
+"""The whole calibration: nearest point, posterior, leave-one-out, readings, sensitivities."""
 
 from __future__ import annotations
 
 import hashlib
 import logging
+import math
 from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
@@ -16,9 +17,10 @@ from actuators.loading.build import CATALOG
 from pipeline.paper.calibration import search
 from pipeline.paper.calibration.checkpoint import Checkpoint
 from pipeline.paper.calibration.machine import MIDDLE_LEGS
-from pipeline.paper.calibration.prior import PRIOR_FILE
+from pipeline.paper.calibration.prior import PRIOR_FILE, Prior
 from pipeline.paper.calibration.problem import EXTRA, Problem, fixed_before
 from pipeline.paper.calibration.search import Reading
+from pipeline.paper.constants.motor_constants import KEYS
 from pipeline.paper.constants.rotor_friction import HELD, friction_ranges
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.published import PUBLISHED_FILE, Published
@@ -29,6 +31,7 @@ Point = dict[str, Any]
 Progress = Callable[[str, int], Callable[[int], None]]
 logger = logging.getLogger("legwatt")
 AXES_DEG = (0.0, 15.0, 30.0, 45.0, 90.0)
+AT_BOUND = 0.02  # coordinates this close to a bound count as lying at it
 COUNTS = (1, 2)  # middle legs that Fig. 21 counts as loaded
 #: Every axis with either count, and at the vertical axis consumption net of what returns.
 READINGS = (
@@ -59,9 +62,13 @@ class Effort:
 
     Attributes:
         starts: Of the search for the nearest point, per transfer path.
-        draws: From the prior for the ensemble.
+        robots: In the bank from which the posterior takes them.
+        ensembles: Of walkers in the posterior, each started by itself.
+        steps: Of their walkers.
+        left_out_steps: Of the one ensemble per target left out.
+        sets: Of the posterior that are evaluated in full, and per target left out.
+        left_out_sets: Likewise, per target left out.
         prior_draws: From the prior for what it says by itself.
-        left_out_draws: Per target left out.
         reading_starts: Per reading.
         sobol: Base sample of the sensitivity analysis, a power of two.
         workers: Processes.
@@ -69,9 +76,13 @@ class Effort:
     """
 
     starts: int = 4
-    draws: int = 560
-    prior_draws: int = 2000
-    left_out_draws: int = 60
+    robots: int = 400
+    ensembles: int = 4
+    steps: int = 1500
+    left_out_steps: int = 600
+    sets: int = 250
+    left_out_sets: int = 60
+    prior_draws: int = 600
     reading_starts: int = 2
     sobol: int = 512
     workers: int = 2
@@ -88,6 +99,7 @@ def input_hash(robot: Path, effort: Effort) -> str:
     paper = Path(__file__).parents[1]
     names = (
         *(f"calibration/{n}" for n in ("search", "problem", "machine", "quantities", "prior")),
+        *(f"calibration/{n}" for n in ("batch", "posterior", "whole_robot")),
         *(f"constants/{n}" for n in ("motor_constants", "rotor_friction", "table_entries")),
     )
     code = [paper / f"{name}.py" for name in names]
@@ -111,8 +123,8 @@ def calibrate(
         progress: Given a title and a total, returns what is called per finished task.
 
     Returns:
-        Plain results: ``nearest``, ``starts``, ``ensemble``, ``left_out``, ``readings``,
-        ``sensitivity``.
+        Plain results: ``nearest``, ``starts``, ``posterior`` and some of its ``sets``,
+        ``left_out``, ``readings``, ``sensitivity``.
 
     Raises:
         CalibrationError: No admissible point at all.
@@ -127,16 +139,15 @@ def calibrate(
             raise CalibrationError("no start reaches a point that meets every target and limit")
         best = min(good, key=lambda s: s["prior_distance"])
         paths = tuple(p for p in search.PATHS if any(s["path"] == p for s in good))
-        ensemble = run.drawn("member", search.member, paths, effort.draws, "ensemble")
-        unmoved = run.drawn("prior", search.prior_member, paths, effort.prior_draws, "prior")
-        left_out = {"+".join(targets): run.without(targets, paths) for targets in LEAVE_OUT}
-        members = run.with_totals("ensemble", [m for m in ensemble if m.get("admissible")])
+        walkers = run.posterior((), effort.ensembles, effort.steps, "posterior")
+        members = run.points("posterior", _spread(walkers, effort.sets))
+        left_out = {}
+        for targets in LEAVE_OUT:
+            key = "+".join(targets)
+            found = run.posterior(targets, 1, effort.left_out_steps, f"without {key}")
+            left_out[key] = run.points(key, _spread(found, effort.left_out_sets))
         # The motor's limits are the data sheet's, so a draw beyond them is not what it says.
-        before = run.with_totals("prior", [m for m in unmoved if m.get("inside")])
-        predicted = {
-            key: run.with_totals(key, [m for m in tries if m.get("admissible")])
-            for key, tries in left_out.items()
-        }
+        before = [p for p in run.prior(search.PATHS) if p.get("inside")]
         readings = run.readings(best["path"])
         sensitivity = _sensitivity(pool, store, str(robot), best, effort, progress)
     published = task.published
@@ -144,16 +155,70 @@ def calibrate(
         "nearest": best,
         "starts": starts,
         "paths": paths,
-        "ensemble": members,
+        "sets": members,
+        "posterior": posterior_summary(walkers, task.prior),
         "prior": [_kept(p, published) for p in before],
-        "draws": len(ensemble),
         "left_out": {
-            key: [_kept(p, published) for p in points] for key, points in predicted.items()
+            key: [_kept(p, published) for p in points] for key, points in left_out.items()
         },
-        "left_out_draws": effort.left_out_draws,
         "readings": readings,
         "sensitivity": sensitivity,
         "rotor_friction": [asdict(row) for row in friction_ranges(published)],
+    }
+
+
+def _spread(walkers: list[list[Point]], count: int) -> list[Point]:
+    """So many sets of all walkers' sets, evenly spread over walkers and steps."""
+    every = [one for at_step in zip(*walkers, strict=True) for one in at_step]
+    return [every[i] for i in np.linspace(0, len(every) - 1, min(count, len(every))).astype(int)]
+
+
+def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any]:
+    """What the walkers say of every number, and whether they agree.
+
+    Args:
+        walkers: Sets of each walker of every ensemble, in order.
+        prior: Whose coordinates the sets hold.
+
+    Returns:
+        Per number, coordinates of the prior or SI for the motor's constants: quantiles, mean,
+        standard deviation, shares at bounds, rank-normalised split R-hat over the walkers and
+        effective sample size (Vehtari et al., Bayesian Analysis 16, 667, 2021); the share of each
+        path with its standard error.
+    """
+    from arviz_stats.base import array_stats
+
+    z = np.array([[p["z"] for p in own] for own in walkers])  # (walkers, steps, D)
+    constants = np.array([[[p["constants"][k] for k in KEYS] for p in own] for own in walkers])
+    every = np.moveaxis(np.concatenate([z, constants], axis=-1), -1, 0)
+    no_bound = np.full(len(KEYS), np.inf)
+    lower, upper = (np.append(b, e) for b, e in ((prior.lower, -no_bound), (prior.upper, no_bound)))
+    axes = {"chain_axis": 0, "draw_axis": 1}
+    numbers = {}
+    for key, values, least, most in zip((*prior.keys, *KEYS), every, lower, upper, strict=True):
+        low, high = np.quantile(values, [0.025, 0.975])
+        numbers[key] = {
+            "low": float(low),
+            "high": float(high),
+            "mean": float(values.mean()),
+            "spread": float(values.std()),
+            "at_lower": float(np.mean(values - least < AT_BOUND)),
+            "at_upper": float(np.mean(most - values < AT_BOUND)),
+            "r_hat": float(array_stats.rhat(values, **axes)),
+            "effective": float(array_stats.ess(values, **axes)),
+        }
+    paths = {}
+    for path in search.PATHS:
+        taken = np.array([[float(p["path"] == path) for p in own] for own in walkers])
+        share = float(taken.mean())
+        effective = float(array_stats.ess(taken, **axes)) if 0 < share < 1 else math.nan
+        error = math.sqrt(share * (1 - share) / effective) if 0 < share < 1 else 0.0
+        paths[path] = {"share": share, "standard_error": error}
+    return {
+        "numbers": numbers,
+        "paths": paths,
+        "walkers": len(walkers),
+        "sets": int(z.shape[0] * z.shape[1]),
     }
 
 
@@ -204,43 +269,45 @@ class _Run:
         done = self.progress("nearest point", number * len(search.PATHS))
         return self.store.run(self.pool, search.nearest, tasks, done)
 
-    def drawn(
-        self, kind: str, task: Callable[..., Point], paths: tuple[str, ...], draws: int, title: str
-    ) -> list[Point]:
-        """Draws of the ensemble or of the prior.
+    def posterior(
+        self, without: tuple[str, ...], ensembles: int, steps: int, title: str
+    ) -> list[list[Point]]:
+        """Sets of the walkers of independent ensembles in the posterior, by walker.
 
         Args:
-            kind: Begins the tasks' names.
-            task: Makes one draw.
-            paths: Transfer paths that are possible.
-            draws: How many.
+            without: Targets left out.
+            ensembles: How many.
+            steps: Of every walker.
             title: Of the progress.
         """
+        first = 100 * (1 + LEAVE_OUT.index(without)) if without else 0
         tasks = [
-            (f"{kind}/{'+'.join(paths)}/{i}", (self.robot, paths, self.effort.seed, i))
-            for i in range(draws)
+            (
+                f"posterior/{'+'.join(without)}/{i}",
+                (self.robot, self.effort.seed, first + i, without, steps, self.effort.robots),
+            )
+            for i in range(ensembles)
         ]
-        return self.store.run(self.pool, task, tasks, self.progress(title, draws))
+        found = self.store.run(self.pool, search.posterior, tasks, self.progress(title, ensembles))
+        return [walker for ensemble in found for walker in ensemble]
 
-    def without(self, targets: tuple[str, ...], paths: tuple[str, ...]) -> list[Point]:
-        """Draws that do not know some of the targets."""
-        draws = self.effort.left_out_draws
+    def points(self, kind: str, sets: list[Point]) -> list[Point]:
+        """Sets with all that the paper prints and the energy of the whole robot."""
         tasks = [
-            (f"without/{'+'.join(targets)}/{i}", (self.robot, paths, self.effort.seed, i, targets))
-            for i in range(draws)
+            (f"set/{kind}/{i}", (self.robot, s["path"], s["z"], s["constants"]))
+            for i, s in enumerate(sets)
         ]
-        done = self.progress(f"without {' and '.join(targets)}", draws)
-        return self.store.run(self.pool, search.member, tasks, done)
+        done = self.progress(f"whole robot, {kind}", len(sets))
+        return self.store.run(self.pool, search.point_of, tasks, done)
 
-    def with_totals(self, kind: str, points: list[Point]) -> list[Point]:
-        """Points with the energy of the whole robot."""
+    def prior(self, paths: tuple[str, ...]) -> list[Point]:
+        """Draws of the prior, each a set as `points` makes it."""
         tasks = [
-            (f"totals/{kind}/{i}", (self.robot, p["path"], p["z"], p["constants"]))
-            for i, p in enumerate(points)
+            (f"prior/{'+'.join(paths)}/{i}", (self.robot, paths, self.effort.seed, i))
+            for i in range(self.effort.prior_draws)
         ]
-        done = self.progress(f"whole robot, {kind}", len(points))
-        found = self.store.run(self.pool, search.robot_totals, tasks, done)
-        return [p | {"totals": t} for p, t in zip(points, found, strict=True)]
+        done = self.progress("prior", self.effort.prior_draws)
+        return self.store.run(self.pool, search.prior_member, tasks, done)
 
     def readings(self, path: str) -> list[Point]:
         """Every other reading of the paper, with its nearest point where there is one."""

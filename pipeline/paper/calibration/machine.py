@@ -10,6 +10,7 @@ import math
 from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,9 @@ POSTURE = ("trunk_com_left", "joint_2_lateral", "body_height")
 #: Samples per half period: within 0.2 % of the converged energies, see tests.
 SAMPLES = 81
 ROBOT = "robot"
+#: Of each pair whose product is published, the ratio that is free, and the one that follows.
+SPLITS = {"harmonic_drive.ratio": "timing_belt.ratio", "planetary.ratio": "hypoid.ratio"}
+Number = TypeVar("Number", float, Array)
 _REMEMBERED = 16  # outcomes kept per robot: a derivative changes one actuator at a time
 
 
@@ -190,13 +194,20 @@ def catalog_with(catalog: Catalog, values: Mapping[str, float], ratio: float) ->
         ratio: Total ratio of every alternative.
     """
     applied = {key: v for key, v in values.items() if not key.startswith(ROBOT + ".")}
-    if "harmonic_drive.ratio" in applied:
-        applied["timing_belt.ratio"] = ratio / applied["harmonic_drive.ratio"]
-    if "planetary.ratio" in applied:
-        applied["hypoid.ratio"] = ratio / applied["planetary.ratio"]
-    for key, value in applied.items():
+    for key, value in with_splits(applied, ratio).items():
         catalog = catalog.replaced(key, value)
     return catalog
+
+
+def with_splits(values: Mapping[str, Number], ratio: float) -> dict[str, Number]:
+    """Numbers of components, the second ratio of each pair following from the first.
+
+    Args:
+        values: By reference.
+        ratio: Total ratio of every alternative.
+    """
+    pairs = {first: second for first, second in SPLITS.items() if first in values}
+    return dict(values) | {second: ratio / values[first] for first, second in pairs.items()}
 
 
 def actuator_part(part: RobotPart, catalog: Catalog, *, net: bool = False) -> ActuatorPart:

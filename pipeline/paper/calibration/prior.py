@@ -1,4 +1,9 @@
-"""Prior knowledge of the unpublished numbers, as coordinates in which it is a unit Gaussian."""
+"""Prior knowledge of the unpublished numbers, as coordinates in which it is a unit Gaussian.
+
+The centre is the median, and the interval's ends lie at -1.96 and 1.96: where they are unequally
+far from the centre, the belief is as wide on each side as the interval says, and the interval holds
+95 % of it all the same, or more where the bounds cut off what lies outside.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +35,7 @@ class Free:
     Attributes:
         key: ``robot.<name>`` or ``<component>.<name>``.
         centre: Prior centre, SI.
-        interval: Holds about 95 % of the belief, SI.
+        interval: Holds 95 % of the belief before the bounds cut it off, SI.
         bounds: Hard, SI.
         logarithmic: Whether the belief spreads over factors.
         unit: As written.
@@ -48,26 +53,29 @@ class Free:
     reason: str
 
     @property
-    def spread(self) -> float:
-        """One standard deviation, in SI or in natural logarithms."""
-        low, high = self.interval
-        if self.logarithmic:
-            return (math.log(high) - math.log(low)) / (2 * _SIGMAS)
-        return (high - low) / (2 * _SIGMAS)
+    def _sides(self) -> tuple[float, float, float]:
+        """Centre and one standard deviation below and above it, in SI or natural logarithms."""
+        low, middle, high = (
+            math.log(x) if self.logarithmic else x
+            for x in (self.interval[0], self.centre, self.interval[1])
+        )
+        return middle, (middle - low) / _SIGMAS, (high - middle) / _SIGMAS
 
     def value(self, z: float) -> float:
         """SI value at a coordinate, kept inside the bounds against rounding."""
-        if self.logarithmic:
-            raw = self.centre * math.exp(self.spread * z)
-        else:
-            raw = self.centre + self.spread * z
-        return min(max(raw, self.bounds[0]), self.bounds[1])
+        return float(self.at(np.asarray(z)))
+
+    def at(self, z: Array) -> Array:
+        """SI values at coordinates (W,)."""
+        middle, below, above = self._sides
+        raw = middle + np.where(z < 0, below, above) * z
+        return np.clip(np.exp(raw) if self.logarithmic else raw, *self.bounds)
 
     def coordinate(self, value: float) -> float:
         """Coordinate of an SI value."""
-        if self.logarithmic:
-            return math.log(value / self.centre) / self.spread
-        return (value - self.centre) / self.spread
+        middle, below, above = self._sides
+        away = (math.log(value) if self.logarithmic else value) - middle
+        return away / (below if away < 0 else above)
 
 
 @dataclass(frozen=True)
@@ -145,8 +153,8 @@ class _Written(Table):
             raise ValueError("interval and bounds must be [low, high]")
         if not least <= self.value <= most:
             raise ValueError("the bounds exclude the value; widen them or move it")
-        if not low <= self.value <= high:
-            raise ValueError("the interval excludes the value; widen it or move it")
+        if not low < self.value < high:
+            raise ValueError("the value must lie inside the interval; widen it or move it")
         if self.scale == "log" and min(to_si(x, self.unit) for x in (low, least, self.value)) <= 0:
             raise ValueError("a logarithmic scale needs positive numbers")
         return self

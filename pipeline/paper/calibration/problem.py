@@ -41,17 +41,7 @@ EXTRA = "walking_extra_J"
 #: The energy difference stands for it among the fitted rows.
 EVEN = "break_even_standing_fraction"
 #: Met by the choice of the motor's constants, see `pipeline.paper.constants.motor_constants`.
-CHOSEN = ("ideal_current_2", "ideal_voltage_2")
-#: Rows that say the same as a target: left out with it. The torque's own table follows from it,
-#: and so do the energy of the standing leg and with it the break-even.
-FOLLOWING = {
-    "reversible_motor_torque_2": (
-        *(f"reversible_{what}_2" for what in ("current", "voltage", "power")),
-        "reversible_leg_energy_3s",
-        EVEN,
-    ),
-    EXTRA: (EVEN,),
-}
+CHOSEN = ("ideal_current_2", "ideal_voltage_2", "rotor_current_2")
 _STEEP = 200.0  # residual per relative excess over a motor limit
 _STEP = 1e-4  # of a prior standard deviation, for derivatives
 
@@ -172,35 +162,26 @@ class Problem:
         constants = self.sliver.middle if self.constants is None else self.constants
         return self.prior.values(z) | dict(constants)
 
-    def residuals(
-        self, z: Array, centre: Array, *, pull: float, goal: Array | None, free: float = 0.0
-    ) -> Array:
-        """Residual vector at z.
+    def residuals(self, z: Array, *, pull: float, free: float = 0.0) -> Array:
+        """Residual vector at z: the prior's coordinates, the targets, the limits.
 
         Args:
             z: Coordinates (D,).
-            centre: Coordinates whose neighbourhood is sought: 0 for the prior's centre.
             pull: Weight of the distance from the printed values, per half width.
-            goal: Where to aim, in half widths from the printed values, (T,). None aims at the
-                printed values.
-            free: Half widths around the goal within which nothing pulls.
+            free: Half widths around the printed values within which nothing pulls.
         """
         point = self.evaluate(z)
         error = np.array([(point.values[t.name] - t.centre) / t.half_width for t in self.targets])
-        if goal is not None:
-            error = error - goal
         error = np.sign(error) * np.maximum(np.abs(error) - free, 0.0)
         limits = _STEEP * np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
-        return np.concatenate([z - centre, pull * error, limits])
+        return np.concatenate([z, pull * error, limits])
 
     def solve(
         self,
         start: Array,
-        centre: Array,
         *,
         columns: NDArray[np.intp],
         pull: float,
-        goal: Array | None = None,
         free: float = 0.0,
         evaluations: int = 40,
     ) -> Array:
@@ -208,11 +189,9 @@ class Problem:
 
         Args:
             start: Coordinates (D,).
-            centre: As for `residuals`, like `pull`, `goal` and `free`.
             columns: Which coordinates may move.
             pull: Weight of the printed values.
-            goal: Where to aim.
-            free: Where nothing pulls.
+            free: Half widths around them within which nothing pulls.
             evaluations: At most so many.
 
         Returns:
@@ -226,7 +205,7 @@ class Problem:
 
         def residuals(x: Array) -> Array:
             try:
-                return self.residuals(full(x), centre, pull=pull, goal=goal, free=free)
+                return self.residuals(full(x), pull=pull, free=free)
             except PipelineError:
                 # Out of reach or tipping: a wall, felt as a large but finite residual.
                 return np.full(self._size, 30.0)
@@ -259,17 +238,15 @@ class Problem:
         ]
 
     def admissible(self, point: Evaluation) -> bool:
-        """Whether a point is a set of the ensemble.
+        """Whether a point gives every printed value and every motor stays inside its limits.
 
-        It gives every printed value at printed precision, but those that contradict what the
-        motor's constants were chosen by, those left out, and the predictions, which would be none
-        if they were asked for; and every motor stays inside its limits.
+        Values that contradict those by which the motor's constants were chosen are left out, and so
+        are predictions, which would be none if they were asked for.
         """
-        spared = {*self.sliver.frictions.unmet, *self.without}
-        spared |= {row for name in self.without for row in FOLLOWING.get(name, ())}
+        spared = {*self.sliver.frictions.unmet}
         spared |= {p.id for p in self.published.values() if p.role == "prediction"}
-        extra = [t for t in self.targets if t.name == EXTRA]
-        fits = all(abs(point.values[t.name] - t.centre) <= t.half_width for t in extra)
+        extra = next(t for t in self.targets if t.name == EXTRA)
+        fits = abs(point.values[EXTRA] - extra.centre) <= extra.half_width
         return fits and set(self.unmet(point)) <= spared and max(point.excess.values()) <= 0
 
 

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from actuators.loading.build import CATALOG, load_catalog
 from pipeline.errors import PipelineError
+from pipeline.paper.calibration.batch import Bank, bank, drawn
 from pipeline.paper.calibration.machine import POSTURE, catalog_with, with_transfer_path
+from pipeline.paper.calibration.posterior import Posterior, sample
 from pipeline.paper.calibration.prior import PRIOR_FILE, load_prior
 from pipeline.paper.calibration.problem import EXTRA, Evaluation, Problem
 from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
 from pipeline.paper.calibration.whole_robot import totals
 from pipeline.paper.constants.motor_constants import KEYS
-from pipeline.paper.constants.rotor_friction import HELD
 from pipeline.paper.published import PUBLISHED_FILE, load_published
 from pipeline.robot.robot_file import load_robot_file
 
@@ -31,10 +32,9 @@ Array = NDArray[np.float64]
 #: Paths of the foot that the search may choose.
 PATHS = ("cubic", "harmonic", "quintic", "cycloid")
 _PULL = 3.0  # the nearest point: a third of a half width counts like one prior sigma
-_FIRM = 8.0  # a member of the ensemble: close to its own goal
 _STRICT = 60.0  # whether a reading can be met at all: the prior hardly counts,
 _FREE = 0.97  # and inside its printed precision a row does not pull against the motor's limits
-_SPAN = 0.85  # goals of members spread over this part of the half widths
+_THIN = 15  # every so many steps of a walker are kept
 
 
 @cache
@@ -112,18 +112,11 @@ def nearest(
     """
     task = problem(robot, path, reading)
     size = len(task.prior.free)
-    centre = np.zeros(size)
-    z = centre if start == 0 else task.prior.draw(np.random.default_rng([seed, start]))
+    z = np.zeros(size) if start == 0 else task.prior.draw(np.random.default_rng([seed, start]))
     z = _feasible(task, z)
     try:
-        z = task.solve(z, centre, columns=task.actuator_columns, pull=_PULL)
-        z = task.solve(
-            z,
-            centre,
-            columns=np.arange(size),
-            pull=_PULL,
-            evaluations=evaluations,
-        )
+        z = task.solve(z, columns=task.actuator_columns, pull=_PULL)
+        z = task.solve(z, columns=np.arange(size), pull=_PULL, evaluations=evaluations)
         point = task.evaluate(z)
     except PipelineError as error:
         return {"failed": str(error), "path": path}
@@ -145,7 +138,6 @@ def read(
     try:
         z = task.solve(
             z,
-            np.zeros(z.size),
             columns=np.arange(z.size),
             pull=_STRICT,
             free=_FREE,
@@ -171,36 +163,127 @@ def _feasible(task: Problem, z: Array) -> Array:
     return z
 
 
-def member(
-    robot: str, paths: tuple[str, ...], seed: int, draw: int, without: tuple[str, ...] = ()
-) -> dict[str, Any]:
-    """One draw from the prior, moved by its actuators as little as needed to be admissible.
+@dataclass(frozen=True)
+class Robots:
+    """Robots drawn from the prior, in order of what the ideal actuator's printed leg draws.
 
-    The motor's constants and the torque of Table VI are drawn from all that give Tables IV to VI.
+    Attributes:
+        demand: What they ask of their joints; a robot is a column.
+        paths: The foot's path of each.
+        coordinates: Of each robot's numbers, (R, D).
+    """
+
+    demand: Bank
+    paths: tuple[str, ...]
+    coordinates: Array
+
+
+@cache
+def robots(robot: str, seed: int, count: int) -> Robots:
+    """Draw robots, each with a path, that stand and walk as printed.
+
+    Those that turn the motor faster than it may turn are left out: no actuator mends that.
 
     Args:
         robot: Robot file.
-        paths: Transfer paths to choose from.
         seed: Of the run.
-        draw: Number of the draw.
-        without: Targets left out, which the others then predict.
+        count: How many.
     """
-    rng = np.random.default_rng([seed, 5000 if without else 1000, draw])
+    rng = np.random.default_rng([seed, 4000])
+    tasks = {path: problem(robot, path) for path in PATHS}
+    ideal = tasks[PATHS[0]].catalog.chain("ideal")
+    fastest = ideal.motor.max_speed / np.asarray(ideal.ratio)  # of a joint [rad/s]
+    parts, paths, coordinates = [], [], []
+    while len(parts) < count:
+        path = PATHS[int(rng.integers(len(PATHS)))]
+        task = tasks[path]
+        z = task.prior.draw(rng)
+        try:
+            part = task.robot(z)
+        except PipelineError:
+            continue
+        if np.abs(part.series.velocity).max() <= fastest:
+            parts.append(part)
+            paths.append(path)
+            coordinates.append(z[task.robot_columns])
+    demand = bank(parts)
+    order = np.argsort(drawn(demand, ideal))
+    return Robots(demand.taken(order), tuple(paths[i] for i in order), np.array(coordinates)[order])
+
+
+def posterior(
+    robot: str, seed: int, number: int, without: tuple[str, ...], steps: int, bank_size: int
+) -> list[list[dict[str, Any]]]:
+    """One ensemble of walkers in the posterior.
+
+    Args:
+        robot: Robot file.
+        seed: Of the run.
+        number: Of the ensemble; no two of a run have the same.
+        without: Targets left out, which the others then predict.
+        steps: Of every walker; the first third is left out.
+        bank_size: Robots to choose from.
+
+    Returns:
+        Per walker its sets over the steps that are kept: path, coordinates ``z`` and constants.
+    """
+    own = robots(robot, seed, bank_size)
+    task = problem(robot, PATHS[0], without=without)
+    density = Posterior(task, own.demand)
+    chain = sample(density, [seed, 5000, number], steps)[::_THIN]
+    return [_sets(density, own, chain[:, w]) for w in range(chain.shape[1])]
+
+
+def _sets(density: Posterior, own: Robots, x: Array) -> list[dict[str, Any]]:
+    """Walkers (N, D) as sets of numbers."""
+    _, values = density.evaluate(x)
+    prior, columns = density.task.prior, density.task.actuator_columns
+    z = np.empty((len(x), len(prior.free)))
+    chosen = x[:, 0].astype(np.intp)
+    z[:, density.task.robot_columns] = own.coordinates[chosen]
+    for i in columns:
+        free = prior.free[i]
+        z[:, i] = [free.coordinate(value) for value in values[free.key]]
+    return [
+        {
+            "path": own.paths[robot],
+            "z": row.tolist(),
+            "constants": {key: float(values[key][k]) for key in KEYS},
+        }
+        for k, (robot, row) in enumerate(zip(chosen, z, strict=True))
+    ]
+
+
+def prior_member(robot: str, paths: tuple[str, ...], seed: int, draw: int) -> dict[str, Any]:
+    """A draw from the prior: what follows without the paper's energies."""
+    rng = np.random.default_rng([seed, 1000, draw])
     path = paths[int(rng.integers(len(paths)))]
-    task = problem(robot, path, without=without)
-    z0 = task.prior.draw(rng)
-    task.constants, held = task.sliver.draw(rng)
-    goal = rng.uniform(-_SPAN, _SPAN, len(task.targets))
-    for i, target in enumerate(task.targets):
-        if target.name == HELD:
-            goal[i] = (-held - target.centre) / target.half_width * _SPAN
+    task = problem(robot, path)
+    constants, _ = task.sliver.draw(rng)
+    return point_of(robot, path, task.prior.draw(rng).tolist(), constants)
+
+
+def point_of(
+    robot: str, path: str, z: list[float], constants: dict[str, float]
+) -> dict[str, Any]:
+    """A set of numbers with all that the paper prints and the energy of the whole robot.
+
+    The energy is left out where a motor leaves its limits.
+    """
+    task = problem(robot, path)
+    task.constants = constants
+    at = np.array(z)
     try:
-        task.robot(z0)  # a body that cannot stand as printed is not worth a search
-        z = task.solve(z0, z0, columns=task.actuator_columns, pull=_FIRM, goal=goal)
-        point = task.evaluate(z)
+        point = task.evaluate(at)
     except PipelineError as error:
         return {"failed": str(error), "path": path}
-    return summary(task, z, point) | {"path": path}
+    inside = max(point.excess.values()) <= 0
+    found = summary(task, at, point) | {"path": path, "inside": inside}
+    if inside:
+        ratio = task.catalog.parameter("requirement.ratio").value
+        catalog = catalog_with(task.catalog, task.numbers(at), ratio)
+        found["totals"] = totals(point.robot.robot, catalog)
+    return found
 
 
 def summary(task: Problem, z: Array, point: Evaluation) -> dict[str, Any]:
@@ -255,22 +338,6 @@ def _over(joints: tuple[str, ...], result: Any) -> dict[str, float]:
         for j, joint in enumerate(joints)
         if joint.startswith("rm_")
     }
-
-
-def robot_totals(
-    robot: str, path: str, z: list[float], constants: dict[str, float]
-) -> dict[str, Any]:
-    """Energy of the whole robot at one point: walking, standing on three feet and on all.
-
-    Returns:
-        Per alternative ``cycle_J``, ``stand_3_W`` and ``stand_6_W``.
-    """
-    task = problem(robot, path)
-    task.constants = constants
-    point = task.evaluate(np.array(z))
-    ratio = task.catalog.parameter("requirement.ratio").value
-    catalog = catalog_with(task.catalog, task.numbers(np.array(z)), ratio)
-    return totals(point.robot.robot, catalog)
 
 
 def sensitivity_row(robot: str, path: str, rows: list[list[float]]) -> list[list[float]]:

@@ -31,22 +31,20 @@ from pipeline.robot.robot_file import load_robot_file
 
 RESULTS_FILE = Path(__file__).parent / "results" / "calibration.json"
 _DIGITS = 9
-#: Standard deviation of the ensemble, in the prior's, below which a number counts as known.
+#: Standard deviation of the posterior, in the prior's, below which a number counts as known.
 DETERMINED_BELOW = 0.3
-#: Ensemble spread over prior spread above which the targets tell nothing of a number.
+#: Posterior spread over prior spread above which the targets say nothing of a number.
 FREE_ABOVE = 0.85
-#: Shift of the ensemble's mean, in the prior's standard deviations, that is no chance of the draw.
+#: Shift of the posterior's mean, in the prior's standard deviations, that is worth a word.
 MOVED_ABOVE = 0.5
 #: Beyond this many standard deviations a number has left the prior's 95 % belief.
 BELIEF = 1.96
-#: Coordinates this close to a bound count as lying at it.
-AT_BOUND = 0.02
-#: Share of the ensemble at a bound that is worth a word.
+#: Share of the posterior at a bound that is worth a word.
 AT_LEAST = 0.05
 FIXED = "fixed by Tables IV to VI"
 #: What the targets did to a number.
 VERDICTS = {
-    "determined": f"ensemble narrower than {DETERMINED_BELOW:g} prior standard deviations",
+    "determined": f"posterior narrower than {DETERMINED_BELOW:g} prior standard deviations",
     "narrowed": f"narrower than the prior, its mean within {MOVED_ABOVE:g} of the prior's centre",
     "moved": f"its mean more than {MOVED_ABOVE:g} prior standard deviations from the centre",
     "against the prior": "its mean outside what the prior believes at 95 %",
@@ -76,13 +74,15 @@ class Calibrated:
         prior: Centre before; None for the motor's constants, which Tables IV to VI fix.
         prior_interval: 95 % belief before; None likewise.
         value: At the nearest point.
-        low: 2.5 % quantile over the ensemble.
-        high: 97.5 % quantile.
-        shift: Mean of the ensemble less the prior's centre, in prior standard deviations.
-        spread: Standard deviation over the ensemble, in prior standard deviations.
-        at_lower: Share of the ensemble at the lower bound [1].
-        at_upper: Share of the ensemble at the upper bound [1].
+        low: 2.5 % quantile of the posterior, or the value where that is less.
+        high: 97.5 % quantile of the posterior, or the value where that is greater.
+        shift: Mean of the posterior less the prior's centre, in prior standard deviations.
+        spread: Standard deviation of the posterior, in prior standard deviations.
+        at_lower: Share of the posterior at the lower bound [1].
+        at_upper: Share of the posterior at the upper bound [1].
         verdict: One of `VERDICTS`.
+        r_hat: How well the walkers agree on it: 1 where they do [1].
+        effective: Effective number of independent draws behind these numbers.
     """
 
     key: str
@@ -97,15 +97,17 @@ class Calibrated:
     at_lower: float
     at_upper: float
     verdict: str
+    r_hat: float
+    effective: float
 
     @property
     def at_bound(self) -> float:
-        """Share of the ensemble at either bound [1]."""
+        """Share of the posterior at either bound [1]."""
         return self.at_lower + self.at_upper
 
     @property
     def bound(self) -> str:
-        """The bound at which most of those sets lie: ``lower``, ``upper``, or empty for none."""
+        """The bound near which most of it lies: ``lower``, ``upper``, or empty for none."""
         if self.at_bound == 0:
             return ""
         return "lower" if self.at_lower > self.at_upper else "upper"
@@ -114,29 +116,18 @@ class Calibrated:
 def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibrated]:
     """What the calibration says of every free number and of the motor's constants."""
     best = np.array(results["nearest"]["z"])
-    members = np.array([m["z"] for m in results["ensemble"]])
+    known = results["posterior"]["numbers"]
     out = []
-    for i, free in enumerate(prior.free):
-        own = members[:, i]
-        low, high = (free.value(float(q)) for q in np.quantile(own, [0.025, 0.975]))
-        value = free.value(float(best[i]))
-        spread, shift = float(own.std()), float(own.mean())
-        at_lower = float(np.mean(own - free.coordinate(free.bounds[0]) < AT_BOUND))
-        at_upper = float(np.mean(free.coordinate(free.bounds[1]) - own < AT_BOUND))
+    for free, coordinate in zip(prior.free, best, strict=True):
+        own = known[free.key]
+        low, high, value = (free.value(float(q)) for q in (own["low"], own["high"], coordinate))
         out.append(
             Calibrated(
-                free.key,
-                free.unit,
-                free.centre,
-                free.interval,
-                value,
-                min(low, value),
-                max(high, value),
-                shift,
-                spread,
-                at_lower,
-                at_upper,
-                number_verdict(shift, spread, _prior_spread(free)),
+                *(free.key, free.unit, free.centre, free.interval),
+                *(value, min(low, value), max(high, value)),
+                *(own["mean"], own["spread"], own["at_lower"], own["at_upper"]),
+                number_verdict(own["mean"], own["spread"], _prior_spread(free)),
+                *(own["r_hat"], own["effective"]),
             )
         )
     return out + _constants(results)
@@ -146,8 +137,8 @@ def number_verdict(shift: float, spread: float, prior_spread: float) -> str:
     """What the targets did to a number, one of `VERDICTS`.
 
     Args:
-        shift: Mean of the ensemble, in prior standard deviations from the prior's centre.
-        spread: Standard deviation of the ensemble, in the same.
+        shift: Mean of the posterior, in prior standard deviations from the prior's centre.
+        spread: Standard deviation of the posterior, in the same.
         prior_spread: Standard deviation of the prior itself, cut off at the bounds, in the same.
     """
     if abs(shift) > BELIEF:
@@ -160,17 +151,16 @@ def number_verdict(shift: float, spread: float, prior_spread: float) -> str:
 
 
 def _constants(results: Mapping[str, Any]) -> list[Calibrated]:
-    """The motor's three constants over the ensemble."""
+    """The motor's three constants in the posterior."""
     out = []
     for key in KEYS:
-        own = [m["constants"][key] for m in results["ensemble"]]
+        own = results["posterior"]["numbers"][key]
         value = results["nearest"]["constants"][key]
-        low, high = (float(q) for q in np.quantile(own, [0.025, 0.975]))
-        low, high = min(low, value), max(high, value)
         out.append(
             Calibrated(
-                *(key, UNITS[key], None, None, value, low, high),
-                *(None, None, 0.0, 0.0, FIXED),
+                *(key, UNITS[key], None, None),
+                *(value, min(own["low"], value), max(own["high"], value)),
+                *(None, None, 0.0, 0.0, FIXED, own["r_hat"], own["effective"]),
             )
         )
     return out
@@ -203,7 +193,7 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
         if path not in documents:
             documents[path] = tomlkit.parse(path.read_text(encoding="utf-8"))
         reason = _REASONS[number.verdict] + (
-            f"; at its {number.bound} bound in {100 * number.at_bound:.0f} % of the sets"
+            f"; at its {number.bound} bound in {100 * number.at_bound:.0f} % of the posterior"
             if number.at_bound >= AT_LEAST
             else ""
         )
@@ -265,7 +255,7 @@ def _posture(document: tomlkit.TOMLDocument, results: dict[str, Any]) -> None:
     """Numbers solved from section II.C and Table III."""
     rows = ("the reaction of 192.6 N", "joint 2 in Table III", "joint 3 in Table III")
     for name, row in zip(POSTURE, rows, strict=True):
-        spread = [m["posture"][name] for m in results["ensemble"]]
+        spread = [m["posture"][name] for m in results["sets"]]
         low, high = (float(q) for q in np.quantile(spread, [0.025, 0.975]))
         value = results["nearest"]["posture"][name]
         reason = f"solved from {row}"

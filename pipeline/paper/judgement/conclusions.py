@@ -12,7 +12,7 @@ from pipeline.paper.judgement.evidence import NONE, Evidence, Interval, quantile
 from pipeline.paper.judgement.reproduction import PREDICTED_BY
 
 Values = Mapping[str, float]
-FITTED, FOLLOWS, PREDICTED = "fitted", "follows", "predicted"
+PUT_IN, FITTED, FOLLOWS = "put in", "fitted", "follows"
 _IRREVERSIBLE = PREDICTED_BY["walking_ratio_irreversible"]
 #: Energies of the leg that stands for 3 s, by alternative.
 _STANDING = {a: f"{a}_leg_energy_3s" for a in ("ideal", "rotor", "reversible", "irreversible")}
@@ -28,7 +28,7 @@ class Sentence:
         quantity: What is computed.
         unit: Of it.
         printed: What the paper says.
-        part: `FITTED`, `FOLLOWS` (from fitted and put-in numbers) or `PREDICTED`.
+        part: `PUT_IN`, `FITTED` or `FOLLOWS` (from fitted and put-in numbers).
         left_out: Key of the sets that predict it; empty where none do.
         value: The quantity from the printed values' computed counterparts, SI.
         holds: Whether the sentence holds for them.
@@ -64,7 +64,7 @@ class Conclusion:
         prior_share: Share of the prior's draws in which the sentence holds.
         left_out: 95 % of what the other targets predict; NaN where it is not fitted.
         left_out_share: Share of these sets in which the sentence holds.
-        ensemble_share: Share of the ensemble in which it holds; NaN where that was asked for.
+        posterior_share: Share of the posterior in which it holds; NaN where that was asked for.
     """
 
     sentence: Sentence
@@ -74,7 +74,7 @@ class Conclusion:
     prior_share: float
     left_out: Interval
     left_out_share: float
-    ensemble_share: float
+    posterior_share: float
 
 
 def ideal_margin(values: Values) -> float:
@@ -169,7 +169,7 @@ SENTENCES = (
         "energy of the loaded leg in 3 s",
         "J",
         "0",
-        PREDICTED,
+        PUT_IN,
         "",
         lambda v: v[_STANDING["irreversible"]],
         lambda v: v[_STANDING["irreversible"]] == 0,
@@ -213,6 +213,6 @@ def _conclusion(s: Sentence, ours: Values, known: Evidence | None) -> Conclusion
             sets: Sequence = known.left_out[s.left_out]
             left_out = quantiles([s.value(p.values) for p in sets])
             shares[1] = share(sets, s.holds)
-        if s.part == PREDICTED:
-            shares[2] = share(known.ensemble, s.holds)
+        if s.part == FOLLOWS:
+            shares[2] = share(known.posterior, s.holds)
     return Conclusion(s, s.value(ours), s.holds(ours), prior, shares[0], left_out, *shares[1:])

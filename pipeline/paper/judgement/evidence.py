@@ -34,13 +34,14 @@ class Evidence:
     """Sets of numbers, by what they were asked to meet.
 
     Attributes:
-        ensemble: Every printed value but contradicted ones and predictions.
+        posterior: Every target: draws of the posterior.
         prior: Nothing but the standing posture, the motor's constants, which Tables III to V
             fix, and the motor's limits: what data sheets and literature say of the rest.
-        left_out: Everything but some targets, by the targets' names joined with ``+``.
+        left_out: Every target but some: draws of the posterior without them, by their names joined
+            with ``+``.
     """
 
-    ensemble: Sequence[Point]
+    posterior: Sequence[Point]
     prior: Sequence[Point]
     left_out: Mapping[str, Sequence[Point]]
 
@@ -48,7 +49,7 @@ class Evidence:
 def evidence(results: Mapping[str, Any]) -> Evidence:
     """The sets of a stored calibration."""
     return Evidence(
-        [_point(p) for p in results["ensemble"]],
+        [_point(p) for p in results["sets"]],
         [_point(p) for p in results["prior"]],
         {key: [_point(p) for p in points] for key, points in results["left_out"].items()},
     )

@@ -22,6 +22,7 @@ _FIXES = {
     "standing_reaction_rm": "trunk_com_left",
     "standing_torque_2": "joint_2_lateral",
     "standing_torque_3": "body_height",
+    "rotor_current_2": "rotor_re40.coulomb",
 }
 
 

@@ -39,7 +39,7 @@ class Price:
         leg_energy: What that leg draws in one cycle with the irreversible actuator [J].
         no_load: No-load current of the motor [A].
         no_load_sheet: The data sheet's [A].
-        no_load_share: Share of the ensemble above `NOTABLE` times the data sheet's; NaN without.
+        no_load_share: Share of the posterior above `NOTABLE` times the data sheet's; NaN without.
     """
 
     gear_friction: float
@@ -77,7 +77,7 @@ def price(
                 m["constants"][ROTOR_FRICTION],
                 prior.free[viscous].value(m["z"][viscous]),
             )
-            for m in results["ensemble"]
+            for m in results["sets"]
         ]
         share = float(np.mean(np.array(currents) > limit))
     values = [catalog.parameter(key).value for key in (ROTOR_FRICTION, ROTOR_VISCOUS)]

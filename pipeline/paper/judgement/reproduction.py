@@ -36,7 +36,7 @@ class ReproducedRow:
         computed: Ours.
         verdict: `REPRODUCED` within the half width, else `MISSED`, or `CONTRADICTED` where other
             printed values leave no way to meet it.
-        met: Share of the ensemble that meets the row at printed precision; NaN without one.
+        met: Share of the posterior that meets the row at printed precision; NaN without it.
         prior: 95 % of what data sheets and literature say; NaN where other rows fix the quantity.
         left_out: 95 % of what the other targets predict; NaN where it is no target.
         remark: In words, may be empty.
@@ -81,7 +81,7 @@ def reproduction(
             verdict = CONTRADICTED if name in unmet else MISSED
         met, prior, left_out = math.nan, NONE, NONE
         if known is not None:
-            own = [from_si(p.values[name], row.unit) for p in known.ensemble]
+            own = [from_si(p.values[name], row.unit) for p in known.posterior]
             met = float(np.mean([row.reproduced(v) for v in own]))
             if name not in fixed:
                 prior = quantiles([from_si(p.values[name], row.unit) for p in known.prior])
@@ -105,7 +105,7 @@ def _remark(row: Published, published: Mapping[str, Published], known: Evidence 
         power = published["rotor_power_2"]
         text = f"3 s times the rounded {power.value:g} W"
         if known is not None:
-            sets = [from_si(p.values[row.id], row.unit) for p in known.ensemble]
+            sets = [from_si(p.values[row.id], row.unit) for p in known.posterior]
             text += f"; unrounded {min(sets):.4g} to {max(sets):.4g} J"
         return text
     if row.id == EVEN and known is not None:

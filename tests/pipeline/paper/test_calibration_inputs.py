@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from actuators.loading.build import load_catalog
-from pipeline.paper.calibration.prior import PRIOR_FILE, load_prior
+from pipeline.paper.calibration.prior import PRIOR_FILE, Free, load_prior
 from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
 from pipeline.paper.errors import PriorError, TargetError
 from pipeline.paper.published import PUBLISHED_FILE, load_published
@@ -30,11 +30,11 @@ def written(tmp_path: Path, lines: list[str]) -> Path:
 def test_every_printed_value_is_computed_and_has_its_role() -> None:
     published = load_published(IDS, DIMENSIONS)
     assert Counter(p.role for p in published.values()) == {
-        "input": 10,
-        "target": 10,
-        "consequence": 20,
+        "input": 11,
+        "target": 11,
+        "consequence": 19,
         "symmetry": 1,
-        "prediction": 2,
+        "prediction": 1,
         "contradicted": 3,
     }
 
@@ -101,7 +101,7 @@ def test_a_missing_target_file_or_column_is_one_line(tmp_path: Path) -> None:
     ("old", "new", "message"),
     [
         ("bounds = [0, 60]", "bounds = [40, 60]", "bounds exclude the value"),
-        ("interval = [0, 60]", "interval = [40, 60]", "interval excludes the value"),
+        ("interval = [0, 60]", "interval = [40, 60]", "value must lie inside the interval"),
         ('unit = "mm"', 'unit = "mmm"', "unknown unit"),
         ('scale = "linear"', 'scale = "liner"', "'scale' = 'liner': did you mean 'linear'"),
         ("value = 30", 'value = "thirty"', "'value' must be a number, not 'thirty'"),
@@ -126,6 +126,20 @@ def test_coordinates_are_those_of_a_unit_gaussian() -> None:
         assert free.value(0.0) == pytest.approx(free.centre)
     drawn = prior.draw(np.random.default_rng(0))
     assert ((drawn >= prior.lower) & (drawn <= prior.upper)).all()
+
+
+@pytest.mark.parametrize("free", load_prior().free, ids=lambda f: f.key)
+def test_an_interval_holds_what_the_file_says(free: Free) -> None:
+    """95 % of the belief, 2.5 % beyond each end or what the bounds leave of that; on both scales."""
+    z = np.linspace(free.coordinate(free.bounds[0]), free.coordinate(free.bounds[1]), 200_001)
+    weight = np.exp(-0.5 * z**2)
+    value = free.at(z)
+    low, high = (np.sum(weight[side]) for side in (value < free.interval[0], value > free.interval[1]))
+    kept = 1 - (low + high) / np.sum(weight)
+    assert 0.9499 <= kept
+    cut = [0.025 * (edge != bound) for edge, bound in zip(free.interval, free.bounds, strict=True)]
+    assert kept == pytest.approx(1 - sum(cut), abs=0.026)
+    assert max(low, high) / np.sum(weight) <= 0.0257  # of what the bounds leave
 
 
 def test_the_prior_names_numbers_that_exist(root: Path) -> None:

@@ -60,7 +60,7 @@ def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(ro
     assert rows["ideal_current_2"].verdict == "reproduced"
     for table in tables:
         for column in table.columns:
-            if column.startswith(("prior_", "left_out_", "met_share", "ensemble_")):
+            if column.startswith(("prior_", "left_out_", "met_share", "posterior_")):
                 assert all(v is None or v != v for v in table.columns[column]), column
 
 

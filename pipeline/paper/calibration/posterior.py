@@ -1,0 +1,288 @@
+"""The posterior of the unpublished numbers: the prior where every target comes out as printed.
+
+A printed number says that the true one lies within half its last digit, all of that range alike,
+so the likelihood is one where every target is inside and no motor beyond its limits, else zero:
+
+    p(z, c | targets)  ~  N(z; 0, 1) [z inside its bounds] [targets met] [limits kept]
+
+with z the prior's coordinates and c the motor's constants, uniform over all that give Tables IV to
+VI. Targets met to a ten-thousandth are thin slabs, which random steps leave at once. Each target t
+therefore takes the place of one coordinate z_s of which it is a monotone function: a walker holds
+t, which is uniform inside what is printed, z_s is solved for, and the density becomes
+N(z_s) |dz_s / dt|.
+
+The foot's path through the air is a discrete unknown, uniform before. Robots, each with a path,
+come from a bank of draws of their own prior, in which each is as likely as another; a walker names
+one by its number.
+
+Sampled by emcee (Foreman-Mackey et al., PASP 125, 306, 2013): its moves need no gradient, which a
+likelihood with edges does not have, and it asks for many walkers at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import emcee
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize.elementwise import find_root
+
+from actuators.chain import Chain
+from pipeline.paper.calibration.batch import Bank, drawn, outcome
+from pipeline.paper.calibration.machine import PUBLISHED_LEG, with_splits
+from pipeline.paper.calibration.prior import Free
+from pipeline.paper.calibration.problem import EXTRA, Problem, Target
+from pipeline.paper.constants.motor_constants import KEYS
+from pipeline.paper.constants.rotor_friction import HELD
+from pipeline.paper.errors import CalibrationError
+
+Array = NDArray[np.float64]
+#: Targets that take the place of a coordinate, in the order in which they are solved for: each
+#: rises or falls with it throughout. Where two want the same one, the first takes it.
+SOLVED = {
+    HELD: "harmonic_drive.coulomb",
+    "walking_ratio_reversible": "harmonic_drive.viscous",
+    "walking_ratio_irreversible": "planetary.coulomb",
+    EXTRA: "planetary.coulomb",
+}
+WALKERS = 32
+_STARTS = 100  # times four draws per walker, before none is said to fit
+_STEP = 1e-4  # of a prior standard deviation, for the slope of a target
+_CLOSE = 1e-6  # of a prior standard deviation, to which a coordinate is solved for
+#: Shares of a walker's coordinates that steps draw anew.
+_SHARES = (0.05, 0.1, 0.2, 0.4)
+#: Share of the steps that only go to another robot, and how far, as a share of the bank.
+_ELSEWHERE, _REACH = 0.3, 0.2
+
+
+@dataclass(frozen=True)
+class _Sets:
+    """Walkers as sets of numbers; a set is a column.
+
+    Attributes:
+        demand: Of their robots.
+        values: Of their numbers in SI, by reference, (W,).
+    """
+
+    demand: Bank
+    values: Mapping[str, Array]
+
+    def taken(self, which: NDArray[np.intp]) -> _Sets:
+        """Some of the sets."""
+        return _Sets(self.demand.taken(which), {k: v[which] for k, v in self.values.items()})
+
+    def with_number(self, key: str, value: Array) -> _Sets:
+        """The sets with one number replaced."""
+        return _Sets(self.demand, {**self.values, key: value})
+
+
+class Posterior:
+    """The density, for many walkers at once.
+
+    A walker holds the number of a robot, the sampled coordinates, the motor's constants with the
+    torque of Table VI, and where in its printed range (-1 to 1) each other solved target lies.
+
+    Args:
+        task: Prior, catalogue, targets; its `without` names the targets left out.
+        robots: The bank.
+        targets: What has to come out; the task's by default.
+    """
+
+    def __init__(self, task: Problem, robots: Bank, targets: Sequence[Target] = ()) -> None:
+        self.task, self.robots = task, robots
+        self.targets = {t.name: t for t in (targets or task.targets)}
+        own = {f.key: f for f in (task.prior.free[i] for i in task.actuator_columns)}
+        self.solved: dict[str, Free] = {}
+        for name, key in SOLVED.items():
+            if name in self.targets and own[key] not in self.solved.values():
+                self.solved[name] = own[key]
+        self.free = tuple(f for f in own.values() if f not in self.solved.values())
+        self.aimed = tuple(name for name in self.solved if name != HELD)
+        self.numbers = slice(1, 1 + len(self.free))
+        self.constants = slice(self.numbers.stop, self.numbers.stop + len(KEYS) + 1)
+        self.aims = slice(self.constants.stop, self.constants.stop + len(self.aimed))
+        self.size = self.aims.stop
+        self.ratio = task.catalog.parameter("requirement.ratio").value
+
+    def start(self, rng: np.random.Generator, count: int) -> Array:
+        """Walkers drawn from the prior, aims uniform, (W, D); some may have no density."""
+        out = np.empty((count, self.size))
+        out[:, 0] = rng.integers(self.robots.count, size=count)
+        columns = [self.task.prior.free.index(f) for f in self.free]
+        out[:, self.numbers] = [self.task.prior.draw(rng)[columns] for _ in range(count)]
+        out[:, self.constants] = self.drawn_constants(rng, count)
+        out[:, self.aims] = rng.uniform(-1, 1, (count, len(self.aimed)))
+        return out
+
+    def drawn_constants(self, rng: np.random.Generator, count: int) -> Array:
+        """Draws of the motor's constants and the torque that they hold, (W, 4)."""
+        sets, held = self.task.sliver.draws(rng, count)
+        return np.column_stack([sets, held])
+
+    def __call__(self, x: Array) -> Array:
+        """Log density up to a constant, (W,); minus infinity where there is none.
+
+        Args:
+            x: Walkers (W, D).
+        """
+        log, _ = self.evaluate(x)
+        return log
+
+    def evaluate(self, x: Array) -> tuple[Array, dict[str, Array]]:
+        """Log density of walkers (W,), and their numbers in SI by reference, (W,).
+
+        Args:
+            x: Walkers (W, D).
+        """
+        z = x[:, self.numbers]
+        lower, upper = (np.array([f.coordinate(f.bounds[k]) for f in self.free]) for k in (0, 1))
+        good = ((z >= lower) & (z <= upper)).all(axis=1) & (np.abs(x[:, self.aims]) <= 1).all(axis=1)
+        good &= (x[:, 0] >= 0) & (x[:, 0] < self.robots.count)
+        log = np.where(good, -0.5 * (z**2).sum(axis=1), -np.inf)
+        values = {f.key: f.at(column) for f, column in zip(self.free, z.T, strict=True)}
+        values |= dict(zip(KEYS, x[:, self.constants].T, strict=False))
+        values |= {f.key: np.full(len(x), f.centre) for f in self.solved.values()}
+        robots = np.where(good, x[:, 0], 0).astype(np.intp)
+        sets = _Sets(self.robots.taken(robots), values)
+        for name, free in self.solved.items():
+            kept = np.flatnonzero(np.isfinite(log))
+            found, density = self._solved(name, free, sets.taken(kept), self._goal(name, x[kept]))
+            log[kept] += density
+            values[free.key][kept] = found
+        kept = np.flatnonzero(np.isfinite(log))
+        log[kept] += self._likelihood(sets.taken(kept))
+        return log, values
+
+    def _goal(self, name: str, x: Array) -> Array:
+        """The value of a solved target that walkers ask for, (W,)."""
+        target = self.targets[name]
+        if name == HELD:  # its place in the printed range is the constants'
+            printed = next(t for t in self.task.targets if t.name == HELD)
+            return target.centre - printed.centre - x[:, self.constants.stop - 1]
+        aim = x[:, self.aims.start + self.aimed.index(name)]
+        return target.centre + target.half_width * aim
+
+    def _chain(self, sets: _Sets, name: str) -> Chain:
+        return self.task.catalog.chain(name, with_splits(sets.values, self.ratio))
+
+    def _target(self, name: str) -> Callable[[_Sets], Array]:
+        """A solved target as a function of sets of numbers, (W,)."""
+        alternative = name.removeprefix("walking_ratio_")
+        if name == HELD:
+            # The torque of joint 2 is negative: the upper end of what holds is the least.
+            return lambda s: self._chain(s, "reversible").holding(s.demand.standing).high[1]
+        if name == EXTRA:
+            return self._extra
+        return lambda s: (
+            drawn(s.demand, self._chain(s, alternative)) / drawn(s.demand, self._chain(s, "ideal"))
+        )
+
+    def _extra(self, sets: _Sets) -> Array:
+        energy = [
+            sum(outcome(sets.demand, self._chain(sets, name)).energy.values())
+            for name in ("reversible", "irreversible")
+        ]
+        return (energy[1] - energy[0]) / 2
+
+    def _solved(self, name: str, free: Free, sets: _Sets, goal: Array) -> tuple[Array, Array]:
+        """The number that gives a target, and the log density it brings, (W,) each."""
+        target = self._target(name)
+        count = goal.size
+        if count == 0:
+            return goal, goal
+
+        def at(z: Array, which: Array) -> Array:
+            own = sets.taken(which.astype(np.intp))
+            return target(own.with_number(free.key, free.at(z))) - goal[which.astype(np.intp)]
+
+        ends = [np.full(count, free.coordinate(bound)) for bound in free.bounds]
+        every = np.arange(count)
+        root = find_root(at, tuple(ends), args=(every,), tolerances={"xatol": _CLOSE})
+        good = np.flatnonzero(root.success)
+        log = np.full(count, -np.inf)
+        z = root.x[good]
+        slope = (at(z + _STEP, every[good]) - at(z - _STEP, every[good])) / (2 * _STEP)
+        log[good] = -0.5 * z**2 - np.log(np.abs(slope))
+        value = np.full(count, free.centre)
+        value[good] = free.at(z)
+        return value, log
+
+    def _likelihood(self, sets: _Sets) -> Array:
+        """Zero where the other targets are met and every limit is kept, else minus infinity."""
+        if sets.demand.count == 0:
+            return np.zeros(0)
+        found = {
+            name: outcome(sets.demand, self._chain(sets, name))
+            for name in self.task.catalog.alternatives
+        }
+        good = (found["irreversible"].held == 0).all(axis=0)
+        good &= np.max([o.excess for o in found.values()], axis=0) <= 0
+        for name in self.targets.keys() - self.solved.keys():
+            target = self.targets[name]
+            if name == EXTRA:
+                value = self._extra(sets)
+            else:
+                alternative = name.removeprefix("walking_ratio_")
+                value = found[alternative].energy[PUBLISHED_LEG] / found["ideal"].energy[PUBLISHED_LEG]
+            good &= np.abs(value - target.centre) <= target.half_width
+        return np.where(good, 0.0, -np.inf)
+
+
+def _redrawn(posterior: Posterior, rng: np.random.Generator) -> emcee.moves.Move:
+    """A step that draws some of a walker's coordinates anew from the prior, or a robot near by."""
+    reach = max(int(_REACH * posterior.robots.count), 1)
+    block = np.arange(posterior.size)
+    block[posterior.constants] = posterior.constants.start  # they come together
+
+    def proposal(x: Array, random: object) -> tuple[Array, Array]:
+        share = rng.choice(_SHARES, size=(len(x), 1))
+        moved = (rng.uniform(size=x.shape) < share)[:, block]
+        q = np.where(moved, posterior.start(rng, len(x)), x)
+        near = rng.uniform(size=len(x)) < _ELSEWHERE
+        q[near] = x[near]
+        q[near, 0] += rng.integers(-reach, reach + 1, near.sum())
+        # Drawn from the prior, which the density holds as well.
+        squares = [(y[:, posterior.numbers] ** 2).sum(axis=1) for y in (q, x)]
+        return q, 0.5 * (squares[0] - squares[1])
+
+    return emcee.moves.MHMove(proposal)
+
+
+def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int = WALKERS) -> Array:
+    """One ensemble of walkers, started from draws of the prior that have a density.
+
+    Args:
+        posterior: The density.
+        seed: Of everything random.
+        steps: Of every walker; the first third is left out.
+        walkers: How many.
+
+    Returns:
+        Walkers over the kept steps, (S, W, D).
+
+    Raises:
+        CalibrationError: No draw of the prior can be solved for the targets.
+    """
+    rng = np.random.default_rng(seed)
+    found = np.empty((0, posterior.size))
+    for _ in range(_STARTS):
+        x = posterior.start(rng, 4 * walkers)
+        found = np.concatenate([found, x[np.isfinite(posterior(x))]])
+        if len(found) >= walkers:
+            break
+    if len(found) == 0:
+        raise CalibrationError(
+            f"none of {_STARTS * 4 * walkers} draws of the prior meets the targets inside the "
+            "motor's limits; widen prior.toml"
+        )
+    start = found[np.arange(walkers) % len(found)]
+    sampler = emcee.EnsembleSampler(
+        walkers, posterior.size, posterior, moves=_redrawn(posterior, rng), vectorize=True
+    )
+    # emcee draws acceptances from a state of its own.
+    sampler.random_state = np.random.RandomState(int(rng.integers(2**31))).get_state()
+    sampler.run_mcmc(start, steps, skip_initial_state_check=True)
+    chain: Array = sampler.get_chain(discard=steps // 3)
+    return chain
