@@ -97,7 +97,9 @@ class Catalog:
             f"{name}_spread": constants.parameter(name).spread
             for name in ("torque_constant", "resistance")
         }
-        numbers = {n: own.get(f"{alternative.motor}.{n}", v) for n, v in constants.items()}
+        numbers: dict[str, Any] = {
+            n: own.get(f"{alternative.motor}.{n}", v) for n, v in constants.items()
+        }
         motor = DCMotor(name=WINDING, **numbers, **spread)
         stages = {e.stage: e.name for e in alternative.elements if e.stage}
         chain = Chain(name=name, elements=elements, motor=motor, stages=MappingProxyType(stages))

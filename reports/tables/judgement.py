@@ -168,7 +168,7 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
             "computed": ("ours", "see unit"),
             "holds": ("whether the sentence holds for ours", ""),
             "part": (
-                "in the calibration; put in, or fitted: asked for, so that it holds there says nothing; "
+                "in the calibration; put in, or fitted: asked for, so that it holds says nothing; "
                 "follows: from fitted and put-in numbers",
                 "",
             ),
@@ -257,8 +257,14 @@ def calibration(rows: Sequence[Calibrated]) -> Table:
             "prior_low": ("lower end of the 95 % belief", "see unit"),
             "prior_high": ("upper end of the 95 % belief", "see unit"),
             "calibrated": ("at the set nearest to the prior", "see unit"),
-            "low": ("2.5 % quantile of the posterior, or the calibrated number where that is less", "see unit"),
-            "high": ("97.5 % quantile of the posterior, or the calibrated number where that is greater", "see unit"),
+            "low": (
+                "2.5 % quantile of the posterior, or the calibrated number where that is less",
+                "see unit",
+            ),
+            "high": (
+                "97.5 % quantile of the posterior, or the calibrated number where that is greater",
+                "see unit",
+            ),
             "shift_over_prior": (
                 "mean of the posterior less the prior's centre, in prior standard deviations",
                 "1",

@@ -94,13 +94,9 @@ def bank(parts: list[RobotPart]) -> Bank:
             return np.concatenate([values[rows] + k * span for k in range(count)])
         return values[rows].T.ravel()
 
-    return Bank(
-        *(
-            np.stack([column(part, name) for part in parts], axis=1)
-            for name in ("time", "velocity", "acceleration", "torque", "direction")
-        ),
-        np.stack([part.standing_torque for part in parts], axis=1),
-    )
+    names = ("time", "velocity", "acceleration", "torque", "direction")
+    columns = {name: np.stack([column(part, name) for part in parts], axis=1) for name in names}
+    return Bank(**columns, standing=np.stack([part.standing_torque for part in parts], axis=1))
 
 
 @dataclass(frozen=True)

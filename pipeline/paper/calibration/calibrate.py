@@ -61,7 +61,7 @@ class Effort:
     """How much is computed.
 
     Attributes:
-        starts: Of the search for the nearest point, per transfer path.
+        starts: Of the search for the nearest point, per transfer path: draws of the posterior.
         robots: In the bank from which the posterior takes them.
         ensembles: Of walkers in the posterior, each started by itself.
         steps: Of their walkers.
@@ -69,7 +69,6 @@ class Effort:
         sets: Of the posterior that are evaluated in full, and per target left out.
         left_out_sets: Likewise, per target left out.
         prior_draws: From the prior for what it says by itself.
-        reading_starts: Per reading.
         sobol: Base sample of the sensitivity analysis, a power of two.
         workers: Processes.
         seed: Of everything random.
@@ -77,14 +76,13 @@ class Effort:
 
     starts: int = 4
     robots: int = 400
-    ensembles: int = 4
-    steps: int = 1500
+    ensembles: int = 2
+    steps: int = 3000
     left_out_steps: int = 600
     sets: int = 250
     left_out_sets: int = 60
-    prior_draws: int = 600
-    reading_starts: int = 2
-    sobol: int = 512
+    prior_draws: int = 400
+    sobol: int = 256
     workers: int = 2
     seed: int = 1
 
@@ -133,13 +131,13 @@ def calibrate(
     store = Checkpoint(work / "tasks.jsonl", input_hash(robot, effort))
     with ProcessPoolExecutor(effort.workers) as pool:
         run = _Run(str(robot), effort, store, pool, progress)
-        starts = run.starts()
+        walkers = run.posterior((), effort.ensembles, effort.steps, "posterior")
+        starts = run.starts(walkers)
         good = [s for s in starts if s.get("admissible")]
         if not good:
             raise CalibrationError("no start reaches a point that meets every target and limit")
         best = min(good, key=lambda s: s["prior_distance"])
         paths = tuple(p for p in search.PATHS if any(s["path"] == p for s in good))
-        walkers = run.posterior((), effort.ensembles, effort.steps, "posterior")
         members = run.points("posterior", _spread(walkers, effort.sets))
         left_out = {}
         for targets in LEAVE_OUT:
@@ -148,7 +146,7 @@ def calibrate(
             left_out[key] = run.points(key, _spread(found, effort.left_out_sets))
         # The motor's limits are the data sheet's, so a draw beyond them is not what it says.
         before = [p for p in run.prior(search.PATHS) if p.get("inside")]
-        readings = run.readings(best["path"])
+        readings = run.readings(best["path"], best["z"])
         sensitivity = _sensitivity(pool, store, str(robot), best, effort, progress)
     published = task.published
     return {
@@ -258,15 +256,23 @@ class _Run:
     pool: ProcessPoolExecutor
     progress: Progress
 
-    def starts(self) -> list[Point]:
-        """Nearest points to the prior's centre from every start."""
-        seed, number = self.effort.seed, self.effort.starts
-        tasks = [
-            (f"start/{path}/{i}", (self.robot, path, search.READ, seed, i, 30))
-            for path in search.PATHS
-            for i in range(number)
-        ]
-        done = self.progress("nearest point", number * len(search.PATHS))
+    def starts(self, walkers: list[list[Point]]) -> list[Point]:
+        """Nearest points to the prior's centre, from the posterior's nearest draws of each path.
+
+        Args:
+            walkers: Of the posterior.
+        """
+        every = sorted(
+            (p for own in walkers for p in own), key=lambda p: float(np.dot(p["z"], p["z"]))
+        )
+        tasks = []
+        for path in search.PATHS:
+            own = [p["z"] for p in every if p["path"] == path][: self.effort.starts]
+            tasks += [
+                (f"start/{path}/{i}", (self.robot, path, search.READ, z, 30))
+                for i, z in enumerate(own)
+            ]
+        done = self.progress("nearest point", len(tasks))
         return self.store.run(self.pool, search.nearest, tasks, done)
 
     def posterior(
@@ -309,22 +315,24 @@ class _Run:
         done = self.progress("prior", self.effort.prior_draws)
         return self.store.run(self.pool, search.prior_member, tasks, done)
 
-    def readings(self, path: str) -> list[Point]:
-        """Every other reading of the paper, with its nearest point where there is one."""
-        seed, number = self.effort.seed, self.effort.reading_starts
+    def readings(self, path: str, start: list[float]) -> list[Point]:
+        """Every other reading of the paper, with its nearest point where there is one.
+
+        Args:
+            path: Of the foot.
+            start: Coordinates at which every search begins.
+        """
         tasks = [
-            (f"reading/{_task_name(reading)}/{i}", (self.robot, path, reading, seed, i, 30))
+            (f"reading/{_task_name(reading)}", (self.robot, path, reading, start, 30))
             for reading in READINGS
-            for i in range(number)
         ]
-        done = self.progress("readings", len(READINGS) * number)
-        found = self.store.run(self.pool, search.read, tasks, done)
-        grouped = []
-        for r, reading in enumerate(READINGS):
-            tries = [p for p in found[r * number : (r + 1) * number] if "failed" not in p]
-            chosen = min(tries, key=_reading_cost) if tries else None
-            grouped.append(asdict(reading) | {"point": chosen})
-        return grouped
+        found = self.store.run(
+            self.pool, search.read, tasks, self.progress("readings", len(READINGS))
+        )
+        return [
+            asdict(reading) | {"point": None if "failed" in point else point}
+            for reading, point in zip(READINGS, found, strict=True)
+        ]
 
 
 def _task_name(reading: Reading) -> str:
@@ -343,12 +351,6 @@ def _kept(point: dict[str, Any], published: Mapping[str, Published]) -> dict[str
         "values": {k: short(v) for k, v in point["values"].items() if k not in fixed},
         "totals": {a: {k: short(v) for k, v in t.items()} for a, t in point["totals"].items()},
     }
-
-
-def _reading_cost(point: dict[str, Any]) -> float:
-    """Misfit first, distance from the prior second."""
-    worst = max(max(abs(e) for e in point["errors"].values()) - 1, 0.0)
-    return 1e3 * worst + 1e3 * max(max(point["excess"].values()), 0.0) + point["prior_distance"]
 
 
 def _sensitivity(

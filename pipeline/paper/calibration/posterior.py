@@ -27,6 +27,7 @@ from dataclasses import dataclass
 import emcee
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 from scipy.optimize.elementwise import find_root
 
 from actuators.chain import Chain
@@ -34,6 +35,7 @@ from pipeline.paper.calibration.batch import Bank, drawn, outcome
 from pipeline.paper.calibration.machine import PUBLISHED_LEG, with_splits
 from pipeline.paper.calibration.prior import Free
 from pipeline.paper.calibration.problem import EXTRA, Problem, Target
+from pipeline.paper.calibration.quantities import PAIR
 from pipeline.paper.constants.motor_constants import KEYS
 from pipeline.paper.constants.rotor_friction import HELD
 from pipeline.paper.errors import CalibrationError
@@ -51,10 +53,9 @@ WALKERS = 32
 _STARTS = 100  # times four draws per walker, before none is said to fit
 _STEP = 1e-4  # of a prior standard deviation, for the slope of a target
 _CLOSE = 1e-6  # of a prior standard deviation, to which a coordinate is solved for
-#: Shares of a walker's coordinates that steps draw anew.
-_SHARES = (0.05, 0.1, 0.2, 0.4)
-#: Share of the steps that only go to another robot, and how far, as a share of the bank.
-_ELSEWHERE, _REACH = 0.3, 0.2
+_REACH = 0.2  # how far a step goes to another robot, as a share of the bank
+_MOVES = (0.7, 0.1, 0.2)  # shares of the three kinds of steps
+_STAGES = 3
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,8 @@ class Posterior:
         self.constants = slice(self.numbers.stop, self.numbers.stop + len(KEYS) + 1)
         self.aims = slice(self.constants.stop, self.constants.stop + len(self.aimed))
         self.size = self.aims.stop
+        every = np.arange(self.size)
+        self.continuous = np.concatenate([every[self.numbers], every[self.aims]])
         self.ratio = task.catalog.parameter("requirement.ratio").value
 
     def start(self, rng: np.random.Generator, count: int) -> Array:
@@ -138,7 +141,9 @@ class Posterior:
         """
         z = x[:, self.numbers]
         lower, upper = (np.array([f.coordinate(f.bounds[k]) for f in self.free]) for k in (0, 1))
-        good = ((z >= lower) & (z <= upper)).all(axis=1) & (np.abs(x[:, self.aims]) <= 1).all(axis=1)
+        good = ((z >= lower) & (z <= upper)).all(axis=1) & (np.abs(x[:, self.aims]) <= 1).all(
+            axis=1
+        )
         good &= (x[:, 0] >= 0) & (x[:, 0] < self.robots.count)
         log = np.where(good, -0.5 * (z**2).sum(axis=1), -np.inf)
         values = {f.key: f.at(column) for f, column in zip(self.free, z.T, strict=True)}
@@ -180,11 +185,10 @@ class Posterior:
         )
 
     def _extra(self, sets: _Sets) -> Array:
-        energy = [
-            sum(outcome(sets.demand, self._chain(sets, name)).energy.values())
-            for name in ("reversible", "irreversible")
-        ]
-        return (energy[1] - energy[0]) / 2
+        legs = [outcome(sets.demand, self._chain(sets, name)).energy for name in PAIR]
+        reversible, irreversible = (np.mean(list(energy.values()), axis=0) for energy in legs)
+        extra: Array = irreversible - reversible
+        return extra
 
     def _solved(self, name: str, free: Free, sets: _Sets, goal: Array) -> tuple[Array, Array]:
         """The number that gives a target, and the log density it brings, (W,) each."""
@@ -193,13 +197,20 @@ class Posterior:
         if count == 0:
             return goal, goal
 
-        def at(z: Array, which: Array) -> Array:
-            own = sets.taken(which.astype(np.intp))
-            return target(own.with_number(free.key, free.at(z))) - goal[which.astype(np.intp)]
+        def at(z: Array, which: NDArray[np.intp]) -> Array:
+            missed: Array = (
+                target(sets.taken(which).with_number(free.key, free.at(z))) - goal[which]
+            )
+            return missed
 
         ends = [np.full(count, free.coordinate(bound)) for bound in free.bounds]
         every = np.arange(count)
-        root = find_root(at, tuple(ends), args=(every,), tolerances={"xatol": _CLOSE})
+        root = find_root(  # type: ignore[call-overload]
+            lambda z, which: at(z, which.astype(np.intp)),  # passed on as floats
+            (ends[0], ends[1]),
+            args=(every,),
+            tolerances={"xatol": _CLOSE},
+        )
         good = np.flatnonzero(root.success)
         log = np.full(count, -np.inf)
         z = root.x[good]
@@ -225,38 +236,60 @@ class Posterior:
                 value = self._extra(sets)
             else:
                 alternative = name.removeprefix("walking_ratio_")
-                value = found[alternative].energy[PUBLISHED_LEG] / found["ideal"].energy[PUBLISHED_LEG]
+                value = (
+                    found[alternative].energy[PUBLISHED_LEG] / found["ideal"].energy[PUBLISHED_LEG]
+                )
             good &= np.abs(value - target.centre) <= target.half_width
         return np.where(good, 0.0, -np.inf)
 
 
-def _redrawn(posterior: Posterior, rng: np.random.Generator) -> emcee.moves.Move:
-    """A step that draws some of a walker's coordinates anew from the prior, or a robot near by."""
+def _moves(
+    posterior: Posterior, rng: np.random.Generator, centre: Array, factor: Array
+) -> list[tuple[emcee.moves.Move, float]]:
+    """Steps in the continuous coordinates, to other constants and to robots near by.
+
+    Args:
+        posterior: The density.
+        rng: Of everything random.
+        centre: Mean of the Gaussian towards whose draws the continuous coordinates turn, (C,).
+        factor: Of its covariance, lower triangular, (C, C).
+    """
+    own = posterior.continuous
     reach = max(int(_REACH * posterior.robots.count), 1)
-    block = np.arange(posterior.size)
-    block[posterior.constants] = posterior.constants.start  # they come together
 
-    def proposal(x: Array, random: object) -> tuple[Array, Array]:
-        share = rng.choice(_SHARES, size=(len(x), 1))
-        moved = (rng.uniform(size=x.shape) < share)[:, block]
-        q = np.where(moved, posterior.start(rng, len(x)), x)
-        near = rng.uniform(size=len(x)) < _ELSEWHERE
-        q[near] = x[near]
-        q[near, 0] += rng.integers(-reach, reach + 1, near.sum())
-        # Drawn from the prior, which the density holds as well.
-        squares = [(y[:, posterior.numbers] ** 2).sum(axis=1) for y in (q, x)]
-        return q, 0.5 * (squares[0] - squares[1])
+    def turned(x: Array, random: object) -> tuple[Array, Array]:
+        # A rotation towards a draw of a Gaussian leaves that Gaussian as it is.
+        angle = rng.uniform(0, np.pi / 2, (len(x), 1))
+        old = solve_triangular(factor, (x[:, own] - centre).T, lower=True).T
+        new = np.cos(angle) * old + np.sin(angle) * rng.normal(size=old.shape)
+        q = x.copy()
+        q[:, own] = centre + new @ factor.T
+        return q, 0.5 * ((new**2).sum(axis=1) - (old**2).sum(axis=1))
 
-    return emcee.moves.MHMove(proposal)
+    def constants(x: Array, random: object) -> tuple[Array, Array]:
+        q = x.copy()
+        q[:, posterior.constants] = posterior.drawn_constants(rng, len(x))
+        return q, np.zeros(len(x))
+
+    def robot(x: Array, random: object) -> tuple[Array, Array]:
+        q = x.copy()
+        q[:, 0] += rng.integers(-reach, reach + 1, len(x))
+        return q, np.zeros(len(x))
+
+    kinds = (emcee.moves.MHMove(step) for step in (turned, constants, robot))
+    return list(zip(kinds, _MOVES, strict=True))
 
 
 def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int = WALKERS) -> Array:
     """One ensemble of walkers, started from draws of the prior that have a density.
 
+    The first third of the steps turns towards the prior's draws, the second towards those of the
+    Gaussian with the walkers' mean and covariance, the last likewise, and only it is kept.
+
     Args:
         posterior: The density.
         seed: Of everything random.
-        steps: Of every walker; the first third is left out.
+        steps: Of every walker.
         walkers: How many.
 
     Returns:
@@ -266,6 +299,29 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
         CalibrationError: No draw of the prior can be solved for the targets.
     """
     rng = np.random.default_rng(seed)
+    x = _starts(posterior, rng, walkers)
+    own = posterior.continuous
+    centre, factor = np.zeros(own.size), np.eye(own.size)
+    chain = np.empty(0)
+    for _ in range(_STAGES):
+        sampler = emcee.EnsembleSampler(
+            walkers,
+            posterior.size,
+            posterior,
+            moves=_moves(posterior, rng, centre, factor),
+            vectorize=True,
+        )
+        # emcee draws acceptances from a state of its own.
+        sampler.random_state = np.random.RandomState(int(rng.integers(2**31))).get_state()
+        x = sampler.run_mcmc(x, steps // _STAGES, skip_initial_state_check=True).coords
+        chain = sampler.get_chain()
+        recent = chain[len(chain) // 2 :].reshape(-1, posterior.size)[:, own]
+        centre, factor = recent.mean(axis=0), np.linalg.cholesky(np.cov(recent.T))
+    return chain
+
+
+def _starts(posterior: Posterior, rng: np.random.Generator, walkers: int) -> Array:
+    """Draws of the prior that have a density, (W, D)."""
     found = np.empty((0, posterior.size))
     for _ in range(_STARTS):
         x = posterior.start(rng, 4 * walkers)
@@ -277,12 +333,4 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
             f"none of {_STARTS * 4 * walkers} draws of the prior meets the targets inside the "
             "motor's limits; widen prior.toml"
         )
-    start = found[np.arange(walkers) % len(found)]
-    sampler = emcee.EnsembleSampler(
-        walkers, posterior.size, posterior, moves=_redrawn(posterior, rng), vectorize=True
-    )
-    # emcee draws acceptances from a state of its own.
-    sampler.random_state = np.random.RandomState(int(rng.integers(2**31))).get_state()
-    sampler.run_mcmc(start, steps, skip_initial_state_check=True)
-    chain: Array = sampler.get_chain(discard=steps // 3)
-    return chain
+    return found[np.arange(walkers) % len(found)]

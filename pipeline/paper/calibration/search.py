@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from actuators.loading.build import CATALOG, load_catalog
 from pipeline.errors import PipelineError
 from pipeline.paper.calibration.batch import Bank, bank, drawn
-from pipeline.paper.calibration.machine import POSTURE, catalog_with, with_transfer_path
+from pipeline.paper.calibration.machine import POSTURE, RobotPart, catalog_with, with_transfer_path
 from pipeline.paper.calibration.posterior import Posterior, sample
 from pipeline.paper.calibration.prior import PRIOR_FILE, load_prior
 from pipeline.paper.calibration.problem import EXTRA, Evaluation, Problem
@@ -34,7 +34,7 @@ PATHS = ("cubic", "harmonic", "quintic", "cycloid")
 _PULL = 3.0  # the nearest point: a third of a half width counts like one prior sigma
 _STRICT = 60.0  # whether a reading can be met at all: the prior hardly counts,
 _FREE = 0.97  # and inside its printed precision a row does not pull against the motor's limits
-_THIN = 15  # every so many steps of a walker are kept
+_THIN = 10  # every so many steps of a walker are kept
 
 
 @cache
@@ -98,7 +98,7 @@ def problem(
 
 
 def nearest(
-    robot: str, path: str, reading: Reading, seed: int, start: int, evaluations: int
+    robot: str, path: str, reading: Reading, start: list[float], evaluations: int
 ) -> dict[str, Any]:
     """The admissible point nearest to the prior's centre, from one start.
 
@@ -106,17 +106,14 @@ def nearest(
         robot: Robot file.
         path: Transfer path.
         reading: Of the paper.
-        seed: Of the run.
-        start: 0 starts at the prior's centre, others at a random draw.
+        start: Coordinates (D,).
         evaluations: At most so many of the full problem.
     """
     task = problem(robot, path, reading)
-    size = len(task.prior.free)
-    z = np.zeros(size) if start == 0 else task.prior.draw(np.random.default_rng([seed, start]))
-    z = _feasible(task, z)
+    z = _feasible(task, np.array(start))
     try:
         z = task.solve(z, columns=task.actuator_columns, pull=_PULL)
-        z = task.solve(z, columns=np.arange(size), pull=_PULL, evaluations=evaluations)
+        z = task.solve(z, columns=np.arange(z.size), pull=_PULL, evaluations=evaluations)
         point = task.evaluate(z)
     except PipelineError as error:
         return {"failed": str(error), "path": path}
@@ -124,13 +121,13 @@ def nearest(
 
 
 def read(
-    robot: str, path: str, reading: Reading, seed: int, start: int, evaluations: int
+    robot: str, path: str, reading: Reading, start: list[float], evaluations: int
 ) -> dict[str, Any]:
     """As `nearest`, and where that misses a row, as close to the rows as the bounds allow.
 
     What is then still missed is out of reach of this reading, whatever the prior says.
     """
-    found = nearest(robot, path, reading, seed, start, evaluations)
+    found = nearest(robot, path, reading, start, evaluations)
     if "failed" in found or found["admissible"]:
         return found
     task = problem(robot, path, reading)
@@ -193,7 +190,9 @@ def robots(robot: str, seed: int, count: int) -> Robots:
     tasks = {path: problem(robot, path) for path in PATHS}
     ideal = tasks[PATHS[0]].catalog.chain("ideal")
     fastest = ideal.motor.max_speed / np.asarray(ideal.ratio)  # of a joint [rad/s]
-    parts, paths, coordinates = [], [], []
+    parts: list[RobotPart] = []
+    paths: list[str] = []
+    coordinates: list[Array] = []
     while len(parts) < count:
         path = PATHS[int(rng.integers(len(PATHS)))]
         task = tasks[path]
@@ -263,9 +262,7 @@ def prior_member(robot: str, paths: tuple[str, ...], seed: int, draw: int) -> di
     return point_of(robot, path, task.prior.draw(rng).tolist(), constants)
 
 
-def point_of(
-    robot: str, path: str, z: list[float], constants: dict[str, float]
-) -> dict[str, Any]:
+def point_of(robot: str, path: str, z: list[float], constants: dict[str, float]) -> dict[str, Any]:
     """A set of numbers with all that the paper prints and the energy of the whole robot.
 
     The energy is left out where a motor leaves its limits.
@@ -305,27 +302,6 @@ def summary(task: Problem, z: Array, point: Evaluation) -> dict[str, Any]:
         "prior_distance": float(0.5 * z @ z),
         "admissible": task.admissible(point),
         "electrical_over_mechanical": _over(ideal.joint.joints, ideal),
-    }
-
-
-def prior_member(robot: str, paths: tuple[str, ...], seed: int, draw: int) -> dict[str, Any]:
-    """The draw of `member` as it is, not moved: what follows without the paper's energies."""
-    rng = np.random.default_rng([seed, 1000, draw])
-    path = paths[int(rng.integers(len(paths)))]
-    task = problem(robot, path)
-    z = task.prior.draw(rng)
-    task.constants, _ = task.sliver.draw(rng)
-    try:
-        point = task.evaluate(z)
-    except PipelineError as error:
-        return {"failed": str(error), "path": path}
-    numbers = task.numbers(z)
-    return {
-        "path": path,
-        "z": z.tolist(),
-        "constants": {key: numbers[key] for key in KEYS},
-        "values": dict(point.values),
-        "inside": max(point.excess.values()) <= 0,
     }
 
 

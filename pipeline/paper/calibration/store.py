@@ -156,11 +156,11 @@ def _constants(results: Mapping[str, Any]) -> list[Calibrated]:
     for key in KEYS:
         own = results["posterior"]["numbers"][key]
         value = results["nearest"]["constants"][key]
+        low, high = min(own["low"], value), max(own["high"], value)
         out.append(
             Calibrated(
-                *(key, UNITS[key], None, None),
-                *(value, min(own["low"], value), max(own["high"], value)),
-                *(None, None, 0.0, 0.0, FIXED, own["r_hat"], own["effective"]),
+                *(key, UNITS[key], None, None, value, low, high),
+                *(None, None, 0.0, 0.0, FIXED, float(own["r_hat"]), float(own["effective"])),
             )
         )
     return out
