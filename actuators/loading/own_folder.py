@@ -76,7 +76,7 @@ def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]
     Raises:
         DataSheetError: Something is missing, unreadable or contradicts the rest.
     """
-    sheet = read_sheet(words)
+    sheet = read_sheet({name: str(text) for name, text in words.items()})
     x = {name: number.value for name, number in sheet.items()}
     found = converted(x)
     wrong = "; ".join(contradictions(sheet, found))
@@ -139,7 +139,7 @@ def _texts(name: str, source: str, parameters: Mapping[str, Parameter]) -> dict[
         elements[-1] += stage
     texts[ALTERNATIVES_FILE] = (
         f"# {name}, by `python -m pipeline init-actuator` from: {one_line(source)}\n"
-        + _head(_IDEAL, f"ratio and motor of {name} without losses or inertia")
+        + _head(_IDEAL, f"Ideal: ratio and motor of {name} alone")
         + _element(_IDEAL, "transmission", "ratio", ["gear.ratio"])
         + 'stage = "m"\n'
         + _head(name, f"{name} by its data sheet")

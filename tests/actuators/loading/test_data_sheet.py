@@ -202,7 +202,7 @@ def test_a_limit_of_torque_at_the_output_is_the_current_that_gives_it(tmp_path):
 
 
 def test_a_motor_without_gear_needs_no_word_of_one():
-    p = si(gear_ratio="1", gear_efficiency=None, gear_inertia=None, shaft=None)
+    p = si(gear_ratio=1, gear_efficiency=None, gear_inertia=None, shaft=None)
     assert {key for key in p if key.startswith("gear")} == {"gear.ratio"}
 
 
