@@ -20,6 +20,10 @@ class CatalogError(ActuatorError):
     """A component or an alternative of the catalogue that does not fit together."""
 
 
+class DataSheetError(ActuatorError):
+    """What a data sheet is said to print: missing, unreadable, or at odds with itself."""
+
+
 class UnphysicalElementError(ActuatorError):
     """An element whose parameters contradict its law, such as negative friction."""
 

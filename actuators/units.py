@@ -49,6 +49,9 @@ _TABLE: Final[Mapping[str, Mapping[str, float]]] = {
         "V*s/rad": 1.0,
         "V/krpm": 1.0 / (1e3 * _RPM),
     },
+    # Of a motor: speed without load per volt, and torque per square root of its copper loss.
+    "speed constant": {"rad/(s*V)": 1.0, "rpm/V": _RPM},
+    "motor constant": {"N*m/sqrt(W)": 1.0, "mN*m/sqrt(W)": 1e-3},
     "thermal resistance": {"K/W": 1.0},
     "temperature coefficient": {"1/K": 1.0, "%/K": 1e-2},
     "temperature": {"K": 1.0, "degC": 1.0},
@@ -122,6 +125,15 @@ def quantity(written: object, dimension_name: str) -> float:
         dimension_name: Of the table, e.g. ``length``.
 
     Raises:
+        UnitError: As for `number_and_unit`.
+    """
+    return to_si(*number_and_unit(written, dimension_name))
+
+
+def number_and_unit(written: object, dimension_name: str) -> tuple[float, str]:
+    """Return a number and its unit as they are written; arguments as for `quantity`.
+
+    Raises:
         UnitError: No number, no unit, or a unit of another dimension; says what is expected.
     """
     number = isinstance(written, (int, float)) and not isinstance(written, bool)
@@ -142,7 +154,7 @@ def quantity(written: object, dimension_name: str) -> float:
         raise UnitError(f"{written!r:.40}: expected a {dimension_name} in one of {known}")
     if not math.isfinite(value):
         raise UnitError(f"{written!r:.40} is not finite")
-    return to_si(value, unit)
+    return value, unit
 
 
 def from_si(value: float, unit: str) -> float:

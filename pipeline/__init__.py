@@ -15,6 +15,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from actuators.loading.own_folder import init_actuator
     from pipeline.api.init import init
     from pipeline.api.logs import compare, forward, identify, read_log, validate
     from pipeline.api.machine import Machine, load
@@ -28,6 +29,7 @@ _HOME = {
         ("read_log", "compare", "identify", "validate", "forward"), "pipeline.api.logs"
     ),
     "init": "pipeline.api.init",
+    "init_actuator": "actuators.loading.own_folder",
     "reports": "pipeline.api.reports",
 }
 __all__ = [
@@ -36,6 +38,7 @@ __all__ = [
     "forward",
     "identify",
     "init",
+    "init_actuator",
     "load",
     "read_log",
     "reports",

@@ -19,7 +19,7 @@ from actuators.errors import CatalogError, closest, one_line
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
 #: Files and columns are called after alternatives.
-_NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
+NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
 
 # law -> class, arguments it must have, arguments it may have
 LAWS: Final[Mapping[str, tuple[Callable[..., Element], frozenset[str], frozenset[str]]]] = {
@@ -93,7 +93,7 @@ class _Element(Table):
     """An element as it stands in a file: what is none of its keys is an argument of its law."""
 
     model_config = ConfigDict(extra="allow")
-    expected = "name, law and arguments"
+    expected = "name, law, arguments, and for the last element stage"
     __pydantic_extra__: dict[str, str] = Field(init=False)
     name: str
     law: str
@@ -136,6 +136,11 @@ def _stages_differ(elements: tuple[_Element, ...]) -> tuple[_Element, ...]:
         raise ValueError("is empty, expected at least one [[NAME.element]]")
     if len(set(stages)) != len(stages):
         raise ValueError(f"a stage is named twice among {', '.join(stages)}")
+    if not elements[-1].stage:
+        raise ValueError(
+            f"must have the key 'stage' in its last entry ({one_line(elements[-1].name)}): "
+            'the name of the motor\'s shaft, such as stage = "m"'
+        )
     return elements
 
 
@@ -163,7 +168,7 @@ def read_alternative(name: str, entry: object) -> Alternative:
         CatalogError: The name cannot be part of a file's, a key, law or argument is unknown or
             missing, or a stage is named twice.
     """
-    if not _NAME.fullmatch(name):
+    if not NAME.fullmatch(name):
         raise CatalogError(
             f"{ALTERNATIVES_FILE} [{one_line(name)}]: expected a name of letters a to z, digits, "
             "'_' and '-'; tables and files are called after it"

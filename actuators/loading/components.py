@@ -14,7 +14,9 @@ from actuators.parameters import ParameterSet, parameters_from_table, read_toml
 MOTOR_KIND: Final = "dc_motor"
 
 _FRICTION: Final = {"coulomb": "torque", "load": "ratio", "viscous": "viscous friction"}
-_DRAG: Final = {"coulomb": "torque", "viscous": "viscous friction"}
+_GEAR: Final = {"ratio": "ratio", **_FRICTION, "inertia": "inertia"}
+#: What a part may lack; what it has, an alternative uses, but for the mass, which is no law's.
+OPTIONAL: Final = frozenset({*_FRICTION, "inertia", "mass"})
 
 KINDS: Final[Mapping[str, Mapping[str, str]]] = {
     "requirement": {"ratio": "ratio"},
@@ -25,19 +27,21 @@ KINDS: Final[Mapping[str, Mapping[str, str]]] = {
         "supply_voltage": "voltage",
         "continuous_current": "current",
         "peak_current": "current",
+        "mass": "mass",
     },
-    "rotating_friction": {**_DRAG, "inertia": "inertia"},
-    "harmonic_drive": {"ratio": "ratio", **_FRICTION, "inertia": "inertia"},
-    "timing_belt": {"ratio": "ratio", **_FRICTION},
-    "planetary": {"ratio": "ratio", "coulomb": "torque"},
+    "rotating_friction": {**_FRICTION, "inertia": "inertia"},
+    "gear": _GEAR,
+    "harmonic_drive": _GEAR,
+    "timing_belt": _GEAR,
+    "planetary": _GEAR,
     "hypoid": {
-        "ratio": "ratio",
+        **_GEAR,
         "pinion_angle": "angle",
         "wheel_angle": "angle",
         "wheel_radius": "length",
         "friction": "ratio",
     },
-    "bearing": _DRAG,
+    "bearing": _FRICTION,
 }
 
 
@@ -84,5 +88,5 @@ def load_component(path: Path) -> Component:
     """
     file = one_line(path.name)
     written = checked(_Written, read_toml(path), file, CatalogError)
-    parameters = parameters_from_table(written.parameters, KINDS[written.kind], file)
+    parameters = parameters_from_table(written.parameters, KINDS[written.kind], file, OPTIONAL)
     return Component(path.stem, written.kind, written.title, written.note, parameters)

@@ -18,6 +18,7 @@ from pathlib import Path
 from pipeline.cli.blind_options import add_blind_options, add_twin_options
 from pipeline.cli.decimal_option import add_decimal_option
 from pipeline.cli.gap.options import add_gap_options
+from pipeline.cli.init_actuator.options import add_actuator_options
 from pipeline.cli.named_path import named_path
 from pipeline.cli.view import add_view_options
 from pipeline.cli.walk_options import add_force_options, add_machine_options
@@ -103,6 +104,10 @@ def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
     init.add_argument("--base", metavar="LINK", help="the base's link; the root by default")
     init.set_defaults(run=_run_init)
 
+    actuator = verbs.add_parser("init-actuator", help="write actuator files from a data sheet")
+    add_actuator_options(actuator)
+    actuator.set_defaults(run=_run_init_actuator)
+
     urdf = verbs.add_parser("urdf", help="build the URDFs from their robot files")
     urdf.add_argument(
         "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
@@ -130,6 +135,12 @@ def _run_init(options: argparse.Namespace) -> int:
     from pipeline.cli.init import run_init
 
     return run_init(options.source, options.out, feet=options.foot, base=options.base)
+
+
+def _run_init_actuator(options: argparse.Namespace) -> int:
+    from pipeline.cli.init_actuator.run import run_init_actuator
+
+    return run_init_actuator(options)
 
 
 def _run_check(options: argparse.Namespace) -> int:

@@ -65,6 +65,13 @@ def copy(tmp_path):
         ("alternatives.toml", 'stage = "ph"', 'stage = "mp"', "named twice"),
         ("alternatives.toml", 'viscous = "pinion.viscous"\n', "", "used by no alternative"),
         ("alternatives.toml", 'stage = "ph"\n', "", "name the stage, too"),
+        (
+            "alternatives.toml",
+            'stage = "m"\n',
+            "",
+            r"'element' must have the key 'stage' in its last entry \(transmission\)",
+        ),
+        ("pinion.toml", r"\[parameters.viscous\](.|\n)*?\n\n", "", "no parameter 'viscous'"),
         ("alternatives.toml", "shaft = ", "shfat = ", "no argument 'shfat'"),
         (
             "alternatives.toml",

@@ -1,0 +1,1 @@
+"""The verb `init-actuator`: a folder of actuator files from a data sheet."""

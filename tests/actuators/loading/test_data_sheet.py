@@ -1,0 +1,275 @@
+"""What a data sheet prints against closed forms, a three-phase winding, and energy balances."""
+
+import math
+
+import numpy as np
+import pytest
+
+import pipeline as lw
+from actuators.energy.balance import balance_residual
+from actuators.errors import DataSheetError
+from actuators.loading.build import load_catalog
+from actuators.loading.own_folder import parameters_of
+from actuators.shaft import ShaftSeries
+
+# maxon RE 40, order number 148867, catalogue 2019, with the planetary gear GP 42 C of 12.25:1.
+RE40 = {
+    "torque_constant": "30.2 mN*m/A",
+    "speed_constant": "317 rpm/V",
+    "current_of": "dc",
+    "resistance": "0.299 ohm",
+    "resistance_of": "terminal",
+    "supply_voltage": "24 V",
+    "no_load_current": "137 mA",
+    "no_load_voltage": "24 V",
+    "no_load_speed": "7580 rpm",
+    "coulomb_share": "0.9 to 1",
+    "stall_torque": "2.42 N*m",
+    "rotor_inertia": "142 g*cm^2",
+    "continuous_current": "6 A",
+    "continuous_torque": "0.177 N*m",
+    "peak_current": "80.2 A",
+    "max_speed": "12000 rpm",
+    "gear_ratio": "12.25",
+    "gear_efficiency": "81 %",
+    "gear_inertia": "15 g*cm^2",
+    "shaft": "motor",
+    "mass": "480 g",
+}
+
+
+def si(**changes):
+    """SI values of the parameters of the RE 40 with changes; None takes an entry out."""
+    words = {name: text for name, text in (RE40 | changes).items() if text is not None}
+    return {key: p.value for key, p in parameters_of(words, "a sheet").items()}
+
+
+def chain(folder, **changes):
+    """The chain of the RE 40 with changes, by way of its files."""
+    words = {name: text for name, text in (RE40 | changes).items() if text is not None}
+    lw.init_actuator("own", folder / "own", source="a sheet", **words)
+    return load_catalog(folder / "own").chain("own")
+
+
+def steady(torque, speed):
+    """Constant torque [N*m] and speed [rad/s] at a joint, over a second."""
+    time = np.array([0.0, 1.0])
+    still = np.zeros((2, 1))
+    return ShaftSeries.at_joint(
+        ("j",), time, time[:, None] * speed, still + speed, still, still + torque
+    )
+
+
+def test_what_is_printed_stays_as_printed_and_the_rest_says_how_it_came():
+    found = parameters_of(RE40, "maxon 2019")
+    assert {key for key, p in found.items() if p.basis != "datasheet"} == {
+        *("rotor.coulomb", "rotor.viscous", "gear.load")
+    }
+    k = found["motor.torque_constant"]
+    assert (k.value_as_written, k.unit, k.source) == (pytest.approx(30.2), "mN*m/A", "maxon 2019")
+    assert found["gear.load"].basis == "derived"
+    assert found["gear.load"].reason == "1 / efficiency - 1"
+    coulomb = found["rotor.coulomb"]
+    assert coulomb.basis == "assumed"
+    torque = 0.0302 * 0.137  # k_t x no-load current [N*m]
+    assert coulomb.interval == pytest.approx((0.9 * torque, torque))
+    assert "--coulomb-share 0.9 to 1" in coulomb.source
+
+
+def test_torque_constant_by_the_speed_per_volt():
+    k = si(torque_constant=None)["motor.torque_constant"]
+    assert k == pytest.approx(60 / (2 * math.pi * 317), rel=1e-12)  # [N*m/A]
+
+
+@pytest.mark.parametrize(
+    ("convention", "amperes"),
+    [("dc", math.sqrt(3) / 2), ("phase-peak", 1.0), ("phase-rms", math.sqrt(0.5))],
+)
+@pytest.mark.parametrize(("of", "ohms"), [("phase", 0.1), ("phase-to-phase", 0.2)])
+def test_copper_loss_and_power_are_those_of_three_phases_in_every_convention(
+    convention, amperes, of, ohms
+):
+    """A star of 0.1 ohm and 0.02 V*s/rad per phase, its sines summed over a turn."""
+    angles = np.linspace(0.0, 2 * np.pi, 60, endpoint=False)[:, None] + np.arange(3) * 2 * np.pi / 3
+    peak, flux, speed, volts = 7.0, 0.02, 50.0, 48.0  # [A], [V*s/rad], [rad/s], [V]
+    current, back = peak * np.cos(angles), flux * speed * np.cos(angles)
+    loss = (0.1 * current**2).sum(axis=1).mean()  # [W]
+    torque = (back * current).sum(axis=1).mean() / speed  # [N*m]
+    between = (back[:, 0] - back[:, 1]).max() / speed  # [V*s/rad]
+    assert loss == pytest.approx(1.5 * peak**2 * 0.1)
+    p = si(
+        torque_constant=None,
+        speed_constant=f"{1 / float(between)!r} rad/(s*V)",
+        current_of=convention,
+        resistance=f"{ohms} ohm",
+        resistance_of=of,
+        supply_voltage=f"{volts} V",
+        no_load_voltage="48 V",
+        no_load_speed=None,
+        stall_torque=None,
+        continuous_torque=None,
+    )
+    k, ampere = p["motor.torque_constant"], amperes * peak
+    assert k * ampere == pytest.approx(torque, rel=1e-12)
+    assert p["motor.resistance"] * ampere**2 == pytest.approx(loss, rel=1e-12)
+    electrical = (p["motor.resistance"] * ampere + k * speed) * ampere  # U I [W]
+    assert electrical == pytest.approx(loss + torque * speed, rel=1e-12)
+    assert p["motor.supply_voltage"] / k == pytest.approx(volts / between, rel=1e-12)
+
+
+@pytest.mark.parametrize("share", ["0", "0.3", "1"])
+def test_without_load_the_motor_draws_its_no_load_current(tmp_path, share):
+    own = chain(tmp_path, coulomb_share=share, no_load_voltage=None, gear_inertia=None)
+    speed = 7580 * math.pi / 30 / 12.25
+    assert own.moving(steady(0.0, speed)).current == pytest.approx(0.137, rel=1e-9)
+
+
+def test_the_no_load_speed_follows_from_the_voltage_where_it_is_not_printed():
+    p = si(no_load_speed=None, coulomb_share="0")
+    speed = (24 - 0.299 * 0.137) / 0.0302  # [rad/s]
+    assert p["rotor.viscous"] == pytest.approx(0.0302 * 0.137 / speed, rel=1e-9)
+
+
+def test_a_gear_drives_with_its_efficiency_and_loses_as_much_when_driven(tmp_path):
+    own = chain(tmp_path, no_load_current="0 A", gear_efficiency="0.81")
+    for torque, share in ((5.0, 1 / 0.81), (-5.0, 2 - 1 / 0.81)):
+        result = own.moving(steady(torque, 3.0))
+        assert result.motor.power == pytest.approx(torque * 3.0 * share, rel=1e-9)
+        lost = result.losses["gear_friction"]
+        assert lost == pytest.approx(5.0 * 3.0 * (1 / 0.81 - 1), rel=1e-9)
+        assert np.abs(balance_residual(result)).max() < 1e-12
+
+
+def test_the_torque_that_drives_it_back_is_the_one_at_which_it_yields(tmp_path):
+    own = chain(tmp_path, no_load_current=None, coulomb_share=None, back_drive_torque="0.51 N*m")
+    assert own.moving(steady(-0.51, 1e-9)).motor.torque == pytest.approx(0.0, abs=1e-10)
+    held = own.holding(np.array([0.509, 0.511]))
+    assert held.motor_torque[0] == 0.0 < held.motor_torque[1]
+
+
+def test_two_measurements_of_friction_need_no_share():
+    p = si(coulomb_share=None, back_drive_torque="40 mN*m")
+    assert p["rotor.coulomb"] == pytest.approx(0.040 * (2 - 1 / 0.81) / 12.25)
+    speed = 7580 * math.pi / 30
+    assert p["rotor.coulomb"] + p["rotor.viscous"] * speed == pytest.approx(0.0302 * 0.137)
+
+
+# Schaeffler RT1-H strain-wave gears of ratio 100 (TPI 275): rated torque [N*m], starting torque and
+# running torque without load at 2000 rpm [mN*m], efficiency at rated torque, back-driving torque.
+@pytest.mark.parametrize(
+    ("rated", "starting", "running", "efficiency", "printed"),
+    [
+        (10, 21, 35, 0.67, 2.21),
+        (31, 29, 51, 0.77, 3.06),
+        (52, 37, 105, 0.77, 3.89),
+        (87, 69, 195, 0.77, 7.26),
+    ],
+)
+def test_a_strain_wave_gear_by_three_numbers_gives_the_fourth(
+    rated, starting, running, efficiency, printed
+):
+    p = si(
+        gear_ratio="100",
+        gear_efficiency=str(efficiency),
+        gear_rated_torque=f"{rated} N*m",
+        gear_starting_torque=f"{starting} mN*m",
+        gear_running_torque=f"{running} mN*m",
+        gear_running_speed="2000 rpm",
+    )
+    back_driving = 100 * p["gear.coulomb"] / (1 - p["gear.load"])  # [N*m]
+    assert back_driving == pytest.approx(printed, rel=0.11)
+    lost = (p["gear.coulomb"] + p["gear.viscous"] * 2000 * math.pi / 30) * 100 / rated + p[
+        "gear.load"
+    ]
+    assert 1 / (1 + lost) == pytest.approx(efficiency, rel=1e-9)
+
+
+def test_a_limit_of_torque_at_the_output_is_the_current_that_gives_it(tmp_path):
+    own = chain(
+        tmp_path,
+        shaft="output",
+        peak_current=None,
+        peak_torque="20 N*m",
+        no_load_speed="619 rpm",
+        stall_torque=None,
+        continuous_torque=None,
+        max_speed=None,
+        coulomb_share="1",
+    )
+    result = own.moving(steady(20.0, 1.0))
+    assert result.current == pytest.approx(own.motor.peak_current, rel=1e-9)
+    assert own.motor.max_speed == pytest.approx(24 / 0.0302)
+
+
+def test_a_motor_without_gear_needs_no_word_of_one():
+    p = si(gear_ratio=1, gear_efficiency=None, gear_inertia=None, shaft=None)
+    assert {key for key in p if key.startswith("gear")} == {"gear.ratio"}
+
+
+WRONG = {
+    "k_t and KV": (
+        {"speed_constant": "200 rpm/V"},
+        r"30.2 mN\*m/A, but --speed-constant \(0.0477 N",
+    ),
+    "convention": (
+        {"motor_constant": "0.045 N*m/sqrt(W)"},
+        r"conventions give 0.0552 N\*m/sqrt\(W\)",
+    ),
+    "stall torque": ({"stall_torque": "1.2 N*m"}, r"1.2 N\*m, but .* give 2.42 N\*m"),
+    "no-load speed": (
+        {"no_load_speed": "9000 rpm"},
+        r"9000 rpm, but .* give 7.58e\+03 to 7.59e\+03 r",
+    ),
+    "torque of no current": ({"continuous_torque": "0.3 N*m"}, r"without any loss at most 0.181 N"),
+    "peak": (
+        {"peak_current": "5 A"},
+        r"^the peak current or torque is below the continuous one: c",
+    ),
+    "self-locking": ({"gear_efficiency": "0.45"}, r"1 and more per load .* locks the gear"),
+    "idle": (
+        {
+            "gear_starting_torque": "50 mN*m",
+            "gear_rated_torque": "1 N*m",
+        },
+        r"the torque that turns the gear without load alone costs more",
+    ),
+    "back-drive": (
+        {"back_drive_torque": "3 N*m", "coulomb_share": None},
+        r"--no-load-current: its torque is less than .* brings to the rotor, 6.21 A",
+    ),
+    "running": (
+        {
+            **{"gear_starting_torque": "2 mN*m", "gear_running_torque": "1 mN*m"},
+            **{"gear_rated_torque": "1 N*m", "gear_running_speed": "1 rad/s"},
+        },
+        r"--gear-running-torque is below --gear-starting-torque",
+    ),
+    "resistance": (
+        {"resistance": "300 ohm", "no_load_speed": None},
+        r"--no-load-current x --resistance exceeds --no-load-voltage",
+    ),
+    "missing": (
+        {"resistance_of": None, "peak_current": None, "shaft": None},
+        r"^missing: --resistance-of, --peak-current or --peak-torque, --shaft; --help says",
+    ),
+    "range": ({"gear_efficiency": "0.9 to 0.8"}, r"the lower number first, such as '0.84 to 0.95'"),
+    "more than all": ({"gear_efficiency": "1.2"}, r"expected more than 0, at most 1,"),
+    "negative": ({"no_load_current": "-1 A"}, r"expected 0 or more,"),
+    "no unit": ({"resistance": "0.299"}, r"--resistance: '0.299' has no unit"),
+    "choice": ({"current_of": "phase-pek"}, r"--current-of 'phase-pek': did you mean 'phase-peak'"),
+    "twice": ({"gear_load": "0.1"}, r"--gear-efficiency is not used: --gear-load says the same"),
+    "no gear": ({"gear_ratio": "1"}, r"--gear-efficiency is not used: there is no gear"),
+    "unused": (
+        {"gear_rated_torque": "1 N*m"},
+        r"--gear-rated-torque is not used: it says nothing without --gear-starting-torque",
+    ),
+    "unknown": ({"resistence": "1 ohm"}, r"no entry 'resistence': did you mean 'resistance'"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_what_contradicts_or_lacks_is_one_line(what):
+    changes, message = WRONG[what]
+    with pytest.raises(DataSheetError, match=message) as caught:
+        si(**changes)
+    assert "\n" not in str(caught.value)
