@@ -112,7 +112,7 @@ def compare(a: Run, b: Run) -> Comparison:
 
 def _pairs(name: str, a: RunTable, b: RunTable) -> list[Pair]:
     keys = [key for key in _keys(a) if key in _keys(b)]
-    rows = [_rows(table.frame, keys) for table in (a, b)]
+    rows = [_rows(_of_any_robot(name, table.frame), keys) for table in (a, b)]
     out = []
     for quantity, unit in a.units.items():
         if not unit or quantity not in b.units or quantity in keys or _numbers(a, quantity):
@@ -138,6 +138,14 @@ def _pairs(name: str, a: RunTable, b: RunTable) -> list[Pair]:
             for key, own, x, y in found
         ]
     return out
+
+
+def _of_any_robot(name: str, frame: pandas.DataFrame) -> pandas.DataFrame:
+    """Parameters under the same name whatever the robot: its own come first."""
+    if name != PARAMETERS or frame.empty:
+        return frame
+    first = frame.columns[0]
+    return frame.assign(**{first: frame[first].replace(frame[first].iloc[0], "robot")})
 
 
 def _weight(a: float, b: float, largest: float) -> float:
@@ -194,9 +202,9 @@ def _inputs(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[tuple[str, str,
             if own.get(key) == other.get(key):
                 continue
             if hashes:
-                words = ["there" if key in m else "not read" for m in (own, other)]
+                words = ["read" if key in m else "not read" for m in (own, other)]
                 if key in own and key in other:
-                    words = ["", "other contents"]
+                    words = ["read", "read, with other contents"]
             else:
                 words = [_words(m.get(key)) for m in (own, other)]
             label = {"inputs_sha256": "file", "options": "option", "versions": "version of"}[group]

@@ -11,17 +11,19 @@ from pipeline.api.diff.runs import Run, read_run
 from reports.errors import ReportError
 from reports.folder.staging import staged
 from reports.html import write_html
-from reports.page import Block, FigureBlock, Page, PairBlock, Points, Section, TableBlock, Text
+from reports.page import Block, FigureBlock, Page, PairBlock, Section, TableBlock, Text
 from reports.table import Table, table_from_rows
-from reports.typeset import unit_text
+from reports.typeset import unit_suffix, unit_text
 from reports.writer import write_table
 
 #: Of the table and its files.
 NAME = "side_by_side"
 #: Tables that a reader looks for first, as far as both runs have them.
-FIRST = ("robot_energy", "walking_energy", "standing_energy", "where", "found", "bodies")
+FIRST = ("robot_energy", "walking_energy", "standing_energy", "bodies", "where", "found")
 #: Rows of a table that the page shows; the CSV has all.
 SHOWN = 12
+#: Inputs that the first lines name.
+TOLD = 4
 #: Change of a number, over the largest of its column, that is rounding's.
 ROUNDING = 1e-9
 _COLUMNS = {
@@ -98,7 +100,8 @@ def answer(both: Comparison) -> list[str]:
     runs = zip("AB", names, (both.a, both.b), strict=True)
     out = ["; ".join(f"**{x}** is `{name}` (a run of `{run.verb}`)" for x, name, run in runs) + "."]
     changed = [p for p in both.table(PARAMETERS) if differs(p)]
-    went = [what for what, *_ in both.inputs]
+    went = [f"{what} ({x}; {y})" for what, x, y in both.inputs]
+    went = [*went[:TOLD], f"{len(went) - TOLD} more below"] if len(went) > TOLD + 1 else went
     went += [f"{len(changed)} numbers of parameters.csv"] if changed else []
     out.append(f"**What went in** differs in: {'; '.join(went) or 'nothing that the runs state'}.")
     results = [p for p in both.pairs if p.table != PARAMETERS]
@@ -107,7 +110,7 @@ def answer(both: Comparison) -> list[str]:
     text = f"**What came out:** {sum(map(differs, shared))} of {len(shared)} numbers"
     text += f" that both have differ; {alone} stand in one alone." if alone else " differ."
     for name in FIRST:
-        pairs = [p for p in both.table(name) if p.both]
+        pairs = [p for p in both.table(name) if p.both and p.unit != "1"]
         if pairs:
             head = pairs[0].quantity
             own = [p for p in pairs if p.quantity == head][:4]
@@ -142,9 +145,12 @@ def page(both: Comparison, folder: Path) -> Page:
     sections = [Section("What went in", _went_in(both))]
     names = [n for n in both.a.tables if n in both.b.tables and n != PARAMETERS]
     order = sorted(names, key=lambda n: FIRST.index(n) if n in FIRST else len(FIRST))
+    shown = {name: _shown(both, name) for name in order}
     same = [name for name in order if not any(map(differs, both.table(name)))]
-    blocks = [_block(both, name) for name in order if name not in same]
-    sections.append(Section("What came out", (*blocks, *_same(same))))
+    alone = [name for name in order if not shown[name] and name not in same]
+    blocks = [_block(both, name, pairs) for name, pairs in shown.items() if pairs]
+    last = *_same(same, "The same in both"), *_same(alone, f"No row in common, see `{NAME}.csv`")
+    sections.append(Section("What came out", (*blocks, *last)))
     pairs = [
         PairBlock(
             FigureBlock(folder / "a" / name, f"A: {Path(name).stem.replace('_', ' ')}"),
@@ -152,9 +158,8 @@ def page(both: Comparison, folder: Path) -> Page:
         )
         for name in both.figures
     ]
-    alone = [f"{x}: {', '.join(n for n, y in both.alone.items() if y == x)}" for x in "AB"]
-    alone = [line for line in alone if not line.endswith(": ")]
-    rest: tuple[Block, ...] = (Text("In one run alone:"), Points(tuple(alone))) if alone else ()
+    own = {x: [n for n, y in both.alone.items() if y == x] for x in "AB"}
+    rest = [Text(f"In {x} alone: {', '.join(names)}.") for x, names in own.items() if names]
     sections.append(Section("Figures", (*pairs, *rest)))
     return Page(
         "Two runs side by side: A is {}, B is {}".format(*labels(both.a, both.b)),
@@ -171,27 +176,41 @@ def _went_in(both: Comparison) -> tuple[Block, ...]:
         caption = "Files, options and versions that differ, by the sidecars of the runs."
         blocks.append(TableBlock(("what", "A", "B"), both.inputs, caption))
     if any(map(differs, both.table(PARAMETERS))):
-        blocks.append(_block(both, PARAMETERS))
+        blocks.append(_block(both, PARAMETERS, _shown(both, PARAMETERS)))
     return tuple(blocks) or (Text("Nothing that the runs state differs."),)
 
 
-def _same(names: Sequence[str]) -> tuple[Block, ...]:
-    return (Text(f"The same in both: {', '.join(names)}."),) if names else ()
+def _same(names: Sequence[str], text: str) -> tuple[Block, ...]:
+    return (Text(f"{text}: {', '.join(names)}."),) if names else ()
 
 
-def _block(both: Comparison, name: str) -> TableBlock:
-    """The numbers of a table that differ most, in the table's order."""
+def _shown(both: Comparison, name: str) -> list[Pair]:
+    """The numbers of a table that differ most, and what one run has alone where that is little."""
     apart = [pair for pair in both.table(name) if differs(pair)]
-    most = sorted(apart, key=lambda pair: -pair.weight)[:SHOWN]
+    alone = [pair for pair in apart if not pair.both]
+    most = sorted((p for p in apart if p.both), key=lambda pair: -pair.weight)[:SHOWN]
+    most += alone if len(alone) <= SHOWN else []
+    return [pair for pair in apart if pair in most]
+
+
+def _block(both: Comparison, name: str, pairs: Sequence[Pair]) -> TableBlock:
     rows = tuple(
         (
-            f"{p.row}: {both.a.tables[name].meanings[p.quantity]}"
-            + (f" [{unit_text(p.unit)}]" if _unit(p) else ""),
+            f"{p.row}: {_words(p)}",
             *(x if x == x else None for x in (p.a, p.b, p.difference, p.ratio)),
         )
-        for p in apart
-        if p in most
+        for p in pairs
     )
-    which = f"the {len(most)} that differ most" if len(most) < len(apart) else "those that differ"
-    caption = f"`{name}`: {which} of {len(both.table(name))} numbers."
+    every = both.table(name)
+    shared, apart = (sum(p.both and (differs(p) or k) for p in every) for k in (True, False))
+    which = "those that differ most" if apart > SHOWN else "all that differ"
+    caption = f"`{name}`: {which} of {shared} numbers that both have"
+    caption += f"; {len(every) - shared} stand in one run alone." if len(every) > shared else "."
     return TableBlock(("what", "A", "B", "B − A", "B / A"), rows, caption, f"{NAME}.csv")
+
+
+def _words(pair: Pair) -> str:
+    """The words of a column's header, with the unit in brackets."""
+    suffix = unit_suffix(pair.unit)
+    words = pair.quantity.removesuffix(f"_{suffix}") if suffix else pair.quantity
+    return words.replace("_", " ") + (f" [{unit_text(pair.unit)}]" if _unit(pair) else "")
