@@ -84,7 +84,9 @@ def read_run(folder: Path) -> Run:
         raise ReportError(f"{shown}: holds no run; {expected}")
     if manifest.verb.split()[0] not in KINDS:
         raise ReportError(f"{shown}: holds a run of '{one_line(manifest.verb)}'; {expected}")
-    tables, series, changed, meta = {}, [], [], {}
+    tables: dict[str, RunTable] = {}
+    series, changed = [], []
+    meta: dict[str, Any] = {}
     for name, digest in manifest.files.items():
         side, path = folder / f"{name[:-4]}.meta.json", folder / name
         if not name.endswith(".csv") or not side.is_file() or not path.is_file():
