@@ -72,17 +72,17 @@ def bodies_blocks(found: FoundBodies) -> tuple[Block, ...]:
     rows = tuple(
         (
             body.link,
+            f"**{', '.join(body.differs_in)}**" if body.differs_in else "nothing",
             float(body.urdf[0]),
             float(body.found[0]),
             *(float(end[0]) if np.isfinite(end[0]) else None for end in (body.low, body.high)),
             *(_place(point) for point in (body.urdf, body.found)),
-            f"**{', '.join(body.differs_in)}**" if body.differs_in else "nothing",
         )
         for body in found.bodies
     )
     table = TableBlock(
-        ("link", "mass by URDF [kg]", "as found [kg]", "95 % from", "to")
-        + ("centre of mass by URDF [mm]", "as found [mm]", "differs in"),
+        ("link", "differs in", "mass by URDF [kg]", "as found [kg]", "95 % from", "to")
+        + ("centre of mass by URDF [mm]", "as found [mm]"),
         rows,
         "Links with all that is fixed to them, largest change first; centre of mass in the link's "
         "frame. A link differs where the URDF's value lies outside the 95 % interval, that of the "

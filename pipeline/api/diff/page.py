@@ -102,7 +102,9 @@ def answer(both: Comparison) -> list[str]:
     changed = [p for p in both.table(PARAMETERS) if differs(p)]
     went = [f"{what} ({x}; {y})" for what, x, y in both.inputs]
     went = [*went[:TOLD], f"{len(went) - TOLD} more below"] if len(went) > TOLD + 1 else went
-    went += [f"{len(changed)} numbers of parameters.csv"] if changed else []
+    went += (
+        [f"{len(changed)} number{'s' * (len(changed) > 1)} of parameters.csv"] if changed else []
+    )
     out.append(f"**What went in** differs in: {'; '.join(went) or 'nothing that the runs state'}.")
     results = [p for p in both.pairs if p.table != PARAMETERS]
     shared = [p for p in results if p.both]
