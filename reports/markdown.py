@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from reports.atomic import write_text
-from reports.page import Block, FigureBlock, Page, Points, TableBlock, Text, cell_text
+from reports.page import Block, FigureBlock, Page, PairBlock, Points, TableBlock, Text, cell_text
 from reports.typeset import prose
 
 
@@ -43,6 +43,8 @@ def _block(block: Block, folder: Path) -> str:
             f"{i}. {item}" if block.numbered else f"- {item}"
             for i, item in enumerate(map(prose, block.items), 1)
         )
+    if isinstance(block, PairBlock):
+        return "\n\n".join(_block(b, folder) for b in (block.first, block.second))
     if isinstance(block, FigureBlock):
         picture = os.path.relpath(block.file, folder).replace(os.sep, "/")
         caption = prose(block.caption)

@@ -92,7 +92,15 @@ class FigureBlock:
     alt: str = ""
 
 
-Block = Text | Points | TableBlock | FigureBlock
+@dataclass(frozen=True)
+class PairBlock:
+    """Two pictures side by side; one below the other where the page is narrow."""
+
+    first: FigureBlock
+    second: FigureBlock
+
+
+Block = Text | Points | TableBlock | FigureBlock | PairBlock
 
 
 @dataclass(frozen=True)

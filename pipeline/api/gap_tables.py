@@ -20,6 +20,7 @@ from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.logs.errors import EffectError
 from pipeline.logs.quality.finding import Finding
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.found_bodies import FoundBody
 from reports.table import Table
 from reports.tables import gap as tables
 
@@ -102,9 +103,22 @@ def base_table(naming: Naming) -> Table:
     return tables.base_parameters([asdict(one) for one in naming.base])
 
 
+def bodies_table(bodies: Sequence[FoundBody]) -> Table:
+    """Rows of `bodies.csv`."""
+    names = [name.removeprefix("urdf_") for name in tables.BODIES if name.startswith("urdf_")]
+    rows: list[dict[str, Any]] = []
+    for body in bodies:
+        row: dict[str, Any] = {"link": body.link}
+        for k, name in enumerate(names):
+            row |= {f"urdf_{name}": body.urdf[k], f"found_{name}": body.found[k]}
+            row |= {f"low_{name}": _known(body.low[k]), f"high_{name}": _known(body.high[k])}
+        rows.append(row | {"differs_in": JOINED.join(body.differs_in)})
+    return tables.bodies(rows)
+
+
 def _known(value: float) -> float | None:
     """A number, or an empty cell where there is none."""
-    return None if math.isnan(value) else value
+    return value if math.isfinite(value) else None
 
 
 def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:

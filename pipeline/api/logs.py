@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from pipeline.api.gap_bodies import bodies_of, bodies_tables, write_model
 from pipeline.api.gap_forward import forward_table, rollout_tables
 from pipeline.api.gap_meta import metadata
 from pipeline.api.gap_tables import candidates_table, found_table, quality_table, where_table
@@ -20,8 +21,8 @@ from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
 from pipeline.identification.workflow.story import Story, tell
 from pipeline.identification.workflow.validate import check
+from pipeline.simulation.found_bodies import FoundBodies
 from reports.table import Table
-from reports.writer import write_text
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,10 +60,12 @@ class Identified(Result):
     Attributes:
         model: The machine with what was found and written.
         story: Everything the page tells.
+        bodies: Those found to be others, and the corrected URDF.
     """
 
     model: Machine
     story: Story
+    bodies: FoundBodies
 
     @property
     def found(self) -> Table:
@@ -87,8 +90,7 @@ class Identified(Result):
 
     def _write(self, out: Path, decimal: str) -> None:
         super()._write(out, decimal)
-        if self.story.weighed.text:
-            write_text(out / "model.toml", self.story.weighed.text)
+        write_model(out, self.story.weighed.text, self.bodies)
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,8 +236,10 @@ class _Run:
             candidates_table(naming.candidates, naming.found, self.given.model),
             found_table(naming.found, self.given.model),
         ]
+        bodies = bodies_of(self.given, story.weighed.text)
+        tables += bodies_tables(bodies)
         verb = f"gap {self.options.step}"
-        return Identified(by_name(tables), verb, self.meta, model, story)
+        return Identified(by_name(tables), verb, self.meta, model, story, bodies)
 
 
 def _several(logs: Any) -> list[Any]:

@@ -72,6 +72,10 @@ def parser() -> argparse.ArgumentParser:
     add_blind_options(blind)
     blind.set_defaults(run=_run_blind)
 
+    diff = verbs.add_parser("diff", help="lay two finished runs side by side on one page")
+    _diff_options(diff)
+    diff.set_defaults(run=_run_diff)
+
     calibrate = verbs.add_parser(
         "calibrate", help="fit the unpublished numbers to the paper's figures and store them"
     )
@@ -113,6 +117,15 @@ def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
         "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
     )
     urdf.set_defaults(run=_run_urdf)
+
+
+def _diff_options(sub: argparse.ArgumentParser) -> None:
+    kinds = "folder that stand, walk and reports wrote, or gap"
+    sub.add_argument("a", type=named_path, metavar="A", help=kinds)
+    sub.add_argument("b", type=named_path, metavar="B", help="another, of a run of the same kind")
+    out = DEFAULT_OUT / "diff"
+    sub.add_argument("--out", type=named_path, default=out, help="folder for the page and the CSV")
+    add_decimal_option(sub)
 
 
 def _run_options(sub: argparse.ArgumentParser) -> None:
@@ -191,6 +204,15 @@ def _run_gap(options: argparse.Namespace) -> int:
         from pipeline.cli.gap.run import run_gap
 
         return run_gap(options)
+
+
+def _run_diff(options: argparse.Namespace) -> int:
+    from pipeline.api.diff.page import write_diff
+    from pipeline.cli.decimal_option import decimal_of
+
+    for line in write_diff(options.a, options.b, options.out, decimal_of(options)):
+        print(line)
+    return EXIT_OK
 
 
 def _run_twin(options: argparse.Namespace) -> int:

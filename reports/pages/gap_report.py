@@ -13,6 +13,7 @@ from pipeline.identification.compare.stages import noise_floor, overall
 from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Remainder
 from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.story import Story
+from pipeline.simulation.found_bodies import FoundBodies
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import (
@@ -26,6 +27,7 @@ from reports.page import (
     table_block,
 )
 from reports.pages import gap_words as words
+from reports.pages.bodies_words import URDF_FILE, bodies_blocks, bodies_words
 from reports.pages.names import legs_text
 from reports.table import Table
 
@@ -44,25 +46,33 @@ TONES = {
 SHOWN_CANDIDATES = 15
 
 
-def write_report(story: Story, tables: Sequence[Table], folder: Path, footer: str) -> None:
+def write_report(
+    story: Story, bodies: FoundBodies, tables: Sequence[Table], folder: Path, footer: str
+) -> None:
     """Write ``report.md`` and ``index.html``; the figures must be there already."""
-    page = report(story, {t.name: t for t in tables}, folder, footer)
+    page = report(story, bodies, {t.name: t for t in tables}, folder, footer)
     write_markdown(page, folder / "report.md")
     write_html(page, folder / "index.html")
 
 
-def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) -> Page:
+def report(
+    story: Story, bodies: FoundBodies, tables: dict[str, Table], folder: Path, footer: str
+) -> Page:
     """The page; see `write_report`."""
     names = ", ".join(m.name for m in story.where.measurements)
     files = {f"{t.name}.csv": t.description for t in tables.values()}
     if story.weighed.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
+    if bodies.urdf:
+        files[URDF_FILE] = "The robot's URDF with the bodies found"
+    own = bodies_blocks(bodies)
     return Page(
         title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
-        answer=answer(story),
+        answer=answer(story, bodies),
         sections=(
             _where(story, tables, folder),
             _what(story, tables, folder),
+            *([Section("The bodies", own)] if own else []),
             _smaller(story, folder),
             *_energy(story),
             _left(story),
@@ -73,14 +83,15 @@ def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) ->
     )
 
 
-def answer(story: Story) -> tuple[str, ...]:
-    """The first lines: where, what, how much smaller, what it costs, what is left."""
+def answer(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
+    """The first lines: where, what, bodies, how much smaller, what it costs, what is left."""
     naming, weighed = story.naming, story.weighed
     out = [
         words.where_words(story.where.rows),
         words.what_words(
             naming, story.where.measurements[0].channels, unexplained=weighed.unexplained
         ),
+        *filter(None, [bodies_words(bodies)]),
         words.shrink_words(naming.found, _joints(story), _whole(story), naming.unit, story.noise),
     ]
     if story.energy is not None:

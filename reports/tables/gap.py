@@ -85,6 +85,22 @@ BASE_PARAMETERS: dict[str, Meaning] = {
     "far": ("fitted less URDF, per the URDF's uncertainty as validation chose it", "1"),
 }
 
+_BODY = {"mass_kg": "mass", **{f"center_{axis}_m": f"centre of mass, {axis}" for axis in "xyz"}}
+BODIES: dict[str, Meaning] = {
+    "link": ("with all that is fixed to it", ""),
+    **{
+        f"{head}{name}": (f"{what}{tail}", name.rpartition("_")[2])
+        for name, what in _BODY.items()
+        for head, tail in (
+            ("urdf_", " by the URDF, in the link's frame"),
+            ("found_", " as found"),
+            ("low_", ": lower end of the 95 % interval; empty where there is none"),
+            ("high_", ": upper end of the 95 % interval; empty where there is none"),
+        )
+    },
+    "differs_in": ("where the URDF's value lies outside the interval, joined by +", ""),
+}
+
 
 def quality(rows: Rows) -> Table:
     """The judgement on the logs."""
@@ -114,6 +130,13 @@ def base_parameters(rows: Rows) -> Table:
     """What a log tells of the bodies, beside the URDF."""
     return table_from_rows(
         "base_parameters", rows, BASE_PARAMETERS, "Base parameters of the bodies: URDF and log."
+    )
+
+
+def bodies(rows: Rows) -> Table:
+    """Bodies by the URDF and as found."""
+    return table_from_rows(
+        "bodies", rows, BODIES, "Bodies by the URDF and as found, the largest change first."
     )
 
 

@@ -9,6 +9,7 @@ from contextlib import AbstractContextManager
 from importlib.metadata import version
 from pathlib import Path
 
+from pipeline.api.gap_bodies import bodies_of, bodies_tables, refuse_own_urdf, write_model
 from pipeline.api.gap_figures import (
     write_in_time,
     write_signature,
@@ -34,11 +35,12 @@ from pipeline.identification.workflow.setup import Setup, check_options, setup, 
 from pipeline.identification.workflow.story import Story, Told, signature_name, tell
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
+from pipeline.simulation.found_bodies import FoundBodies
 from reports.folder.staging import staged
 from reports.pages import gap_words as words
 from reports.pages.gap_report import write_report
 from reports.table import Table
-from reports.writer import write_table, write_text
+from reports.writer import write_table
 
 logger = logging.getLogger("legwatt")
 EXPLAINED, UNEXPLAINED = 0, 1
@@ -70,6 +72,7 @@ def run(options: Options) -> int:
     """
     check_options(options)
     given = setup(options)
+    refuse_own_urdf(given, options.out)
     with Progress() as progress:
         progress.step("reading and judging the logs")
         intake, parts, fitted = take_in(given, options)
@@ -97,19 +100,19 @@ def run(options: Options) -> int:
         else:
             progress.step("letting effects compete")
             told = tell(given, where, options, progress)
-        tables += _answer_tables(told, given)
+        bodies = bodies_of(given, told.model_file)
+        tables += [*_answer_tables(told, given), *bodies_tables(bodies)]
         progress.step("writing")
         if options.step == "name":
             _write_tables(options, given, tables)
         else:
             with _staged(options, given) as folder:
                 _tables_into(folder, options, given, tables)
-                if told.model_file:
-                    write_text(folder / "model.toml", told.model_file)
+                write_model(folder, told.model_file, bodies)
                 if options.step != "add":
-                    _figures_and_page(told, tables, folder)
+                    _figures_and_page(told, bodies, tables, folder)
     _say_warnings(given, where.intake.findings)
-    _say_answer(told.story, options.out)
+    _say_answer(told.story, bodies, options.out)
     logger.info("what took long: %s", progress.took())
     return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
 
@@ -152,7 +155,9 @@ def _tables_into(folder: Path, options: Options, given: Setup, tables: Sequence[
         write_table(table, folder, meta=meta, decimal=options.decimal)
 
 
-def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None:
+def _figures_and_page(
+    told: Told, bodies: FoundBodies, tables: Sequence[Table], folder: Path
+) -> None:
     story, where = told.story, told.story.where
     model, weighed = story.given.model, told.story.weighed
     write_where_map(where.rows, model.joints, model.name, folder)
@@ -168,7 +173,7 @@ def _figures_and_page(told: Told, tables: Sequence[Table], folder: Path) -> None
         f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "
         "input hashes, versions."
     )
-    write_report(story, tables, folder, footer)
+    write_report(story, bodies, tables, folder, footer)
 
 
 def _say_findings(findings: Sequence[Finding]) -> None:
@@ -201,10 +206,10 @@ def _say_where(where: Whereabouts) -> None:
         )
 
 
-def _say_answer(story: Story, out: Path) -> None:
+def _say_answer(story: Story, bodies: FoundBodies, out: Path) -> None:
     from reports.pages.gap_report import answer
 
-    for paragraph in answer(story):
+    for paragraph in answer(story, bodies):
         print(words.plain(paragraph))
     print(f"written to {out}")
 

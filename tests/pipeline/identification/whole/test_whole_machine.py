@@ -155,3 +155,24 @@ def test_base_parameters_stand_beside_the_urdf(answer: Answer) -> None:
     # Bodies were 25 % off: some combination is told far from what the URDF says.
     assert max(abs(float(r["far"])) for r in rows) > 1.0
     assert any(not float(r["low"]) <= float(r["urdf"]) <= float(r["high"]) for r in rows)
+
+
+def test_bodies_are_told_by_link_and_a_urdf_holds_them(
+    answer: Answer, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rows = {r["link"]: r for r in answer.rows("bodies.csv")}
+    assert set(rows) == {"link_1", "link_2", "link_3"}
+    last = rows["link_3"]
+
+    assert float(last["urdf_mass_kg"]) == 2.0
+    assert float(last["low_mass_kg"]) <= float(last["found_mass_kg"]) <= float(last["high_mass_kg"])
+    found = pin.buildModelFromUrdf(str(answer.out / "model.urdf"))
+    known = load_model(answer.out / "model.toml").rigid
+    data, rng = (found.createData(), known.createData()), np.random.default_rng(0)
+    for q, v, a in rng.normal(size=(20, 3, 3)):
+        one, other = (pin.rnea(m, d, q, v, a) for m, d in zip((found, known), data, strict=True))
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12)
+    # As the robot of a run that would write over it, it would be put right twice.
+    robot, log = str(answer.out / "model.urdf"), str(answer.log)
+    assert main(["gap", "add", log, "--robot", robot, "--out", str(answer.out)]) == 2
+    assert "choose another folder" in capsys.readouterr().err

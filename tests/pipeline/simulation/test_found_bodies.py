@@ -1,0 +1,153 @@
+"""Bodies as found: by link and interval, and as a URDF that asks for the same torque."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from pipeline.effects.model_file import Edit, EditParameter, apply_edits, base_model, new_model_file
+from pipeline.effects.registry import EFFECTS
+from pipeline.machine.machine import MachineModel
+from pipeline.robot.urdf_source import read_urdf
+from pipeline.simulation.found_bodies import corrected_urdf, found_bodies, not_in_urdf
+from pipeline.simulation.rigid_bodies import changed_model
+from reports.pages.bodies_words import body_words
+
+#: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
+ARM = """<?xml version='1.0' encoding="ISO-8859-1"?>
+<!-- Müller's arm -->
+<robot name="arm">
+  <link name="base"/>
+  <link name="upper"><!-- 2 kg --><inertial><origin xyz="0 0 0.1"/><mass value="2"/>
+    <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial>
+    <visual><geometry><mesh filename="package://arm/upper.stl" scale="1 1 1"/></geometry></visual>
+  </link>
+  <link name="cover"><inertial><mass value="0.3"/>
+    <inertia ixx="0.001" ixy="0" ixz="0" iyy="0.001" iyz="0" izz="0.001"/></inertial></link>
+  <link name="forearm"/>
+  <link name="tool"><inertial><origin xyz="0 0.02 0.1" rpy="0.1 0.2 0.3"/><mass value="1"/>
+    <inertia ixx="0.02" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.01"/></inertial></link>
+  <joint name="a" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="50" velocity="5"/></joint>
+  <joint name="b" type="continuous"><parent link="upper"/><child link="forearm"/>
+    <origin xyz="0 0 0.3"/><axis xyz="0 1 0"/><limit effort="50" velocity="5"/></joint>
+  <joint name="c" type="fixed"><parent link="forearm"/><child link="tool"/>
+    <origin xyz="0 0 0.2" rpy="0 0.5 0"/></joint>
+  <joint name="d" type="fixed"><parent link="upper"/><child link="cover"/></joint>
+</robot>
+"""
+WHOLE = {"mass": 0.4, "mx": 0.01, "my": 0.02, "mz": 0.1, "Ixx": 0.06, "Iyy": 0.05, "Izz": 0.02}
+
+
+def edit(effect: str, link: str, spread: float = 0.1, **values: float) -> Edit:
+    units = {p.name: p.unit for p in EFFECTS[effect].parameters}
+    own = [
+        EditParameter(n, v, units[n], (v - spread * abs(v), v + spread * abs(v)))
+        for n, v in values.items()
+    ]
+    return Edit(effect, (link,), tuple(own))
+
+
+def whole(link: str, spread: float = 0.1) -> Edit:
+    products = dict.fromkeys(("Ixy", "Ixz", "Iyz"), 0.0)
+    return edit("rigid_body_parameters", link, spread, **WHOLE, **products)
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(ARM.encode("latin-1"))
+    return path
+
+
+def torque_apart(text: str, machine: MachineModel) -> float:
+    """Largest difference of generalised force over its size, at random states."""
+    rng = np.random.default_rng(0)
+    own = [pin.JointModelFreeFlyer()] if machine.floating else []
+    urdf, edited = pin.buildModelFromXML(text, *own), changed_model(machine.rigid, machine.bodies)
+    data = urdf.createData(), edited.createData()
+    apart = []
+    for _ in range(30):
+        q = pin.integrate(urdf, pin.neutral(urdf), rng.uniform(-1, 1, urdf.nv))
+        v, a = rng.normal(size=(2, urdf.nv))
+        one, other = (pin.rnea(m, d, q, v, a) for m, d in zip((urdf, edited), data, strict=True))
+        apart.append(np.abs(one - other).max() / np.abs(other).max())
+    return float(max(apart))
+
+
+@pytest.mark.parametrize(
+    ("robot", "edits"),
+    [
+        ("hexapod.toml", [edit("link_mass", "base_link", mass=2.0), whole("rm_tibia_link")]),
+        (
+            "leg.urdf",
+            [
+                edit("link_mass", "rm_tibia_link", mass=0.5, x=0.1, z=-0.2),
+                edit("center_of_mass_offset", "rm_femur_link", x=0.01, y=0.0, z=-0.02),
+                whole("rm_hip_link"),
+            ],
+        ),
+        ("arm", [whole("forearm"), edit("link_mass", "upper", mass=-0.2)]),
+        ("arm", [edit("link_mass", "forearm", mass=0.5, y=0.1)]),
+    ],
+)
+def test_the_corrected_urdf_asks_for_the_same_torque(
+    root: Path, arm: Path, robot: str, edits: list[Edit]
+) -> None:
+    path = arm if robot == "arm" else root / "urdf" / robot
+    bare = base_model(new_model_file(path))
+    source = read_urdf(path.with_suffix(".urdf"))
+    text = corrected_urdf(source, str(path), bare, edits)
+    assert torque_apart(source, bare) < 1e-13
+    assert torque_apart(source, apply_edits(bare, edits)) > 1e-3
+    assert torque_apart(text, apply_edits(bare, edits)) < 1e-13
+
+
+def test_all_but_the_inertial_elements_stays(arm: Path) -> None:
+    bare = base_model(new_model_file(arm))
+    text = corrected_urdf(read_urdf(arm), "arm", bare, [edit("link_mass", "upper", mass=0.5)])
+    inertial = re.compile(r"<inertial>.*?</inertial>", re.DOTALL)
+    expected = ARM.replace(' encoding="ISO-8859-1"', "")  # it is written in UTF-8
+    assert inertial.sub("", text) == inertial.sub("", expected)
+    assert inertial.findall(text)[1:] == inertial.findall(ARM)[1:]
+
+
+def test_what_is_fixed_to_a_link_stays_while_a_body_is_left_without_it(arm: Path) -> None:
+    bare = base_model(new_model_file(arm))
+    more, less = (
+        corrected_urdf(read_urdf(arm), "arm", bare, [one])
+        for one in (edit("link_mass", "upper", mass=0.5), whole("forearm"))
+    )
+    assert '<mass value="2.5"/>' in more
+    assert '<mass value="0.3"/>' in more  # the cover's own
+    assert '<mass value="0.4"/>' in less  # with the tool, of 1 kg by itself
+    assert '<mass value="1"/>' not in less
+
+
+@pytest.mark.parametrize("effect", [n for n, e in EFFECTS.items() if e.place_kind == "link"])
+def test_what_was_found_lies_inside_its_interval(arm: Path, effect: str) -> None:
+    values = {p.name: 0.1 for p in EFFECTS[effect].parameters}
+    change = whole("upper") if "Ixx" in values else edit(effect, "upper", **values)
+    (body,) = found_bodies(base_model(new_model_file(arm)), [change])
+    assert (body.low <= body.found + 1e-12).all()
+    assert (body.found <= body.high + 1e-12).all()
+    assert body.differs.any()
+
+
+def test_intervals_decide_what_differs_and_come_first(arm: Path) -> None:
+    bare = base_model(new_model_file(arm))
+    clear = edit("link_mass", "upper", 0.2, mass=0.5)
+    first, second = found_bodies(bare, [whole("forearm", 20.0), clear])
+    assert (first.link, first.differs_in) == ("upper", ("mass",))
+    assert body_words(first).startswith("**upper +0.5 kg** (2.3 kg by URDF, as found 2.8 kg")
+    np.testing.assert_allclose([first.low[0], first.high[0]], [2.7, 2.9])
+    np.testing.assert_allclose(first.found[1:], first.urdf[1:])
+    assert second.differs_in == ()
+    assert np.isinf(second.high[3])  # the mass may be nothing
+    friction = Edit("coulomb_friction", ("a",), (EditParameter("torque", 0.1, "N*m", (0, 1)),))
+    assert not_in_urdf([clear, friction]) == ("coulomb_friction at a",)
+    assert not found_bodies(bare, [friction])
