@@ -21,7 +21,7 @@ likelihood with edges does not have, and it asks for many walkers at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import emcee
@@ -68,7 +68,7 @@ class _Sets:
     """
 
     demand: Bank
-    values: Mapping[str, Array]
+    values: dict[str, Array]
 
     def taken(self, which: NDArray[np.intp]) -> _Sets:
         """Some of the sets."""
@@ -146,19 +146,24 @@ class Posterior:
         )
         good &= (x[:, 0] >= 0) & (x[:, 0] < self.robots.count)
         log = np.where(good, -0.5 * (z**2).sum(axis=1), -np.inf)
-        values = {f.key: f.at(column) for f, column in zip(self.free, z.T, strict=True)}
-        values |= dict(zip(KEYS, x[:, self.constants].T, strict=False))
-        values |= {f.key: np.full(len(x), f.centre) for f in self.solved.values()}
-        robots = np.where(good, x[:, 0], 0).astype(np.intp)
-        sets = _Sets(self.robots.taken(robots), values)
+        sets = self.as_sets(x)
         for name, free in self.solved.items():
             kept = np.flatnonzero(np.isfinite(log))
             found, density = self._solved(name, free, sets.taken(kept), self._goal(name, x[kept]))
             log[kept] += density
-            values[free.key][kept] = found
+            sets.values[free.key][kept] = found
         kept = np.flatnonzero(np.isfinite(log))
         log[kept] += self._likelihood(sets.taken(kept))
-        return log, values
+        return log, sets.values
+
+    def as_sets(self, x: Array) -> _Sets:
+        """Walkers (W, D) as sets of numbers, those that are solved for at their centres."""
+        columns = zip(self.free, x[:, self.numbers].T, strict=True)
+        values = {f.key: f.at(column) for f, column in columns}
+        values |= dict(zip(KEYS, x[:, self.constants].T, strict=False))
+        values |= {f.key: np.full(len(x), f.centre) for f in self.solved.values()}
+        robots = np.clip(x[:, 0], 0, self.robots.count - 1).astype(np.intp)
+        return _Sets(self.robots.taken(robots), values)
 
     def _goal(self, name: str, x: Array) -> Array:
         """The value of a solved target that walkers ask for, (W,)."""
