@@ -15,6 +15,7 @@ from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
 from reports.pages.names import shown_leg
+from reports.pages.paper_sections import paper_sections
 from reports.pages.robot_page import FOOTER, energy_section, files_of, gait_section
 from reports.pages.summary_words import answer, percent, roles_text
 from reports.table import Table
@@ -56,6 +57,7 @@ def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: P
         sections.append(_reading(judged.by))
     sections += [
         _conclusions(judged, tables, out),
+        *paper_sections(tables),
         _parameters(judged.by, tables, given),
         _robot(given, out),
     ]
@@ -223,7 +225,11 @@ def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Sect
     return Section(
         "What the conclusions hang on",
         (
-            table_block(tables["conclusions"], shown),
+            table_block(
+                tables["conclusions"],
+                shown,
+                keep=[where == "Section V" for where in tables["conclusions"].columns["where"]],
+            ),
             *words,
             FigureBlock(
                 out / "energy_per_minute_middle_legs.svg",
