@@ -1,4 +1,4 @@
-"""Sections of the paper's page: section IV.A sentence by sentence, and what the paper leaves out."""
+"""Sections of the paper's page: section IV.A by sentences, and what the paper leaves out."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ def _sentences(table: Table) -> Section:
         "Section IV.A, sentence by sentence",
         (
             Text(
-                "What section IV.A says of the energy through each stage of the actuators, as ratios "
-                "of the energies computed here. The paper gives no number to *much higher*; here "
-                "it is at least twice as high, at every joint that the sentence speaks of. "
+                "What section IV.A says of the energy through each stage of the actuators, as "
+                "ratios of the energies computed here. The paper gives no number to *much higher*; "
+                "here it is at least twice as high, at every joint that the sentence speaks of. "
                 "Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any "
                 "inertia: what the inertia adds to E_m(+) comes back as E_m(−)."
             ),

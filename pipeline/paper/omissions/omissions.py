@@ -173,8 +173,8 @@ def _grease(part: RobotPart, catalog: Catalog, base: Costs) -> list[Omission]:
         rows.append(
             _row(
                 "temperature of the gears' grease",
-                f"at {at} degC friction without load of gears and bearings is so many times that "
-                "at 20 degC",
+                f"at {at} °C friction without load of gears and bearings is so many times that at "
+                "20 °C",
                 number,
                 costs_of(part, warm),
                 base,
@@ -191,7 +191,7 @@ def _winding(part: RobotPart, catalog: Catalog, base: Costs) -> Omission:
     warm = with_factors(catalog, {f"{motor}.resistance": factor for motor in motors})
     return _row(
         "temperature of the winding",
-        f"warmer than the data sheet's 25 degC by so much: {factor:.3f} times the resistance",
+        f"warmer than the data sheet's 25 °C by so much: {factor:.3f} times the resistance",
         number,
         costs_of(part, warm),
         base,
