@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from reports.page import Section, TableBlock, Text, table_block
+from reports.page import Section, TableBlock, Text
 from reports.table import Table
+from reports.typeset import number_text, unit_text
 
-_HOLDS = {(True,): "yes", (False,): "no"}
 _TONES = {"yes": "good", "no": "bad", "in part": "bad"}
 
 
@@ -34,16 +34,14 @@ def _sentences(table: Table) -> Section:
         places.setdefault(key, {})[str(c["joint"][i])] = i
     rows = tuple(
         (
-            where.removeprefix("Section "),
-            sentence,
-            quantity,
-            printed,
+            f"**{where.removeprefix('Section ')}** {sentence}: {quantity}",
             *(c["computed"][at[joint]] if joint in at else None for joint in joints),
-            _HOLDS.get(tuple({bool(c["holds"][i]) for i in at.values()}), "in part"),
+            _verdict([bool(c["holds"][i]) for i in at.values()]),
+            printed,
         )
         for (where, sentence, quantity, printed), at in places.items()
     )
-    headers = ("in", "sentence", "ratio", "paper", *(f"joint {joint}" for joint in joints), "holds")
+    headers = ("sentence: ratio", *(f"joint {joint}" for joint in joints), "holds", "paper")
     block = TableBlock(
         headers,
         rows,
@@ -67,19 +65,36 @@ def _sentences(table: Table) -> Section:
     )
 
 
+def _with_value(name: str, value: float | None, unit: str) -> str:
+    if value is None:
+        return name
+    return f"{name}: {number_text(value)}{'' if unit == '1' else f' {unit_text(unit)}'}"
+
+
+def _verdict(holds: Sequence[bool]) -> str:
+    return "yes" if all(holds) else "in part" if any(holds) else "no"
+
+
 def _omissions(table: Table) -> Section:
-    shown = {
-        "left_out": "left out",
-        "assumption": "put in as",
-        "value": "value",
-        "unit": "unit",
-        "break_even": "break-even",
-        "break_even_change": "moved by",
-        "ratio_rotor": "rotor / ideal",
-        "ratio_reversible": "reversible / ideal",
-        "ratio_irreversible": "irreversible / ideal",
-        "note": "note",
-    }
+    c = table.columns
+    named = [f"ratio_{name}" for name in ("rotor", "reversible", "irreversible")]
+    rows = tuple(
+        (
+            _with_value(c["left_out"][i], c["value"][i], c["unit"][i]),
+            c["break_even"][i],
+            c["break_even_change"][i],
+            *(c[name][i] for name in named),
+            c["assumption"][i],
+            c["note"][i],
+        )
+        for i in range(table.rows)
+    )
+    headers = (
+        *("left out", "break-even", "moved by"),
+        *(f"{name.removeprefix('ratio_')} / ideal" for name in named),
+        *("put in as", "note"),
+    )
+    block = TableBlock(headers, rows, table.description, f"{table.name}.csv", digits=3)
     return Section(
         "What the paper leaves out",
         (
@@ -89,6 +104,6 @@ def _omissions(table: Table) -> Section:
                 "share of time standing above which irreversible gears use less energy, the "
                 "ratios are those of walking."
             ),
-            table_block(table, shown, digits=3),
+            block,
         ),
     )

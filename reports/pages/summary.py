@@ -16,7 +16,13 @@ from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
 from reports.pages.names import shown_leg
 from reports.pages.paper_sections import paper_sections
-from reports.pages.robot_page import FOOTER, energy_section, files_of, gait_section
+from reports.pages.robot_page import (
+    FOOTER,
+    actuators_section,
+    energy_section,
+    files_of,
+    gait_section,
+)
 from reports.pages.summary_words import answer, percent, roles_text
 from reports.table import Table
 
@@ -51,6 +57,7 @@ def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: P
     """The page; see `write_summary`."""
     sections = [
         energy_section(given, tables, out),
+        actuators_section(given, out),
         _reproduction(judged, tables),
     ]
     if judged.by.results is not None:
