@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from reports.page import Section, TableBlock, Text
+from reports.page import Points, Section, TableBlock, Text
 from reports.table import Table
 from reports.typeset import number_text, unit_text
 
@@ -84,15 +84,18 @@ def _omissions(table: Table) -> Section:
             c["break_even"][i],
             c["break_even_change"][i],
             *(c[name][i] for name in named),
-            c["assumption"][i],
-            c["note"][i],
         )
         for i in range(table.rows)
     )
     headers = (
         *("left out", "break-even", "moved by"),
         *(f"{name.removeprefix('ratio_')} / ideal" for name in named),
-        *("put in as", "note"),
+    )
+    said = tuple(
+        f"**{name}**: {assumption}" + (f"; {note}" if note else "")
+        for name, assumption, note in zip(
+            (row[0] for row in rows), c["assumption"], c["note"], strict=True
+        )
     )
     block = TableBlock(headers, rows, table.description, f"{table.name}.csv", digits=3)
     return Section(
@@ -105,5 +108,6 @@ def _omissions(table: Table) -> Section:
                 "ratios are those of walking."
             ),
             block,
+            Points(said),
         ),
     )

@@ -228,15 +228,12 @@ def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Sect
             "left_out_high": "left out, high",
             "left_out_holds_share": "holds left out",
         }
+    of_v = [where == "Section V" for where in tables["conclusions"].columns["where"]]
     notes = [f"{row.subject.replace('_', ' ')}: {row.note}" for row in judgement.break_even]
     return Section(
         "What the conclusions hang on",
         (
-            table_block(
-                tables["conclusions"],
-                shown,
-                keep=[where == "Section V" for where in tables["conclusions"].columns["where"]],
-            ),
+            table_block(tables["conclusions"], shown, keep=of_v),
             *words,
             FigureBlock(
                 out / "energy_per_minute_middle_legs.svg",

@@ -172,9 +172,8 @@ def _grease(part: RobotPart, catalog: Catalog, base: Costs) -> list[Omission]:
         warm = with_factors(catalog, dict.fromkeys(_GREASED, number.value))
         rows.append(
             _row(
-                "temperature of the gears' grease",
-                f"at {at} °C friction without load of gears and bearings is so many times that at "
-                "20 °C",
+                f"grease of the gears at {at} °C",
+                "friction without load of gears and bearings is so many times that at 20 °C",
                 number,
                 costs_of(part, warm),
                 base,
@@ -190,7 +189,7 @@ def _winding(part: RobotPart, catalog: Catalog, base: Costs) -> Omission:
     motors = {catalog.alternatives[name].motor for name in NEEDED}
     warm = with_factors(catalog, {f"{motor}.resistance": factor for motor in motors})
     return _row(
-        "temperature of the winding",
+        "warming of the winding",
         f"warmer than the data sheet's 25 °C by so much: {factor:.3f} times the resistance",
         number,
         costs_of(part, warm),
@@ -214,19 +213,18 @@ def _returned(part: RobotPart, catalog: Catalog, base: Costs) -> list[Omission]:
         }
         for name, walk in found.walking.items()
     }  # fmt: skip
-    name = "energy that flows back"
     return [
         _row(
-            name,
-            "the motors of a leg share a bus, what is left over is lost",
+            "bus shared by a leg",
+            "what flows back from a motor drives the others of its leg, the rest is lost",
             None,
             Costs(shared, base.stand),
             base,
-            "in the paper all of it is lost, as in a braking resistor",
+            "in the paper all that flows back is lost, as in a braking resistor",
         ),
         _row(
-            name,
-            "all of it is stored and used again",
+            "bus that stores what flows back",
+            "all of it is used again",
             None,
             costs_of(part, catalog, net=True),
             base,
@@ -246,8 +244,8 @@ def _brakes(base: Costs) -> list[Omission]:
         better = _REVERSIBLE if number.value < equal else _IRREVERSIBLE
         rows.append(
             _row(
-                "a brake on every reversible joint",
-                "it holds without power; open, while walking, it draws so much",
+                "brakes on reversible joints",
+                "each holds without power; open, while walking, it draws so much",
                 number,
                 costs,
                 base,
@@ -264,15 +262,15 @@ def _hypoid(part: RobotPart, catalog: Catalog, base: Costs) -> list[Omission]:
     alone = float(gear.locking_friction)
     together = holding_friction(chain, gear, part.standing_torque)
     rows = []
-    for friction, source, what in (
-        (alone, "1 / tan(pinion_angle)", "the gear no longer locks itself"),
-        (together, "root of the chain's holding torque", "the standing leg no longer holds"),
+    for part_sliding, friction, source, what in (
+        ("gear", alone, "1 / tan(pinion_angle)", "the gear no longer locks itself"),
+        ("leg", together, "root of the chain's holding torque", "the standing leg slides"),
     ):
         number = Parameter("friction", friction, "1", friction, "derived", source)
         costs = costs_of(part, catalog.replaced(_HYPOID_FRICTION, friction, bounds=None))
         rows.append(
             _row(
-                "how far the hypoid is from sliding",
+                f"hypoid's friction, {part_sliding} sliding",
                 f"friction at its teeth below which {what}",
                 number,
                 costs,

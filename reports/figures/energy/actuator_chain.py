@@ -52,7 +52,7 @@ _MOTOR_NUMBERS = ("torque_constant", "resistance")
 #: [in]: narrow, so that letters can be read where the page is.
 _WIDTH, _MARGIN, _LINE, _GAP = 4.8, 0.12, 0.175, 0.5
 _NUMBERS_AT, _MARKS_AT = 1.82, 4.0
-_NAME_CHARS, _NUMBER_CHARS, _TITLE_CHARS, _WORD_CHARS = 20, 31, 46, 36
+_NAME_CHARS, _NUMBER_CHARS, _TITLE_CHARS, _WORD_CHARS = 20, 31, 46, 56
 _LEGEND_CHARS = 66
 
 
@@ -247,14 +247,7 @@ def _draw_shaft(axes: Axes, shaft: Shaft, y: float) -> None:
         else f"{stage_symbol(shaft.stage, 'Γ')}, {stage_symbol(shaft.stage, 'ω')}"
     )
     text = f"{stage_symbol(shaft.stage)}: {names}"
-    where = textwrap.wrap(shaft.where, _WORD_CHARS)
-    axes.text(1.0, y + _GAP / 2, text, va="center", ha="left", fontsize=9.5, color=INK)
-    axes.text(
-        2.1,
-        y + _GAP / 2,
-        "\n".join(where),
-        va="center",
-        ha="left",
-        fontsize=8.5,
-        color=QUIET,
-    )
+    where = textwrap.shorten(shaft.where, _WORD_CHARS, placeholder=" …")
+    look: dict[str, Any] = {"va": "center", "ha": "left"}
+    axes.text(1.0, y + 0.35 * _GAP, text, fontsize=9.5, color=INK, **look)
+    axes.text(1.0, y + 0.72 * _GAP, where, fontsize=8.5, color=QUIET, **look)

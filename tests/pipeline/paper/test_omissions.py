@@ -87,7 +87,7 @@ def test_a_brake_decides_by_what_it_draws_open(rows: tuple[Omission, ...]) -> No
 def test_returned_energy_used_again_helps_the_ideal_actuator_most(
     rows: tuple[Omission, ...],
 ) -> None:
-    shared, stored = of(rows, "flows back")
+    shared, stored = of(rows, "bus")
     for name in ("reversible", "irreversible"):
         assert rows[0].ratios[name] < shared.ratios[name] < stored.ratios[name]
 
