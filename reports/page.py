@@ -85,11 +85,13 @@ class FigureBlock:
         file: SVG or PNG; it must lie in the page's folder or below it.
         caption: What to see in it.
         alt: For those who cannot see it; the caption by default.
+        half: Whether two stand side by side where the page is wide: for narrow pictures.
     """
 
     file: Path
     caption: str
     alt: str = ""
+    half: bool = False
 
 
 @dataclass(frozen=True)

@@ -83,6 +83,12 @@ class Hypoid(Element):
         return factor
 
     @property
+    def locking_friction(self) -> Scalars:
+        """Friction at the teeth from which on the gear locks itself: 1 / tan b1."""
+        friction: Scalars = 1.0 / np.tan(self.pinion_angle)
+        return friction
+
+    @property
     def pinion_radius(self) -> Scalars:
         """r1 [m], tied to the ratio."""
         radius: Scalars = (

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.energy.energy import stage_energies
+from pipeline.api.pictures.actuators import actuator_drawings
 from pipeline.api.pictures.gait import legs_stretches
 from pipeline.api.pictures.robot import robot_drawings, write_gait_steps
 from pipeline.api.pictures.scene import Scenery
@@ -64,6 +65,7 @@ def drawings(
         *_energy(given, walking),
         *_all_legs(given, walking),
         *_demand(given, walking, paper),
+        *actuator_drawings(given),
     ]
 
 

@@ -25,6 +25,7 @@ def judged(given: Settings, by: Basis) -> tuple[Judged, list[Table]]:
         tables.rotor_friction(judgement.ranges),
         tables.break_even(judgement.break_even),
         tables.energy_per_minute(judgement.per_minute),
+        *([tables.omissions(judgement.omissions)] if judgement.omissions else []),
     ]
     if by.results is not None:
         out += [

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from actuators.loading.build import Catalog
+from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.robot.robot import Robot
@@ -58,6 +59,7 @@ def robot_page(
         sections=(
             gait_section(robot, out),
             energy_section(given, tables, out),
+            actuators_section(given, out),
             _demand(robot, tables, out),
             _limits(given.catalog, tables, out),
             _standing(tables),
@@ -179,6 +181,20 @@ def energy_section(given: Settings, tables: Mapping[str, Table], out: Path) -> S
             ),
         ),
     )
+
+
+def actuators_section(given: Settings, out: Path) -> Section:
+    """What each alternative is built of."""
+    figures = tuple(
+        FigureBlock(out / f"actuator_chain_{name}.svg", f"Parts of the {title}.", half=True)
+        for name, title in short_titles(given.catalog).items()
+        if name != AS_BUILT  # of several alternatives, which have drawings of their own
+    )
+    words = (
+        "Every actuator from the motor's terminals to the joint: its elements with their numbers, "
+        "and between them the shafts whose energies, torques and speeds the tables name."
+    )
+    return Section("How the actuators are built", (Text(words), *figures))
 
 
 def _demand(robot: Robot, tables: Mapping[str, Table], out: Path) -> Section:

@@ -15,7 +15,14 @@ from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
 from reports.pages.names import shown_leg
-from reports.pages.robot_page import FOOTER, energy_section, files_of, gait_section
+from reports.pages.paper_sections import paper_sections
+from reports.pages.robot_page import (
+    FOOTER,
+    actuators_section,
+    energy_section,
+    files_of,
+    gait_section,
+)
 from reports.pages.summary_words import answer, percent, roles_text
 from reports.table import Table
 
@@ -50,12 +57,14 @@ def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: P
     """The page; see `write_summary`."""
     sections = [
         energy_section(given, tables, out),
+        actuators_section(given, out),
         _reproduction(judged, tables),
     ]
     if judged.by.results is not None:
         sections.append(_reading(judged.by))
     sections += [
         _conclusions(judged, tables, out),
+        *paper_sections(tables),
         _parameters(judged.by, tables, given),
         _robot(given, out),
     ]
@@ -219,11 +228,12 @@ def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Sect
             "left_out_high": "left out, high",
             "left_out_holds_share": "holds left out",
         }
+    of_v = [where == "Section V" for where in tables["conclusions"].columns["where"]]
     notes = [f"{row.subject.replace('_', ' ')}: {row.note}" for row in judgement.break_even]
     return Section(
         "What the conclusions hang on",
         (
-            table_block(tables["conclusions"], shown),
+            table_block(tables["conclusions"], shown, keep=of_v),
             *words,
             FigureBlock(
                 out / "energy_per_minute_middle_legs.svg",

@@ -16,6 +16,7 @@ from pipeline.paper.judgement.conclusions import Conclusion
 from pipeline.paper.judgement.fig_21 import BreakEven, EnergyPerMinute
 from pipeline.paper.judgement.leave_one_out import Prediction
 from pipeline.paper.judgement.reproduction import ReproducedRow
+from pipeline.paper.omissions.omissions import Omission
 from pipeline.paper.published import ROLES
 from reports.table import Table, table_from_rows
 
@@ -138,12 +139,14 @@ def readings(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def conclusions(rows: Sequence[Conclusion]) -> Table:
-    """Section V, sentence by sentence."""
+    """Sections V and IV.A, sentence by sentence."""
     return table_from_rows(
         "conclusions",
         [
             {
+                "where": row.sentence.where,
                 "sentence": row.sentence.text,
+                "joint": row.sentence.joint,
                 "quantity": row.sentence.quantity,
                 "unit": row.sentence.unit,
                 "printed": row.sentence.printed,
@@ -161,7 +164,9 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
             for row in rows
         ],
         {
-            "sentence": ("what section V says", ""),
+            "where": ("section of the paper", ""),
+            "sentence": ("what the paper says", ""),
+            "joint": ("joint of the middle right leg, or empty", ""),
             "quantity": ("what is computed for it", ""),
             "unit": ("unit of the numbers", ""),
             "printed": ("the paper's number or word", ""),
@@ -183,6 +188,57 @@ def conclusions(rows: Sequence[Conclusion]) -> Table:
                 "1",
             ),
         },
+    )
+
+
+def omissions(rows: Sequence[Omission]) -> Table:
+    """What the paper leaves out, and how far its answer moves with it."""
+    others = list(rows[0].ratios)
+    return table_from_rows(
+        "omissions",
+        [
+            {
+                "left_out": row.name or "nothing",
+                "assumption": row.assumption,
+                "value": row.number and row.number.value_as_written,
+                "unit": row.number.unit if row.number else "",
+                "basis": row.number.basis if row.number else "",
+                "source": row.number.source if row.number else "",
+                "break_even": _known(row.break_even),
+                "break_even_change": _known(row.moved),
+                **{f"ratio_{name}": row.ratios[name] for name in others},
+                **{f"ratio_{name}_change": row.ratios_moved[name] for name in others},
+                "note": row.note,
+            }
+            for row in rows
+        ],
+        {
+            "left_out": ("what the paper leaves out", ""),
+            "assumption": ("how it is put in", ""),
+            "value": ("with which number; empty where there is none", "see unit"),
+            "unit": ("unit of value", ""),
+            "basis": ("of value, as in parameters.csv", ""),
+            "source": ("of value", ""),
+            "break_even": (
+                "fraction of time standing above which the irreversible actuator uses less, both "
+                "middle legs; empty where there is none",
+                "1",
+            ),
+            "break_even_change": ("by how much it is more than in the first row", "1"),
+            **{
+                f"ratio_{name}": (
+                    f"walking energy of the middle right leg, {name} over ideal actuator",
+                    "1",
+                )
+                for name in others
+            },
+            **{
+                f"ratio_{name}_change": ("by how much it is more than in the first row", "1")
+                for name in others
+            },
+            "note": ("in words", ""),
+        },
+        "Each row changes one thing against the numbers of the run; nothing here is fitted.",
     )
 
 

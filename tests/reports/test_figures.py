@@ -14,11 +14,15 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
+from actuators.elements.element import Element
+from actuators.elements.inertia import Inertia
 from actuators.elements.motor import DCMotor
 from actuators.energy.energy import StageEnergy
+from actuators.loading.build import load_catalog
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.joint_demand import MotionDemand
 from reports.errors import FigureError
+from reports.figures.energy.actuator_chain import Shaft, actuator_chain_figure, chain_parts
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
 from reports.figures.energy.joint_demand import Stretch, joint_demand_figure, stretches
@@ -139,6 +143,46 @@ def test_stage_energy_of_zeros_and_of_unknown_joints() -> None:
         stage_energy_figure([], JOINTS, places=PLACES, title="t")
     with pytest.raises(FigureError, match="where stage 'el' is"):
         stage_energy_figure(STAGES, JOINTS, places={"out": "joint"}, title="t")
+
+
+@pytest.mark.parametrize("name", load_catalog().alternatives)
+def test_a_chain_is_drawn_from_the_terminals_to_the_joint(name: str) -> None:
+    catalog = load_catalog()
+    alternative = catalog.alternatives[name]
+    parts = chain_parts(catalog, name)
+    shafts = [part.stage for part in parts if isinstance(part, Shaft)]
+    assert shafts == [*alternative.stage_names][::-1]
+    drawn = [p.name for block in parts if isinstance(block, tuple) for p in block]
+    elements = [e.name.replace("_", " ") for e in alternative.elements]
+    assert drawn == ["motor", *elements[::-1]]
+    figure = actuator_chain_figure(parts, title=alternative.title, subtitle="s")
+    heights = {}
+    for text in figure.axes[0].texts:  # the vertical axis points down
+        heights.setdefault(text.get_text().replace("\n", " "), text.get_position()[1])
+    at = [heights[word] for word in drawn]
+    assert at == sorted(at)
+    chain = catalog.chain(name)
+    lossy = [type(e).loss is not Element.loss for e in chain.elements]
+    words = texts(figure)
+    assert words.count("heat") == sum(lossy) + 1  # and the motor
+    assert words.count("kinetic") == sum(isinstance(e, Inertia) for e in chain.elements)
+    figure.canvas.draw()
+    right = max(t.get_window_extent().x1 for t in figure.axes[0].texts)
+    assert right <= figure.bbox.x1
+
+
+def test_a_chain_of_ones_own_is_drawn_with_its_own_names(root: Path) -> None:
+    catalog = load_catalog(root / "tests/pipeline/data_files/xl330_actuators")
+    for name in catalog.alternatives:
+        parts = chain_parts(catalog, name)
+        long = [replace(p, law="drag", numbers=("torque 4 mN·m",)) for p in parts[1]]
+        first = Shaft("input_100%", "far away " * 20)
+        figure = actuator_chain_figure([first, tuple(long), *parts[2:]], title="own " * 30)
+        figure.canvas.draw()  # the name of a stage is no formula
+        assert max(t.get_window_extent().x1 for t in figure.axes[0].texts) <= figure.bbox.x1
+        words = " ".join(texts(figure))
+        assert "torque 4" in words
+        assert "joint" in words
 
 
 def test_words_too_long_for_a_bar_stand_once_in_the_key() -> None:

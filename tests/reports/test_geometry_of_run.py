@@ -18,7 +18,7 @@ NAMES = (
     *("gait", "robot", "zero_pose", "electrical_energy", "joint_torques", "ground_forces"),
     *(
         f"{kind}_{alternative}"
-        for kind in ("motor_limits", "stage_energy")
+        for kind in ("actuator_chain", "motor_limits", "stage_energy")
         for alternative in ("ideal", "rotor", "reversible", "irreversible")
     ),
     *(f"joint_demand_rm_joint_{k}" for k in (1, 2, 3)),

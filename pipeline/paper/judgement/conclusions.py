@@ -1,4 +1,4 @@
-"""The sentences of section V as numbers: ours, before the fit, and with fitted rows left out."""
+"""The paper's sentences as numbers: ours, before the fit, and with fitted rows left out."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _STANDING = {a: f"{a}_leg_energy_3s" for a in ("ideal", "rotor", "reversible", "
 
 @dataclass(frozen=True)
 class Sentence:
-    """One sentence of section V and how it is tested.
+    """One sentence of the paper and how it is tested.
 
     Attributes:
         name: Short name: of the printed value it rests on, where there is one.
@@ -33,6 +33,8 @@ class Sentence:
         value: The quantity from the printed values' computed counterparts, SI.
         holds: Whether the sentence holds for them.
         rests_on: The computed counterparts it needs; the one of its own name by default.
+        where: Section.
+        joint: Of the middle right leg; empty for all of it.
     """
 
     name: str
@@ -45,6 +47,8 @@ class Sentence:
     value: Callable[[Values], float]
     holds: Callable[[Values], bool]
     rests_on: tuple[str, ...] = ()
+    where: str = "Section V"
+    joint: str = ""
 
     @property
     def needs(self) -> tuple[str, ...]:
@@ -94,6 +98,7 @@ def _ratio(alternative: str) -> Callable[[Values], float]:
     return lambda v: v[f"walking_ratio_{alternative}"]
 
 
+#: Of section V; those of section IV.A stand in `stage_sentences`.
 SENTENCES = (
     Sentence(
         "walking_ratio_rotor",
@@ -188,17 +193,21 @@ SENTENCES = (
 )
 
 
-def conclusions(ours: Values, known: Evidence | None) -> tuple[Conclusion, ...]:
+def conclusions(
+    ours: Values, known: Evidence | None, sentences: Sequence[Sentence] = SENTENCES
+) -> tuple[Conclusion, ...]:
     """Every sentence that can be tested, on ours and on the sets of the calibration.
 
     Args:
         ours: Computed counterparts of the printed values, and the energy difference, SI; without
             those for which the catalogue has no actuator.
-        known: The calibration's sets; None where they belong to other numbers.
+        known: The calibration's sets; None where they belong to other numbers, or do not hold
+            what the sentences rest on.
+        sentences: Which.
     """
     return tuple(
         _conclusion(sentence, ours, known)
-        for sentence in SENTENCES
+        for sentence in sentences
         if all(name in ours for name in sentence.needs)
     )
 

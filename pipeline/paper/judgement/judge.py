@@ -20,6 +20,9 @@ from pipeline.paper.judgement.fig_21 import BreakEven, EnergyPerMinute, break_ev
 from pipeline.paper.judgement.leave_one_out import Prediction, leave_one_out
 from pipeline.paper.judgement.price import PRICED, Price, price
 from pipeline.paper.judgement.reproduction import ReproducedRow, reproduction
+from pipeline.paper.judgement.stage_sentences import STAGE_SENTENCES, stage_values
+from pipeline.paper.omissions.costs import NEEDED
+from pipeline.paper.omissions.omissions import Omission, omissions
 from pipeline.paper.published import Published
 from pipeline.robot.robot import Robot
 
@@ -30,7 +33,7 @@ class Judgement:
 
     Attributes:
         reproduction: Every printed value.
-        conclusions: Every sentence of section V.
+        conclusions: Every sentence of section V, then of section IV.A joint by joint.
         break_even: Where the irreversible actuator begins to pay.
         per_minute: The lines of Fig. 21.
         predictions: Each target as the rest predicts it; empty without the calibration's sets.
@@ -38,6 +41,7 @@ class Judgement:
         contradiction: Of Table V with itself.
         price: What the fit asks of single numbers; None without the actuator it was asked of.
         missing: Ids of printed values for which the catalogue has no actuator.
+        omissions: What the paper leaves out; empty without its four alternatives.
     """
 
     reproduction: tuple[ReproducedRow, ...]
@@ -49,6 +53,7 @@ class Judgement:
     contradiction: Contradiction
     price: Price | None
     missing: tuple[str, ...] = ()
+    omissions: tuple[Omission, ...] = ()
 
 
 def judge(
@@ -85,7 +90,8 @@ def judge(
     against = contradiction(published, ranges)
     return Judgement(
         reproduction(published, ours, against.best.unmet, known),
-        conclusions(ours, known),
+        conclusions(ours, known)
+        + conclusions(stage_values(actuators, robot.spec), None, STAGE_SENTENCES),
         break_evens(whole, known),
         per_minute(whole, known),
         () if known is None else tuple(leave_one_out(published, known)),
@@ -93,4 +99,7 @@ def judge(
         against,
         price(actuators, catalog, prior, results) if asked else None,
         tuple(name for name in published if name not in ours),
+        omissions(part, catalog, published)
+        if all(name in catalog.alternatives for name in NEEDED)
+        else (),
     )

@@ -66,7 +66,7 @@ def stage_energy_figure(
             raise FigureError(f"'{title}': no words say where stage '{stage.stage}' is")
     forward, reverse = _energies(stages, joints)
     top, bottom = limits or energy_limits([stages], joints)
-    names = {s.stage: (_symbol(s.stage), places[s.stage]) for s in stages}
+    names = {s.stage: (stage_symbol(s.stage), places[s.stage]) for s in stages}
     long = [f"{symbol}  {words}" for symbol, words in names.values() if " " in words]
     rows = math.ceil(len(joints) / _IN_ROW)
     across = math.ceil(len(joints) / rows)
@@ -161,10 +161,15 @@ def _joules(value: float) -> str:
     return "0" if value < 5e-4 else number(value, 3 if value >= 1 else 2)
 
 
-def _symbol(stage: str) -> str:
-    """A stage's energy as a formula; what TeX would read otherwise stands for itself."""
+def stage_symbol(stage: str, letter: str = "E") -> str:
+    """A stage's energy as a formula; what TeX would read otherwise stands for itself.
+
+    Args:
+        stage: Short name.
+        letter: Of another variable, such as torque.
+    """
     plain = re.sub(r"([_#%&${}])", r"\\\1", stage)
-    return rf"$E_{{\mathrm{{{plain}}}}}$"
+    return rf"${letter}_{{\mathrm{{{plain}}}}}$"
 
 
 def _key(figure: Figure, long: Sequence[str]) -> None:

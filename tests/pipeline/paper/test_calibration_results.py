@@ -33,6 +33,7 @@ from pipeline.paper.judgement.leave_one_out import leave_one_out
 from pipeline.paper.judgement.readings import reading_rows, readings, supported, verdict
 from pipeline.paper.judgement.reproduction import headline
 from pipeline.paper.judgement.sensitivity import Index, leading, ranking, sensitivity_rows
+from pipeline.paper.judgement.stage_sentences import STAGE_SENTENCES
 from pipeline.paper.published import Published, load_published
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -128,6 +129,40 @@ def test_lines_of_fig_21_come_with_the_prior_and_without_their_own_figure(
     prior = pair["irreversible"].prior
     assert prior is not None
     assert pair["irreversible"].energy[0] > prior[1][0]  # fitted beyond what data sheets say
+
+
+def test_sentences_of_section_iv_a_hold_but_two(judgement: Judgement) -> None:
+    """Much higher is at least twice as high, which 1.6 to 1.7 times is not."""
+    rows = [c for c in judgement.conclusions if c.sentence.where != "Section V"]
+    found: dict[str, list[float]] = {}
+    for row in rows:
+        found.setdefault(row.sentence.quantity, []).append(round(row.computed, 3))
+    assert found["E_m(+), actuator with ideal transmission over ideal actuator"] == pytest.approx(
+        [69, 3.8, 13], rel=0.02
+    )
+    assert found["reversible actuator, E_wg(+) over E_out(+)"] == pytest.approx(
+        [137, 5.9, 20], rel=0.02
+    )
+    assert found["reversible actuator, E_m(+) over E_wg(+)"] == pytest.approx(
+        [1.6, 1.65, 1.74], rel=0.02
+    )
+    assert found["E_m(+), irreversible over reversible"] == pytest.approx(
+        [1.24, 1.45, 1.37], rel=0.01
+    )
+    not_held = {row.sentence.text for row in rows if not row.holds}
+    assert not_held == {
+        "so does the timing belt",
+        "the fluctuation of the rotor's kinetic energy increases the dissipation in it",
+    }
+    assert all(math.isnan(row.prior_share) for row in rows)  # evaluated on ours alone
+
+
+@pytest.mark.parametrize("sentence", STAGE_SENTENCES, ids=lambda s: f"{s.text} {s.joint}")
+def test_a_sentence_of_section_iv_a_can_hold_and_fail(sentence: Any) -> None:
+    above, below = sentence.needs
+    verdicts = {sentence.holds({above: value, below: 1.0}) for value in (0.5, 1.0, 1.9, 2.0)}
+    assert verdicts == {True, False}
+    assert not sentence.holds({above: 1.0, below: 0.0})
 
 
 @pytest.mark.parametrize("sentence", SENTENCES, ids=lambda s: s.text)

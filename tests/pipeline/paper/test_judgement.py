@@ -20,8 +20,11 @@ from pipeline.paper.judgement.sensitivity import Index
 from pipeline.paper.published import load_published
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.settings import Settings
+from reports.page import TableBlock
+from reports.pages.paper_sections import paper_sections
 from reports.pages.summary import measure_next
 from reports.pages.summary_words import first_paragraph
+from reports.tables import judgement as tables
 
 #: Tables that rest on the calibration's sets.
 OF_THE_SETS = {"readings", "leave_one_out", "calibration", "sensitivities"}
@@ -153,6 +156,39 @@ def test_the_first_paragraph_says_what_is_fitted_predicted_contradicted_and_what
     assert price.gear_friction > 2 * price.gear_prior
     assert price.gear_heat > 0.5 * price.leg_energy
     assert price.no_load_share > 0.5
+
+
+def test_the_page_lays_out_section_iv_a_and_what_is_left_out(shipped: Judged) -> None:
+    judgement = shipped.judgement
+    found = [tables.conclusions(judgement.conclusions), tables.omissions(judgement.omissions)]
+    sentences, left_out = paper_sections({table.name: table for table in found})
+    rows = next(block for block in sentences.blocks if isinstance(block, TableBlock))
+    assert rows.headers == ("sentence: ratio", "joint 1", "joint 2", "joint 3", "holds", "paper")
+    assert len(rows.rows) == 10
+    assert [row[4] for row in rows.rows].count("no") == 2
+    rows = next(block for block in left_out.blocks if isinstance(block, TableBlock))
+    assert rows.rows[0][1:3] == (pytest.approx(0.94, abs=1e-4), 0.0)
+    assert len(rows.rows) == len(judgement.omissions)
+    assert any(str(row[0]).endswith("0.672 W") for row in rows.rows)
+
+
+def test_without_one_of_the_papers_actuators_nothing_is_said_of_what_it_leaves_out(
+    root: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "catalog"
+    shutil.copytree(CATALOG, folder)
+    text = (folder / "alternatives.toml").read_text(encoding="utf-8")
+    text = text.replace('stage = "wg"', 'stage = "w"')
+    (folder / "alternatives.toml").write_text(text, encoding="utf-8")
+    run = given(root, "--actuators", str(folder))
+    by = basis(run)
+    assert isinstance(by, Basis)
+    judged, found = judging.judged(run, by)
+    assert judged.judgement.omissions == ()
+    assert "omissions" not in {table.name for table in found}
+    spoken = {c.sentence.where for c in judged.judgement.conclusions}
+    assert {"Section IV.A.1", "Section IV.A.2"} <= spoken
+    assert not {"Section IV.A.3", "Section IV.A.4"} & spoken
 
 
 def test_what_to_measure_next_is_said_only_where_it_is_known() -> None:

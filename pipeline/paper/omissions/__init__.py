@@ -1,0 +1,1 @@
+"""What the paper leaves out, put in: how far its answer moves."""

@@ -1,0 +1,144 @@
+"""What the paper leaves out moves its answer by what closed forms and the chains say."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuators.elements.hypoid import Hypoid
+from actuators.errors import SelfLockingError
+from actuators.loading.build import Catalog, load_catalog
+from actuators.shaft import ShaftSeries
+from pipeline.paper.calibration.machine import RobotPart, actuator_part, part_of
+from pipeline.paper.calibration.problem import EVEN
+from pipeline.paper.calibration.quantities import DIMENSIONS, IDS, computed
+from pipeline.paper.omissions.costs import costs_of, holding_friction
+from pipeline.paper.omissions.omissions import Omission, idle_break_even, omissions
+from pipeline.paper.published import load_published
+from pipeline.robot.robot_file import load_robot_file
+
+HELD = 0.866  # of the reversible actuators, Table VI [W]
+
+
+@pytest.fixture(scope="module")
+def catalog() -> Catalog:
+    return load_catalog()
+
+
+@pytest.fixture(scope="module")
+def part(root: Path) -> RobotPart:
+    return part_of(load_robot_file(root / "urdf" / "hexapod.toml"))
+
+
+@pytest.fixture(scope="module")
+def rows(part: RobotPart, catalog: Catalog) -> tuple[Omission, ...]:
+    return omissions(part, catalog, load_published(IDS, DIMENSIONS))
+
+
+def of(rows: tuple[Omission, ...], word: str) -> list[Omission]:
+    return [row for row in rows if word in row.name]
+
+
+def test_the_first_row_is_what_the_rest_of_the_judgement_says(
+    rows: tuple[Omission, ...], part: RobotPart, catalog: Catalog
+) -> None:
+    known = computed(part, actuator_part(part, catalog), 1)
+    assert rows[0].break_even == pytest.approx(known[EVEN], rel=1e-12)
+    for name, ratio in rows[0].ratios.items():
+        assert ratio == pytest.approx(known[f"walking_ratio_{name}"], rel=1e-12)
+        assert rows[0].ratios_moved[name] == 0.0
+
+
+@pytest.mark.parametrize(("watts", "share"), [(0.67, 0.735), (2.0, 0.513)])
+def test_idle_drivers_in_closed_form_from_printed_numbers(watts: float, share: float) -> None:
+    """The paper's 94 % and 0.866 W alone: what walking costs more follows from them."""
+    extra = 0.94 / 0.06 * HELD  # [W]
+    f = idle_break_even(0.94, HELD, 6 * watts)
+    assert f == pytest.approx(share, abs=1e-3)
+    assert (1 - f) * extra == pytest.approx(f * (HELD + 6 * watts), rel=1e-12)
+    assert idle_break_even(0.94, HELD, 0.0) == pytest.approx(0.94, rel=1e-12)
+
+
+def test_idle_drivers_through_the_costs_agree_with_the_closed_form(
+    rows: tuple[Omission, ...], part: RobotPart, catalog: Catalog
+) -> None:
+    held = costs_of(part, catalog).stand["reversible"]
+    found = of(rows, "drivers")
+    assert len(found) == 2
+    for row in found:
+        assert row.number is not None
+        closed = idle_break_even(rows[0].break_even, held, 6 * row.number.value)
+        assert row.break_even == pytest.approx(closed, rel=1e-9)
+        assert row.moved == pytest.approx(closed - rows[0].break_even, rel=1e-9)
+
+
+def test_a_brake_decides_by_what_it_draws_open(rows: tuple[Omission, ...]) -> None:
+    for row in of(rows, "brake"):
+        assert row.number is not None
+        assert math.isnan(row.break_even)
+        cheaper = "irreversible" if row.number.value > 0 else "reversible"
+        assert f"walking, the {cheaper} one draws less" in row.note
+
+
+def test_returned_energy_used_again_helps_the_ideal_actuator_most(
+    rows: tuple[Omission, ...],
+) -> None:
+    shared, stored = of(rows, "bus")
+    for name in ("reversible", "irreversible"):
+        assert rows[0].ratios[name] < shared.ratios[name] < stored.ratios[name]
+
+
+def test_warm_windings_and_cold_grease_cost_more(rows: tuple[Omission, ...]) -> None:
+    cold, warm = of(rows, "grease")
+    assert warm.ratios["reversible"] < rows[0].ratios["reversible"] < cold.ratios["reversible"]
+    assert cold.ratios["rotor"] == rows[0].ratios["rotor"]  # no gear, no grease
+    (winding,) = of(rows, "winding")
+    # Copper is most of what the ideal actuator loses, and least of the others.
+    assert all(moved < 0 for moved in winding.ratios_moved.values())
+
+
+def test_a_hypoid_is_irreversible_from_its_locking_friction_on() -> None:
+    gear = Hypoid("gear", ratio=30.0, pinion_angle=1.44, wheel_angle=0.43, friction=0.1)
+    still = np.zeros((1, 1))
+    backwards = ShaftSeries.at_joint(("j",), np.zeros(1), still, still + 1.0, still, still - 1.0)
+    for factor, locks in ((0.999, False), (1.001, True)):
+        gear = replace(gear, friction=factor * gear.locking_friction)
+        assert (gear.driven_factor <= 0.0) == locks
+        if locks:
+            with pytest.raises(SelfLockingError):
+                gear.driving(backwards)
+        else:
+            gear.driving(backwards)
+
+
+def test_the_chain_holds_down_to_its_holding_friction(
+    rows: tuple[Omission, ...], part: RobotPart, catalog: Catalog
+) -> None:
+    chain = catalog.chain("irreversible")
+    gear = chain.element("hypoid")
+    assert isinstance(gear, Hypoid)
+    mu = holding_friction(chain, gear, part.standing_torque)
+    for factor, draws in ((1.001, False), (0.999, True)):
+        power = chain.replaced(replace(gear, friction=factor * mu)).holding(part.standing_torque)
+        assert (power.power.sum() > 0) == draws
+    # In closed form, from the joint inwards: bearing, gear, pinion, and the motor side times n.
+    p = {key: catalog.parameter(key).value for key in (
+        "output_bearing.coulomb", "hypoid.ratio", "pinion.coulomb", "planetary.ratio",
+        "planetary.coulomb", "rotor_re40.coulomb",
+    )}  # fmt: skip
+    load = abs(part.standing_torque[1]) - p["output_bearing.coulomb"]
+    motor_side = p["planetary.coulomb"] + p["rotor_re40.coulomb"]
+    held = p["pinion.coulomb"] + p["planetary.ratio"] * motor_side
+    share = held * p["hypoid.ratio"] / load  # driven factor that still holds
+    b1, b2 = np.tan(gear.pinion_angle), np.tan(gear.wheel_angle)
+    assert mu == pytest.approx((1 - share) / (b1 - share * b2), rel=1e-9)
+    locks, holds = of(rows, "sliding")
+    assert locks.number is not None
+    assert holds.number is not None
+    assert 1 - locks.number.value / gear.friction == pytest.approx(0.044, abs=1e-3)
+    assert holds.number.value == pytest.approx(mu, rel=1e-9)
+    assert holding_friction(chain, gear, np.zeros(3)) == 0.0
