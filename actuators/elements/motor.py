@@ -23,6 +23,7 @@ class DCMotor:
         supply_voltage: Voltage at hand [V].
         continuous_current: Permissible root mean square current [A].
         peak_current: Permissible instantaneous current [A].
+        mass: [kg]; no law uses it, and 0 says that no file states it.
         torque_constant_spread: Standard deviation of k as its file states it, relative [1].
         resistance_spread: Of R likewise [1].
 
@@ -40,6 +41,7 @@ class DCMotor:
     supply_voltage: float = math.inf
     continuous_current: float = math.inf
     peak_current: float = math.inf
+    mass: float = 0.0
     torque_constant_spread: float = 0.0
     resistance_spread: float = 0.0
 
@@ -50,6 +52,7 @@ class DCMotor:
             resistance=self.resistance,
             torque_constant_spread=self.torque_constant_spread,
             resistance_spread=self.resistance_spread,
+            mass=self.mass,
         )
         require(np.greater(self.torque_constant, 0.0), self.name, "torque_constant must be > 0")
         for limit in ("max_speed", "supply_voltage", "continuous_current", "peak_current"):

@@ -15,6 +15,8 @@ MOTOR_KIND: Final = "dc_motor"
 
 _FRICTION: Final = {"coulomb": "torque", "load": "ratio", "viscous": "viscous friction"}
 _DRAG: Final = {"coulomb": "torque", "viscous": "viscous friction"}
+#: What a part may lack: no law takes its mass.
+OPTIONAL: Final = frozenset({"mass"})
 
 KINDS: Final[Mapping[str, Mapping[str, str]]] = {
     "requirement": {"ratio": "ratio"},
@@ -25,6 +27,7 @@ KINDS: Final[Mapping[str, Mapping[str, str]]] = {
         "supply_voltage": "voltage",
         "continuous_current": "current",
         "peak_current": "current",
+        "mass": "mass",
     },
     "rotating_friction": {**_DRAG, "inertia": "inertia"},
     "harmonic_drive": {"ratio": "ratio", **_FRICTION, "inertia": "inertia"},
@@ -84,5 +87,5 @@ def load_component(path: Path) -> Component:
     """
     file = one_line(path.name)
     written = checked(_Written, read_toml(path), file, CatalogError)
-    parameters = parameters_from_table(written.parameters, KINDS[written.kind], file)
+    parameters = parameters_from_table(written.parameters, KINDS[written.kind], file, OPTIONAL)
     return Component(path.stem, written.kind, written.title, written.note, parameters)

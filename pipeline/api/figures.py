@@ -24,6 +24,7 @@ from reports.figures.energy.joint_demand import joint_demand_figure, stretches
 from reports.figures.energy.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.several import Drawing, save_figures
+from reports.figures.style import NARROW
 from reports.pages.gait_words import gait_and_conditions
 from reports.pages.names import leg_words, short_titles, shown_leg
 
@@ -182,15 +183,20 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
     )
     if IDEAL not in walking.results:
         subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
-    figure = partial(
-        electrical_energy_figure,
-        list(labels.values()),
-        electrical,
-        reference=titles.get(IDEAL),
+    ideal = titles.get(IDEAL)
+    figure = partial(electrical_energy_figure, list(labels.values()), electrical, reference=ideal)
+    wide = partial(
+        figure,
         title=f"Electrical energy per cycle, {leg_words(leg)}",
         subtitle=f"{_name(given)}; {subtitle}",
     )
-    return [*out, Drawing("electrical_energy", figure)]
+    narrow = partial(
+        figure,
+        title=f"Energy per cycle, {leg_words(leg)}",
+        subtitle=f"\N{MULTIPLICATION SIGN}: times that of the {ideal}" if ideal else "",
+        width=NARROW,
+    )
+    return [*out, Drawing("electrical_energy", wide), Drawing("electrical_energy_narrow", narrow)]
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:

@@ -30,6 +30,9 @@ INK, QUIET, FAINT, SHADE_DARK, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#dde1e6
 #: size.
 WIDTH = 9.5
 
+#: Of one whose letters can be read on a telephone [in].
+NARROW = 4.6
+
 #: Colours in order, for things without a colour of their own.
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, QUIET)
 #: Energy towards the joint, and energy that comes back.

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.effects.base import place_text
 from pipeline.identification.compare.circumstances import WHOLE
 from pipeline.identification.compare.stages import noise_floor, overall
-from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Remainder
+from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Remainder, named
 from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.story import Story
 from reports.html import write_html
@@ -18,6 +18,7 @@ from reports.markdown import write_markdown
 from reports.page import (
     Block,
     FigureBlock,
+    Number,
     Page,
     Points,
     Section,
@@ -26,6 +27,7 @@ from reports.page import (
     table_block,
 )
 from reports.pages import gap_words as words
+from reports.pages.motor_words import motors_text
 from reports.pages.names import legs_text
 from reports.table import Table
 
@@ -59,8 +61,11 @@ def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) ->
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     return Page(
         title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
-        answer=answer(story),
+        numbers=_numbers(story),
+        picture=FigureBlock(folder / "waterfall_narrow.svg", alt="The gap, effect by effect."),
+        answer=_first(story),
         sections=(
+            Section("The answer in full", tuple(map(Text, answer(story)))),
             _where(story, tables, folder),
             _what(story, tables, folder),
             _smaller(story, folder),
@@ -70,6 +75,46 @@ def report(story: Story, tables: dict[str, Table], folder: Path, footer: str) ->
         ),
         files=files,
         footer=footer,
+    )
+
+
+def _numbers(story: Story) -> tuple[Number, ...]:
+    """The gap before and after, the noise, and how much was found."""
+    before, _, after = _whole(story)
+    unit, found = story.naming.unit, story.naming.found
+    ended = "bad" if story.weighed.unexplained else "good"
+    listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
+    return (
+        Number(f"{words.number(before)} {unit}", "measured less predicted, model as it was"),
+        Number(
+            f"{words.number(after)} {unit}", "the same with what was found, held-out data", ended
+        ),
+        Number(f"{words.number(story.noise)} {unit}", "noise floor of the logs"),
+        Number(str(len(found)), f"effects found{listed}"),
+    )
+
+
+def _first(story: Story) -> tuple[str, ...]:
+    """One sentence each: where, what is fitted, what it predicts, what it costs, whose motors."""
+    naming, motors = story.naming, story.given.motors
+    before, _, after = _whole(story)
+    whose = (
+        "**Whose motors:** none; the log's torque is compared at the joints."
+        if motors is None
+        else motors_text(motors)
+    )
+    return (
+        words.where_short(story.where.rows),
+        words.fitted_words(naming),
+        f"**Predicted:** held-out data, which had no say in it: the gap of all joints is "
+        f"{words.number(after)} {naming.unit}, {words.number(before)} {naming.unit} before.",
+        *(
+            (f"**What it costs,** one gait cycle: {cost}.",)
+            if story.energy and (cost := words.cost_words(story.energy, story.given.alternative))
+            else ()
+        ),
+        words.left_words(story.weighed.left),
+        whose,
     )
 
 

@@ -35,9 +35,9 @@ from pipeline.identification.workflow.story import Story, Told, signature_name, 
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
 from reports.folder.staging import staged
-from reports.pages import gap_words as words
 from reports.pages.gap_report import write_report
 from reports.table import Table
+from reports.typeset import plain
 from reports.writer import write_table, write_text
 
 logger = logging.getLogger("legwatt")
@@ -205,7 +205,7 @@ def _say_answer(story: Story, out: Path) -> None:
     from reports.pages.gap_report import answer
 
     for paragraph in answer(story):
-        print(words.plain(paragraph))
+        print(plain(paragraph))
     print(f"written to {out}")
 
 

@@ -29,6 +29,7 @@ from pipeline.logs.reading.plan import plan_reading
 from pipeline.logs.reading.table_file import sha256
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.machine.motors import Motors, motors_of
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
 from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.payload import with_payload
@@ -76,6 +77,16 @@ class Setup:
     bare: MachineModel
     warnings: tuple[str, ...] = ()
     mimics: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def motors(self) -> Motors | None:
+        """Whose motors the logs are compared with; None where torque is compared at the joints."""
+        if not self.alternative:
+            return None
+        used = {self.alternative: self.own.actuators(self.catalog, self.alternative)}
+        mass = float(sum(inertia.mass for inertia in self.bare.rigid.inertias))
+        stated = self.file.actuators is not None
+        return motors_of(self.catalog, self.own, used, self.bare.joints, mass, stated=stated)
 
     @property
     def legged(self) -> bool:

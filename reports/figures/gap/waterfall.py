@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from textwrap import shorten
 from typing import TYPE_CHECKING
 
 from reports.errors import FigureError
@@ -14,6 +15,7 @@ from reports.figures.style import (
     INK,
     ORANGE,
     QUIET,
+    WIDTH,
     headline,
     new_figure,
     number,
@@ -50,6 +52,7 @@ def gap_waterfall_figure(
     *,
     title: str,
     subtitle: str = "",
+    width: float = WIDTH,
 ) -> Figure:
     """Draw it from top to bottom.
 
@@ -60,6 +63,7 @@ def gap_waterfall_figure(
         unit: Of all.
         title: Headline.
         subtitle: Second line.
+        width: [in]; labels stand above their bars where it is less than usual.
 
     Raises:
         FigureError: A negative gap.
@@ -67,23 +71,27 @@ def gap_waterfall_figure(
     if min([before, noise_floor, *(s.gap for s in steps)]) < 0:
         raise FigureError("waterfall: a gap is negative; give root mean squares")
     labels = ["model as it was", *(s.label for s in steps), "what is left"]
-    figure = new_figure(0.42 * len(labels) + 1.5)
+    narrow = width < WIDTH
+    figure = new_figure((0.54 if narrow else 0.42) * len(labels) + 1.5, width)
     ax = figure.subplots()
+    thick = 0.42 if narrow else 0.62
     gaps = [before, *(s.gap for s in steps)]
-    ax.barh(0, before, color=ORANGE, height=0.62)
+    ax.barh(0, before, color=ORANGE, height=thick)
     ax.text(before, 0, f" {number(before)}", va="center", fontsize=8.5)
     for k, (old, new) in enumerate(pairwise(gaps), start=1):
-        ax.barh(k, old - new, left=new, color=GREEN if new < old else ORANGE, height=0.62)
-        ax.plot([old, old], [k - 1 + 0.31, k - 0.31], color=QUIET, linewidth=0.8)
+        ax.barh(k, old - new, left=new, color=GREEN if new < old else ORANGE, height=thick)
+        ax.plot([old, old], [k - 1 + thick / 2, k - thick / 2], color=QUIET, linewidth=0.8)
         sign = "\N{MINUS SIGN}" if new <= old else "+"
         change = f"{sign}{number(abs(old - new), 2)}"
         if abs(new - old) < _NOTHING * before:
             change = "0"
         ax.text(max(old, new), k, f" {change}", va="center", fontsize=8.5)
     last = len(labels) - 1
-    ax.barh(last, gaps[-1], color=BLUE, height=0.62)
+    ax.barh(last, gaps[-1], color=BLUE, height=thick)
     if last > 1:
-        ax.plot([gaps[-1]] * 2, [last - 1 + 0.31, last - 0.31], color=QUIET, linewidth=0.8)
+        ax.plot(
+            [gaps[-1]] * 2, [last - 1 + thick / 2, last - thick / 2], color=QUIET, linewidth=0.8
+        )
     beside = max(gaps[-1], noise_floor if gaps[-1] > 0.5 * noise_floor else 0.0)
     ax.text(beside, last, f" {number(gaps[-1])}", va="center", fontsize=8.5)
     ax.axvline(noise_floor, color=INK, linewidth=1.0, linestyle=(0, (4, 2)))
@@ -95,9 +103,11 @@ def gap_waterfall_figure(
         fontsize=8,
         color=QUIET,
     )
-    ax.set_yticks(range(len(labels)), labels)
+    ax.set_yticks(range(len(labels)), [] if narrow else labels)
+    for k, label in enumerate(labels if narrow else ()):
+        ax.text(0, k - thick / 2, shorten(label, 50), va="bottom")
     ax.invert_yaxis()
-    ax.set_xlim(0, 1.14 * max([*gaps, noise_floor]))
+    ax.set_xlim(0, (1.2 if narrow else 1.14) * max([*gaps, noise_floor]))
     ax.set_ylim(last + 0.55, -1.05)
     ax.tick_params(axis="y", length=0)
     ax.spines["left"].set_visible(False)
