@@ -14,8 +14,8 @@ from reports.typeset import number_text
 #: 1.0 for rubber on dry concrete.
 DRY_GROUND = 1.0
 OWN = (
-    "Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, or `[actuators]` "
-    "in the robot file"
+    "Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, or "
+    "`[actuators]` in the robot file"
 )
 #: Quantity of `motor_limits` to how its breach is said.
 _ASKS = {

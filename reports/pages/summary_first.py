@@ -1,4 +1,4 @@
-"""What the paper's page shows at first sight: four numbers, and what is fitted, predicted, known."""
+"""What the paper's page shows at first sight: four numbers, what is fitted, what is predicted."""
 
 from __future__ import annotations
 

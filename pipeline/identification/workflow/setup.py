@@ -62,6 +62,7 @@ class Setup:
         file: The model file whose edits are in `model`; without edits where none was given.
         bare: The model before those edits.
         warnings: What of the files a reader should know, in words.
+        folder: Of the user's own actuator files; None for the project's catalogue.
         mimics: Joints of the URDF that mimic another, to the other's name; no log may move them.
     """
 
@@ -77,6 +78,7 @@ class Setup:
     bare: MachineModel
     warnings: tuple[str, ...] = ()
     mimics: Mapping[str, str] = field(default_factory=dict)
+    folder: Path | None = None
 
     @property
     def motors(self) -> Motors | None:
@@ -85,7 +87,7 @@ class Setup:
             return None
         used = {self.alternative: self.own.actuators(self.catalog, self.alternative)}
         mass = float(sum(inertia.mass for inertia in self.bare.rigid.inertias))
-        stated = self.file.actuators is not None
+        stated = self.folder is not None
         return motors_of(self.catalog, self.own, used, self.bare.joints, mass, stated=stated)
 
     @property
@@ -148,6 +150,7 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         alternative=alternative,
         file=file,
         bare=bare,
+        folder=parts.folder,
         warnings=(*parts.remarks, *odd, *(given_file.changed if given_file else ())),
         mimics=mimics_in(text, str(path)),
     )
