@@ -95,13 +95,8 @@ def _numbers(story: Story) -> tuple[Number, ...]:
 
 def _first(story: Story) -> tuple[str, ...]:
     """One sentence each: where, what is fitted, what it predicts, what it costs, whose motors."""
-    naming, motors = story.naming, story.given.motors
+    naming = story.naming
     before, _, after = _whole(story)
-    whose = (
-        "**Whose motors:** none; the log's torque is compared at the joints."
-        if motors is None
-        else motors_text(motors)
-    )
     return (
         words.where_short(story.where.rows),
         words.fitted_words(naming),
@@ -113,8 +108,16 @@ def _first(story: Story) -> tuple[str, ...]:
             else ()
         ),
         words.left_words(story.weighed.left),
-        whose,
+        whose_motors(story),
     )
+
+
+def whose_motors(story: Story) -> str:
+    """Which motors turn the log's currents into torque."""
+    motors = story.given.motors
+    if motors is None:
+        return "**Whose motors:** none; the log's torque is compared at the joints."
+    return motors_text(motors)
 
 
 def answer(story: Story) -> tuple[str, ...]:

@@ -90,6 +90,7 @@ def fitted_words(naming: Naming) -> str:
         return "**Fitted:** nothing beside the tolerances of the machine's parts."
     levels = Counter(f.level for f in naming.found)
     sure = ", ".join(f"{count} {level}" for level, count in levels.items())
+    sure = sure if len(naming.found) > 1 else naming.found[0].level
     return f"**Fitted:** {_named(naming.found)}; {sure}."
 
 

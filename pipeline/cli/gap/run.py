@@ -202,9 +202,9 @@ def _say_where(where: Whereabouts) -> None:
 
 
 def _say_answer(story: Story, out: Path) -> None:
-    from reports.pages.gap_report import answer
+    from reports.pages.gap_report import answer, whose_motors
 
-    for paragraph in answer(story):
+    for paragraph in (whose_motors(story), *answer(story)):
         print(plain(paragraph))
     print(f"written to {out}")
 

@@ -62,7 +62,7 @@ class Setup:
         file: The model file whose edits are in `model`; without edits where none was given.
         bare: The model before those edits.
         warnings: What of the files a reader should know, in words.
-        folder: Of the user's own actuator files; None for the project's catalogue.
+        folder: Of the actuator files, the user's or the project's.
         mimics: Joints of the URDF that mimic another, to the other's name; no log may move them.
     """
 
@@ -78,7 +78,7 @@ class Setup:
     bare: MachineModel
     warnings: tuple[str, ...] = ()
     mimics: Mapping[str, str] = field(default_factory=dict)
-    folder: Path | None = None
+    folder: Path = CATALOG
 
     @property
     def motors(self) -> Motors | None:
@@ -87,7 +87,7 @@ class Setup:
             return None
         used = {self.alternative: self.own.actuators(self.catalog, self.alternative)}
         mass = float(sum(inertia.mass for inertia in self.bare.rigid.inertias))
-        stated = self.folder is not None
+        stated = self.folder != CATALOG
         return motors_of(self.catalog, self.own, used, self.bare.joints, mass, stated=stated)
 
     @property

@@ -105,7 +105,8 @@ def gap_waterfall_figure(
     )
     ax.set_yticks(range(len(labels)), [] if narrow else labels)
     for k, label in enumerate(labels if narrow else ()):
-        ax.text(0, k - thick / 2, shorten(label, 50), va="bottom")
+        clear = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}  # of the noise floor
+        ax.text(0, k - thick / 2 - 0.04, shorten(label, 50), va="bottom", bbox=clear)
     ax.invert_yaxis()
     ax.set_xlim(0, (1.2 if narrow else 1.14) * max([*gaps, noise_floor]))
     ax.set_ylim(last + 0.55, -1.05)
