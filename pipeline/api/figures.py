@@ -176,15 +176,22 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                 ),
             ),
         ]
+    return [*out, *_electrical(given, leg, list(labels.values()), electrical)]
+
+
+def _electrical(
+    given: Settings, leg: str, labels: list[str], electrical: dict[str, Array]
+) -> list[Drawing]:
+    """What every alternative draws, wide and narrow."""
     subtitle = (
         "returned energy is lost"
         if given.regeneration.policy == "none"
         else "what the motors draw; robot_energy.csv has what their return saves"
     )
-    if IDEAL not in walking.results:
+    if IDEAL not in given.catalog.alternatives:
         subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
-    ideal = titles.get(IDEAL)
-    figure = partial(electrical_energy_figure, list(labels.values()), electrical, reference=ideal)
+    ideal = short_titles(given.catalog).get(IDEAL)
+    figure = partial(electrical_energy_figure, labels, electrical, reference=ideal)
     wide = partial(
         figure,
         title=f"Electrical energy per cycle, {leg_words(leg)}",
@@ -196,7 +203,7 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
         subtitle=f"\N{MULTIPLICATION SIGN}: times that of the {ideal}" if ideal else "",
         width=NARROW,
     )
-    return [*out, Drawing("electrical_energy", wide), Drawing("electrical_energy_narrow", narrow)]
+    return [Drawing("electrical_energy", wide), Drawing("electrical_energy_narrow", narrow)]
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:

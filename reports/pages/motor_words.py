@@ -81,18 +81,13 @@ def limits_text(
             over = _breaches(tables[name], titles)
             asks += [f"{verb} takes {'; '.join(over)}"] if over else []
     out = [f"**Beyond the motors:** {'; '.join(asks)}."] if asks else []
-    ground = DRY_GROUND if friction is None else friction
     foot, needed = greatest_friction(tables)
-    if needed > ground:
-        offered = (
-            f"dry ground seldom offers more than {number_text(ground)}; "
-            "`--friction-coefficient` looks for forces within it, or says that the robot slides"
-            if friction is None
-            else f"the ground offers {number_text(ground)}"
-        )
+    if slips(needed, friction):
         out.append(
             f"**Beyond the ground:** leg `{foot}` needs a coefficient of friction of "
-            f"**{number_text(needed)}** by this rule of forces; {offered}."
+            f"**{number_text(needed)}** by this rule of forces, dry ground seldom offers more than "
+            f"{number_text(DRY_GROUND)}; `--friction-coefficient 0.8` looks for forces within it, "
+            "or says that the robot slides."
         )
     return tuple(out)
 
@@ -114,6 +109,11 @@ def _breaches(table: Table, titles: Mapping[str, str]) -> list[str]:
         )
         said.append(f"{ask} (`{c['joint'][worst]}`, {titles[name]}{others})")
     return said
+
+
+def slips(needed: float, friction: float | None) -> bool:
+    """Whether feet need more than dry ground gives; a stated friction has bound the forces."""
+    return friction is None and needed > DRY_GROUND
 
 
 def greatest_friction(tables: Mapping[str, Table]) -> tuple[str, float]:

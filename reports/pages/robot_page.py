@@ -28,10 +28,10 @@ from reports.page import (
 )
 from reports.pages.gait_words import conditions, gait_and_conditions, pace
 from reports.pages.motor_words import (
-    DRY_GROUND,
     greatest_friction,
     limits_text,
     motors_text,
+    slips,
     tightest,
 )
 from reports.pages.names import leg_words, names_text, short_titles, shown_leg
@@ -115,7 +115,6 @@ def _numbers_first(
     least, most = min(powers, key=powers.__getitem__), max(powers, key=powers.__getitem__)
     ends = dict.fromkeys((least, most))
     _, friction = greatest_friction(tables)
-    ground = given.forces.friction_coefficient or DRY_GROUND
     joint, quantity, share = tightest(tables["motor_limits"])
     return (
         Number(
@@ -132,7 +131,7 @@ def _numbers_first(
         Number(
             number_text(friction),
             "coefficient of friction that the feet need",
-            "bad" if friction > ground else "good",
+            "bad" if slips(friction, given.forces.friction_coefficient) else "good",
         ),
         Number(
             f"{100 * share:.0f} %",

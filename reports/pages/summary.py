@@ -36,6 +36,18 @@ TONES = {
     "not determined": "quiet",
 }
 
+#: Every printed number beside ours; the first three columns are shown as one.
+_BESIDE = {
+    "quantity": "quantity",
+    "joint": "joint",
+    "unit": "unit",
+    "published": "paper",
+    "computed": "ours",
+    "verdict": "verdict",
+    "role": "role",
+    "where": "where",
+}
+
 
 def write_summary(given: Settings, judged: Judged, tables: Sequence[Table], out: Path) -> int:
     """Write ``summary.md`` and ``index.html``.
@@ -85,22 +97,12 @@ def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: P
 
 
 def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
-    shown = {
-        "quantity": "quantity",
-        "joint": "joint",
-        "unit": "unit",
-        "published": "paper",
-        "computed": "ours",
-        "verdict": "verdict",
-        "role": "role",
-        "where": "where",
-    }
     if judged.by.results is None:
         return Section(
             "Every number the paper prints",
             (
                 Text(roles_text()),
-                _one_name(table_block(tables["reproduction"], shown, tones=TONES)),
+                _one_name(table_block(tables["reproduction"], _BESIDE, tones=TONES)),
             ),
         )
     open_ = {
@@ -120,7 +122,7 @@ def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
         "Every number the paper prints",
         (
             Text(roles_text()),
-            _one_name(table_block(tables["reproduction"], shown, tones=TONES)),
+            _one_name(table_block(tables["reproduction"], _BESIDE, tones=TONES)),
             Text(
                 "What is known of them without the fit. *Prior*: 95 % of what data sheets and "
                 "literature say before anything is fitted. *Left out*: 95 % of what everything "

@@ -154,7 +154,7 @@ def test_what_motors_and_ground_cannot_give_is_said(solo: Run) -> None:
     slippery = calm | {"walking_stability": limits(stability, greatest_friction_needed=steep)}
     (text,) = limits_text(slippery, titles, None)
     assert "needs a coefficient of friction of **2.6**" in text
-    assert "`--friction-coefficient`" in text
+    assert "`--friction-coefficient 0.8`" in text
     assert limits_text(slippery, titles, 3.0) == ()
 
 

@@ -15,6 +15,7 @@ from reports.figures.style import (
     QUIET,
     WIDTH,
     headline,
+    name_rows,
     new_figure,
     number,
     styled,
@@ -61,7 +62,7 @@ def electrical_energy_figure(
     figure = new_figure((0.54 if narrow else 0.62) * len(alternatives) + 1.55, width)
     headline(figure, title, subtitle)
     axes = figure.subplots()
-    thick = 0.45 if narrow else 0.62
+    thick, names = 0.45 if narrow else 0.62, []
     for row, (name, parts) in enumerate(alternatives.items()):
         left = 0.0
         for j, value in enumerate(parts):
@@ -76,17 +77,13 @@ def electrical_energy_figure(
         if name != reference and base > 0:
             times = f"{number(totals[name] / base)} \N{MULTIPLICATION SIGN}"
             ratio = f", {times}" if narrow else f"   {times} {reference}"
-        words = f"{number(left)} J{ratio}"
-        if narrow:
-            axes.text(0, row - thick / 2, f"{shorten(name, 44)}: {words}", va="bottom")
-        else:
-            axes.text(left + 0.008 * widest, row, words, va="center")
+        names.append(f"{shorten(name, 44)}: {number(left)} J{ratio}" if narrow else name)
+        if not narrow:
+            axes.text(left + 0.008 * widest, row, f"{number(left)} J{ratio}", va="center")
     _name_joints(axes, joints, 0.18 if narrow else 0.12)
-    axes.set_yticks(range(len(alternatives)), [] if narrow else list(alternatives))
+    name_rows(axes, names, thick, above=narrow)
     axes.set_ylim(len(alternatives) - 0.5, -0.95)
     axes.set_xlim(0, (1.02 if narrow else 1.25) * widest)
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
     axes.set_xlabel("electrical energy per cycle [J]")
     return figure
 
