@@ -154,14 +154,10 @@ def _answer(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
     titles = short_titles(given.catalog)
     costs = "; ".join(
         f"{titles[name]} **{number_text(power)} W**"
-        + ("" if _missing(cot) else f" (cost of transport {number_text(cot)})")
-        for name, power, cot in zip(
-            energy["alternative"], energy["average_power_W"], energy["cost_of_transport"],
-            strict=True,
-        )
-    )  # fmt: skip
+        for name, power in zip(energy["alternative"], energy["average_power_W"], strict=True)
+    )
     cost = f"**What it costs** to drive all joints, on average over one cycle: {costs}."
-    return (what, cost, *_fitted_and_known(given, tables), _stability(tables["walking_stability"]))
+    return (what, cost, *_fitted_and_known(given, tables))
 
 
 def _fitted_and_known(given: Settings, tables: Mapping[str, Table]) -> tuple[str, str]:
@@ -194,10 +190,6 @@ def _walk(given: Settings, gait: Gait) -> str:
     if gait.margin is not None:
         said.append("its body swaying to keep its balance")
     return ", ".join(said)
-
-
-def _missing(value: object) -> bool:
-    return value is None or (isinstance(value, float) and not np.isfinite(value))
 
 
 def _stability(table: Table) -> str:
@@ -237,6 +229,7 @@ def _demand(robot: Robot, tables: Mapping[str, Table], out: Path) -> Section:
     leg = shown_leg(robot)
     joints = next(entry.joints for entry in robot.spec.legs if entry.name == leg)
     blocks: list[Text | FigureBlock | TableBlock | Points] = [
+        Text(_stability(tables["walking_stability"])),
         FigureBlock(out / "joint_torques.svg", "Torque of every joint, all legs."),
         FigureBlock(out / "ground_forces.svg", "Ground forces of all feet, margin of stability."),
         table_block(tables["walking_stability"], caption="Stability by set of standing feet."),

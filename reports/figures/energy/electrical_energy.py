@@ -59,7 +59,8 @@ def electrical_energy_figure(
     base = totals[reference] if reference is not None else 0.0
     widest = max(*totals.values(), 1e-9)
     narrow = width < WIDTH
-    figure = new_figure((0.54 if narrow else 0.62) * len(alternatives) + 1.55, width)
+    row_height, rest = (0.5, 1.35) if narrow else (0.62, 1.55)  # [in]
+    figure = new_figure(row_height * len(alternatives) + rest, width)
     headline(figure, title, subtitle)
     axes = figure.subplots()
     thick, names = 0.45 if narrow else 0.62, []
