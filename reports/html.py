@@ -54,6 +54,7 @@ def html(page: Page, folder: Path) -> str:
     environment.filters.update(marked=marked, cell=cell_text, breakable=breakable, prose=prose)
     return environment.get_template("page.html").render(
         page=page,
+        picture=_block(page.picture, folder) if page.picture else None,
         sections=[
             {
                 "id": f"s{number}",

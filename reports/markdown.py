@@ -22,7 +22,12 @@ def write_markdown(page: Page, path: Path) -> Path:
 
 def markdown(page: Page, folder: Path) -> str:
     """The text of a page; `folder` is where it will lie."""
-    parts = [f"# {prose(page.title)}", *map(prose, page.answer)]
+    parts = [f"# {prose(page.title)}", *map(prose, page.notices)]
+    if page.numbers:
+        parts.append("\n".join(f"- **{prose(n.value)}** {prose(n.label)}" for n in page.numbers))
+    parts += map(prose, page.answer)
+    if page.picture:
+        parts.append(_block(page.picture, folder))
     for section in page.sections:
         parts.append(f"## {prose(section.heading)}")
         parts += [_block(block, folder) for block in section.blocks]
@@ -48,7 +53,8 @@ def _block(block: Block, folder: Path) -> str:
     if isinstance(block, FigureBlock):
         picture = os.path.relpath(block.file, folder).replace(os.sep, "/")
         caption = prose(block.caption)
-        return f"![{_cell(prose(block.alt) or caption)}]({picture})\n\n*{caption}*"
+        shown = f"![{_cell(prose(block.alt) or caption)}]({picture})"
+        return f"{shown}\n\n*{caption}*" if caption else shown
     return _table(block)
 
 

@@ -83,13 +83,13 @@ class FigureBlock:
 
     Attributes:
         file: SVG or PNG; it must lie in the page's folder or below it.
-        caption: What to see in it.
+        caption: What to see in it; none where its title says so.
         alt: For those who cannot see it; the caption by default.
         half: Whether two stand side by side where the page is wide: for narrow pictures.
     """
 
     file: Path
-    caption: str
+    caption: str = ""
     alt: str = ""
     half: bool = False
 
@@ -114,15 +114,33 @@ class Section:
 
 
 @dataclass(frozen=True)
+class Number:
+    """A number to see before anything is read.
+
+    Attributes:
+        value: With its unit.
+        label: What it is, in a few words.
+        tone: ``good``, ``bad`` or ``quiet``.
+    """
+
+    value: str
+    label: str
+    tone: str = "quiet"
+
+
+@dataclass(frozen=True)
 class Page:
-    """A report that gives its answer first.
+    """A report that gives its answer at first sight.
 
     Attributes:
         title: Of the page.
-        answer: Paragraphs that a reader in a hurry reads and then stops.
-        sections: The rest.
+        answer: A few sentences that a reader in a hurry reads and then stops.
+        sections: The rest, the answer in full words first.
         files: File name (relative) to what it holds, listed at the end.
         footer: A last line, such as versions.
+        notices: What a reader must not overlook, above everything else.
+        numbers: Four at most.
+        picture: Beside the answer; one whose text can be read on a telephone.
     """
 
     title: str
@@ -130,6 +148,9 @@ class Page:
     sections: tuple[Section, ...] = ()
     files: Mapping[str, str] = field(default_factory=dict)
     footer: str = ""
+    notices: tuple[str, ...] = ()
+    numbers: tuple[Number, ...] = ()
+    picture: FigureBlock | None = None
 
 
 def table_block(

@@ -19,6 +19,7 @@ _PRODUCT = re.compile(
 _PERCENT = re.compile(r"(?<=\d)%")
 _OHM = re.compile(r"(?<=\d )ohm\b")
 _APART = re.compile(r"(`[^`]*`|\]\([^)\s]+\))")
+_LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 _NEGATIVE = re.compile(r"(?<![\w.)\]\-])-(?=\d)")
 
 
@@ -76,3 +77,8 @@ def _prose(text: str) -> str:
     text = _OHM.sub("Ω", text)
     text = _PERCENT.sub(" %", text)
     return _NEGATIVE.sub(MINUS, text)
+
+
+def plain(text: str) -> str:
+    """A paragraph without marks, for a terminal."""
+    return _LINK.sub(r"\1", text).replace("**", "").replace("`", "")

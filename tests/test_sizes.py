@@ -17,7 +17,6 @@ LONGER = {
     "pipeline/identification/selection/select.py:select": 68,
     "pipeline/logs/prepared/prepare.py:prepare": 70,
     "pipeline/robot/urdf_builder.py:_leg": 71,
-    "reports/figures/gap/waterfall.py:gap_waterfall_figure": 62,
     "reports/pages/summary.py:_reproduction": 75,
 }
 

@@ -1,11 +1,13 @@
 """Where a motion asks more of a motor than its data sheet permits."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from actuators.arrays import FloatArray
-from actuators.chain import ChainResult
+from actuators.chain import ChainResult, HoldingResult
+from actuators.elements.motor import DCMotor
 from actuators.energy.energy import duration, weighted
 
 
@@ -66,6 +68,30 @@ def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:
         rows.append(
             LimitRow(joint, "rms_current", "A", limit, value, float(time[0]), float(over), over)
         )
+    return tuple(rows)
+
+
+def standing_rows(
+    holding: HoldingResult, joints: Sequence[str], motors: Sequence[DCMotor]
+) -> tuple[LimitRow, ...]:
+    """Return a row for every joint and limit that holding still can breach.
+
+    Args:
+        holding: Arrays (J,).
+        joints: Names, in the order of the columns.
+        motors: One per joint.
+    """
+    rows = []
+    for j, (joint, motor) in enumerate(zip(joints, motors, strict=True)):
+        current, voltage = abs(float(holding.current[j])), abs(float(holding.voltage[j]))
+        rows += [
+            LimitRow(joint, quantity, unit, limit, value, 0.0, float(value > limit), value > limit)
+            for quantity, unit, limit, value in (
+                ("voltage", "V", motor.supply_voltage, voltage),
+                ("current", "A", motor.peak_current, current),
+                ("rms_current", "A", motor.continuous_current, current),
+            )
+        ]
     return tuple(rows)
 
 

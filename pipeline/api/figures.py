@@ -25,6 +25,7 @@ from reports.figures.energy.joint_demand import joint_demand_figure, stretches
 from reports.figures.energy.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.several import Drawing, save_figures
+from reports.figures.style import NARROW
 from reports.pages.gait_words import gait_and_conditions
 from reports.pages.names import leg_words, short_titles, shown_leg
 
@@ -177,22 +178,34 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
                 ),
             ),
         ]
+    return [*out, *_electrical(given, leg, list(labels.values()), electrical)]
+
+
+def _electrical(
+    given: Settings, leg: str, labels: list[str], electrical: dict[str, Array]
+) -> list[Drawing]:
+    """What every alternative draws, wide and narrow."""
     subtitle = (
         "returned energy is lost"
         if given.regeneration.policy == "none"
         else "what the motors draw; robot_energy.csv has what their return saves"
     )
-    if IDEAL not in walking.results:
+    if IDEAL not in given.catalog.alternatives:
         subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
-    figure = partial(
-        electrical_energy_figure,
-        list(labels.values()),
-        electrical,
-        reference=titles.get(IDEAL),
+    ideal = short_titles(given.catalog).get(IDEAL)
+    figure = partial(electrical_energy_figure, labels, electrical, reference=ideal)
+    wide = partial(
+        figure,
         title=f"Electrical energy per cycle, {leg_words(leg)}",
         subtitle=f"{_name(given)}; {subtitle}",
     )
-    return [*out, Drawing("electrical_energy", figure)]
+    narrow = partial(
+        figure,
+        title=f"Energy per cycle, {leg_words(leg)}",
+        subtitle=f"\N{MULTIPLICATION SIGN}: times that of the {ideal}" if ideal else "",
+        width=NARROW,
+    )
+    return [Drawing("electrical_energy", wide), Drawing("electrical_energy_narrow", narrow)]
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:

@@ -19,11 +19,14 @@ from reports.figures.gap.signature import Signature, gap_signature_figure
 from reports.figures.gap.waterfall import GapStep, gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
+from reports.figures.style import NARROW, WIDTH
 from reports.typeset import unit_text
 
 Array = NDArray[np.float64]
 #: A stretch of time that a picture can show [s].
 _LONGEST = 8.0
+#: Steps that the narrow picture shows one by one.
+FEW = 4
 #: Ways of sorting in the order in which the map shows them.
 SHOWN = (WHOLE, "phase", "direction", "speed", "load", "power", "reversal", "position", "time")
 TITLES = {WHOLE: "all", "power": "joint is"}
@@ -63,17 +66,24 @@ def _in_order(rows: Sequence[Where]) -> list[Where]:
 def write_waterfall(
     stages: Sequence[Stage], noise: float, unit: str, robot: str, out: Path
 ) -> None:
-    """Draw `waterfall`: the gap of all joints, effect by effect."""
+    """Draw `waterfall`: the gap of all joints, effect by effect; and a narrow one of few steps."""
     first, *rest = stages
-    figure = gap_waterfall_figure(
-        overall(first.gap),
-        [GapStep(_words(stage.label), overall(stage.gap)) for stage in rest],
-        noise,
-        unit,
-        title=f"{robot}: the gap, effect by effect",
-        subtitle="root mean square over all joints, on held-out data",
-    )
-    save_figure(figure, out, "waterfall")
+    steps = [GapStep(_words(stage.label), overall(stage.gap)) for stage in rest]
+    short = steps[:FEW]
+    if len(steps) > FEW:
+        short.append(GapStep(f"{len(steps) - FEW} more effects", steps[-1].gap))
+    subtitle = "root mean square over all joints, on held-out data"
+    for name, shown, width in (("waterfall", steps, WIDTH), ("waterfall_narrow", short, NARROW)):
+        figure = gap_waterfall_figure(
+            overall(first.gap),
+            shown,
+            noise,
+            unit,
+            title=f"{robot}: the gap, effect by effect",
+            subtitle=subtitle,
+            width=width,
+        )
+        save_figure(figure, out, name)
 
 
 def _words(label: str) -> str:

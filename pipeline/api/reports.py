@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.api.machine import Machine
 from pipeline.api.tables import (
-    findings,
     inputs_of,
     metadata,
     table_of_parameters,
@@ -22,7 +22,10 @@ from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand
 from reports.folder.staging import staged
+from reports.pages.motor_words import limits_text, motors_text
+from reports.pages.names import short_titles
 from reports.table import Table
+from reports.typeset import plain
 from reports.writer import write_table
 
 if TYPE_CHECKING:
@@ -127,7 +130,17 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
             files += _pictures(given, (standing, walking), judgement, tables, out, said)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
     remarks = given.effects.remarks if given.effects else ()
-    return (*said, *given.remarks, *remarks, *(findings(walking) if walking else ()))
+    return (*_first_lines(given, tables, judgement), *said, *given.remarks, *remarks)
+
+
+def _first_lines(
+    given: Settings, tables: Sequence[Table], judged: Judged | None
+) -> tuple[str, ...]:
+    """Whose motors were assumed, but for the paper's, and what they and the ground cannot give."""
+    named = {t.name: t for t in tables}
+    limits = limits_text(named, short_titles(given.catalog), given.forces.friction_coefficient)
+    motors = (motors_text(given.motors),) if judged is None else ()
+    return tuple(plain(line) for line in (*motors, *limits))
 
 
 def _held_against_the_paper(given: Settings, said: list[str]) -> tuple[Judged | None, list[Table]]:

@@ -11,8 +11,9 @@ from typing import Any
 
 from tqdm import tqdm
 
+from actuators.energy.limits import limit_rows, standing_rows
 from actuators.loading.build import CATALOG
-from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.foot_tracking import foot_tracking
 from pipeline.robot.robot_file import RobotSpec
@@ -39,8 +40,9 @@ def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
 
 
 def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:
-    """The four tables of standing still."""
+    """The tables of standing still."""
     return [
+        _standing_limits(given, standing),
         standing_tables.standing(standing.demand, standing.holding),
         standing_tables.standing_energy(
             standing.demand, standing.holding, leg_joints(given.robot.spec)
@@ -48,6 +50,16 @@ def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:
         standing_tables.standing_posture(standing.demand),
         standing_tables.standing_contacts(standing.contacts),
     ]
+
+
+def _standing_limits(given: Settings, standing: Standing) -> Table:
+    joints = standing.demand.joints
+    rows = {}
+    for name, chain in given.chains().items():
+        motors = [joint.chain.motor for joint in drivetrains_of(chain, joints).joints]
+        if name in standing.holding:
+            rows[name] = standing_rows(standing.holding[name], joints, motors)
+    return walking_tables.motor_limits(rows, "standing_limits")
 
 
 def walked(
@@ -95,7 +107,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
             given.machine.mass * p["gravity"],  # the mass that the forces rest on
             gait.speed,
         ),
-        walking_tables.motor_limits(walking.results),
+        walking_tables.motor_limits({n: limit_rows(r) for n, r in walking.results.items()}),
     ]
     if not given.quasi_static:
         static = walked(given, chains, quasi_static=True)
@@ -185,19 +197,3 @@ def _forces_options(given: Settings) -> dict[str, Any]:
         "friction_coefficient": choice.friction_coefficient,
     }
     return {name: value for name, value in options.items() if value is not None}
-
-
-def findings(walking: Walking) -> list[str]:
-    """Lines for the terminal: what a reader should not overlook."""
-    from actuators.energy.limits import limit_rows
-
-    lines = []
-    for name, result in walking.results.items():
-        breaches = [row for row in limit_rows(result) if row.breach]
-        if breaches:
-            worst = max(breaches, key=lambda row: row.peak / row.limit)
-            lines.append(
-                f"motor limit: '{name}' asks {worst.peak:.4g} {worst.unit} ({worst.quantity}) of "
-                f"{worst.joint}, the data sheet allows {worst.limit:.4g}; see motor_limits.csv"
-            )
-    return lines

@@ -12,6 +12,7 @@ from pipeline.dynamics.force_rules import GroundForces
 from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.motors import Motors, motors_of
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
 from pipeline.motion.gait import gait_table
 from pipeline.motion.gait_table import spec_with_gait
@@ -77,6 +78,18 @@ class Settings:
     def machine(self) -> Robot:
         """The robot with what the model file's effects change in bodies and ground."""
         return self.robot if self.effects is None else self.effects.robot
+
+    @property
+    def motors(self) -> Motors:
+        """Whose motors drive the joints, and what they weigh."""
+        return motors_of(
+            self.catalog,
+            self.own,
+            self.own.every(self.catalog),
+            self.robot.joints,
+            self.machine.mass,
+            stated=self.actuators is not None,
+        )
 
     @property
     def adjust(self) -> Adjust | None:

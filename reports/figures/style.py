@@ -6,11 +6,12 @@ imported when the first figure is drawn, not with this module.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache, wraps
 from pathlib import Path
+from textwrap import shorten
 from typing import TYPE_CHECKING, Any, ParamSpec
 
 from reports.typeset import number_text
@@ -29,6 +30,9 @@ INK, QUIET, FAINT, SHADE_DARK, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#dde1e6
 #: Of all figures alike [in], so that a page that shows them at its own width shows letters of one
 #: size.
 WIDTH = 9.5
+
+#: Of one whose letters can be read on a telephone [in].
+NARROW = 4.6
 
 #: Colours in order, for things without a colour of their own.
 CYCLE = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, QUIET)
@@ -157,6 +161,23 @@ def headline(figure: Figure, title: str, subtitle: str = "") -> None:
 def horizontal_grid(axes: Axes) -> None:
     """Faint horizontal lines, for reading values off a vertical scale."""
     axes.grid(True, axis="y")
+    axes.tick_params(axis="y", length=0)
+    axes.spines["left"].set_visible(False)
+
+
+def name_rows(axes: Axes, names: Sequence[str], thick: float, *, above: bool) -> None:
+    """Names of horizontal bars, beside them or, in a narrow figure, above them.
+
+    Args:
+        axes: The axes.
+        names: From the top down, at 0, 1, ...
+        thick: Height of a bar.
+        above: Whether the figure is narrow.
+    """
+    axes.set_yticks(range(len(names)), [] if above else names)
+    for row, name in enumerate(names if above else ()):
+        clear = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}  # of what lies behind
+        axes.text(0, row - thick / 2 - 0.04, shorten(name, 62), va="bottom", bbox=clear)
     axes.tick_params(axis="y", length=0)
     axes.spines["left"].set_visible(False)
 

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.effects.base import place_text
 from pipeline.identification.compare.circumstances import WHOLE
 from pipeline.identification.compare.stages import noise_floor, overall
-from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Remainder
+from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Remainder, named
 from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.story import Story
 from pipeline.simulation.found_bodies import FoundBodies
@@ -19,6 +19,7 @@ from reports.markdown import write_markdown
 from reports.page import (
     Block,
     FigureBlock,
+    Number,
     Page,
     Points,
     Section,
@@ -28,6 +29,7 @@ from reports.page import (
 )
 from reports.pages import gap_words as words
 from reports.pages.bodies_words import URDF_FILE, bodies_blocks, bodies_words
+from reports.pages.motor_words import motors_text
 from reports.pages.names import legs_text
 from reports.table import Table
 
@@ -68,8 +70,11 @@ def report(
     own = bodies_blocks(bodies)
     return Page(
         title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
-        answer=answer(story, bodies),
+        numbers=_numbers(story),
+        picture=FigureBlock(folder / "waterfall_narrow.svg", alt="The gap, effect by effect."),
+        answer=_first(story, bodies),
         sections=(
+            Section("The answer in full", tuple(map(Text, answer(story, bodies)))),
             _where(story, tables, folder),
             _what(story, tables, folder),
             *([Section("The bodies", own)] if own else []),
@@ -81,6 +86,49 @@ def report(
         files=files,
         footer=footer,
     )
+
+
+def _numbers(story: Story) -> tuple[Number, ...]:
+    """The gap before and after, the noise, and how much was found."""
+    before, _, after = _whole(story)
+    unit, found = story.naming.unit, story.naming.found
+    ended = "bad" if story.weighed.unexplained else "good"
+    listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
+    effects = f"effect{'s' * (len(found) != 1)} found"
+    return (
+        Number(f"{words.number(before)} {unit}", "measured less predicted, model as it was"),
+        Number(f"{words.number(after)} {unit}", "with what was found, held-out data", ended),
+        Number(f"{words.number(story.noise)} {unit}", "noise floor of the logs"),
+        Number(str(len(found)), effects + listed),
+    )
+
+
+def _first(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
+    """One sentence each: where, what is fitted, what it predicts, what it costs, whose motors."""
+    naming = story.naming
+    before, _, after = _whole(story)
+    return (
+        words.where_short(story.where.rows),
+        words.fitted_words(naming),
+        *filter(None, [bodies_words(bodies)]),
+        f"**Predicted:** held-out data, which had no say in it: the gap of all joints is "
+        f"{words.number(after)} {naming.unit}, {words.number(before)} {naming.unit} before.",
+        *(
+            (f"**What it costs,** one gait cycle: {cost}.",)
+            if story.energy and (cost := words.cost_words(story.energy, story.given.alternative))
+            else ()
+        ),
+        words.left_words(story.weighed.left),
+        whose_motors(story),
+    )
+
+
+def whose_motors(story: Story) -> str:
+    """Which motors turn the log's currents into torque."""
+    motors = story.given.motors
+    if motors is None:
+        return "**Whose motors:** none; the log's torque is compared at the joints."
+    return motors_text(motors)
 
 
 def answer(story: Story, bodies: FoundBodies) -> tuple[str, ...]:

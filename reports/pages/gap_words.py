@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 import math
-import re
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -30,7 +30,6 @@ from pipeline.logs.prepared.measurement import PROVE, Measurement
 from pipeline.simulation.energy_change import PAIR, EnergyChange
 from reports.page import cell_text
 
-_LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 #: A band is worth a word when its gap is this many times the joint's.
 STANDS_OUT = 1.25
 #: Names of a column's wrong scale, and of what is the same in a log of current alone.
@@ -72,6 +71,27 @@ def where_words(rows: Sequence[Where]) -> str:
         top = max(bands, key=lambda row: row.gap)
         text += f"; it is largest {_circumstance(top)} ({number(top.gap)} {worst.unit})"
     return text + "."
+
+
+def where_short(rows: Sequence[Where]) -> str:
+    """At which joint the model as it was misses most, and by how much."""
+    worst = next((row for row in rows if row.by == WHOLE), None)
+    if worst is None:
+        return "No joint has enough rows to compare."
+    return (
+        f"**Where:** most at **{worst.joint}**, {number(worst.gap)} {worst.unit} root mean square, "
+        f"{percent(worst.share_of_total)} of the squared gap of all joints."
+    )
+
+
+def fitted_words(naming: Naming) -> str:
+    """What was fitted to the logs, with its values."""
+    if not naming.found:
+        return "**Fitted:** nothing beside the tolerances of the machine's parts."
+    levels = Counter(f.level for f in naming.found)
+    sure = ", ".join(f"{count} {level}" for level, count in levels.items())
+    sure = sure if len(naming.found) > 1 else naming.found[0].level
+    return f"**Fitted:** {_named(naming.found)}; {sure}."
 
 
 def _circumstance(row: Where) -> str:
@@ -287,11 +307,14 @@ def removed(before: float, after: float, noise: float) -> float | None:
     return 1.0 - math.sqrt(min(left / above, 1.0))
 
 
-def energy_words(change: EnergyChange, alternative: str) -> str:
-    """What it costs in joules, and the break-even."""
-    names = [n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before]
+def _priced(change: EnergyChange, alternative: str) -> list[str]:
+    return [n for n in dict.fromkeys((*PAIR, alternative)) if n in change.before]
+
+
+def cost_words(change: EnergyChange, alternative: str) -> str:
+    """Energy of one gait cycle before and after, by actuator; empty where none can be told."""
     parts = []
-    for name in names:
+    for name in _priced(change, alternative):
         if name not in change.after:
             continue
         old, new = change.before[name].cycle, change.after[name].cycle
@@ -300,12 +323,15 @@ def energy_words(change: EnergyChange, alternative: str) -> str:
         else:
             share = f"{100 * (new - old) / old:+.1f}".replace("-", "\N{MINUS SIGN}")
             parts.append(f"{name} {old:.1f} to {new:.1f} J ({share} %)")
+    return "; ".join(parts)
+
+
+def energy_words(change: EnergyChange, alternative: str) -> str:
+    """What it costs in joules, and the break-even."""
+    names, parts = _priced(change, alternative), cost_words(change, alternative)
     text = "**What it costs:** "
     if parts:
-        text += (
-            "electrical energy of one gait cycle of the whole robot, by actuator: "
-            f"{'; '.join(parts)}."
-        )
+        text += f"electrical energy of one gait cycle of the whole robot, by actuator: {parts}."
     silent = [name for name in names if name not in change.after]
     if silent:
         against = f"against `{alternative}`" if alternative else "against a joint without actuator"
@@ -421,8 +447,3 @@ def _unit(unit: str) -> str:
 
 def _share(value: float) -> str:
     return "no share" if math.isnan(value) else f"{100 * value:.1f} %"
-
-
-def plain(text: str) -> str:
-    """A paragraph without marks, for a terminal."""
-    return _LINK.sub(r"\1", text).replace("**", "").replace("`", "")

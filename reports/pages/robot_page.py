@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from actuators.loading.build import Catalog
+from pipeline.machine.motors import Motors
 from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
@@ -15,8 +17,24 @@ from pipeline.robot.robot import Robot
 from pipeline.simulation.settings import Settings
 from reports.html import write_html
 from reports.markdown import write_markdown
-from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
+from reports.page import (
+    FigureBlock,
+    Number,
+    Page,
+    Points,
+    Section,
+    TableBlock,
+    Text,
+    table_block,
+)
 from reports.pages.gait_words import conditions, gait_and_conditions, pace
+from reports.pages.motor_words import (
+    greatest_friction,
+    limits_text,
+    motors_text,
+    slips,
+    tightest,
+)
 from reports.pages.names import leg_words, names_text, short_titles, shown_leg
 from reports.table import Table
 from reports.typeset import number_text
@@ -52,11 +70,17 @@ def robot_page(
     given: Settings, tables: Mapping[str, Table], out: Path, remarks: Sequence[str] = ()
 ) -> Page:
     """The page; see `write_robot_page`."""
-    robot, gait = given.robot, gait_of(given.robot.spec)
+    robot, motors = given.robot, given.motors
+    titles, friction = short_titles(given.catalog), given.forces.friction_coefficient
+    whose, limits = motors_text(motors), limits_text(tables, titles, friction)
     return Page(
         title=f"What it costs to actuate {robot.spec.name}, {gait_and_conditions(robot.spec)}",
-        answer=_answer(given, gait, tables, remarks),
+        notices=limits if motors.stated else (whose, *limits),
+        numbers=_numbers_first(given, motors, tables),
+        picture=first_picture(out),
+        answer=((whose,) if motors.stated else ()) + _answer(given, tables),
         sections=(
+            *((Section("Notes", (Points(tuple(remarks)),)),) if remarks else ()),
             gait_section(robot, out),
             energy_section(given, tables, out),
             actuators_section(given, out),
@@ -77,9 +101,49 @@ def files_of(tables: Mapping[str, Table]) -> dict[str, str]:
     }
 
 
-def _answer(
-    given: Settings, gait: Gait, tables: Mapping[str, Table], remarks: Sequence[str]
-) -> tuple[str, ...]:
+def first_picture(out: Path) -> FigureBlock:
+    """The picture at first sight, drawn for a narrow window."""
+    file = out / "electrical_energy_narrow.svg"
+    return FigureBlock(file, alt="Electrical energy of one cycle by alternative and joint.")
+
+
+def _numbers_first(
+    given: Settings, motors: Motors, tables: Mapping[str, Table]
+) -> tuple[Number, ...]:
+    """Power, the motors' mass, friction, and the limit that is nearest."""
+    energy, titles = tables["robot_energy"].columns, short_titles(given.catalog)
+    powers = dict(zip(energy["alternative"], energy["average_power_W"], strict=True))
+    powers = {n: p for n, p in powers.items() if n == given.own.usual} or powers
+    least, most = min(powers, key=powers.__getitem__), max(powers, key=powers.__getitem__)
+    ends = dict.fromkeys((least, most))
+    _, friction = greatest_friction(tables)
+    joint, quantity, share = tightest(tables["motor_limits"])
+    return (
+        Number(
+            f"{' to '.join(number_text(powers[n]) for n in ends)} W",
+            f"to walk: {' to '.join(titles[n] for n in ends)}",
+        ),
+        Number(
+            f"{number_text(motors.total)} kg" if motors.total else "\N{EN DASH}",
+            f"of motors in a robot of {number_text(motors.robot)} kg"
+            if motors.total
+            else "the motors' mass, which their files do not state",
+            "bad" if motors.too_heavy else "quiet",
+        ),
+        Number(
+            number_text(friction),
+            "coefficient of friction that the feet need",
+            "bad" if slips(friction, given.forces.friction_coefficient) else "good",
+        ),
+        Number(
+            f"{100 * share:.0f} %",
+            f"of the motor's {quantity.replace('_', ' ')} limit, `{joint}`",
+            "bad" if share > 1 else "good",
+        ),
+    )
+
+
+def _answer(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
     robot, energy = given.robot, tables["robot_energy"].columns
     joints = sorted({len(leg.joints) for leg in robot.spec.legs})
     held = len(robot.joints) - sum(len(leg.joints) for leg in robot.spec.legs)
@@ -87,23 +151,37 @@ def _answer(
     what = (
         f"**{robot.spec.name}**, {number_text(given.machine.mass)} kg on {len(robot.leg_names)} "
         f"legs of {' or '.join(map(str, joints))} joints{outside}, walks "
-        f"{_walk(given, gait)}."
+        f"{_walk(given, gait_of(robot.spec))}."
     )
     titles = short_titles(given.catalog)
     costs = "; ".join(
         f"{titles[name]} **{number_text(power)} W**"
-        + ("" if _missing(cot) else f" (cost of transport {number_text(cot)})")
-        for name, power, cot in zip(
-            energy["alternative"], energy["average_power_W"], energy["cost_of_transport"],
-            strict=True,
-        )
-    )  # fmt: skip
+        for name, power in zip(energy["alternative"], energy["average_power_W"], strict=True)
+    )
+    cost = f"**What it costs** to drive all joints, on average over one cycle: {costs}."
+    return (what, cost, *_fitted_and_known(given, tables))
+
+
+def _fitted_and_known(given: Settings, tables: Mapping[str, Table]) -> tuple[str, str]:
+    """A sentence on what was fitted, and one on what is known and what assumed."""
+    c = tables["parameters"].columns
+    own = [basis for group, basis in zip(c["group"], c["basis"], strict=True)
+           if group != given.robot.spec.name]  # fmt: skip
+    count = Counter(map(str, own))
+    elsewhere = count["calibrated"] + count["identified"]
+    effects = given.effects.names if given.effects else ()
+    here = f"{', '.join(effects)}, by the model file" if effects else "nothing to this robot"
+    more = (
+        f"; {elsewhere} of the {len(own)} numbers of the actuators were fitted to another machine"
+        if elsewhere
+        else ""
+    )
+    known = count["datasheet"] + count["published"] + count["derived"]
     return (
-        what,
-        f"**What it costs** to drive all joints, on average over one cycle: {costs}.",
-        _stability(tables["walking_stability"]),
-        breaches_text(tables["motor_limits"], titles),
-        *(f"**Note:** {remark}." for remark in remarks),
+        f"**Fitted:** {here}{more}.",
+        f"**Known:** bodies and joints by the URDF, {known} numbers of the actuators by data sheet "
+        f"or publication; {count['assumed']} are assumed. Every one with its source is under "
+        "*What went in*.",
     )
 
 
@@ -116,49 +194,15 @@ def _walk(given: Settings, gait: Gait) -> str:
     return ", ".join(said)
 
 
-def _missing(value: object) -> bool:
-    return value is None or (isinstance(value, float) and not np.isfinite(value))
-
-
 def _stability(table: Table) -> str:
     c = table.columns
     margins = np.array(c["least_margin_m"], dtype=float)
     at = int(margins.argmin())
-    frictions = np.array(c["greatest_friction_needed"], dtype=float)
-    slip = int(np.nanargmax(frictions))
     return (
         f"**Stability:** the centre of mass stays at least {number_text(1e3 * margins[at])} mm "
         f"inside the feet that stand ({c['segment'][at]}, at {number_text(c['at_time_s'][at])} s); "
-        f"the lightest foot carries {number_text(min(c['least_normal_force_N']))} N, and leg "
-        f"`{c['foot_of_greatest_friction'][slip]}` needs a coefficient of friction of "
-        f"{number_text(frictions[slip])}."
+        f"the lightest foot carries {number_text(min(c['least_normal_force_N']))} N."
     )
-
-
-def breaches_text(table: Table, titles: Mapping[str, str]) -> str:
-    """Which motors leave their data sheet, the worst of each alternative.
-
-    Args:
-        table: ``motor_limits``.
-        titles: Alternative to its title.
-    """
-    c = table.columns
-    over = [i for i, breach in enumerate(c["breach"]) if breach]
-    if not over:
-        return "**Motors:** every alternative's motor stays within its data sheet at every joint."
-    worst: dict[str, int] = {}
-    for i in over:
-        name = str(c["alternative"][i])
-        if name not in worst or c["peak"][i] / c["limit"][i] > (
-            c["peak"][worst[name]] / c["limit"][worst[name]]
-        ):
-            worst[name] = i
-    said = "; ".join(
-        f"{titles[name]}: {c['quantity'][i].replace('_', ' ')} of `{c['joint'][i]}` "
-        f"{number_text(c['peak'][i])} of {number_text(c['limit'][i])} {c['unit'][i]}"
-        for name, i in worst.items()
-    )
-    return f"**Motors beyond their data sheet** (the worst of each alternative): {said}."
 
 
 def energy_section(given: Settings, tables: Mapping[str, Table], out: Path) -> Section:
@@ -201,6 +245,7 @@ def _demand(robot: Robot, tables: Mapping[str, Table], out: Path) -> Section:
     leg = shown_leg(robot)
     joints = next(entry.joints for entry in robot.spec.legs if entry.name == leg)
     blocks: list[Text | FigureBlock | TableBlock | Points] = [
+        Text(_stability(tables["walking_stability"])),
         FigureBlock(out / "joint_torques.svg", "Torque of every joint, all legs."),
         FigureBlock(out / "ground_forces.svg", "Ground forces of all feet, margin of stability."),
         table_block(tables["walking_stability"], caption="Stability by set of standing feet."),

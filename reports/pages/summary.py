@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from pipeline.motion.gait import gait_table
@@ -14,15 +15,18 @@ from pipeline.simulation.settings import Settings
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Page, Points, Section, TableBlock, Text, table_block
-from reports.pages.names import shown_leg
+from reports.pages.motor_words import limits_text, motors_text
+from reports.pages.names import short_titles, shown_leg
 from reports.pages.paper_sections import paper_sections
 from reports.pages.robot_page import (
     FOOTER,
     actuators_section,
     energy_section,
     files_of,
+    first_picture,
     gait_section,
 )
+from reports.pages.summary_first import first_sentences, numbers_first
 from reports.pages.summary_words import answer, percent, roles_text
 from reports.table import Table
 
@@ -32,6 +36,18 @@ TONES = {
     "contradicted": "bad",
     "against the prior": "bad",
     "not determined": "quiet",
+}
+
+#: Every printed number beside ours; the first three columns are shown as one.
+_BESIDE = {
+    "quantity": "quantity",
+    "joint": "joint",
+    "unit": "unit",
+    "published": "paper",
+    "computed": "ours",
+    "verdict": "verdict",
+    "role": "role",
+    "where": "where",
 }
 
 
@@ -68,30 +84,30 @@ def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: P
         _parameters(judged.by, tables, given),
         _robot(given, out),
     ]
+    limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
     return Page(
         title="What it costs to actuate the hexapod, and whether the model agrees with the paper",
-        answer=answer(judged, tables),
-        sections=tuple(sections),
+        notices=limits,
+        numbers=numbers_first(judged),
+        picture=first_picture(out),
+        answer=(*first_sentences(judged), motors_text(given.motors, "the paper's")),
+        sections=(
+            Section("The answer in full", tuple(map(Text, answer(judged, tables)))),
+            *sections,
+        ),
         files=files_of(tables),
         footer=FOOTER,
     )
 
 
 def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
-    shown = {
-        "where": "where",
-        "quantity": "quantity",
-        "joint": "joint",
-        "unit": "unit",
-        "published": "paper",
-        "computed": "ours",
-        "role": "role",
-        "verdict": "verdict",
-    }
     if judged.by.results is None:
         return Section(
             "Every number the paper prints",
-            (Text(roles_text()), table_block(tables["reproduction"], shown, tones=TONES)),
+            (
+                Text(roles_text()),
+                _one_name(table_block(tables["reproduction"], _BESIDE, tones=TONES)),
+            ),
         )
     open_ = {
         "where": "where",
@@ -110,7 +126,7 @@ def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
         "Every number the paper prints",
         (
             Text(roles_text()),
-            table_block(tables["reproduction"], shown, tones=TONES),
+            _one_name(table_block(tables["reproduction"], _BESIDE, tones=TONES)),
             Text(
                 "What is known of them without the fit. *Prior*: 95 % of what data sheets and "
                 "literature say before anything is fitted. *Left out*: 95 % of what everything "
@@ -151,6 +167,21 @@ def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
                 },
             ),
         ),
+    )
+
+
+def _one_name(block: TableBlock) -> TableBlock:
+    """Quantity, joint and unit in one column: paper, ours and verdict fit on a narrow window."""
+    rows = tuple(
+        (f"{quantity}{f' {joint}' if joint else ''}{f' [{unit}]' if unit else ''}", *rest)
+        for quantity, joint, unit, *rest in block.rows
+    )
+    hint = "what is printed, joint of the middle right leg, unit"
+    return replace(
+        block,
+        headers=("quantity, joint", *block.headers[3:]),
+        rows=rows,
+        hints=(hint, *block.hints[3:]),
     )
 
 

@@ -25,8 +25,8 @@ _WORDS = {1: "one", 2: "two", 3: "three", 4: "four"}
 def answer(judged: Judged, tables: Mapping[str, Table]) -> tuple[str, ...]:
     """The paragraphs a reader in a hurry reads."""
     if judged.by.results is None:
-        return (_changed(judged), _energies(judged, tables), " ".join(_counted(judged)))
-    others = (_changed(judged),) if judged.by.word else ()
+        return (changed(judged), _energies(judged, tables), " ".join(_counted(judged)))
+    others = (changed(judged),) if judged.by.word else ()
     return (first_paragraph(judged), _energies(judged, tables), _posterior(judged), *others)
 
 
@@ -212,12 +212,12 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
     more = next(c for c in judged.judgement.conclusions if c.sentence.name == EXTRA)
     return text + (
         " Data sheets and literature alone, before any fit, put the irreversible gears at "
-        f"{_span(rows['walking_ratio_irreversible'].prior)} times the ideal drive's energy; in "
+        f"{span(rows['walking_ratio_irreversible'].prior)} times the ideal drive's energy; in "
         f"{percent(1 - more.prior_share)} of their draws walking takes less with irreversible than "
         "with reversible gears, and where it takes more, the irreversible ones pay above "
         f"{_percent(row.prior)} of the time standing. With everything fitted but their own two "
         "figures (almost 15 and the share of standing), irreversible gears take "
-        f"{_span(rows['walking_ratio_irreversible'].left_out)} times the ideal drive's energy."
+        f"{span(rows['walking_ratio_irreversible'].left_out)} times the ideal drive's energy."
     )
 
 
@@ -230,7 +230,8 @@ def _percent(interval: Interval) -> str:
     return f"{100 * interval[0]:.0f} to {percent(interval[1])}"
 
 
-def _span(interval: Interval) -> str:
+def span(interval: Interval) -> str:
+    """An interval with one decimal."""
     return f"{interval[0]:.1f} to {interval[1]:.1f}"
 
 
@@ -262,7 +263,8 @@ def _posterior(judged: Judged) -> str:
     )
 
 
-def _changed(judged: Judged) -> str:
+def changed(judged: Judged) -> str:
+    """What of the run is not the paper's."""
     return f"**Not the paper's:** {judged.by.word}."
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from actuators.chain import HoldingResult
 from pipeline.dynamics.contact_forces import ContactForces
@@ -88,12 +89,14 @@ def standing_posture(demand: JointDemand) -> Table:
 
 def standing_contacts(contacts: ContactForces) -> Table:
     """Feet and ground forces while standing."""
-    columns = {"foot": list(contacts.legs)}
+    columns: dict[str, Any] = {"foot": list(contacts.legs)}
     meanings = {"foot": ("leg whose foot this is", "")}
     for k, axis in enumerate("xyz"):
-        columns[f"{axis}_m"] = contacts.position[0, :, k]  # type: ignore[assignment]
+        columns[f"{axis}_m"] = contacts.position[0, :, k]
         meanings[f"{axis}_m"] = (f"foot point, {axis} in the base frame", "m")
     for k, axis in enumerate("xyz"):
-        columns[f"force_{axis}_N"] = contacts.force_world[0, :, k]  # type: ignore[assignment]
+        columns[f"force_{axis}_N"] = contacts.force_world[0, :, k]
         meanings[f"force_{axis}_N"] = (f"force of the ground on the robot, world {axis}", "N")
+    columns["friction_needed"] = contacts.friction_needed[0]
+    meanings["friction_needed"] = ("tangential over normal force; empty for a lifted foot", "1")
     return Table("standing_contacts", columns, meanings, "Standing still; lifted feet carry 0 N.")

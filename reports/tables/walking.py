@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from actuators.chain import ChainResult
 from actuators.energy.energy import loss_energies, stage_energies
-from actuators.energy.limits import limit_rows
+from actuators.energy.limits import LimitRow
 from actuators.energy.regeneration import BUS, Supply
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.dynamics.joint_demand import MotionDemand
@@ -317,11 +317,16 @@ def _support_energy(
     return total
 
 
-def motor_limits(results: Mapping[str, ChainResult]) -> Table:
-    """Peaks over the cycle against the motor's data sheet."""
+def motor_limits(limits: Mapping[str, Sequence[LimitRow]], name: str = "motor_limits") -> Table:
+    """Peaks over the cycle, or at standstill, against the motor's data sheet.
+
+    Args:
+        limits: By alternative.
+        name: Of the table.
+    """
     rows = [
         {
-            "alternative": name,
+            "alternative": alternative,
             "joint": row.joint,
             "quantity": row.quantity,
             "unit": row.unit,
@@ -331,11 +336,11 @@ def motor_limits(results: Mapping[str, ChainResult]) -> Table:
             "share_of_time_over": row.share_over,
             "breach": row.breach,
         }
-        for name, result in results.items()
-        for row in limit_rows(result)
+        for alternative, own in limits.items()
+        for row in own
     ]
     return table_from_rows(
-        "motor_limits",
+        name,
         rows,
         {
             "alternative": ALTERNATIVE,

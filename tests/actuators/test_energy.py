@@ -15,7 +15,7 @@ from actuators.energy.energy import (
     stage_energies,
     stage_energy,
 )
-from actuators.energy.limits import limit_rows, rms_over_time, time_over
+from actuators.energy.limits import limit_rows, rms_over_time, standing_rows, time_over
 from actuators.energy.regeneration import supply
 from actuators.errors import EnergyError
 from actuators.loading.build import load_catalog
@@ -187,6 +187,20 @@ def test_limits_of_a_fast_and_a_slow_joint():
     assert rows["fast", "voltage"].breach
     assert not any(r.breach for (joint, _), r in rows.items() if joint == "slow")
     assert rows["slow", "rms_current"].limit == 5.77
+
+
+def test_limits_at_standstill_in_closed_form():
+    """I = T / k and U = R I; the continuous current binds, since standing has no end."""
+    chain = CHAINS["ideal"]
+    k, ratio = chain.motor.torque_constant, chain.ratio
+    motor = replace(chain.motor, resistance=170.0)
+    holding = replace(chain, motor=motor).holding(np.array([30.71, -0.01]))
+    rows = {(r.joint, r.quantity): r for r in standing_rows(holding, ("a", "b"), (motor, motor))}
+    assert len(rows) == 6
+    assert rows["a", "voltage"].peak == pytest.approx(170.0 * 30.71 / ratio / k)
+    assert (rows["a", "voltage"].limit, rows["a", "voltage"].breach) == (24.0, True)
+    assert rows["a", "rms_current"].peak == pytest.approx(30.71 / ratio / k)
+    assert [key for key, row in rows.items() if row.breach] == [("a", "voltage")]
 
 
 def test_root_mean_square_of_a_line_is_exact():

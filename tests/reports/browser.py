@@ -9,6 +9,7 @@ import shutil
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,11 +27,16 @@ frame.onload = () => {{
   out.page = root.scrollWidth;
   out.tables = [...d.querySelectorAll('.wide')].map((e) => ({{
     frame: e.clientWidth, table: e.scrollWidth, right: box(e).right,
-    scrolls: d.defaultView.getComputedStyle(e).overflowX }}));
-  out.pictures = [...d.images].map((e) => ({{ left: box(e).left, right: box(e).right,
+    scrolls: d.defaultView.getComputedStyle(e).overflowX,
+    columns: Object.fromEntries([...e.querySelectorAll('th')].map(
+      (h) => [h.textContent, box(h).right])) }}));
+  out.pictures = [...d.images].map((e) => ({{ left: box(e.parentElement).left,
+    right: box(e.parentElement).right, scale: box(e).width / e.naturalWidth,
     shape: (box(e).width / box(e).height) / (e.naturalWidth / e.naturalHeight) }}));
-  out.beyond = [...d.querySelectorAll('body *')].filter((e) => !e.closest('.wide table')
+  out.beyond = [...d.querySelectorAll('body *')].filter((e) => !e.closest('.wide table, figure a')
     && box(e).right > root.clientWidth + 1).map((e) => e.tagName + ' ' + e.className);
+  out.numbers = d.querySelectorAll('.numbers li').length;
+  out.first = box(d.querySelector('.first')).bottom;
   document.getElementById('m').textContent = JSON.stringify(out);
 }};
 frame.srcdoc = {page};
@@ -39,13 +45,24 @@ frame.srcdoc = {page};
 
 @dataclass(frozen=True)
 class Layout:
-    """What stands where in a window of one width [px]."""
+    """What stands where in a window of one width [px]; pictures by their frames."""
 
     window: float
     page: float
-    tables: list[dict[str, object]]
+    tables: list[dict[str, Any]]
     pictures: list[dict[str, float]]
     beyond: list[str]
+    numbers: int
+    first: float
+
+    def at_first_sight(self) -> bool:
+        """Four numbers, the picture and the answer: one screen, two of a telephone."""
+        return self.numbers == 4 and self.first <= (800 if self.window > 640 else 1600)
+
+    @property
+    def letters(self) -> float:
+        """Height of the letters of the smallest picture, of which 12 px are the usual [px]."""
+        return 12 * min(picture["scale"] for picture in self.pictures)
 
 
 def run(folder: Path, *options: str) -> str:

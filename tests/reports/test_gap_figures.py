@@ -14,6 +14,7 @@ from reports.figures.gap.signature import Signature, binned, gap_signature_figur
 from reports.figures.gap.waterfall import GapStep, gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
+from reports.figures.style import NARROW
 from reports.tables.gap import deciding_motion, found
 from tests.reports import geometry
 
@@ -74,6 +75,16 @@ def test_waterfall_bars_join_up() -> None:
     assert [round(b.get_x(), 6) for b in bars] == [0.0, 0.6, 0.2, 0.0]
     with pytest.raises(FigureError, match="negative"):
         gap_waterfall_figure(-1.0, steps, 0.1, "A", title="t")
+
+
+def test_narrow_waterfall_can_be_read_on_a_telephone() -> None:
+    """Labels above the bars, nothing outside, letters of 9 pt on 4.6 in."""
+    steps = [GapStep(f"coulomb friction at rm_joint_{k}", 0.8 / k) for k in range(1, 5)]
+    figure = gap_waterfall_figure(1.0, steps, 0.1, "A", title="t", subtitle="s", width=NARROW)
+    assert geometry.outside(figure) == []
+    assert geometry.overlapping(figure) == []
+    assert {s.label for s in steps} <= {text.get_text() for text in figure.axes[0].texts}
+    assert not figure.axes[0].get_yticklabels()[0].get_text()
 
 
 def test_where_map_shows_every_known_cell() -> None:

@@ -16,6 +16,7 @@ from tests.reports import geometry
 
 NAMES = (
     *("gait", "robot", "zero_pose", "electrical_energy", "joint_torques", "ground_forces"),
+    "electrical_energy_narrow",
     *(
         f"{kind}_{alternative}"
         for kind in ("actuator_chain", "motor_limits", "stage_energy")

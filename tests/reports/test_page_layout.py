@@ -47,7 +47,7 @@ def test_nothing_is_wider_than_the_window(page: Path, tmp_path: Path, width: int
     assert seen.page <= seen.window
     assert seen.beyond == []
     for picture in seen.pictures:
-        assert 0 <= picture["left"] < picture["right"] <= seen.window
+        assert 0 <= picture["left"] < picture["right"] <= seen.window  # its frame, which scrolls
         assert picture["shape"] == pytest.approx(1.0, abs=0.06)  # with its frame
     assert len(seen.tables) == 2
     for table in seen.tables:

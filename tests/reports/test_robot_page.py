@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,10 +13,14 @@ from pipeline.api.figures import drawings
 from pipeline.api.tables import table_of_parameters, tables_of_standing, tables_of_walking
 from pipeline.simulation.settings import Settings, settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand, walk
-from reports.html import html
-from reports.page import FigureBlock, Page
-from reports.pages.robot_page import robot_page
+from reports.figures.several import save_figures
+from reports.html import html, write_html
+from reports.markdown import markdown
+from reports.page import FigureBlock, Page, Points, Section, Text
+from reports.pages.motor_words import limits_text, motors_text
+from reports.pages.robot_page import first_picture, robot_page
 from reports.table import Table
+from tests.reports.browser import layout, needs_chromium
 
 Run = tuple[Settings, Standing, Walking, Mapping[str, Table]]
 
@@ -44,19 +49,51 @@ def test_the_title_names_robot_and_gait(page: tuple[Page, Path]) -> None:
     assert page[0].title == "What it costs to actuate solo12, crawl gait"
 
 
-def test_the_first_paragraphs_say_robot_cost_stability_motors(
+def test_the_first_paragraphs_say_robot_cost_what_is_fitted_and_known(
     page: tuple[Page, Path], solo: Run
 ) -> None:
-    what, cost, stability, motors, remark = page[0].answer
+    what, cost, fitted, known = page[0].answer
     assert "2.5" in what
     assert "4 legs of 3 joints" in what
-    tables = solo[3]
+    given, _, _, tables = solo
     for power in tables["robot_energy"].columns["average_power_W"]:
         assert f"{power:.3g}"[:3] in cost
+    bases = [p.basis for c in given.catalog.components.values() for p in c.parameters.rows()]
+    assert f"{bases.count('calibrated')} of the {len(bases)} numbers" in fitted
+    assert f"{bases.count('assumed')} are assumed" in known
     least = min(tables["walking_stability"].columns["least_margin_m"])
-    assert f"{1e3 * least:.3g}"[:3] in stability
-    assert motors.startswith("**Motors")
-    assert remark == "**Note:** a remark."
+    (said,) = (s.blocks[0] for s in page[0].sections if s.heading.endswith("stability"))
+    assert isinstance(said, Text)
+    assert f"{1e3 * least:.3g}"[:3] in said.text
+    assert page[0].sections[0] == Section("Notes", (Points(("a remark",)),))
+
+
+def test_whose_motors_are_assumed_stands_first(page: tuple[Page, Path], solo: Run) -> None:
+    """With their mass from the motor's file: 12 of 0.48 kg are heavier than the robot."""
+    whose, beyond = page[0].notices
+    for words in ("none are stated", "maxon RE 40", "400:1", "5.76 kg", "2.50 kg", "init-actuator"):
+        assert words in whose
+    assert "weigh more than the robot" in whose
+    _, mass, friction, share = page[0].numbers
+    assert (mass.value, mass.tone) == ("5.76 kg", "bad")
+    columns = solo[3]["motor_limits"].columns
+    worst = max(p / limit for p, limit in zip(columns["peak"], columns["limit"], strict=True))
+    assert (share.value, share.tone) == (f"{100 * worst:.0f} %", "bad")
+    needed = max(solo[3]["walking_stability"].columns["greatest_friction_needed"])
+    assert (friction.value, friction.tone) == (f"{needed:.3g}", "good")
+    assert beyond.startswith("**Beyond the motors:** walking takes ")
+    assert markdown(page[0], page[1]).index(whose[:40]) < 200
+
+
+def test_motors_that_are_stated_are_no_assumption(root: Path) -> None:
+    folder = root / "tests" / "pipeline" / "data_files" / "xl330_actuators"
+    motors = settings(robot=root / "urdf" / "solo12.toml", actuators=folder, walks=False).motors
+    text = motors_text(motors)
+    assert motors.stated
+    assert "as stated for this robot, XL330-M288" in text
+    assert "state no `mass`" in text
+    assert "init-actuator" not in text
+    assert "weigh" not in text
 
 
 def test_every_figure_of_the_run_is_on_the_page_but_plain_ones(
@@ -70,7 +107,9 @@ def test_every_figure_of_the_run_is_on_the_page_but_plain_ones(
         if isinstance(block, FigureBlock)
     }
     drawn = {d.name for d in drawings(given, standing, walking)} | {"gait_steps"}
-    assert drawn - shown == {"stage_energy_ideal", "stage_energy_rotor"}
+    first = page[0].picture
+    assert first is not None
+    assert drawn - shown == {"stage_energy_ideal", "stage_energy_rotor", first.file.stem}
     assert shown <= drawn
 
 
@@ -79,7 +118,7 @@ def test_another_robots_page_has_no_word_of_the_paper_but_sources_of_numbers(
 ) -> None:
     content, folder = page
     sections = tuple(s for s in content.sections if s.heading != "What went in")
-    text = html(Page(content.title, content.answer, sections, content.files), folder)
+    text = html(replace(content, sections=sections), folder)
     plain = re.sub(r"<style>.*?</style>|data:[^\"]*", "", text, flags=re.S)
     assert not re.search(r"\bpaper\b|Fig\. \d|\bsection III\b|hexapod|reproduced", plain)
 
@@ -90,14 +129,49 @@ def test_tables_of_another_robot_have_no_word_of_the_paper(solo: Run) -> None:
         assert not re.search(r"\bpaper\b|Fig\.|section III|hexapod", meanings), table.name
 
 
-def test_motors_within_their_limits_are_said_to_be(solo: Run, tmp_path: Path) -> None:
-    from reports.pages.robot_page import breaches_text
+def limits(table: Table, **columns: object) -> Table:
+    return Table(table.name, dict(table.columns) | columns, table.meanings, table.description)
 
-    table = solo[3]["motor_limits"]
-    columns = dict(table.columns) | {"breach": [False] * table.rows}
-    calm = Table(table.name, columns, table.meanings, table.description)
+
+def test_what_motors_and_ground_cannot_give_is_said(solo: Run) -> None:
+    """Each quantity once, by its worst joint; friction against what the ground offers."""
+    tables = {name: solo[3][name] for name in ("motor_limits", "walking_stability")}
+    table, rows = tables["motor_limits"], tables["motor_limits"].rows
     titles = {str(name): str(name) for name in table.columns["alternative"]}
-    assert "stays within its data sheet" in breaches_text(calm, titles)
-    over = dict(columns) | {"breach": [i == 0 for i in range(table.rows)]}
-    text = breaches_text(Table(table.name, over, table.meanings), titles)
+    calm = tables | {"motor_limits": limits(table, breach=[False] * rows)}
+    assert limits_text(calm, titles, None) == ()
+    over = limits(
+        table,
+        breach=[i in (0, 3) for i in range(rows)],
+        quantity=["current", "x", "x", "rms_current"] + ["x"] * (rows - 4),
+        peak=[9.0] * rows,
+        limit=[4.0] * rows,
+    )
+    (text,) = limits_text({"motor_limits": over}, titles, None)
+    assert "walking takes 9 A where the motor bears 4 A at most" in text
+    assert "9 A root mean square where the motor bears 4 A continuously" in text
     assert str(table.columns["joint"][0]) in text
+    stability = tables["walking_stability"]
+    steep = [2.6] + [0.1] * (stability.rows - 1)
+    slippery = calm | {"walking_stability": limits(stability, greatest_friction_needed=steep)}
+    (text,) = limits_text(slippery, titles, None)
+    assert "needs a coefficient of friction of **2.6**" in text
+    assert "`--friction-coefficient 0.8`" in text
+    assert limits_text(slippery, titles, 3.0) == ()
+
+
+@needs_chromium
+@pytest.mark.parametrize("width", [1280, 400])
+def test_all_of_it_is_seen_at_first_sight(
+    solo: Run, page: tuple[Page, Path], tmp_path: Path, width: int
+) -> None:
+    given, standing, walking, _ = solo
+    (first,) = (
+        d for d in drawings(given, standing, walking) if d.name == "electrical_energy_narrow"
+    )
+    save_figures([first], tmp_path)
+    content = replace(page[0], picture=first_picture(tmp_path), sections=())
+    seen = layout(write_html(content, tmp_path / "index.html"), width, tmp_path)
+    assert seen.at_first_sight()
+    assert seen.letters >= 9.5
+    assert seen.page <= seen.window

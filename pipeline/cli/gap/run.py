@@ -37,9 +37,9 @@ from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.folder.staging import staged
-from reports.pages import gap_words as words
 from reports.pages.gap_report import write_report
 from reports.table import Table
+from reports.typeset import plain
 from reports.writer import write_table
 
 logger = logging.getLogger("legwatt")
@@ -207,10 +207,10 @@ def _say_where(where: Whereabouts) -> None:
 
 
 def _say_answer(story: Story, bodies: FoundBodies, out: Path) -> None:
-    from reports.pages.gap_report import answer
+    from reports.pages.gap_report import answer, whose_motors
 
-    for paragraph in answer(story, bodies):
-        print(words.plain(paragraph))
+    for paragraph in (whose_motors(story), *answer(story, bodies)):
+        print(plain(paragraph))
     print(f"written to {out}")
 
 

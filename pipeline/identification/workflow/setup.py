@@ -29,6 +29,7 @@ from pipeline.logs.reading.plan import plan_reading
 from pipeline.logs.reading.table_file import sha256
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
+from pipeline.machine.motors import Motors, motors_of
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
 from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.payload import with_payload
@@ -61,6 +62,7 @@ class Setup:
         file: The model file whose edits are in `model`; without edits where none was given.
         bare: The model before those edits.
         warnings: What of the files a reader should know, in words.
+        folder: Of the actuator files, the user's or the project's.
         mimics: Joints of the URDF that mimic another, to the other's name; no log may move them.
     """
 
@@ -76,6 +78,17 @@ class Setup:
     bare: MachineModel
     warnings: tuple[str, ...] = ()
     mimics: Mapping[str, str] = field(default_factory=dict)
+    folder: Path = CATALOG
+
+    @property
+    def motors(self) -> Motors | None:
+        """Whose motors the logs are compared with; None where torque is compared at the joints."""
+        if not self.alternative:
+            return None
+        used = {self.alternative: self.own.actuators(self.catalog, self.alternative)}
+        mass = float(sum(inertia.mass for inertia in self.bare.rigid.inertias))
+        stated = self.folder != CATALOG
+        return motors_of(self.catalog, self.own, used, self.bare.joints, mass, stated=stated)
 
     @property
     def legged(self) -> bool:
@@ -137,6 +150,7 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         alternative=alternative,
         file=file,
         bare=bare,
+        folder=parts.folder,
         warnings=(*parts.remarks, *odd, *(given_file.changed if given_file else ())),
         mimics=mimics_in(text, str(path)),
     )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 from actuators.loading.build import Catalog
+from actuators.units import dimension
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
@@ -30,7 +31,9 @@ def fingerprint(
     out |= _gait(spec)
     out["standing.feet"] = repr(spec.standing_feet)
     out["legs"] = repr([(leg.name, leg.joints, leg.foot, leg.side) for leg in spec.legs])
-    out |= {f"{component}.{p.name}": p.value for component, p in catalog.rows()}
+    # No law takes a part's mass.
+    parts = [(component, p) for component, p in catalog.rows() if dimension(p.unit) != "mass"]
+    out |= {f"{component}.{p.name}": p.value for component, p in parts}
     for name, a in catalog.alternatives.items():
         elements = [(e.name, e.law, e.stage, sorted(e.arguments.items())) for e in a.elements]
         out[f"alternatives.{name}"] = repr((a.motor, a.ratio, elements))

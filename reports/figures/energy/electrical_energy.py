@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from textwrap import shorten
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reports.errors import FigureError
-from reports.figures.style import CYCLE, QUIET, headline, new_figure, number, styled
+from reports.figures.style import (
+    CYCLE,
+    QUIET,
+    WIDTH,
+    headline,
+    name_rows,
+    new_figure,
+    number,
+    styled,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +36,7 @@ def electrical_energy_figure(
     reference: str | None,
     title: str,
     subtitle: str = "",
+    width: float = WIDTH,
 ) -> Figure:
     """Electrical energy of all alternatives, one stacked bar each, split by joint.
 
@@ -35,6 +46,7 @@ def electrical_energy_figure(
         reference: The alternative to which the ratio at the end of a bar is; None for no ratio.
         title: First line.
         subtitle: Second line.
+        width: [in]; names stand above their bars where it is less than usual.
 
     Raises:
         FigureError: Shapes that do not fit, nothing to draw, or no such reference.
@@ -46,38 +58,42 @@ def electrical_energy_figure(
     totals = {name: float(a.sum()) for name, a in alternatives.items()}
     base = totals[reference] if reference is not None else 0.0
     widest = max(*totals.values(), 1e-9)
-    figure = new_figure(0.62 * len(alternatives) + 1.55)
+    narrow = width < WIDTH
+    row_height, rest = (0.5, 1.35) if narrow else (0.62, 1.55)  # [in]
+    figure = new_figure(row_height * len(alternatives) + rest, width)
     headline(figure, title, subtitle)
     axes = figure.subplots()
+    thick, names = 0.45 if narrow else 0.62, []
     for row, (name, parts) in enumerate(alternatives.items()):
         left = 0.0
         for j, value in enumerate(parts):
             color = CYCLE[j % len(CYCLE)]
-            axes.barh(row, value, left=left, height=0.62, color=color, edgecolor="white")
-            if value > 0.05 * widest:
+            axes.barh(row, value, left=left, height=thick, color=color, edgecolor="white")
+            if value > (0.1 if narrow else 0.05) * widest:
                 axes.text(
                     left + value / 2, row, number(value), ha="center", va="center", color="white"
                 )
             left += value
         ratio = ""
         if name != reference and base > 0:
-            ratio = f"   {number(totals[name] / base)} \N{MULTIPLICATION SIGN} {reference}"
-        axes.text(left + 0.008 * widest, row, f"{number(left)} J{ratio}", va="center")
-    _name_joints(axes, joints)
-    axes.set_yticks(range(len(alternatives)), list(alternatives))
+            times = f"{number(totals[name] / base)} \N{MULTIPLICATION SIGN}"
+            ratio = f", {times}" if narrow else f"   {times} {reference}"
+        names.append(f"{shorten(name, 44)}: {number(left)} J{ratio}" if narrow else name)
+        if not narrow:
+            axes.text(left + 0.008 * widest, row, f"{number(left)} J{ratio}", va="center")
+    _name_joints(axes, joints, 0.18 if narrow else 0.12)
+    name_rows(axes, names, thick, above=narrow)
     axes.set_ylim(len(alternatives) - 0.5, -0.95)
-    axes.set_xlim(0, 1.25 * widest)
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
+    axes.set_xlim(0, (1.02 if narrow else 1.25) * widest)
     axes.set_xlabel("electrical energy per cycle [J]")
     return figure
 
 
-def _name_joints(axes: Axes, joints: Sequence[str]) -> None:
+def _name_joints(axes: Axes, joints: Sequence[str], apart: float) -> None:
     """Joint names in their colours above the first bar, spaced like the words they are."""
     for j, joint in enumerate(joints):
         axes.text(
-            0.005 + min(0.12, 0.98 / len(joints)) * j,
+            0.005 + min(apart, 0.98 / len(joints)) * j,
             1.0,
             joint,
             transform=axes.transAxes,

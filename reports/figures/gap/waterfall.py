@@ -14,7 +14,9 @@ from reports.figures.style import (
     INK,
     ORANGE,
     QUIET,
+    WIDTH,
     headline,
+    name_rows,
     new_figure,
     number,
     styled,
@@ -22,6 +24,7 @@ from reports.figures.style import (
 from reports.typeset import unit_text
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 #: A change below this share of the whole gap is none.
@@ -50,6 +53,7 @@ def gap_waterfall_figure(
     *,
     title: str,
     subtitle: str = "",
+    width: float = WIDTH,
 ) -> Figure:
     """Draw it from top to bottom.
 
@@ -60,6 +64,7 @@ def gap_waterfall_figure(
         unit: Of all.
         title: Headline.
         subtitle: Second line.
+        width: [in]; labels stand above their bars where it is less than usual.
 
     Raises:
         FigureError: A negative gap.
@@ -67,23 +72,13 @@ def gap_waterfall_figure(
     if min([before, noise_floor, *(s.gap for s in steps)]) < 0:
         raise FigureError("waterfall: a gap is negative; give root mean squares")
     labels = ["model as it was", *(s.label for s in steps), "what is left"]
-    figure = new_figure(0.42 * len(labels) + 1.5)
+    narrow = width < WIDTH
+    figure = new_figure((0.54 if narrow else 0.42) * len(labels) + 1.5, width)
     ax = figure.subplots()
+    thick = 0.42 if narrow else 0.62
     gaps = [before, *(s.gap for s in steps)]
-    ax.barh(0, before, color=ORANGE, height=0.62)
-    ax.text(before, 0, f" {number(before)}", va="center", fontsize=8.5)
-    for k, (old, new) in enumerate(pairwise(gaps), start=1):
-        ax.barh(k, old - new, left=new, color=GREEN if new < old else ORANGE, height=0.62)
-        ax.plot([old, old], [k - 1 + 0.31, k - 0.31], color=QUIET, linewidth=0.8)
-        sign = "\N{MINUS SIGN}" if new <= old else "+"
-        change = f"{sign}{number(abs(old - new), 2)}"
-        if abs(new - old) < _NOTHING * before:
-            change = "0"
-        ax.text(max(old, new), k, f" {change}", va="center", fontsize=8.5)
     last = len(labels) - 1
-    ax.barh(last, gaps[-1], color=BLUE, height=0.62)
-    if last > 1:
-        ax.plot([gaps[-1]] * 2, [last - 1 + 0.31, last - 0.31], color=QUIET, linewidth=0.8)
+    _bars(ax, gaps, thick)
     beside = max(gaps[-1], noise_floor if gaps[-1] > 0.5 * noise_floor else 0.0)
     ax.text(beside, last, f" {number(gaps[-1])}", va="center", fontsize=8.5)
     ax.axvline(noise_floor, color=INK, linewidth=1.0, linestyle=(0, (4, 2)))
@@ -95,12 +90,28 @@ def gap_waterfall_figure(
         fontsize=8,
         color=QUIET,
     )
-    ax.set_yticks(range(len(labels)), labels)
-    ax.invert_yaxis()
-    ax.set_xlim(0, 1.14 * max([*gaps, noise_floor]))
+    name_rows(ax, labels, thick, above=narrow)
+    ax.set_xlim(0, (1.2 if narrow else 1.14) * max([*gaps, noise_floor]))
     ax.set_ylim(last + 0.55, -1.05)
-    ax.tick_params(axis="y", length=0)
-    ax.spines["left"].set_visible(False)
     ax.set_xlabel(f"gap on held-out data, root mean square [{unit_text(unit)}]")
     headline(figure, title, subtitle)
     return figure
+
+
+def _bars(ax: Axes, gaps: Sequence[float], thick: float) -> None:
+    """The gap before, each fall or rise, and what is left."""
+    ax.barh(0, gaps[0], color=ORANGE, height=thick)
+    ax.text(gaps[0], 0, f" {number(gaps[0])}", va="center", fontsize=8.5)
+    for k, (old, new) in enumerate(pairwise(gaps), start=1):
+        ax.barh(k, old - new, left=new, color=GREEN if new < old else ORANGE, height=thick)
+        ax.plot([old, old], [k - 1 + thick / 2, k - thick / 2], color=QUIET, linewidth=0.8)
+        sign = "\N{MINUS SIGN}" if new <= old else "+"
+        change = f"{sign}{number(abs(old - new), 2)}"
+        if abs(new - old) < _NOTHING * gaps[0]:
+            change = "0"
+        ax.text(max(old, new), k, f" {change}", va="center", fontsize=8.5)
+    last = len(gaps)
+    ax.barh(last, gaps[-1], color=BLUE, height=thick)
+    if last > 1:
+        ends = [last - 1 + thick / 2, last - thick / 2]
+        ax.plot([gaps[-1]] * 2, ends, color=QUIET, linewidth=0.8)

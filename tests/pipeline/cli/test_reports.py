@@ -18,6 +18,7 @@ FIGURES = (
     *(f"joint_demand_rm_joint_{k}" for k in (1, 2, 3)),  # Fig. 2 to 4
     *(f"stage_energy_{a}" for a in ("ideal", "rotor", "reversible", "irreversible")),  # 14 to 20
     "electrical_energy",
+    "electrical_energy_narrow",
     "robot",
     "gait",
 )
@@ -85,6 +86,13 @@ def test_nothing_of_the_page_is_cut(reports: Path, tmp_path: Path, width: int) -
     assert len(seen.pictures) >= 10
     for table in seen.tables:
         assert table["table"] <= table["frame"] or table["scrolls"] == "auto"
+    assert seen.at_first_sight() or width == 800
+    assert seen.letters >= 9
+    beside = [t["columns"] for t in seen.tables if {"paper", "ours"} <= set(t["columns"])]
+    assert len(beside) == 2  # every printed number; the conclusions
+    for columns in beside:
+        verdict = columns.get("verdict", columns.get("holds"))
+        assert columns["paper"] < columns["ours"] < verdict <= seen.window
 
 
 @needs_chromium

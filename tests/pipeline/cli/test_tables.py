@@ -59,6 +59,10 @@ TABLES = {
         ["alternative", "joint", "quantity", "unit", "limit", "peak", "breach"],
         4 * 18 * 4,
     ),
+    "standing_limits": (
+        ["alternative", "joint", "quantity", "limit", "peak", "breach"],
+        4 * 18 * 3,
+    ),
     "parameters": (["parameter", "value", "unit", "basis", "source", "interval_low"], None),
 }
 

@@ -13,6 +13,7 @@ import pytest
 from pipeline.cli.demo import DEMO, HIDDEN, SLOW, write_demo
 from pipeline.effects.model_file import load_model, read_model_file
 from tests.command_line import exit_code, rows_of, sidecar_of
+from tests.reports.browser import layout, needs_chromium
 
 COLUMNS = {
     "quality": "log column check value unit verdict detail",
@@ -23,7 +24,7 @@ COLUMNS = {
 }
 SAME_FOR = 3.0  # [s] of the shipped logs
 SAME_SHARE = 0.95  # of all samples
-FIGURES = ("where_map", "waterfall", "in_time", "effect_1_coulomb_friction")
+FIGURES = ("where_map", "waterfall", "waterfall_narrow", "in_time", "effect_1_coulomb_friction")
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +70,20 @@ def test_pictures_and_page_are_there(run: tuple[int, Path]) -> None:
     page = (out / "index.html").read_text(encoding="utf-8")
     assert "<script" not in page
     assert "data:image/svg+xml" in page
+
+
+@needs_chromium
+@pytest.mark.parametrize("width", [1280, 400])
+def test_the_answer_is_seen_at_first_sight(
+    run: tuple[int, Path], tmp_path: Path, width: int
+) -> None:
+    seen = layout(run[1] / "index.html", width, tmp_path)
+    assert seen.at_first_sight()
+    assert seen.letters >= 9
+    assert seen.beyond == []
+    first = (run[1] / "report.md").read_text(encoding="utf-8").split("##")[0]
+    for said in ("**Fitted:**", "**Predicted:**", "**Whose motors:** none are stated", "8.64 kg"):
+        assert said in first
 
 
 @pytest.mark.slow

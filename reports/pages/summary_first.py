@@ -1,0 +1,86 @@
+"""What the paper's page shows at first sight: four numbers, what is fitted, what is predicted."""
+
+from __future__ import annotations
+
+from pipeline.paper.calibration.problem import EVEN
+from pipeline.paper.judgement.basis import Judged
+from pipeline.paper.judgement.conclusions import Conclusion
+from pipeline.paper.judgement.reproduction import REPRODUCED, headline
+from reports.page import Number
+from reports.pages.summary_words import changed, percent, span
+from reports.typeset import number_text
+
+#: Sentences of the paper whose numbers stand first, where the run has them.
+_FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
+
+
+def numbers_first(judged: Judged) -> tuple[Number, ...]:
+    """What the paper's main sentences come to here, and how many of its numbers are predicted."""
+    said = {c.sentence.name: c for c in judged.judgement.conclusions}
+    out = [_number(said[name], judged) for name in _FIRST if name in said]
+    met, of = headline(judged.judgement.reproduction)["prediction"]
+    if of and judged.by.results is not None:
+        label = "*predicted:* printed numbers that were neither put in nor fitted, nor follow"
+        out.append(Number(f"{met} of {of}", label, "good" if met == of else "bad"))
+    return tuple(out)
+
+
+def _number(row: Conclusion, judged: Judged) -> Number:
+    share = row.sentence.name == EVEN
+    value = (
+        percent(row.computed, 1)
+        if share
+        else f"{number_text(row.computed)} \N{MULTIPLICATION SIGN}"
+    )
+    part = "computed anew" if judged.by.results is None else row.sentence.part
+    return Number(value, f"*{part}:* {row.sentence.text}", "quiet" if row.holds else "bad")
+
+
+def first_sentences(judged: Judged) -> tuple[str, ...]:
+    """What it is about, what was fitted, what is predicted, and what is known without the fit."""
+    rows = {row.published.id: row for row in judged.judgement.reproduction}
+    mass = f" of {rows['robot_mass'].published.value:g} kg" if "robot_mass" in rows else ""
+    about = (
+        f"A paper compares drives for the joints of a six-legged robot{mass}: an *ideal* one, one "
+        "with a real motor's *rotor*, *reversible* gears, and *irreversible* gears, which lock "
+        "when the motor is off. It prints energies, not the friction behind them."
+    )
+    if judged.by.results is None:
+        return about, changed(judged)
+    count = headline(judged.judgement.reproduction)
+    total = sum(of for _, of in count.values())
+    fitted = (
+        f"**Fitted:** the friction of motors and gears, to {count['target'][1]} of the {total} "
+        "numbers that the paper prints; that these agree is no evidence."
+    )
+    predicted = [r for r in rows.values() if r.published.role == "prediction"]
+    each = "; ".join(
+        f"{_named(r.published.where, r.published.quantity, r.published.joint)}: "
+        f"{number_text(r.computed)} where {number_text(r.published.value)} is printed"
+        for r in predicted
+    )
+    met = sum(r.verdict == REPRODUCED for r in predicted)
+    words = (
+        f"**Predicted:** {len(predicted)} of them, {met} reproduced ({each}). The rest were put "
+        "in, follow from these, are zero by symmetry, or are contradicted by the paper itself."
+    )
+    return about, fitted, words, *_known(judged), *((changed(judged),) if judged.by.word else ())
+
+
+def _named(where: str, quantity: str, joint: str) -> str:
+    return f"{where}, {quantity}{f' of joint {joint}' if joint else ''}"
+
+
+def _known(judged: Judged) -> tuple[str, ...]:
+    """What data sheets and literature say of the paper's ratios before anything is fitted."""
+    parts = [
+        f"{span(c.prior)} (paper: {c.sentence.printed}) with {c.sentence.name.rpartition('_')[2]}"
+        for c in judged.judgement.conclusions
+        if c.sentence.name in _FIRST and c.sentence.name != EVEN
+    ]
+    if not parts:
+        return ()
+    return (
+        "**Known without the fit:** data sheets and literature alone put walking at "
+        f"{' and '.join(parts)} gears, times the ideal drive's energy (95 %).",
+    )
