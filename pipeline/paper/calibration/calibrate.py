@@ -74,14 +74,14 @@ class Effort:
         seed: Of everything random.
     """
 
-    starts: int = 4
-    robots: int = 400
+    starts: int = 3
+    robots: int = 300
     ensembles: int = 2
     steps: int = 3000
-    left_out_steps: int = 600
+    left_out_steps: int = 900
     sets: int = 250
     left_out_sets: int = 60
-    prior_draws: int = 400
+    prior_draws: int = 300
     sobol: int = 256
     workers: int = 2
     seed: int = 1

@@ -31,7 +31,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize.elementwise import find_root
 
 from actuators.chain import Chain
-from pipeline.paper.calibration.batch import Bank, drawn, outcome
+from pipeline.paper.calibration.batch import Bank, BatchOutcome, drawn, outcome
 from pipeline.paper.calibration.machine import PUBLISHED_LEG, with_splits
 from pipeline.paper.calibration.prior import Free
 from pipeline.paper.calibration.problem import EXTRA, Problem, Target
@@ -51,11 +51,11 @@ SOLVED = {
 }
 WALKERS = 32
 _STARTS = 100  # times four draws per walker, before none is said to fit
-_STEP = 1e-4  # of a prior standard deviation, for the slope of a target
-_CLOSE = 1e-6  # of a prior standard deviation, to which a coordinate is solved for
+_STEP = 1e-3  # of a prior standard deviation, for the slope of a target
+_CLOSE = 1e-4  # of a prior standard deviation, to which a coordinate is solved for
 _REACH = 0.2  # how far a step goes to another robot, as a share of the bank
-_MOVES = (0.7, 0.1, 0.2)  # shares of the three kinds of steps
-_STAGES = 3
+_MOVES = (0.65, 0.05, 0.3)  # shares of the three kinds of steps
+_SETTLING = 0.15  # of the steps, twice, before any is kept
 
 
 @dataclass(frozen=True)
@@ -149,8 +149,10 @@ class Posterior:
         sets = self.as_sets(x)
         for name, free in self.solved.items():
             kept = np.flatnonzero(np.isfinite(log))
-            found, density = self._solved(name, free, sets.taken(kept), self._goal(name, x[kept]))
-            log[kept] += density
+            own = sets.taken(kept)
+            goal, unit = self._goal(name, x[kept]), self._unit(name, own)
+            found, density = self._solved(name, free, own, goal * unit)
+            log[kept] += density + np.log(unit)
             sets.values[free.key][kept] = found
         kept = np.flatnonzero(np.isfinite(log))
         log[kept] += self._likelihood(sets.taken(kept))
@@ -177,23 +179,21 @@ class Posterior:
     def _chain(self, sets: _Sets, name: str) -> Chain:
         return self.task.catalog.chain(name, with_splits(sets.values, self.ratio))
 
+    def _unit(self, name: str, sets: _Sets) -> Array:
+        """What a solved target is a multiple of, (W,): the ideal actuator's energy, or 1."""
+        if name in (HELD, EXTRA):
+            return np.ones(sets.demand.count)
+        return drawn(sets.demand, self._chain(sets, "ideal"))
+
     def _target(self, name: str) -> Callable[[_Sets], Array]:
-        """A solved target as a function of sets of numbers, (W,)."""
+        """A solved target in its `_unit` as a function of sets of numbers, (W,)."""
         alternative = name.removeprefix("walking_ratio_")
         if name == HELD:
             # The torque of joint 2 is negative: the upper end of what holds is the least.
             return lambda s: self._chain(s, "reversible").holding(s.demand.standing).high[1]
         if name == EXTRA:
-            return self._extra
-        return lambda s: (
-            drawn(s.demand, self._chain(s, alternative)) / drawn(s.demand, self._chain(s, "ideal"))
-        )
-
-    def _extra(self, sets: _Sets) -> Array:
-        legs = [outcome(sets.demand, self._chain(sets, name)).energy for name in PAIR]
-        reversible, irreversible = (np.mean(list(energy.values()), axis=0) for energy in legs)
-        extra: Array = irreversible - reversible
-        return extra
+            return lambda s: _extra(*(outcome(s.demand, self._chain(s, a)) for a in PAIR))
+        return lambda s: drawn(s.demand, self._chain(s, alternative))
 
     def _solved(self, name: str, free: Free, sets: _Sets, goal: Array) -> tuple[Array, Array]:
         """The number that gives a target, and the log density it brings, (W,) each."""
@@ -219,7 +219,8 @@ class Posterior:
         good = np.flatnonzero(root.success)
         log = np.full(count, -np.inf)
         z = root.x[good]
-        slope = (at(z + _STEP, every[good]) - at(z - _STEP, every[good])) / (2 * _STEP)
+        step = np.where(z + _STEP > ends[1][good], -_STEP, _STEP)  # towards the inside
+        slope = (at(z + step, every[good]) - root.f_x[good]) / step
         log[good] = -0.5 * z**2 - np.log(np.abs(slope))
         value = np.full(count, free.centre)
         value[good] = free.at(z)
@@ -238,7 +239,7 @@ class Posterior:
         for name in self.targets.keys() - self.solved.keys():
             target = self.targets[name]
             if name == EXTRA:
-                value = self._extra(sets)
+                value = _extra(*(found[a] for a in PAIR))
             else:
                 alternative = name.removeprefix("walking_ratio_")
                 value = (
@@ -246,6 +247,13 @@ class Posterior:
                 )
             good &= np.abs(value - target.centre) <= target.half_width
         return np.where(good, 0.0, -np.inf)
+
+
+def _extra(reversible: BatchOutcome, irreversible: BatchOutcome) -> Array:
+    """Energy per middle leg and cycle by which the irreversible actuator draws more, (W,) [J]."""
+    energies = [np.mean(list(o.energy.values()), axis=0) for o in (reversible, irreversible)]
+    extra: Array = energies[1] - energies[0]
+    return extra
 
 
 def _moves(
@@ -288,8 +296,8 @@ def _moves(
 def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int = WALKERS) -> Array:
     """One ensemble of walkers, started from draws of the prior that have a density.
 
-    The first third of the steps turns towards the prior's draws, the second towards those of the
-    Gaussian with the walkers' mean and covariance, the last likewise, and only it is kept.
+    Steps turn towards draws of the prior at first, then towards those of a Gaussian with the
+    walkers' mean and covariance, found anew after a while; from then on they are kept.
 
     Args:
         posterior: The density.
@@ -308,7 +316,8 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
     own = posterior.continuous
     centre, factor = np.zeros(own.size), np.eye(own.size)
     chain = np.empty(0)
-    for _ in range(_STAGES):
+    settling = max(int(_SETTLING * steps), 2)
+    for length in (settling, settling, steps - 2 * settling):
         sampler = emcee.EnsembleSampler(
             walkers,
             posterior.size,
@@ -318,7 +327,7 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
         )
         # emcee draws acceptances from a state of its own.
         sampler.random_state = np.random.RandomState(int(rng.integers(2**31))).get_state()
-        x = sampler.run_mcmc(x, steps // _STAGES, skip_initial_state_check=True).coords
+        x = sampler.run_mcmc(x, length, skip_initial_state_check=True).coords
         chain = sampler.get_chain()
         recent = chain[len(chain) // 2 :].reshape(-1, posterior.size)[:, own]
         centre, factor = recent.mean(axis=0), np.linalg.cholesky(np.cov(recent.T))

@@ -220,7 +220,7 @@ def posterior(
         seed: Of the run.
         number: Of the ensemble; no two of a run have the same.
         without: Targets left out, which the others then predict.
-        steps: Of every walker; the first third is left out.
+        steps: Of every walker; the first three tenths are left out.
         bank_size: Robots to choose from.
 
     Returns:

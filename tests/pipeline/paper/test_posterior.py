@@ -58,10 +58,10 @@ def test_many_sets_at_once_are_each_set_by_itself(
         for name, aim in zip(density.aimed, x[density.aims], strict=True):
             target = density.targets[name]
             wanted = target.centre + aim * target.half_width
-            assert point.values[name] == pytest.approx(wanted, rel=1e-5)
+            assert point.values[name] == pytest.approx(wanted, abs=1e-3 * target.half_width)
         for target in task.targets:
             missed = abs(point.values[target.name] - target.centre)
-            assert missed <= target.half_width * (1 + 1e-4), target.name
+            assert missed <= target.half_width * (1 + 1e-3), target.name
 
 
 def test_a_target_rises_or_falls_with_the_number_that_is_solved_for(
