@@ -332,7 +332,7 @@ def calibration(rows: Sequence[Calibrated]) -> Table:
             "at_lower_share": ("share of the posterior at the number's lower bound", "1"),
             "at_upper_share": ("share of the posterior at the number's upper bound", "1"),
             "verdict": ("; ".join(f"{v}: {meaning}" for v, meaning in VERDICTS.items()), ""),
-            "r_hat": ("rank-normalised split R-hat over the walkers; 1 where they agree", "1"),
+            "r_hat": ("nested R-hat of groups of walkers; 1 where they agree", "1"),
             "effective_sample_size": ("independent draws that say as much", "1"),
         },
     )

@@ -16,7 +16,7 @@ import numpy as np
 from actuators.loading.build import CATALOG
 from pipeline.paper.calibration import search
 from pipeline.paper.calibration.checkpoint import Checkpoint
-from pipeline.paper.calibration.machine import MIDDLE_LEGS
+from pipeline.paper.calibration.machine import MIDDLE_LEGS, ROBOT
 from pipeline.paper.calibration.prior import PRIOR_FILE, Prior
 from pipeline.paper.calibration.problem import EXTRA, Problem, fixed_before
 from pipeline.paper.calibration.search import Reading
@@ -31,6 +31,7 @@ Point = dict[str, Any]
 Progress = Callable[[str, int], Callable[[int], None]]
 logger = logging.getLogger("legwatt")
 AXES_DEG = (0.0, 15.0, 30.0, 45.0, 90.0)
+_GROUPS = 8  # of walkers, which have to agree
 AT_BOUND = 0.02  # coordinates this close to a bound count as lying at it
 COUNTS = (1, 2)  # middle legs that Fig. 21 counts as loaded
 #: Every axis with either count, and at the vertical axis consumption net of what returns.
@@ -180,9 +181,11 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
 
     Returns:
         Per number, coordinates of the prior or SI for the motor's constants: quantiles, mean,
-        standard deviation, shares at bounds, rank-normalised split R-hat over the walkers and
-        effective sample size (Vehtari et al., Bayesian Analysis 16, 667, 2021); the share of each
-        path with its standard error.
+        standard deviation, shares at bounds, nested R-hat, which is made for many short chains
+        (Margossian et al., Bayesian Analysis 2024), of eight groups of walkers, and effective
+        sample size (Vehtari et al., Bayesian Analysis 16, 667, 2021); the share of each path with
+        its standard error. Of robots the bank holds no more than it does: where they matter, their
+        effective number counts as well.
     """
     from arviz_stats.base import array_stats
 
@@ -192,9 +195,16 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
     no_bound = np.full(len(KEYS), np.inf)
     lower, upper = (np.append(b, e) for b, e in ((prior.lower, -no_bound), (prior.upper, no_bound)))
     axes = {"chain_axis": 0, "draw_axis": 1}
+    groups = np.arange(len(walkers)) * _GROUPS // len(walkers)
+    own = [key.startswith(f"{ROBOT}.") for key in prior.keys]
+    _, counts = np.unique(z[..., own].reshape(-1, sum(own)), axis=0, return_counts=True)
+    robots = float(counts.sum() ** 2 / (counts.astype(float) ** 2).sum())
     numbers = {}
     for key, values, least, most in zip((*prior.keys, *KEYS), every, lower, upper, strict=True):
         low, high = np.quantile(values, [0.025, 0.975])
+        effective = float(array_stats.ess(values, **axes))
+        if key.startswith(f"{ROBOT}."):
+            effective = _both(effective, robots)
         numbers[key] = {
             "low": float(low),
             "high": float(high),
@@ -202,22 +212,30 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
             "spread": float(values.std()),
             "at_lower": float(np.mean(values - least < AT_BOUND)),
             "at_upper": float(np.mean(most - values < AT_BOUND)),
-            "r_hat": float(array_stats.rhat(values, **axes)),
-            "effective": float(array_stats.ess(values, **axes)),
+            "r_hat": float(array_stats.rhat_nested(values, superchain_ids=groups, **axes)),
+            "effective": effective,
         }
     paths = {}
     for path in search.PATHS:
         taken = np.array([[float(p["path"] == path) for p in own] for own in walkers])
         share = float(taken.mean())
-        effective = float(array_stats.ess(taken, **axes)) if 0 < share < 1 else math.nan
-        error = math.sqrt(share * (1 - share) / effective) if 0 < share < 1 else 0.0
+        error = 0.0
+        if 0 < share < 1:
+            effective = _both(float(array_stats.ess(taken, **axes)), robots)
+            error = math.sqrt(share * (1 - share) / effective)
         paths[path] = {"share": share, "standard_error": error}
     return {
         "numbers": numbers,
         "paths": paths,
         "walkers": len(walkers),
         "sets": int(z.shape[0] * z.shape[1]),
+        "robots": robots,
     }
+
+
+def _both(draws: float, robots: float) -> float:
+    """Effective sample size of draws that take their robots from a bank of so many."""
+    return 1 / (1 / draws + 1 / robots)
 
 
 def _task(robot: Path) -> Problem:

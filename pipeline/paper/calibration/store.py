@@ -81,7 +81,7 @@ class Calibrated:
         at_lower: Share of the posterior at the lower bound [1].
         at_upper: Share of the posterior at the upper bound [1].
         verdict: One of `VERDICTS`.
-        r_hat: How well the walkers agree on it: 1 where they do [1].
+        r_hat: How well groups of walkers agree on it: 1 where they do [1].
         effective: Effective number of independent draws behind these numbers.
     """
 

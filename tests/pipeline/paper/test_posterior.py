@@ -109,13 +109,13 @@ def test_agreement_of_walkers_is_measured() -> None:
                 }
                 for _ in range(60)
             ]
-            for k in range(6)
+            for k in range(16)
         ]
 
     together, apart = (posterior_summary(walkers(a), prior) for a in (0.0, 2.0))
     for key in prior.keys:
         assert together["numbers"][key]["r_hat"] < 1.05
-        assert together["numbers"][key]["effective"] > 150
+        assert together["numbers"][key]["effective"] > 300
         assert apart["numbers"][key]["r_hat"] > 1.5
     share = together["paths"]["cubic"]
     assert share["share"] == pytest.approx(0.25, abs=4 * share["standard_error"])
