@@ -22,6 +22,7 @@ from pipeline.cli.named_path import named_path
 from pipeline.cli.view import add_view_options
 from pipeline.cli.walk_options import add_force_options, add_machine_options
 from pipeline.errors import PipelineError, StanceError
+from pipeline.progress import Progress
 
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
 DEFAULT_ROBOT = Path("urdf/hexapod.toml")
@@ -163,10 +164,11 @@ def _folder_held(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _run_reports(options: argparse.Namespace) -> int:
-    with _folder_held(options):
+    with _folder_held(options), Progress(options.verb) as progress:
+        progress.step("loading")
         from pipeline.cli.run import run
 
-        return run(options)
+        return run(options, progress)
 
 
 def _run_view(options: argparse.Namespace) -> int:
@@ -176,10 +178,11 @@ def _run_view(options: argparse.Namespace) -> int:
 
 
 def _run_gap(options: argparse.Namespace) -> int:
-    with _folder_held(options):
+    with _folder_held(options), Progress(options.verb) as progress:
+        progress.step("loading")
         from pipeline.cli.gap.run import run_gap
 
-        return run_gap(options)
+        return run_gap(options, progress)
 
 
 def _run_twin(options: argparse.Namespace) -> int:
