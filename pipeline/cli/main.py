@@ -239,6 +239,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # who reads has enough: `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK
-    except KeyboardInterrupt:
-        print("interrupted; nothing is half-written", file=sys.stderr)
+    except KeyboardInterrupt as reason:
+        print(str(reason) or "interrupted; nothing is half-written", file=sys.stderr)
         return 130
