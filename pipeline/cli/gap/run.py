@@ -85,13 +85,7 @@ def run(options: Options, progress: Progress) -> int:
         where = find_where(given, given.model, intake, parts, fitted)
         tables = [quality_table(where.intake.findings), where_table(where.rows)]
         if options.step == "where":
-            with _staged(options, given) as folder:
-                _tables_into(folder, options, given, tables)
-                write_where_map(where.rows, given.model.joints, given.model.name, folder)
-            progress.close()
-            _say_warnings(given, where.intake.findings)
-            _say_where(where)
-            return EXPLAINED
+            return _where(given, where, options, tables, progress)
         if options.step == "forward":
             progress.step("driving the model by its servos")
             return _drive(given, where, options, progress)
@@ -126,6 +120,19 @@ def _answer_tables(told: Told, given: Setup) -> list[Table]:
         *([base_table(naming)] if naming.base else []),
         *([motion_table(told.deciding, given.model.joints)] if told.deciding else []),
     ]
+
+
+def _where(
+    given: Setup, where: Whereabouts, options: Options, tables: Sequence[Table], progress: Progress
+) -> int:
+    """Step `where`."""
+    with _staged(options, given) as folder:
+        _tables_into(folder, options, given, tables)
+        write_where_map(where.rows, given.model.joints, given.model.name, folder)
+    progress.close()
+    _say_warnings(given, where.intake.findings)
+    _say_where(where)
+    return EXPLAINED
 
 
 def _drive(given: Setup, where: Whereabouts, options: Options, progress: Progress) -> int:
