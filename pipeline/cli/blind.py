@@ -198,12 +198,7 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
         save_figure(draw(hidden, named, counts, text), folder, "blind_confusion")
     for r in reached:
         if r.trials:
-            low, high = r.interval
-            mark = "reached" if r.reached else "not reached"
-            aim = f", aim {r.aim[0]:.0%} to {r.aim[1]:.0%} {mark}" if r.aim else ""
-            print(
-                f"{r.name}: {r.hits} of {r.trials} = {r.value:.1%} ({low:.1%} to {high:.1%}){aim}"
-            )
+            print(r)
     usual = sorted(seconds)[len(seconds) // 2]
     print(f"{len(trials)} trials; an answer takes {usual:.1f} s of computing (median)")
     return 0 if all(r.reached for r in reached if r.trials) else 1

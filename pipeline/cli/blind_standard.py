@@ -110,12 +110,7 @@ def _write(rows: Sequence[Row], out: Path, seed: int, seconds: Sequence[float]) 
             write_table(table, folder, meta=meta)
     for r in reached:
         if r.trials:
-            low, high = r.interval
-            mark = "reached" if r.reached else "not reached"
-            aim = f", aim {r.aim[0]:.0%} to {r.aim[1]:.0%} {mark}" if r.aim else ""
-            print(
-                f"{r.name}: {r.hits} of {r.trials} = {r.value:.1%} ({low:.1%} to {high:.1%}){aim}"
-            )
+            print(r)
     usual = seconds[len(seconds) // 2]
     print(f"{len(rows)} trials; an answer takes {usual:.1f} s of computing (median)")
     return 0 if all(r.reached for r in reached if r.trials) else 1

@@ -111,7 +111,7 @@ def test_a_stopped_run_goes_on_and_judges(
         rows = list(csv.DictReader(file))
     assert [row["outcome"] for row in rows] == ["nothing"] * 3
     printed = capsys.readouterr().out
-    assert printed.index("sha256") < printed.index("nothing_found_in_empty_logs: 3 of 3")
+    assert printed.index("sha256") < printed.index("nothing hidden: nothing named): 3 of 3")
     assert (out / "blind_confusion.png").exists()
     before = (out / "blind_trials.csv").read_bytes()
     assert main(["blind", "--out", str(out), "--workers", "1", "--resume"]) == 0
