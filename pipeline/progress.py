@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import shutil
 import sys
 from threading import Event, Lock, Thread
 from time import perf_counter
@@ -66,11 +67,20 @@ class Progress:
         self._ended, self._lock = Event(), Lock()
 
     def __enter__(self) -> Progress:
-        if sys.stderr.isatty() and not logger.isEnabledFor(logging.INFO):
+        loud = logger.isEnabledFor(logging.INFO)
+        if self._bar is None and sys.stderr.isatty() and not loud:
             from tqdm import tqdm
 
             form = "{desc:<36}|{bar}| {elapsed}, about {remaining} left"
-            self._bar = tqdm(total=1.0, bar_format=form, leave=False, smoothing=0.0)
+            size = shutil.get_terminal_size()  # 80 by 24 where the terminal does not say
+            self._bar = tqdm(
+                total=1.0,
+                bar_format=form,
+                leave=False,
+                smoothing=0.0,
+                ncols=size.columns - 1,
+                nrows=size.lines,
+            )
             Thread(target=self._watch, daemon=True).start()
         return self
 

@@ -73,7 +73,8 @@ def parser() -> argparse.ArgumentParser:
     add_twin_options(twin)
     twin.set_defaults(run=_run_twin)
 
-    blind = _verb(verbs, "blind", "simulate machines with hidden effects and count how often gap finds them")
+    text = "simulate machines with hidden effects and count how often gap finds them"
+    blind = _verb(verbs, "blind", text)
     add_blind_options(blind)
     blind.set_defaults(run=_run_blind)
 

@@ -50,6 +50,19 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         "stand where the log has neither foot forces nor contacts; the lowest feet without it",
     )
     _machine_options(sub)
+    _comparison_options(sub)
+    sub.add_argument(
+        "--out",
+        type=named_path,
+        default=DEFAULT_OUT,
+        help=f"folder for what is written; {DEFAULT_OUT}",
+    )
+    add_decimal_option(sub)
+    sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
+
+
+def _comparison_options(sub: argparse.ArgumentParser) -> None:
+    """What of the logs is compared, and how."""
     sub.add_argument("--mapping", type=named_path, help="mapping file (TOML) for foreign columns")
     sub.add_argument(
         "--effort",
@@ -69,14 +82,6 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help="test on this last share of every log instead of on blocks in between",
     )
-    sub.add_argument(
-        "--out",
-        type=named_path,
-        default=DEFAULT_OUT,
-        help=f"folder for what is written; {DEFAULT_OUT}",
-    )
-    add_decimal_option(sub)
-    sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 
 
 def _machine_options(sub: argparse.ArgumentParser) -> None:
