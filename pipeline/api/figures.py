@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -39,7 +40,13 @@ SUBJECT_TITLES = {
 
 
 def write_figures(
-    given: Settings, standing: Standing, walking: Walking, out: Path, *, paper: bool = False
+    given: Settings,
+    standing: Standing,
+    walking: Walking,
+    out: Path,
+    *,
+    paper: bool = False,
+    done: Callable[[float], None] | None = None,
 ) -> int:
     """Draw and save every figure of a run.
 
@@ -49,12 +56,14 @@ def write_figures(
         walking: Its result.
         out: Folder.
         paper: Whether the run is held against the paper, whose figures are then named.
+        done: Told the share that is drawn.
 
     Returns:
         How many.
     """
     write_gait_steps(Scenery(given.robot), walking, out)
-    return 1 + save_figures(drawings(given, standing, walking, paper=paper), out)
+    every = drawings(given, standing, walking, paper=paper)
+    return 1 + save_figures(every, out, done=done)
 
 
 def drawings(

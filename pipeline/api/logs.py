@@ -16,11 +16,12 @@ from pipeline.effects.model_file import edits_in
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.workflow.forward import forward as drive_forward
 from pipeline.identification.workflow.forward import rms
-from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where, judged
+from pipeline.identification.workflow.locate import Whereabouts, find_where, judged
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
 from pipeline.identification.workflow.story import Story, tell
 from pipeline.identification.workflow.validate import check
+from pipeline.progress import Progress
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.table import Table
 

@@ -18,6 +18,7 @@ from pipeline.api.tables import (
 )
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import RobotFileError
+from pipeline.progress import Progress
 from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand
@@ -89,7 +90,13 @@ def _refuse_stand(given: Settings) -> None:
         )
 
 
-def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple[str, ...]:
+def write(
+    given: Settings,
+    verb: str,
+    folder: Path,
+    decimal: str = ".",
+    progress: Progress | None = None,
+) -> tuple[str, ...]:
     """Compute what a verb asks for, then write it.
 
     Args:
@@ -97,6 +104,7 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         verb: ``stand``, ``walk`` or ``reports``.
         folder: For everything written.
         decimal: Sign of decimals in copies of the tables.
+        progress: Told what is being done.
 
     Returns:
         What was written and what a reader should not overlook, a line each.
@@ -106,28 +114,34 @@ def write(given: Settings, verb: str, folder: Path, decimal: str = ".") -> tuple
         ReportError: The folder cannot be written.
     """
     _refuse_stand(given)
+    progress = progress or Progress()
     said: list[str] = []
     tables: list[Table] = []
     standing = walking = None
     if verb in ("stand", "reports"):
+        progress.step("standing")
         logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
         standing = stand(given.machine, given.chains(), adjust=given.adjust, forces=given.ground)
         tables += tables_of_standing(given, standing)
     if verb in ("walk", "reports"):
+        progress.step("walking")
         logger.info("walking one cycle, %d samples per segment", given.samples)
         walking = walked(given, given.chains())
+        progress.step("tables of walking")
         tables += tables_of_walking(given, walking)
     tables.append(table_of_parameters(given))
     judgement = None
     if verb == "reports":
+        progress.step("comparing with the paper")
         judgement, more = _held_against_the_paper(given, said)
         tables += more
+    progress.step("writing tables")
     with staged(folder, verb, inputs=inputs_of(given)) as out:
         for table in tables:
             write_table(table, out, meta=metadata(given), decimal=decimal)
         files = len(tables)
         if standing is not None and walking is not None:
-            files += _pictures(given, (standing, walking), judgement, tables, out, said)
+            files += _pictures(given, (standing, walking), judgement, tables, out, said, progress)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
     remarks = given.effects.remarks if given.effects else ()
     return (*_first_lines(given, tables, judgement), *said, *given.remarks, *remarks)
@@ -170,14 +184,15 @@ def _pictures(
     tables: list[Table],
     out: Path,
     said: list[str],
+    progress: Progress,
 ) -> int:
     """Figures and pages; how many files."""
     from pipeline.api import judgement as judging
     from pipeline.api.figures import write_figures
     from reports.pages.robot_page import write_robot_page
 
-    logger.info("drawing figures")
-    files = write_figures(given, *results, out, paper=judged is not None)
+    progress.step("drawing figures")
+    files = write_figures(given, *results, out, paper=judged is not None, done=progress.done)
     if judged is not None:
         return files + judging.pages(given, judged, tables, out)
     remarks = given.effects.remarks if given.effects else ()

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +20,9 @@ _ROOT = Path(__file__).parents[2]
 #: An answer takes some ten seconds of computing; after this much it counts as failed [s].
 _PATIENCE: Final = 120
 FAILED: Final = -1
+#: Processes that answer now, and whether they are to end.
+_running: Final[set[subprocess.Popen[bytes]]] = set()
+_stopped: Final = threading.Event()
 
 
 @dataclass(frozen=True)
@@ -77,6 +81,18 @@ class Answer:
     message: str = ""
 
 
+def begin_answers() -> None:
+    """Let answers be given, after others were stopped."""
+    _stopped.clear()
+
+
+def stop_answers() -> None:
+    """End the processes that answer; none begins after them."""
+    _stopped.set()
+    for process in list(_running):
+        process.kill()
+
+
 def ask(folder: str, robot: str, out: str, more: Sequence[str] = ()) -> dict[str, Any]:
     """Run `gap name` in a folder that holds nothing but log, robot and actuators.
 
@@ -100,15 +116,22 @@ def ask(folder: str, robot: str, out: str, more: Sequence[str] = ()) -> dict[str
     )
     with tempfile.TemporaryFile() as said:
         # The limit is one of computing time: other work on the machine must not cost an answer.
-        limited = ["/bin/sh", "-c", f'ulimit -t {_PATIENCE}; exec "$@"', "gap", *command]
+        # Ctrl-C is answered by the process that asks: it ends this one with `stop_answers`.
+        prepared = f"ulimit -t {_PATIENCE}; trap '' INT; exec \"$@\""
+        limited = ["/bin/sh", "-c", prepared, "gap", *command]
         process = subprocess.Popen(
             limited, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=said
         )
+        _running.add(process)
         try:
+            if _stopped.is_set():
+                process.kill()
             _, status, used = os.wait4(process.pid, 0)
         except BaseException:
             process.kill()
             raise
+        finally:
+            _running.discard(process)
         process.returncode = os.waitstatus_to_exitcode(status)
         said.seek(0)
         lines = said.read().decode(errors="replace").strip().splitlines()

@@ -35,10 +35,38 @@ class Rate:
 
     @property
     def reached(self) -> bool:
-        """Whether the share lies inside the aim; where nothing is aimed at it does."""
+        """Whether the share lies inside the aim; where nothing is aimed at it does.
+
+        An aim with two ends, as of the coverage of intervals, is missed above only beyond chance:
+        6 of 6 are no sign that intervals are too wide.
+        """
         if self.aim is None:
             return True
-        return bool(self.trials) and self.aim[0] <= self.value <= self.aim[1]
+        low, high = self.aim
+        most = self.interval[0] if low > 0.0 and high < 1.0 else self.value
+        return bool(self.trials) and low <= self.value and most <= high
+
+    def __str__(self) -> str:
+        """Counts, share with its interval, aim and verdict in one line."""
+        low, high = self.interval
+        text = (
+            f"{self.name} ({self.meaning}): {self.hits} of {self.trials} = {self.value:.1%}, "
+            f"95 % interval of this share {low:.1%} to {high:.1%}"
+        )
+        if self.aim is None:
+            return text
+        verdict = "reached" if self.reached else "missed"
+        if (
+            not self.aim[0] <= self.value <= self.aim[1]
+            and low <= self.aim[1]
+            and high >= self.aim[0]
+        ):
+            verdict = (
+                "above it by no more than chance, which is no miss"
+                if self.reached
+                else f"missed, though a share inside it is not excluded by {self.trials} trials"
+            )
+        return f"{text}; aim {self.aim[0]:.0%} to {self.aim[1]:.0%}: {verdict}"
 
 
 def wilson(hits: int, trials: int) -> tuple[float, float]:

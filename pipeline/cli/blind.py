@@ -11,7 +11,7 @@ import argparse
 import hashlib
 import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -31,7 +31,7 @@ from pipeline.blind.truth import hidden_truths
 from pipeline.blind.twin.matrix import TrialSpec, trial_matrix
 from pipeline.blind.twin.trial import ROBOT_FILES
 from pipeline.cli.blind_standard import run_standard
-from pipeline.cli.blind_steps import clear, hash_of, pool, progress, together
+from pipeline.cli.blind_steps import clear, hash_of, pool, processes, progress, together
 from pipeline.logs.errors import GapError
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.paper.calibration.checkpoint import Checkpoint
@@ -103,10 +103,10 @@ def seal(specs: Sequence[TrialSpec], out: Path, seed: int, workers: int) -> list
     ]
     # One simulation at a time per process: libraries' own threads would only get in the way.
     with (
-        pool(ProcessPoolExecutor(workers)) as processes,
+        pool(processes(workers)) as makers,
         progress("making trials", len(tasks)) as tick,
     ):
-        made = point.run(processes, make, tasks, tick)
+        made = point.run(makers, make, tasks, tick)
     sealed = [Sealed(spec, m["sha256"], m["robot"]) for spec, m in zip(specs, made, strict=True)]
     for s in sorted(sealed, key=lambda s: s.spec.number):
         print(f"trial {s.spec.number:04d} sha256 {s.sha256}")
@@ -198,12 +198,7 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
         save_figure(draw(hidden, named, counts, text), folder, "blind_confusion")
     for r in reached:
         if r.trials:
-            low, high = r.interval
-            mark = "reached" if r.reached else "not reached"
-            aim = f", aim {r.aim[0]:.0%} to {r.aim[1]:.0%} {mark}" if r.aim else ""
-            print(
-                f"{r.name}: {r.hits} of {r.trials} = {r.value:.1%} ({low:.1%} to {high:.1%}){aim}"
-            )
+            print(r)
     usual = sorted(seconds)[len(seconds) // 2]
     print(f"{len(trials)} trials; an answer takes {usual:.1f} s of computing (median)")
     return 0 if all(r.reached for r in reached if r.trials) else 1

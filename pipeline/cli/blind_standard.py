@@ -9,7 +9,7 @@ import argparse
 import hashlib
 import json
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Final
 
@@ -20,7 +20,7 @@ from pipeline.blind.standard.make import MORE, ROBOT, make_standard
 from pipeline.blind.standard.rows import Row, by_effect, rates, reliability, trial_row
 from pipeline.blind.standard.score import score_straight
 from pipeline.blind.twin.fixed.matrix import StandardSpec, standard_matrix
-from pipeline.cli.blind_steps import clear, hash_of, pool, progress, together
+from pipeline.cli.blind_steps import clear, hash_of, pool, processes, progress, together
 from pipeline.logs.errors import GapError
 from pipeline.paper.calibration.checkpoint import Checkpoint
 
@@ -57,10 +57,10 @@ def _seal(specs: Sequence[StandardSpec], out: Path, seed: int, workers: int) -> 
         for s in specs
     ]
     with (
-        pool(ProcessPoolExecutor(workers)) as processes,
+        pool(processes(workers)) as makers,
         progress("making trials", len(tasks)) as tick,
     ):
-        return [m["sha256"] for m in point.run(processes, make_standard, tasks, tick)]
+        return [m["sha256"] for m in point.run(makers, make_standard, tasks, tick)]
 
 
 def _answer(
@@ -110,12 +110,7 @@ def _write(rows: Sequence[Row], out: Path, seed: int, seconds: Sequence[float]) 
             write_table(table, folder, meta=meta)
     for r in reached:
         if r.trials:
-            low, high = r.interval
-            mark = "reached" if r.reached else "not reached"
-            aim = f", aim {r.aim[0]:.0%} to {r.aim[1]:.0%} {mark}" if r.aim else ""
-            print(
-                f"{r.name}: {r.hits} of {r.trials} = {r.value:.1%} ({low:.1%} to {high:.1%}){aim}"
-            )
+            print(r)
     usual = seconds[len(seconds) // 2]
     print(f"{len(rows)} trials; an answer takes {usual:.1f} s of computing (median)")
     return 0 if all(r.reached for r in reached if r.trials) else 1

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import multiprocessing
 import shutil
+import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import Executor
+from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
+
+from pipeline.blind.answer import begin_answers, stop_answers
 
 _ROOT: Final = Path(__file__).parents[2]
 
@@ -43,13 +47,27 @@ def clear(out: Path) -> None:
 
 @contextmanager
 def pool(pool: Executor) -> Iterator[Executor]:
-    """A pool that drops what has not begun when it is interrupted."""
+    """A pool that drops what has not begun and ends what runs when it is interrupted."""
+    begin_answers()
     try:
         yield pool
-    except BaseException:
+    except BaseException as reason:
         pool.shutdown(wait=False, cancel_futures=True)
+        stop_answers()
+        for process in multiprocessing.active_children():
+            process.terminate()
+        if isinstance(reason, KeyboardInterrupt):
+            text = "interrupted; finished trials are kept, --resume goes on from them"
+            raise KeyboardInterrupt(text) from None
         raise
     pool.shutdown()
+
+
+def processes(workers: int) -> ProcessPoolExecutor:
+    """Processes that leave Ctrl-C to the one that started them."""
+    return ProcessPoolExecutor(
+        workers, initializer=signal.signal, initargs=(signal.SIGINT, signal.SIG_IGN)
+    )
 
 
 @contextmanager

@@ -23,6 +23,7 @@ from pipeline.cli.named_path import named_path
 from pipeline.cli.view import add_view_options
 from pipeline.cli.walk_options import add_force_options, add_machine_options
 from pipeline.errors import PipelineError, StanceError
+from pipeline.progress import Progress
 
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE = 0, 1, 2
 DEFAULT_ROBOT = Path("urdf/hexapod.toml")
@@ -32,7 +33,7 @@ logger = logging.getLogger("legwatt")
 
 
 class _Parser(argparse.ArgumentParser):
-    """Errors in one line, as everywhere else."""
+    """Errors in one line, as everywhere else; a verb's own help begins with what it does."""
 
     def error(self, message: str) -> None:  # type: ignore[override]
         self.exit(EXIT_UNUSABLE, f"{self.prog}: {message}; see {self.prog} --help\n")
@@ -40,7 +41,14 @@ class _Parser(argparse.ArgumentParser):
 
 def parser() -> argparse.ArgumentParser:
     """The command line's grammar."""
-    root = _Parser(prog="python -m pipeline", description=__doc__.splitlines()[0])
+    root = _Parser(
+        prog="python -m pipeline",
+        description="The electrical energy it takes to actuate a legged robot, and, from measured "
+        "logs, what its model lacks. VERB --help lists a verb's options.",
+        epilog="Exit codes: 0 it ran; 1 it ran and the finding is negative (the robot tips or "
+        "slides, a check fails, a part of the gap stays unexplained); 2 the input cannot be used; "
+        "130 interrupted.",
+    )
     root.add_argument("--version", action="version", version=f"legwatt {version('legwatt')}")
     verbs = root.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=_Parser)
 
@@ -48,54 +56,56 @@ def parser() -> argparse.ArgumentParser:
     for verb, text in (
         ("stand", "standing still: torques, currents, power of every alternative"),
         ("walk", "one walking cycle: demand, stage energies, losses, limits"),
-        ("reports", "stand, walk and all figures"),
+        ("reports", "stand and walk, with all figures and a page, index.html"),
     ):
-        sub = verbs.add_parser(verb, help=text)
+        sub = _verb(verbs, verb, text)
         _run_options(sub)
         sub.set_defaults(run=_run_reports)
 
-    view = verbs.add_parser("view", help="play robot, gait, forces and torques in a browser, in 3D")
+    view = _verb(verbs, "view", "play robot, gait, forces and torques in a browser, in 3D")
     add_view_options(view)
     view.set_defaults(run=_run_view)
 
-    gap = verbs.add_parser(
-        "gap", help="find what the model lacks: from a measured log to a named effect"
-    )
+    gap = _verb(verbs, "gap", "find what the model lacks: from a measured log to a named effect")
     add_gap_options(gap)
     gap.set_defaults(run=_run_gap)
 
-    twin = verbs.add_parser("twin", help="make one blind trial: a log with something hidden")
+    twin = _verb(verbs, "twin", "simulate a machine with hidden effects and write its log")
     add_twin_options(twin)
     twin.set_defaults(run=_run_twin)
 
-    blind = verbs.add_parser("blind", help="make many blind trials and judge what gap says of them")
+    text = "simulate machines with hidden effects and count how often gap finds them"
+    blind = _verb(verbs, "blind", text)
     add_blind_options(blind)
     blind.set_defaults(run=_run_blind)
 
-    diff = verbs.add_parser("diff", help="lay two finished runs side by side on one page")
+    diff = _verb(verbs, "diff", "lay two finished runs side by side on one page")
     _diff_options(diff)
     diff.set_defaults(run=_run_diff)
 
-    calibrate = verbs.add_parser(
-        "calibrate", help="fit the unpublished numbers to the paper's figures and store them"
-    )
+    text = "fit the unpublished numbers to the paper's figures and store them"
+    calibrate = _verb(verbs, "calibrate", text)
     calibrate.add_argument("--robot", type=named_path, default=DEFAULT_ROBOT, help="robot file")
-    calibrate.add_argument("--workers", type=int, default=2, help="processes")
-    calibrate.add_argument("--seed", type=int, default=1, help="of everything random")
+    calibrate.add_argument("--workers", type=int, default=2, help="number of processes")
+    calibrate.add_argument("--seed", type=int, default=1, help="of the random numbers")
     calibrate.set_defaults(run=_run_calibrate)
     return root
 
 
+def _verb(verbs: argparse._SubParsersAction[_Parser], name: str, text: str) -> _Parser:
+    return verbs.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+
+
 def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
     """What makes and judges robot files."""
-    check = verbs.add_parser("check", help="judge a robot file or URDF for physical sense")
+    check = _verb(verbs, "check", "judge a robot file or URDF for physical sense")
     check.add_argument(
-        "file", type=named_path, help="robot file (.toml), URDF, or a published name"
+        "file", type=named_path, help="robot file (.toml), URDF, or a name as `init` takes it"
     )
     check.add_argument("-v", "--verbose", action="store_true", help="list what passed, too")
     check.set_defaults(run=_run_check)
 
-    init = verbs.add_parser("init", help="write a robot file for a URDF or a robot's name")
+    init = _verb(verbs, "init", "write a robot file for a URDF or a robot's name")
     init.add_argument("source", help="URDF, or a robot that example-robot-data ships, e.g. solo12")
     init.add_argument("--out", type=named_path, help="robot file; NAME.toml here by default")
     init.add_argument(
@@ -108,11 +118,11 @@ def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
     init.add_argument("--base", metavar="LINK", help="the base's link; the root by default")
     init.set_defaults(run=_run_init)
 
-    actuator = verbs.add_parser("init-actuator", help="write actuator files from a data sheet")
+    actuator = _verb(verbs, "init-actuator", "write actuator files from a data sheet")
     add_actuator_options(actuator)
     actuator.set_defaults(run=_run_init_actuator)
 
-    urdf = verbs.add_parser("urdf", help="build the URDFs from their robot files")
+    urdf = _verb(verbs, "urdf", "build the URDFs from their robot files")
     urdf.add_argument(
         "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
     )
@@ -131,9 +141,12 @@ def _diff_options(sub: argparse.ArgumentParser) -> None:
 def _run_options(sub: argparse.ArgumentParser) -> None:
     add_machine_options(sub)
     sub.add_argument(
-        "--out", type=named_path, default=DEFAULT_OUT, help="folder for CSV and figures"
+        "--out",
+        type=named_path,
+        default=DEFAULT_OUT,
+        help=f"folder for what is written; {DEFAULT_OUT}",
     )
-    sub.add_argument("--samples", type=int, default=751, help="samples per half period of the gait")
+    sub.add_argument("--samples", type=int, default=751, help="per half period of the gait; 751")
     add_force_options(sub)
     sub.add_argument(
         "--compare-forces",
@@ -187,10 +200,11 @@ def _folder_held(options: argparse.Namespace) -> Iterator[None]:
 
 
 def _run_reports(options: argparse.Namespace) -> int:
-    with _folder_held(options):
+    with _folder_held(options), Progress(options.verb) as progress:
+        progress.step("loading")
         from pipeline.cli.run import run
 
-        return run(options)
+        return run(options, progress)
 
 
 def _run_view(options: argparse.Namespace) -> int:
@@ -200,10 +214,11 @@ def _run_view(options: argparse.Namespace) -> int:
 
 
 def _run_gap(options: argparse.Namespace) -> int:
-    with _folder_held(options):
+    with _folder_held(options), Progress(options.verb) as progress:
+        progress.step("loading")
         from pipeline.cli.gap.run import run_gap
 
-        return run_gap(options)
+        return run_gap(options, progress)
 
 
 def _run_diff(options: argparse.Namespace) -> int:
@@ -269,6 +284,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # who reads has enough: `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return EXIT_OK
-    except KeyboardInterrupt:
-        print("interrupted; nothing is half-written", file=sys.stderr)
+    except KeyboardInterrupt as reason:
+        print(str(reason) or "interrupted; nothing is half-written", file=sys.stderr)
         return 130

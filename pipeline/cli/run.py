@@ -7,10 +7,11 @@ import argparse
 from pipeline.api.reports import write
 from pipeline.cli.decimal_option import decimal_of
 from pipeline.cli.walk_options import force_choice
+from pipeline.progress import Progress
 from pipeline.simulation.settings import Settings, settings
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace, progress: Progress) -> int:
     """Compute what the verb asks for and write it to the output folder.
 
     Raises:
@@ -18,7 +19,10 @@ def run(options: argparse.Namespace) -> int:
         ActuatorError: Unusable catalogue.
         ReportError: The folder cannot be written.
     """
-    for line in write(settings_of(options), options.verb, options.out, decimal_of(options)):
+    given, decimal = settings_of(options), decimal_of(options)
+    lines = write(given, options.verb, options.out, decimal, progress)
+    progress.close()
+    for line in lines:
         print(line)
     return 0
 

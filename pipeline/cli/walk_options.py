@@ -42,7 +42,8 @@ def add_machine_options(sub: argparse.ArgumentParser) -> None:
         "--regeneration",
         default="none",
         metavar="POLICY",
-        help="what becomes of returned electrical energy: none, bus, or a fraction such as 0.5",
+        help="what becomes of electrical energy that motors return: none (it is lost), bus (other "
+        "motors use it at that instant), or the fraction that is used again, e.g. 0.5",
     )
 
 

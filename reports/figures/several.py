@@ -33,13 +33,20 @@ class Drawing:
     draw: Callable[[], Figure]
 
 
-def save_figures(drawings: Sequence[Drawing], out: Path, *, processes: int | None = None) -> int:
+def save_figures(
+    drawings: Sequence[Drawing],
+    out: Path,
+    *,
+    processes: int | None = None,
+    done: Callable[[float], None] | None = None,
+) -> int:
     """Draw and save every figure.
 
     Args:
         drawings: In any order.
         out: Folder.
         processes: 1 or 2; by default 2 where there are two processors and forking is safe.
+        done: Told the share that is drawn, now and then.
 
     Returns:
         How many figures.
@@ -49,10 +56,17 @@ def save_figures(drawings: Sequence[Drawing], out: Path, *, processes: int | Non
     """
     if processes is None:
         processes = 2 if _may_fork() else 1
+
+    def shown(turns: Iterator[int]) -> Iterator[int]:
+        for turn in turns:
+            if done is not None:
+                done(turn / len(drawings))
+            yield turn
+
     if processes < 2 or len(drawings) < 2:
-        _save(drawings, iter(range(len(drawings))), out)
+        _save(drawings, shown(iter(range(len(drawings)))), out)
     else:
-        _save_in_two(drawings, out)
+        _save_in_two(drawings, out, shown)
     return len(drawings)
 
 
@@ -67,7 +81,9 @@ def _save(drawings: Sequence[Drawing], turns: Iterator[int], out: Path) -> None:
             save_figure(drawings[turn].draw(), out, drawings[turn].name)
 
 
-def _save_in_two(drawings: Sequence[Drawing], out: Path) -> None:
+def _save_in_two(
+    drawings: Sequence[Drawing], out: Path, shown: Callable[[Iterator[int]], Iterator[int]]
+) -> None:
     """The child inherits the drawings by forking; whoever is free takes the next one."""
     import multiprocessing
 
@@ -100,7 +116,7 @@ def _save_in_two(drawings: Sequence[Drawing], out: Path) -> None:
     child.start()
     send.close()
     try:
-        _save(drawings, turns(lambda: True), out)
+        _save(drawings, shown(turns(lambda: True)), out)
     finally:
         with counter.get_lock():
             counter.value = len(drawings)  # after an error or an interrupt nobody goes on

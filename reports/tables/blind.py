@@ -54,7 +54,10 @@ RATES = {
     "high": ("upper end", "1"),
     "aim_low": ("what is aimed at: at least; empty where nothing is", "1"),
     "aim_high": ("at most", "1"),
-    "reached": ("whether the share lies inside the aim", ""),
+    "reached": (
+        "whether the share lies inside the aim; above one with two ends, by chance, is no miss",
+        "",
+    ),
 }
 
 

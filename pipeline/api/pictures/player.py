@@ -5,8 +5,10 @@ viser is an optional extra. It serves a page with everything in it; no network i
 
 from __future__ import annotations
 
+import io
 import time
 from collections.abc import Callable
+from contextlib import redirect_stdout
 from types import ModuleType
 from typing import Any
 
@@ -54,8 +56,9 @@ class Player:
         self.cycle = cycle
         points = np.concatenate([s.points for b in cycle.bodies for s in b.solids])
         self.size = float(np.ptp(points, axis=0).max())
-        self.server: Any = viser_module().ViserServer(host=host, port=port, verbose=False)
-        self.server.gui.configure_theme(control_layout="fixed")
+        with redirect_stdout(io.StringIO()):  # its table of addresses; `address` says it in a line
+            self.server: Any = viser_module().ViserServer(host=host, port=port, verbose=False)
+        self.server.gui.main_panel.dock_right()
         self.bodies = [self._body(i) for i in range(len(cycle.bodies))]
         self.turns = [quaternions(body.rotation) for body in cycle.bodies]
         self._ground()

@@ -34,7 +34,7 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         nargs="+",
         default=[],
         metavar="LOG",
-        help="logs that only prove",
+        help="logs on which the result is tested; nothing is fitted to them",
     )
     sub.add_argument(
         "--base",
@@ -50,20 +50,38 @@ def add_gap_options(sub: argparse.ArgumentParser) -> None:
         "stand where the log has neither foot forces nor contacts; the lowest feet without it",
     )
     _machine_options(sub)
+    _comparison_options(sub)
+    sub.add_argument(
+        "--out",
+        type=named_path,
+        default=DEFAULT_OUT,
+        help=f"folder for what is written; {DEFAULT_OUT}",
+    )
+    add_decimal_option(sub)
+    sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
+
+
+def _comparison_options(sub: argparse.ArgumentParser) -> None:
+    """What of the logs is compared, and how."""
     sub.add_argument("--mapping", type=named_path, help="mapping file (TOML) for foreign columns")
-    sub.add_argument("--effort", metavar="CHANNEL", help="torque, current, voltage or power")
-    sub.add_argument("--cutoff", type=float, metavar="HZ", help="bandwidth of the comparison")
+    sub.add_argument(
+        "--effort",
+        metavar="CHANNEL",
+        help="measured quantity that is compared: torque, current, voltage or "
+        "power; the first of them in the log by default",
+    )
+    sub.add_argument(
+        "--cutoff",
+        type=float,
+        metavar="HZ",
+        help="cut-off frequency of the low-pass filter; chosen from the noise by default",
+    )
     sub.add_argument(
         "--prove-last",
         type=float,
         metavar="SHARE",
-        help="prove on this last share of every log instead of on blocks in between",
+        help="test on this last share of every log instead of on blocks in between",
     )
-    sub.add_argument(
-        "--out", type=named_path, default=DEFAULT_OUT, help="folder for everything written"
-    )
-    add_decimal_option(sub)
-    sub.add_argument("-v", "--verbose", action="store_true", help="say what is being done")
 
 
 def _machine_options(sub: argparse.ArgumentParser) -> None:

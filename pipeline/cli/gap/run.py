@@ -29,12 +29,13 @@ from pipeline.api.gap_tables import (
 from pipeline.cli.gap.options import options_of
 from pipeline.identification.compare.circumstances import WHOLE
 from pipeline.identification.workflow.forward import Drive, by_model, forward, rms
-from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where, judged
+from pipeline.identification.workflow.locate import Whereabouts, find_where, judged
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
 from pipeline.identification.workflow.story import Story, Told, signature_name, tell
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
+from pipeline.progress import Progress
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.folder.staging import staged
 from reports.pages.gap_report import write_report
@@ -50,16 +51,17 @@ READ_OFF = ("elasticity", "play", "ripple", "cannot_tell")
 SAID = 5
 
 
-def run_gap(given: argparse.Namespace) -> int:
+def run_gap(given: argparse.Namespace, progress: Progress) -> int:
     """Run what the command line asks for; see `run`."""
-    return run(options_of(given))
+    return run(options_of(given), progress)
 
 
-def run(options: Options) -> int:
+def run(options: Options, progress: Progress) -> int:
     """Run one step, or all of them.
 
     Args:
         options: Of the run.
+        progress: Told what is being done.
 
     Returns:
         The exit code: 0 where the gap is down to noise, 1 where a part stays unexplained.
@@ -73,27 +75,23 @@ def run(options: Options) -> int:
     check_options(options)
     given = setup(options)
     refuse_own_urdf(given, options.out)
-    with Progress() as progress:
+    with progress:
         progress.step("reading and judging the logs")
         intake, parts, fitted = take_in(given, options)
         if options.step == "read":
             found = judged(intake).findings
             _write_tables(options, given, [quality_table(found)])
+            progress.close()
             _say_findings(found)
             return EXPLAINED
         progress.step("simulating the logs' motion")
         where = find_where(given, given.model, intake, parts, fitted)
         tables = [quality_table(where.intake.findings), where_table(where.rows)]
         if options.step == "where":
-            with _staged(options, given) as folder:
-                _tables_into(folder, options, given, tables)
-                write_where_map(where.rows, given.model.joints, given.model.name, folder)
-            _say_warnings(given, where.intake.findings)
-            _say_where(where)
-            return EXPLAINED
+            return _where(given, where, options, tables, progress)
         if options.step == "forward":
             progress.step("driving the model by its servos")
-            return _drive(given, where, options)
+            return _drive(given, where, options, progress)
         if options.step == "shrink":
             progress.step("weighing the model file's effects")
             told = check(given, where)
@@ -127,12 +125,26 @@ def _answer_tables(told: Told, given: Setup) -> list[Table]:
     ]
 
 
-def _drive(given: Setup, where: Whereabouts, options: Options) -> int:
+def _where(
+    given: Setup, where: Whereabouts, options: Options, tables: Sequence[Table], progress: Progress
+) -> int:
+    """Step `where`."""
+    with _staged(options, given) as folder:
+        _tables_into(folder, options, given, tables)
+        write_where_map(where.rows, given.model.joints, given.model.name, folder)
+    progress.close()
+    _say_warnings(given, where.intake.findings)
+    _say_where(where)
+    return EXPLAINED
+
+
+def _drive(given: Setup, where: Whereabouts, options: Options, progress: Progress) -> int:
     """Step `forward`: 1 where the model file's effects bring positions no nearer."""
     drives = forward(given, where, options)
     joints = given.model.joints
     found = [forward_table(drives, joints), *rollout_tables(drives, joints)]
     _write_tables(options, given, found)
+    progress.close()
     _say_drives(drives)
     first, *rest = (rms(own) for own in by_model(drives).values())
     return UNEXPLAINED if rest and rest[-1] >= first else EXPLAINED

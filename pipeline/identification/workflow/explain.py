@@ -18,9 +18,10 @@ from pipeline.identification.results import Found, Naming
 from pipeline.identification.selection.identify import Identified, estimated_alone, identify
 from pipeline.identification.whole.errors import NotWholeError
 from pipeline.identification.whole.fit import Whole, fit_whole
-from pipeline.identification.workflow.locate import Progress, Whereabouts
+from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
+from pipeline.progress import Progress
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import logging
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from time import perf_counter
-from types import TracebackType
-from typing import Any, Final
 
 from pipeline.identification.compare.bandwidth import with_encoder_noise
 from pipeline.identification.compare.circumstances import Tally, Where, edges_of, where
@@ -22,72 +17,6 @@ from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.quality.finding import refuse
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
-
-logger = logging.getLogger("legwatt")
-#: Share of a run's time that has usually passed when a step begins, by the first word of its text;
-#: shared out from where the demonstration and the blind trials spend theirs.
-_BEGUN: Final = {
-    "reading": 0.0,
-    "simulating": 0.1,
-    "driving": 0.2,
-    "letting": 0.2,
-    "fitting": 0.3,
-    "weighing": 0.7,
-    "writing": 0.9,
-}
-
-
-class Progress:
-    """Steps of a run as a bar with the time that is left, roughly; on a terminal only.
-
-    Attributes:
-        seconds: What every step took so far, by its text [s].
-    """
-
-    def __init__(self) -> None:
-        self.seconds: dict[str, float] = {}
-        self._running = ""
-        self._since = 0.0
-        self._bar: Any = None
-        if sys.stderr.isatty():
-            from tqdm import tqdm
-
-            form = "{desc:<36}|{bar}| {elapsed}, about {remaining} left"
-            self._bar = tqdm(total=1.0, bar_format=form, leave=False, smoothing=0.0)
-
-    def __enter__(self) -> Progress:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._stop()
-        if self._bar is not None:
-            self._bar.close()
-
-    def took(self) -> str:
-        """Every step and its seconds, the longest first, in words."""
-        longest = sorted(self.seconds.items(), key=lambda item: -item[1])
-        return ", ".join(f"{text} {seconds:.1f} s" for text, seconds in longest)
-
-    def _stop(self) -> None:
-        if self._running:
-            past = perf_counter() - self._since
-            self.seconds[self._running] = self.seconds.get(self._running, 0.0) + past
-            logger.info("%s took %.1f s", self._running, past)
-        self._running = ""
-
-    def step(self, text: str) -> None:
-        """Say what comes next."""
-        self._stop()
-        self._running, self._since = text, perf_counter()
-        if self._bar is not None:
-            self._bar.set_description_str(text)
-            begun = _BEGUN.get(text.partition(" ")[0], self._bar.n)
-            self._bar.update(max(0.0, begun - self._bar.n))
 
 
 @dataclass(frozen=True, eq=False)

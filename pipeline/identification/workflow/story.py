@@ -17,12 +17,13 @@ from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.identification.whole.fit import with_found
 from pipeline.identification.workflow.deciding import decide
 from pipeline.identification.workflow.explain import explain
-from pipeline.identification.workflow.locate import Progress, Whereabouts
+from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import Weighed, weigh_found
 from pipeline.machine.machine import MachineModel
+from pipeline.progress import Progress
 from pipeline.simulation.edited import Effects, effects
 from pipeline.simulation.energy_change import EnergyChange, energy_change
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, as_completed
+from concurrent.futures import FIRST_COMPLETED, Executor, wait
 from pathlib import Path
 from typing import Any
 
@@ -63,7 +63,10 @@ class Checkpoint:
                 progress(1)
             else:
                 waiting[pool.submit(function, *arguments)] = name
-        for future in as_completed(waiting):
-            self.add(waiting[future], future.result())
-            progress(1)
+        while waiting:
+            # An interrupt that comes just before the wait is not seen before its end.
+            ended, _ = wait(waiting, timeout=1.0, return_when=FIRST_COMPLETED)
+            for future in ended:
+                self.add(waiting.pop(future), future.result())
+                progress(1)
         return [self.done[name] for name, _ in tasks]

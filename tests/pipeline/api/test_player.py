@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Any
 from unittest.mock import MagicMock
 
+import matplotlib.image
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -20,6 +21,7 @@ from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking, walk
 from reports.errors import ReportError
 from tests.command_line import exit_code
+from tests.reports import browser
 
 COUNT = 8
 
@@ -118,6 +120,35 @@ def test_each_step_shows_bodies_forces_and_torques(
     player.play(lambda: next(turns))
     player.stop()
     server.stop.assert_called_once()
+
+
+@pytest.mark.slow
+@browser.needs_chromium
+def test_a_browser_shows_the_robot(
+    played: Cycle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The picture of a page with the robot differs from that of the same page without it."""
+    pytest.importorskip("viser", reason="the package viser is missing; `make view` installs it")
+    player = Player(played, "127.0.0.1", 8080)
+    pictures = []
+    try:
+        for shown in (True, False):
+            for body in player.bodies:
+                body.visible = shown
+            player.server.flush()
+            picture = tmp_path / f"{shown}.png"
+            options = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+            options += ("--window-size=800,600", "--virtual-time-budget=20000")
+            browser.run(tmp_path, *options, f"--screenshot={picture}", player.address)
+            pictures.append(matplotlib.image.imread(picture)[..., :3])
+        assert capsys.readouterr().out == ""  # the command says where to look
+    finally:
+        player.stop()
+    robot = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 0.05
+    rows, columns = np.nonzero(robot)
+    assert robot.mean() > 0.01
+    assert np.ptp(columns) > 80
+    assert np.ptp(rows) > 40
 
 
 def test_without_viser_one_line_says_how_to_install_it(

@@ -5,16 +5,22 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
+import os
+import signal
+import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from pipeline.blind import answer
 from pipeline.blind.answer import ask
 from pipeline.blind.make import make, read_judgement
 from pipeline.blind.twin.matrix import TrialSpec
 from pipeline.cli import blind
 from pipeline.cli.main import main
+from tests.command_line import in_another_process
 
 SPECS = (
     TrialSpec(0, 3, ("coulomb_friction",), "leg", "low"),
@@ -59,6 +65,16 @@ def _write_answer(to: Path, effect: str) -> None:
     (to / "found.csv").write_text(f"{header},doubt,written\n{line}", encoding="utf-8")
 
 
+def _sealed_at_once(out: str, number: int, *rest: Any) -> Any:
+    """A trial with nothing in it, in place of one that is simulated."""
+    seal = blind.seal_file(Path(out), number)
+    seal.parent.mkdir(parents=True, exist_ok=True)
+    seal.write_text('{"hidden": []}', encoding="utf-8")
+    blind.judgement_file(Path(out), number).write_text("[]", encoding="utf-8")
+    blind.trial_folder(Path(out), number).mkdir(parents=True)
+    return {"sha256": hashlib.sha256(seal.read_bytes()).hexdigest(), "robot": "urdf/leg.toml"}
+
+
 def test_a_stopped_run_goes_on_and_judges(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -74,18 +90,13 @@ def test_a_stopped_run_goes_on_and_judges(
 
     def fake_make(out: str, number: int, *rest: Any) -> Any:
         made.append(number)
-        seal = blind.seal_file(Path(out), number)
-        seal.parent.mkdir(parents=True, exist_ok=True)
-        seal.write_text('{"hidden": []}', encoding="utf-8")
-        blind.judgement_file(Path(out), number).write_text("[]", encoding="utf-8")
-        digest = hashlib.sha256(seal.read_bytes()).hexdigest()
-        return {"sha256": digest, "robot": "urdf/leg.toml"}
+        return _sealed_at_once(out, number)
 
     specs = [TrialSpec(k, k, (), "leg", "low") for k in range(3)]
     monkeypatch.setattr(blind, "trial_matrix", lambda seed: tuple(specs))
     monkeypatch.setattr(blind, "make", fake_make)
     monkeypatch.setattr(blind, "ask", fake_ask)
-    monkeypatch.setattr(blind, "ProcessPoolExecutor", blind.ThreadPoolExecutor)
+    monkeypatch.setattr(blind, "processes", blind.ThreadPoolExecutor)
     out = tmp_path / "blind"
     assert main(["blind", "--out", str(out), "--workers", "1"]) == 130
     assert not (out / "blind_trials.csv").exists()
@@ -100,7 +111,7 @@ def test_a_stopped_run_goes_on_and_judges(
         rows = list(csv.DictReader(file))
     assert [row["outcome"] for row in rows] == ["nothing"] * 3
     printed = capsys.readouterr().out
-    assert printed.index("sha256") < printed.index("nothing_found_in_empty_logs: 3 of 3")
+    assert printed.index("sha256") < printed.index("nothing hidden: nothing named): 3 of 3")
     assert (out / "blind_confusion.png").exists()
     before = (out / "blind_trials.csv").read_bytes()
     assert main(["blind", "--out", str(out), "--workers", "1", "--resume"]) == 0
@@ -109,6 +120,49 @@ def test_a_stopped_run_goes_on_and_judges(
     blind.seal_file(out, 1).write_text('{"hidden": [1]}', encoding="utf-8")
     assert main(["blind", "--out", str(out), "--workers", "1", "--resume"]) == 2
     assert "not what was sealed" in capsys.readouterr().err
+
+
+def _interrupted(whom: str, went_on: Path, out: str, number: int, *rest: Any) -> Any:
+    """A second trial that interrupts the process of `blind`, or its group, after the first."""
+    if whom and number == 1:
+        kept = Path(out) / "sealed.jsonl"
+        while len(kept.read_text(encoding="utf-8").splitlines()) < 2:
+            time.sleep(0.01)
+        (os.killpg if whom == "group" else os.kill)(os.getppid(), signal.SIGINT)
+        time.sleep(60)
+        went_on.touch()
+    return _sealed_at_once(out, number)
+
+
+@pytest.mark.parametrize("to", ["group", "one process"])
+@pytest.mark.parametrize("at", ["making", "asking"])
+def test_an_interrupt_ends_what_runs_and_keeps_what_is_finished(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, at: str, to: str
+) -> None:
+    """The second trial sends the signal and would go on for a minute, then leave a file."""
+    went_on, out, begun = tmp_path / "went on", tmp_path / "blind", tmp_path / "begun"
+
+    program = tmp_path / "gap"
+    # The first answer is given at once, as unusable input; PPID is the process of `blind`.
+    program.write_text(
+        f"#!/bin/sh\n[ -e '{begun}' ] || {{ touch '{begun}'; exit 2; }}\n"
+        f"until [ $(wc -l < '{out}/answers.jsonl') -ge 2 ]; do sleep 0.01; done\n"
+        f"kill -INT {'-' if to == 'group' else ''}$PPID\nsleep 60\ntouch '{went_on}'\n",
+        encoding="utf-8",
+    )
+    program.chmod(0o700)
+    specs = [TrialSpec(k, k, (), "leg", "low") for k in range(4)]
+    monkeypatch.setattr(blind, "trial_matrix", lambda seed: tuple(specs))
+    made = partial(_interrupted, to if at == "making" else "", went_on)
+    monkeypatch.setattr(blind, "make", made)
+    monkeypatch.setattr(answer.sys, "executable", str(program))
+    arguments = ["blind", "--out", str(out), "--workers", "1"]
+    ended = in_another_process(arguments, tmp_path, os.setsid)
+    assert ended.returncode == 130
+    assert ended.stderr == "interrupted; finished trials are kept, --resume goes on from them\n"
+    assert not went_on.exists()
+    kept = out / ("sealed.jsonl" if at == "making" else "answers.jsonl")
+    assert len(kept.read_text(encoding="utf-8").splitlines()) == 2  # the head, one trial
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,27 @@ def test_wilson_at_the_ends() -> None:
     assert Rate("r", "m", 0, 0, (0.95, 1.0)).reached is False
 
 
+@pytest.mark.parametrize(
+    ("hits", "trials", "aim", "words"),
+    [
+        (6, 6, (0.9, 0.99), "above it by no more than chance, which is no miss"),
+        (600, 600, (0.9, 0.99), "missed"),
+        (1, 2, (0.9, 0.99), "missed, though a share inside it is not excluded by 2 trials"),
+        (95, 100, (0.9, 0.99), "reached"),
+        (1, 91, (0.0, 0.01), "missed, though a share inside it is not excluded by 91 trials"),
+        (3, 3, (0.98, 1.0), "reached"),
+    ],
+)
+def test_a_verdict_does_not_contradict_its_figure(
+    hits: int, trials: int, aim: tuple[float, float], words: str
+) -> None:
+    rate = Rate("r", "what is counted", hits, trials, aim)
+    said = str(rate)
+    assert said.startswith(f"r (what is counted): {hits} of {trials} = {hits / trials:.1%}, ")
+    assert said.endswith(f"%: {words}")
+    assert rate.reached == ("missed" not in words)
+
+
 def test_right_name_and_place() -> None:
     truth = hidden("coulomb_friction", torque=1.0)
     s = score(0, [truth], [clear()], answer(named("coulomb_friction", torque=(1.1, 0.9, 1.2))))

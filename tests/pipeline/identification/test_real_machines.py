@@ -19,13 +19,14 @@ from pipeline.cli.main import main, parser
 from pipeline.effects.model_file import load_model
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.results import CONFIRMED, Found
-from pipeline.identification.workflow.locate import Progress, Whereabouts, find_where
+from pipeline.identification.workflow.locate import Whereabouts, find_where
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.setup import Setup, setup, take_in
 from pipeline.identification.workflow.story import tell
 from pipeline.identification.workflow.validate import check
 from pipeline.identification.workflow.written import Weighed
 from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.progress import Progress
 from pipeline.simulation.predict import Simulator
 
 Array = NDArray[np.float64]
