@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Annotated, Final
 
@@ -21,15 +21,43 @@ ALTERNATIVES_FILE: Final = "alternatives.toml"
 #: Files and columns are called after alternatives.
 _NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
 
-# law -> class, arguments it must have, arguments it may have
-LAWS: Final[Mapping[str, tuple[Callable[..., Element], frozenset[str], frozenset[str]]]] = {
-    "ratio": (Ratio, frozenset({"ratio"}), frozenset()),
-    "inertia": (Inertia, frozenset({"inertia"}), frozenset()),
-    "friction": (Friction, frozenset(), frozenset({"coulomb", "load", "viscous"})),
-    "hypoid": (
+
+@dataclass(frozen=True)
+class Law:
+    """What a law's arguments are.
+
+    Attributes:
+        element: Its class.
+        needed: Arguments it must have, with the dimension of each.
+        possible: Arguments it may have, likewise.
+    """
+
+    element: Callable[..., Element]
+    needed: Mapping[str, str] = field(default_factory=dict)
+    possible: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def arguments(self) -> Mapping[str, str]:
+        """Every argument and its dimension."""
+        return {**self.needed, **self.possible}
+
+
+LAWS: Final[Mapping[str, Law]] = {
+    "ratio": Law(Ratio, {"ratio": "ratio"}),
+    "inertia": Law(Inertia, {"inertia": "inertia"}),
+    "friction": Law(
+        Friction,
+        possible={"coulomb": "torque", "load": "ratio", "viscous": "viscous friction"},
+    ),
+    "hypoid": Law(
         Hypoid,
-        frozenset({"ratio", "pinion_angle", "wheel_angle", "wheel_radius", "friction"}),
-        frozenset(),
+        {
+            "ratio": "ratio",
+            "pinion_angle": "angle",
+            "wheel_angle": "angle",
+            "wheel_radius": "length",
+            "friction": "ratio",
+        },
     ),
 }
 
@@ -114,14 +142,14 @@ def _argument_names(entry: _Element) -> _Element:
     """
     if entry.law not in LAWS:
         raise ValueError(f"unknown law '{one_line(entry.law)}': {closest(entry.law, list(LAWS))}")
-    _, needed, possible = LAWS[entry.law]
+    law = LAWS[entry.law]
     for argument in entry.arguments:
-        if argument not in needed | possible:
+        if argument not in law.arguments:
             raise ValueError(
                 f"law '{entry.law}' has no argument '{one_line(argument)}': "
-                f"{closest(argument, sorted(needed | possible))}"
+                f"{closest(argument, sorted(law.arguments))}"
             )
-    lacking = sorted(needed - set(entry.arguments))
+    lacking = sorted(set(law.needed) - set(entry.arguments))
     if lacking:
         names = ", ".join(f"'{name}'" for name in lacking)
         raise ValueError(f"law '{entry.law}' lacks its argument {names}")

@@ -84,5 +84,8 @@ def load_component(path: Path) -> Component:
     """
     file = one_line(path.name)
     written = checked(_Written, read_toml(path), file, CatalogError)
-    parameters = parameters_from_table(written.parameters, KINDS[written.kind], file)
+    kinds = KINDS[written.kind]
+    # What is needed, alternatives say: they name each number, and one that none names is refused.
+    optional = frozenset() if written.kind == MOTOR_KIND else frozenset(kinds)
+    parameters = parameters_from_table(written.parameters, kinds, file, optional)
     return Component(path.stem, written.kind, written.title, written.note, parameters)
