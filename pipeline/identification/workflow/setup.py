@@ -260,11 +260,13 @@ def open_logs(given: Setup, options: Options) -> list[Stream]:
         GapError: The mapping cannot be used.
     """
     mapping = load_mapping(options.mapping) if options.mapping else None
+    paths = (*options.logs, *options.holdout)
+    if mapping is not None:
+        mapping.refuse_unknown_logs(paths)
 
     def adjust(log: Log) -> Log:
         return _adjusted(log, given, options)
 
-    paths = (*options.logs, *options.holdout)
     return [Stream(path, given.expected, mapping, adjust) for path in paths]
 
 
