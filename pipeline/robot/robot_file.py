@@ -13,7 +13,7 @@ from actuators.parameters import REQUIRED_KEYS, ParameterSet, parameters_from_ta
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import si_unit
 from pipeline.errors import RobotFileError
-from pipeline.robot.published import published_names, urdf_path
+from pipeline.robot.published import SCHEME, published_names, urdf_path
 
 #: Numbers every walking robot needs, with their dimension.
 #: Of the project, from the folder it is run in.
@@ -201,7 +201,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return read_toml_file(path)
     except UnreadableTextError as error:
-        hint = "; give the robot file with --robot" if str(error) == "no such file" else ""
+        hint = "; name a robot file (TOML)" if str(error) == "no such file" else ""
         raise RobotFileError(f"{path}: {error}{hint}") from None
 
 
@@ -221,7 +221,7 @@ def load_robot_file(path: Path) -> RobotSpec:
             f"{path}: a URDF says nothing of legs and gait; give a robot file (TOML) that names it "
             f"as robot.urdf, as urdf/hexapod.toml does: `python -m pipeline init {path}` writes one"
         )
-    if not path.exists() and str(path) in published_names():
+    if not path.exists() and str(path).removeprefix(SCHEME) in published_names():
         raise RobotFileError(
             f"{path}: no such file; `python -m pipeline init {path}` writes one for that robot"
         )

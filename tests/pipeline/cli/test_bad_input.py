@@ -241,7 +241,7 @@ def test_urdf_of_ones_own(
 @pytest.mark.parametrize(
     ("robot", "message"),
     [
-        ("nowhere.toml", r"nowhere.toml: no such file; give the robot file with --robot"),
+        ("nowhere.toml", r"nowhere.toml: no such file; name a robot file \(TOML\)"),
         (".", r"is a folder"),
         ("hexapod.urdf", r"a URDF says nothing of legs and gait; give a robot file"),
         ("leg.toml", r"a robot on a stand neither stands nor walks; give one with a floating base"),

@@ -255,7 +255,7 @@ def test_meshes_that_are_missing_leave_the_numbers_as_they_are(tmp_path: Path) -
         ("ur5", {}, r"one foot found \(ee_link\); .*--foot; chains end in ee_link"),
         ("iris", {}, r"iris: no joint moves; a leg has at least one actuated joint"),
         ("cassie", {}, r"cassie.sdf, not in a URDF"),
-        ("solo21", {}, r"no such file, and no robot of example-robot-data; did you mean 'solo"),
+        ("solo21", {}, r"no file and no robot of example-robot-data; did you mean 'solo"),
         ("nowhere/x.urdf", {}, r"nowhere/x.urdf: no such file"),
         ("x.toml", {}, r"x.toml: a robot file; init starts from a URDF"),
         ("quadruped", {}, r"limits of 'BL_KFE', .*: lower equals upper"),
