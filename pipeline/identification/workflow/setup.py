@@ -21,6 +21,7 @@ from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelF
 from pipeline.logs.prepared.contact import Contact, find_contact
 from pipeline.logs.prepared.parts import Parts, split
 from pipeline.logs.prepared.stream import Stream, Survey, survey
+from pipeline.logs.quality.finding import refuse
 from pipeline.logs.quality.repeats import refuse_repeats
 from pipeline.logs.reading.expected import Expected, expected_of_model, expected_of_robot
 from pipeline.logs.reading.log import EFFORTS, Log
@@ -324,6 +325,7 @@ def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
         # By the machine as its files say: what a model file adds changes no bandwidth.
         cutoff = naming_cutoff(given.bare, intake.prepared)
         intake = intake.at(lowered(intake.prepared, cutoff))
+    refuse(intake.findings)
     prepared = intake.prepared
     last = None if surveys else options.prove_last
     parts = split(prepared[:count], holdout=prepared[count:], prove_last=last)

@@ -82,7 +82,7 @@ CHANGES = {
         r"no such number; did you mean 'harmonic_drive.load'",
     ),
     "not a number": ("femur_mass=heavy", r"femur_mass=heavy: expected a number"),
-    "number with unit": ("femur_mass=1 kg", r"expected a number in the unit its file writes"),
+    "number with unit": ("femur_mass=1 kg", r"expected a number in kg, without the unit"),
     "NaN": ("femur_mass=nan", r"femur_mass=nan: expected a finite number"),
     "infinite": ("gait_period=1e999", r"expected a finite number"),
     "negative mass": ("femur_mass=-1", r"femur_mass = -1 kg must be positive"),
