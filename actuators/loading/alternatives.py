@@ -9,7 +9,7 @@ from typing import Annotated, Final
 from pydantic import AfterValidator, ConfigDict, Field, Strict
 
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
-from actuators.checked import Table, checked
+from actuators.checked import Table, Text, checked
 from actuators.elements.element import Element
 from actuators.elements.friction import Friction
 from actuators.elements.hypoid import Hypoid
@@ -123,7 +123,7 @@ class _Element(Table):
     model_config = ConfigDict(extra="allow")
     expected = "name, law and arguments"
     __pydantic_extra__: dict[str, str] = Field(init=False)
-    name: str
+    name: Text
     law: str
     stage: str = ""
     shaft: str = ""
@@ -170,7 +170,7 @@ def _stages_differ(elements: tuple[_Element, ...]) -> tuple[_Element, ...]:
 class _Written(Table):
     """An alternative as it stands in a file."""
 
-    title: str
+    title: Text
     motor: str
     ratio: str
     element: Annotated[

@@ -272,12 +272,12 @@ def _refuse_other_legs(value: object, legs: tuple[str, ...], where: str) -> None
 
 
 def _refuse_other_sets(sets: Legs | None, legs: tuple[str, ...], where: str) -> None:
-    if not sets:
+    two = where.endswith("tripods")
+    if sets is None or (two and not sets):  # no tripods is no gait at all, said where one is asked
         return
     for name in (name for group in sets for name in group):
         if name not in legs:
             raise GaitError(f"{where}: leg '{one_line(name)}' is not known; {closest(name, legs)}")
-    two = where.endswith("tripods")
     wrong = len(sets) < 2 or (two and len(sets) != 2)
     if wrong or sorted(name for group in sets for name in group) != sorted(legs):
         parts = "two sets" if two else "two or more sets"

@@ -538,8 +538,14 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
 
 
 def _check_lengths(parameters: ParameterSet, where: str) -> None:
-    """Refuse metres written for millimetres and the reverse."""
+    """Refuse metres written for millimetres and the reverse, and angles beyond a turn."""
     for name, kind in (GAIT_SCHEMA | BUILD_SCHEMA).items():
+        if kind == "angle" and name in parameters and abs(parameters[name]) > 2 * math.pi:
+            row = parameters.parameter(name)
+            raise RobotFileError(
+                f"{where}: parameters.{name} = {row.value_as_written:g} {row.unit} is more than a "
+                "turn; check its unit"
+            )
         if kind != "length" or name not in parameters:
             continue
         size, row = abs(parameters[name]), parameters.parameter(name)

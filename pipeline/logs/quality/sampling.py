@@ -85,7 +85,10 @@ def new_values(time: Array, x: Array) -> float:
         Infinite where it never changes.
     """
     changes = time[1:][np.diff(x) != 0]
-    return 1.0 / float(np.median(np.diff(changes))) if changes.size > 1 else np.inf
+    if changes.size == 0:
+        return np.inf
+    apart = np.diff(changes) if changes.size > 1 else time[-1:] - time[:1]
+    return 1.0 / float(np.median(apart))
 
 
 def _lattice(values: Array) -> tuple[float, float]:

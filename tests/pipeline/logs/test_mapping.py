@@ -165,6 +165,7 @@ def test_decimal_commas_with_a_dialect(
         ("[time]\ncolumn = 't'\nsample_rate = {value = 5, unit = 'Hz'}", ("not both",)),
         ("[csv]\ndelimiter = 'x'", ("delimiter",)),
         ("[csv]\ndecimal = ','", ("both",)),
+        ("[supply]\nvoltage = {value = -7.4, unit = 'V'}", ("supply.voltage", "positive")),
         ("[controller]\nlaw = 'pid'", ("pid", "duty")),
         ("[controller]\ntorque_off_bridge = 'opn'", ("did you mean 'open'",)),
         ("[[log]]\nmatch = 'x'", ("did you mean 'logs'",)),
