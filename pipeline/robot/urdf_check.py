@@ -420,10 +420,11 @@ def _sizes(root: ET.Element, bodies: Sequence[Body], where: str) -> list[Finding
 
 def _total_mass(name: str, total: float, size: float) -> list[Finding]:
     """A robot's mass [kg] against what would fill a cube of its size [m]; none if usual."""
-    if total <= 0 or size <= 0 or AIR * size**3 <= total <= HEAVY * size**3:
+    volume = size * size * size  # where a power overflows
+    if total <= 0 or size <= 0 or AIR * volume <= total <= HEAVY * volume:
         return []
-    heavy = total > HEAVY * size**3
-    filled = (STEEL if heavy else AIR) * size**3
+    heavy = total > HEAVY * volume
+    filled = (STEEL if heavy else AIR) * volume
     detail = (
         f"{total:.6g} kg within {size:.3g} m of its root, where a cube of that edge full of "
         f"{'steel' if heavy else 'air'} weighs {filled:.3g} kg; "
