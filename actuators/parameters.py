@@ -19,8 +19,8 @@ BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified",
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
 #: Without these a number cannot be judged.
 REQUIRED_KEYS: Final = ("value", "unit", "basis", "source")
-#: No number of a machine is larger in SI units, and products of larger ones overflow.
-LARGEST: Final = 1e12
+#: SI values beyond this overflow somewhere between here and the energies.
+LARGEST: Final = 1e9
 _SIGMAS_95: Final = 1.96
 
 Interval = tuple[float, float]

@@ -56,8 +56,6 @@ BUILD_SCHEMA = {
 BUILDS = ("hexapod", "leg_stand")
 #: Joints of a built leg: hip, femur, tibia.
 BUILT_JOINTS = 3
-#: SI values beyond this overflow somewhere between here and the energies.
-LARGEST = 1e9
 #: Lengths of walking robots lie between these; outside, a unit is wrong by a thousand [m].
 SMALLEST_LENGTH, LARGEST_LENGTH = 1e-3, 10.0
 #: No planet pulls more [m/s^2].
@@ -525,9 +523,6 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
     """
     sizes = ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity")
     _positive(parameters, tuple(name for name in sizes if name in parameters), where)
-    for name, value in parameters.items():
-        if abs(value) > LARGEST:
-            raise RobotFileError(f"{where}: parameters.{name} is beyond any robot; check its unit")
     if "foot_lift" in parameters and parameters["foot_lift"] < 0:
         raise RobotFileError(f"{where}: parameters.foot_lift must not be negative")
     if parameters["gravity"] > LARGEST_GRAVITY:

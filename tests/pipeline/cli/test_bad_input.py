@@ -23,7 +23,7 @@ ROBOT_FILES = {
     "two joints": (r', "rm_joint_3"', "", r"legs.rm: names 2 joints; a built leg has 3"),
     "unknown station": (r'"middle"', '"midle"', r"station = 'midle'; did you mean 'middle'"),
     "sets of no legs": (r"^tripods = .*?$", "tripods = 2", r"gait.tripods: must be two lists"),
-    "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass is beyond any robot"),
+    "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
     "unknown leg": (r'feet = \["lf"', 'feet = ["fl"', r"standing.feet: leg 'fl' is not known"),
     "unknown path": (
         r'path = "\w+"',
