@@ -19,6 +19,8 @@ BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified",
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
 #: Without these a number cannot be judged.
 REQUIRED_KEYS: Final = ("value", "unit", "basis", "source")
+#: SI values beyond this overflow somewhere between here and the energies.
+LARGEST: Final = 1e9
 _SIGMAS_95: Final = 1.96
 
 Interval = tuple[float, float]
@@ -64,6 +66,11 @@ class Parameter:
     def __post_init__(self) -> None:
         if not math.isfinite(self.value):
             raise ParameterError(f"'{self.name}': {self.value} is not a finite number: give one")
+        if abs(self.value) > LARGEST:
+            raise ParameterError(
+                f"'{self.name}': {self.value_as_written:g} {self.unit} is beyond any machine; "
+                "check its unit"
+            )
         if self.basis not in BASES:
             raise ParameterError(
                 f"'{self.name}': unknown basis {self.basis!r:.40}: {closest(self.basis, BASES)}"

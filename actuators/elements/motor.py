@@ -28,7 +28,8 @@ class DCMotor:
         resistance_spread: Of R likewise [1].
 
     Raises:
-        UnphysicalElementError: A constant or limit is not positive.
+        UnphysicalElementError: A constant or limit is not positive, or the peak current is below
+            the continuous one.
 
     Note:
         Inductance is left out: with 0.08 mH and 0.3 ohm it matters below a millisecond.
@@ -57,6 +58,11 @@ class DCMotor:
         require(np.greater(self.torque_constant, 0.0), self.name, "torque_constant must be > 0")
         for limit in ("max_speed", "supply_voltage", "continuous_current", "peak_current"):
             require(getattr(self, limit) > 0.0, self.name, f"{limit} must be > 0")
+        require(
+            self.peak_current >= self.continuous_current,
+            self.name,
+            "peak_current must not be below continuous_current",
+        )
 
     def current(self, torque: FloatArray) -> FloatArray:
         """Return the current (...) [A] for an air-gap torque [N*m]."""

@@ -2,14 +2,14 @@
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Annotated, Final
 
 from pydantic import AfterValidator, ConfigDict, Field, Strict
 
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
-from actuators.checked import Table, checked
+from actuators.checked import Table, Text, checked
 from actuators.elements.element import Element
 from actuators.elements.friction import Friction
 from actuators.elements.hypoid import Hypoid
@@ -21,15 +21,43 @@ ALTERNATIVES_FILE: Final = "alternatives.toml"
 #: Files and columns are called after alternatives.
 NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
 
-# law -> class, arguments it must have, arguments it may have
-LAWS: Final[Mapping[str, tuple[Callable[..., Element], frozenset[str], frozenset[str]]]] = {
-    "ratio": (Ratio, frozenset({"ratio"}), frozenset()),
-    "inertia": (Inertia, frozenset({"inertia"}), frozenset()),
-    "friction": (Friction, frozenset(), frozenset({"coulomb", "load", "viscous"})),
-    "hypoid": (
+
+@dataclass(frozen=True)
+class Law:
+    """What a law's arguments are.
+
+    Attributes:
+        element: Its class.
+        needed: Arguments it must have, with the dimension of each.
+        possible: Arguments it may have, likewise.
+    """
+
+    element: Callable[..., Element]
+    needed: Mapping[str, str] = field(default_factory=dict)
+    possible: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def arguments(self) -> Mapping[str, str]:
+        """Every argument and its dimension."""
+        return {**self.needed, **self.possible}
+
+
+LAWS: Final[Mapping[str, Law]] = {
+    "ratio": Law(Ratio, {"ratio": "ratio"}),
+    "inertia": Law(Inertia, {"inertia": "inertia"}),
+    "friction": Law(
+        Friction,
+        possible={"coulomb": "torque", "load": "ratio", "viscous": "viscous friction"},
+    ),
+    "hypoid": Law(
         Hypoid,
-        frozenset({"ratio", "pinion_angle", "wheel_angle", "wheel_radius", "friction"}),
-        frozenset(),
+        {
+            "ratio": "ratio",
+            "pinion_angle": "angle",
+            "wheel_angle": "angle",
+            "wheel_radius": "length",
+            "friction": "ratio",
+        },
     ),
 }
 
@@ -95,7 +123,7 @@ class _Element(Table):
     model_config = ConfigDict(extra="allow")
     expected = "name, law, arguments, and for the last element stage"
     __pydantic_extra__: dict[str, str] = Field(init=False)
-    name: str
+    name: Text
     law: str
     stage: str = ""
     shaft: str = ""
@@ -114,14 +142,14 @@ def _argument_names(entry: _Element) -> _Element:
     """
     if entry.law not in LAWS:
         raise ValueError(f"unknown law '{one_line(entry.law)}': {closest(entry.law, list(LAWS))}")
-    _, needed, possible = LAWS[entry.law]
+    law = LAWS[entry.law]
     for argument in entry.arguments:
-        if argument not in needed | possible:
+        if argument not in law.arguments:
             raise ValueError(
                 f"law '{entry.law}' has no argument '{one_line(argument)}': "
-                f"{closest(argument, sorted(needed | possible))}"
+                f"{closest(argument, sorted(law.arguments))}"
             )
-    lacking = sorted(needed - set(entry.arguments))
+    lacking = sorted(set(law.needed) - set(entry.arguments))
     if lacking:
         names = ", ".join(f"'{name}'" for name in lacking)
         raise ValueError(f"law '{entry.law}' lacks its argument {names}")
@@ -147,7 +175,7 @@ def _stages_differ(elements: tuple[_Element, ...]) -> tuple[_Element, ...]:
 class _Written(Table):
     """An alternative as it stands in a file."""
 
-    title: str
+    title: Text
     motor: str
     ratio: str
     element: Annotated[

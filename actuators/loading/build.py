@@ -16,6 +16,7 @@ from actuators.errors import ActuatorError, CatalogError, closest, one_line
 from actuators.loading.alternatives import ALTERNATIVES_FILE, LAWS, Alternative, read_alternative
 from actuators.loading.components import MOTOR_KIND, Component, load_component
 from actuators.parameters import Parameter, read_toml
+from actuators.units import dimension, si_unit
 
 CATALOG: Final = Path(__file__).parents[1] / "catalog"
 WINDING: Final = "winding"  # the motor's row among the losses
@@ -76,20 +77,36 @@ class Catalog:
                 joints or one per joint (J,).
 
         Raises:
-            CatalogError: No such alternative, or its ratios do not multiply to what it promises.
-            ActuatorError: A parameter is unphysical.
+            CatalogError: No such alternative, its ratios do not multiply to what it promises, or a
+                parameter is unphysical.
         """
         if name not in self.alternatives:
             raise CatalogError(
                 f"no alternative '{one_line(name)}': {closest(name, list(self.alternatives))}"
             )
-        alternative, own = self.alternatives[name], values or {}
+        own = values or {}
+        alternative = self.alternatives[name]
+        try:
+            chain = self._built(alternative, own)
+        except ActuatorError as error:
+            raise CatalogError(f"alternative '{name}': {error}") from None
+        total = np.asarray(chain.ratio, dtype=float)
+        promised = own.get(alternative.ratio, self.parameter(alternative.ratio).value)
+        if np.any(np.abs(total / promised - 1.0) > _RATIO_TOLERANCE):
+            raise CatalogError(
+                f"alternative '{name}': its ratios multiply to {total.flat[0]:.10g}, "
+                f"'{alternative.ratio}' asks for {promised:.10g}: change them together"
+            )
+        return chain
+
+    def _built(self, alternative: Alternative, own: Mapping[str, Scalars]) -> Chain:
+        """The chain of an alternative, whatever its ratios multiply to."""
 
         def value(reference: str) -> Scalars:
             return own[reference] if reference in own else self.parameter(reference).value
 
         elements = tuple(
-            LAWS[e.law][0](name=e.name, **{a: value(r) for a, r in e.arguments.items()})
+            LAWS[e.law].element(name=e.name, **{a: value(r) for a, r in e.arguments.items()})
             for e in alternative.elements
         )
         constants = self.components[alternative.motor].parameters
@@ -102,14 +119,9 @@ class Catalog:
         }
         motor = DCMotor(name=WINDING, **numbers, **spread)
         stages = {e.stage: e.name for e in alternative.elements if e.stage}
-        chain = Chain(name=name, elements=elements, motor=motor, stages=MappingProxyType(stages))
-        total, promised = np.asarray(chain.ratio, dtype=float), value(alternative.ratio)
-        if np.any(np.abs(total / promised - 1.0) > _RATIO_TOLERANCE):
-            raise CatalogError(
-                f"alternative '{name}': its ratios multiply to {total.flat[0]:.10g}, "
-                f"'{alternative.ratio}' asks for {promised:.10g}: change them together"
-            )
-        return chain
+        return Chain(
+            name=alternative.name, elements=elements, motor=motor, stages=MappingProxyType(stages)
+        )
 
     def chains(self) -> dict[str, Chain]:
         """Return the chain of every alternative, in order."""
@@ -149,8 +161,8 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     Raises:
         ParameterError: A file cannot be read, or a parameter is wrong.
         CatalogError: There is no alternative, a component, law, argument or reference is unknown,
-            a ratio does not come out, or an element leaves out a parameter that its law takes and
-            no other uses.
+            an argument has the unit of another dimension, a ratio does not come out, or a component
+            in use holds a parameter that no alternative names.
         ActuatorError: A parameter is unphysical.
     """
     folder = Path(directory)
@@ -163,28 +175,23 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
     for alternative in alternatives.values():
         _check_motor(alternative, catalog)
-        for reference in alternative.references:
-            _check_reference(alternative.name, reference, catalog)
-        try:
-            catalog.chain(alternative.name)
-        except CatalogError:
-            raise
-        except ActuatorError as error:
-            raise CatalogError(f"alternative '{alternative.name}': {error}") from None
+        _check_references(alternative, catalog)
+        catalog.chain(alternative.name)
     catalog = catalog.only(alternatives)
-    used = {r for alternative in alternatives.values() for r in alternative.references}
-    for element in (e for a in alternatives.values() for e in a.elements):
-        _, needed, possible = LAWS[element.law]
-        # Forgotten, where the law would take it; another part's, where it would not.
-        for component in {r.partition(".")[0] for r in element.arguments.values()}:
-            for name in sorted((needed | possible) - set(element.arguments)):
-                known = name in catalog.components[component].parameters
-                if known and f"{component}.{name}" not in used:
-                    raise CatalogError(
-                        f"{component}.toml: parameter '{name}' is used by no alternative: "
-                        f"name it in {ALTERNATIVES_FILE} or remove it"
-                    )
+    _refuse_unused(catalog)
     return catalog
+
+
+def _refuse_unused(catalog: Catalog) -> None:
+    """Raise where a component in use holds a parameter that no alternative names."""
+    used = {r for alternative in catalog.alternatives.values() for r in alternative.references}
+    for component in catalog.components.values():
+        for name in () if component.kind == MOTOR_KIND else component.parameters:
+            if f"{component.name}.{name}" not in used:
+                raise CatalogError(
+                    f"{component.name}.toml: parameter '{name}' is used by no alternative: "
+                    f"name it in {ALTERNATIVES_FILE} or remove it"
+                )
 
 
 def _check_motor(alternative: Alternative, catalog: Catalog) -> None:
@@ -197,9 +204,21 @@ def _check_motor(alternative: Alternative, catalog: Catalog) -> None:
         )
 
 
-def _check_reference(alternative: str, reference: str, catalog: Catalog) -> None:
-    """Raise unless a reference names a parameter of the catalogue."""
-    try:
-        catalog.parameter(reference)
-    except ActuatorError as error:
-        raise CatalogError(f"alternative '{alternative}': {error}") from None
+def _check_references(alternative: Alternative, catalog: Catalog) -> None:
+    """Raise unless every argument names a parameter of the catalogue, of its own dimension."""
+    wanted = [("ratio", alternative.ratio, "ratio")]
+    for e in alternative.elements:
+        kinds = LAWS[e.law].arguments
+        wanted += [
+            (f"element '{one_line(e.name)}': {a}", r, kinds[a]) for a, r in e.arguments.items()
+        ]
+    for key, reference, expected in wanted:
+        try:
+            unit = catalog.parameter(reference).unit
+        except ActuatorError as error:
+            raise CatalogError(f"alternative '{alternative.name}': {error}") from None
+        if dimension(unit) != expected:
+            raise CatalogError(
+                f"{ALTERNATIVES_FILE} [{alternative.name}]: {key} = '{reference}' is in '{unit}', "
+                f"a unit of {dimension(unit)}; expected {expected} such as '{si_unit(expected)}'"
+            )

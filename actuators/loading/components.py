@@ -15,8 +15,6 @@ MOTOR_KIND: Final = "dc_motor"
 
 _FRICTION: Final = {"coulomb": "torque", "load": "ratio", "viscous": "viscous friction"}
 _GEAR: Final = {"ratio": "ratio", **_FRICTION, "inertia": "inertia"}
-#: What a part may lack; what it has, an alternative uses, but for the mass, which is no law's.
-OPTIONAL: Final = frozenset({*_FRICTION, "inertia", "mass"})
 
 KINDS: Final[Mapping[str, Mapping[str, str]]] = {
     "requirement": {"ratio": "ratio"},
@@ -88,5 +86,8 @@ def load_component(path: Path) -> Component:
     """
     file = one_line(path.name)
     written = checked(_Written, read_toml(path), file, CatalogError)
-    parameters = parameters_from_table(written.parameters, KINDS[written.kind], file, OPTIONAL)
+    kinds = KINDS[written.kind]
+    # What is needed, alternatives say: they name each number, and one that none names is refused.
+    optional = frozenset({"mass"}) if written.kind == MOTOR_KIND else frozenset(kinds)
+    parameters = parameters_from_table(written.parameters, kinds, file, optional)
     return Component(path.stem, written.kind, written.title, written.note, parameters)

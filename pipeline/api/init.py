@@ -16,7 +16,7 @@ import pinocchio as pin
 from actuators.errors import one_line
 from pipeline.dynamics.gait_check import check_gait
 from pipeline.dynamics.stability import support_margin
-from pipeline.errors import RobotFileError
+from pipeline.errors import PipelineError, RobotFileError
 from pipeline.robot.check import Finding, check_robot
 from pipeline.robot.guess.guess import Guess, guess_robot
 from pipeline.robot.guess.pace import shorter
@@ -72,7 +72,10 @@ def init(
     if path.exists():
         raise RobotFileError(f"{path}: there is such a file; give another name with --out")
     with replacing(path) as (temporary,):
-        guess, robot, walked = _walked(guess, path, temporary)
+        try:
+            guess, robot, walked = _walked(guess, path, temporary)
+        except PipelineError as error:  # of the file that is to be, not of the one beside it
+            raise type(error)(str(error).replace(str(temporary), str(path))) from None
         findings = (*check_robot(robot), *walked)
     picture = _draw(robot, path)
     return Init(path, picture, guess, findings)

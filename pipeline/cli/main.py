@@ -106,7 +106,11 @@ def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
     check.set_defaults(run=_run_check)
 
     init = _verb(verbs, "init", "write a robot file for a URDF or a robot's name")
-    init.add_argument("source", help="URDF, or a robot that example-robot-data ships, e.g. solo12")
+    init.add_argument(
+        "source",
+        type=named_path,
+        help="URDF, or a robot that example-robot-data ships, e.g. solo12",
+    )
     init.add_argument("--out", type=named_path, help="robot file; NAME.toml here by default")
     init.add_argument(
         "--foot",
@@ -123,6 +127,10 @@ def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
     actuator.set_defaults(run=_run_init_actuator)
 
     urdf = _verb(verbs, "urdf", "build the URDFs from their robot files")
+    urdf.description = (
+        "Write the URDF of each robot file with robot.build from its numbers, over the file that "
+        "robot.urdf names; a robot file with a URDF of its own is left alone."
+    )
     urdf.add_argument(
         "files", type=named_path, nargs="*", help="robot files; all in urdf/ by default"
     )
@@ -160,7 +168,7 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
 def _run_init(options: argparse.Namespace) -> int:
     from pipeline.cli.init import run_init
 
-    return run_init(options.source, options.out, feet=options.foot, base=options.base)
+    return run_init(str(options.source), options.out, feet=options.foot, base=options.base)
 
 
 def _run_init_actuator(options: argparse.Namespace) -> int:
@@ -184,7 +192,9 @@ def _run_urdf(options: argparse.Namespace) -> int:
         spec = load_robot_file(path)
         if spec.build:
             write_text(spec.urdf, build_urdf(spec))
-            print(spec.urdf)
+            print(f"{spec.urdf}: built from {path}")
+        else:
+            print(f"{path}: nothing built, its URDF {spec.urdf.name} is its own (no robot.build)")
     return EXIT_OK
 
 

@@ -33,7 +33,8 @@ def add_machine_options(sub: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="change a number for this run: NAME=VALUE in the unit the robot file writes, "
         "COMPONENT.NAME=VALUE for an actuator, gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
-        "standing.feet=LEG,LEG,LEG",
+        "standing.feet=LEG,LEG,LEG (standing.feet=lf,lr,rm), lists and tables of [gait] as TOML: "
+        """'gait.sets=[["lf", "rr"], ["rf", "lr"]]'""",
     )
     sub.add_argument(
         "--quasi-static", action="store_true", help="leave out the links' inertial terms"

@@ -7,13 +7,15 @@ the one in front of it on its side lifts off, and the two sides are half a perio
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Final
 
 import numpy as np
 
-from actuators.errors import closest
+from actuators.errors import closest, one_line
 from pipeline.errors import GaitError
 from pipeline.robot.robot_file import LegSpec
 
@@ -146,6 +148,34 @@ GAITS: dict[str, NamedGait] = {
 }
 
 
+#: Gaits that stand on two feet or fewer for a part of the period, or fly.
+DYNAMIC_GAITS: Final = frozenset(
+    {
+        *("trot", "flying_trot", "walking_trot", "pace", "amble", "bound", "half_bound", "pronk"),
+        *("gallop", "canter", "jump", "hop", "run"),
+    }
+)
+
+
+def refuse_unknown(name: object) -> None:
+    """Say of a name that is no gait's whether it is a dynamic one, or which one was meant.
+
+    Raises:
+        GaitError: It is not in `GAITS`.
+    """
+    words = one_line(name)
+    if not isinstance(name, str):
+        raise GaitError(f"{words}: expected the name of a gait: {', '.join(sorted(GAITS))}")
+    if name in GAITS:
+        return
+    if re.sub(r"[\s-]+", "_", words.strip().lower()) in DYNAMIC_GAITS:
+        raise GaitError(
+            f"{words} is a dynamic gait: at times fewer than {LEAST_FEET} feet stand, and every "
+            f"gait here is statically stable; known: {', '.join(sorted(GAITS))}"
+        )
+    raise GaitError(f"{words}: {closest(words, list(GAITS))}")
+
+
 def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     """A gait by name.
 
@@ -157,8 +187,7 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     Raises:
         GaitError: No gait of that name, or none for this number of legs.
     """
-    if name not in GAITS:
-        raise GaitError(f"gait.name = {name}: {closest(name, list(GAITS))}")
+    refuse_unknown(name)
     gait = GAITS[name]
     if gait.legs is not None and len(legs) != gait.legs:
         fit = [g.name for g in GAITS.values() if g.legs in (None, len(legs))]

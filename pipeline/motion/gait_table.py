@@ -7,6 +7,7 @@ leg may have of its own is written either once for all or as a table by leg.
 from __future__ import annotations
 
 import contextlib
+import json
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path as FilePath
@@ -16,10 +17,10 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
 from actuators.errors import UnitError, closest, one_line
-from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.text_file import UnreadableTextError, parsed, read_toml_file
 from actuators.units import quantity
 from pipeline.errors import GaitError
-from pipeline.motion.footfall import GAITS
+from pipeline.motion.footfall import refuse_unknown
 from pipeline.motion.transfer_path import transfer_path
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 
@@ -79,8 +80,10 @@ def _direction(written: object) -> float:
 
 
 def _name(written: object) -> str:
-    if written not in GAITS:
-        raise ValueError(f"{one_line(written)}: {closest(one_line(written), list(GAITS))}")
+    try:
+        refuse_unknown(written)
+    except GaitError as error:
+        raise ValueError(str(error)) from None
     return str(written)
 
 
@@ -218,7 +221,7 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
     try:
         read = GaitTable.model_validate(dict(table))
     except ValidationError as error:
-        raise GaitError(f"{where}: {'; '.join(_words(error))}") from None
+        raise GaitError(f"{where}: {'; '.join(_words(error, legs))}") from None
     ways = [key for key in FOOTFALLS if getattr(read, key) is not None]
     if len(ways) > 1:
         raise GaitError(
@@ -231,7 +234,7 @@ def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str)
     return read
 
 
-def _words(error: ValidationError) -> list[str]:
+def _words(error: ValidationError, legs: tuple[str, ...]) -> list[str]:
     """One part of the line for every key at fault."""
     out: dict[str, str] = {}
     for fault in error.errors():
@@ -242,16 +245,18 @@ def _words(error: ValidationError) -> list[str]:
         elif fault["type"] == "value_error":
             words = f"gait.{key} = {fault['ctx']['error']}"
         else:
-            words = f"gait.{key}: {_expected(key, fault['msg'])}"
+            words = f"gait.{key}: {_expected(key, fault['msg'], legs)}"
         out.setdefault(key, words)
     return list(out.values())
 
 
-def _expected(key: str, message: str) -> str:
+def _expected(key: str, message: str, legs: tuple[str, ...]) -> str:
     if key in ("sets", "tripods"):
-        return f"must be {'two ' if key == 'tripods' else ''}lists of leg names"
+        example = json.dumps([legs[::2], legs[1::2]])
+        return f"must be {'two ' if key == 'tripods' else ''}lists of leg names such as {example}"
     if key == "phase":
-        return "must be a table with a number for each leg"
+        example = ", ".join(f"{leg} = {k / len(legs):.3g}" for k, leg in enumerate(legs))
+        return f"must be a table with a number for each leg such as {{{example}}}"
     return message[0].lower() + message[1:]
 
 
@@ -267,12 +272,12 @@ def _refuse_other_legs(value: object, legs: tuple[str, ...], where: str) -> None
 
 
 def _refuse_other_sets(sets: Legs | None, legs: tuple[str, ...], where: str) -> None:
-    if not sets:
+    two = where.endswith("tripods")
+    if sets is None or (two and not sets):  # no tripods is no gait at all, said where one is asked
         return
     for name in (name for group in sets for name in group):
         if name not in legs:
             raise GaitError(f"{where}: leg '{one_line(name)}' is not known; {closest(name, legs)}")
-    two = where.endswith("tripods")
     wrong = len(sets) < 2 or (two and len(sets) != 2)
     if wrong or sorted(name for group in sets for name in group) != sorted(legs):
         parts = "two sets" if two else "two or more sets"
@@ -312,7 +317,11 @@ def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
         GaitError: The gait file cannot be used.
     """
     spec = load_robot_file(robot)
-    return spec if gait is None else spec.with_gait(**read_gait_file(gait))
+    if gait is None:
+        return spec
+    table = read_gait_file(gait)
+    read_gait_table(table, tuple(leg.name for leg in spec.legs), str(gait))
+    return spec.with_gait(**table)
 
 
 def changed_table(table: Mapping[str, Any], key: str, value: str) -> dict[str, Any]:
@@ -321,12 +330,20 @@ def changed_table(table: Mapping[str, Any], key: str, value: str) -> dict[str, A
     Args:
         table: Before.
         key: Without ``gait.``; ``KEY.LEG`` for one leg of a number by leg.
-        value: As written; a bare number is a share.
+        value: As written; a bare number is a share, lists and tables are as in TOML.
+
+    Raises:
+        GaitError: A list or table that TOML does not read.
     """
     first, _, leg = key.partition(".")
     new: Any = value
     with contextlib.suppress(ValueError):
         new = float(value)
+    if value.startswith(("[", "{")):
+        try:
+            new = parsed(f"value = {value}")["value"]
+        except UnreadableTextError as error:
+            raise GaitError(f"gait.{key}: {error}") from None
     if not leg:
         return merged_gait(table, {first: new})
     known = table.get(first)

@@ -10,7 +10,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pipeline.errors import UnphysicalModelError
-from pipeline.robot.published import published_names, published_robot
+from pipeline.robot.published import named_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 from pipeline.robot.urdf_check import MERGED, OWN_DRIVE, Finding, check_urdf
@@ -43,9 +43,8 @@ def check_file(path: Path) -> list[Finding]:
     """
     if path.suffix.lower() == ".toml":
         return check_robot(load_robot(load_robot_file(path)))
-    if not path.exists() and str(path) in published_names():
-        return check_urdf(read_urdf(published_robot(str(path)).urdf), str(path))
-    return check_urdf(read_urdf(path), str(path))
+    known = named_robot(str(path))
+    return check_urdf(read_urdf(known.urdf if known else path), str(path))
 
 
 def check_robot(robot: Robot) -> list[Finding]:

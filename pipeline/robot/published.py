@@ -12,6 +12,7 @@ from pipeline.errors import UrdfError
 
 #: How a robot file writes such a URDF: ``example-robot-data:solo12``.
 SCHEME: Final = "example-robot-data:"
+_SHOWN: Final = 12  # names in one line
 
 
 @dataclass(frozen=True)
@@ -53,10 +54,11 @@ def published_robot(name: str) -> PublishedRobot:
 
     loaders = _loaders()
     if name not in loaders:
-        raise UrdfError(
-            f"'{one_line(name)}' is no robot of example-robot-data; "
-            f"{closest(name, published_names())}"
-        )
+        known = published_names()
+        hint = closest(name, known)
+        if not hint.startswith("did"):
+            hint = f"known: {', '.join(known[:_SHOWN])} and {len(known) - _SHOWN} more"
+        raise UrdfError(f"'{one_line(name)}' is no file and no robot of example-robot-data; {hint}")
     loader = loaders[name]
     if not loader.urdf_filename:
         raise UrdfError(
@@ -68,6 +70,22 @@ def published_robot(name: str) -> PublishedRobot:
     srdf = folder / loader.srdf_subpath / loader.srdf_filename
     has_srdf = bool(loader.srdf_filename) and srdf.is_file()
     return PublishedRobot(name, urdf, srdf if has_srdf else None, loader.ref_posture or "")
+
+
+def named_robot(given: str) -> PublishedRobot | None:
+    """The robot of the package that a command names, with or without `SCHEME`.
+
+    Returns:
+        None where a file is meant: one that is there, or that is written like one.
+
+    Raises:
+        UrdfError: Neither a file nor a robot, or a robot without a URDF.
+    """
+    path, name = Path(given), given.removeprefix(SCHEME)
+    like_a_file = path.is_file() or path.suffix or len(path.parts) > 1
+    if name == given and (like_a_file or (path.exists() and name not in _loaders())):
+        return None
+    return published_robot(name)
 
 
 def urdf_path(text: str, robot_file: Path) -> Path:

@@ -13,7 +13,7 @@ from actuators.parameters import REQUIRED_KEYS, ParameterSet, parameters_from_ta
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import si_unit
 from pipeline.errors import RobotFileError
-from pipeline.robot.published import published_names, urdf_path
+from pipeline.robot.published import SCHEME, published_names, urdf_path
 
 #: Numbers every walking robot needs, with their dimension.
 #: Of the project, from the folder it is run in.
@@ -56,8 +56,6 @@ BUILD_SCHEMA = {
 BUILDS = ("hexapod", "leg_stand")
 #: Joints of a built leg: hip, femur, tibia.
 BUILT_JOINTS = 3
-#: SI values beyond this overflow somewhere between here and the energies.
-LARGEST = 1e9
 #: Lengths of walking robots lie between these; outside, a unit is wrong by a thousand [m].
 SMALLEST_LENGTH, LARGEST_LENGTH = 1e-3, 10.0
 #: No planet pulls more [m/s^2].
@@ -201,7 +199,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return read_toml_file(path)
     except UnreadableTextError as error:
-        hint = "; give the robot file with --robot" if str(error) == "no such file" else ""
+        hint = "; name a robot file (TOML)" if str(error) == "no such file" else ""
         raise RobotFileError(f"{path}: {error}{hint}") from None
 
 
@@ -221,7 +219,7 @@ def load_robot_file(path: Path) -> RobotSpec:
             f"{path}: a URDF says nothing of legs and gait; give a robot file (TOML) that names it "
             f"as robot.urdf, as urdf/hexapod.toml does: `python -m pipeline init {path}` writes one"
         )
-    if not path.exists() and str(path) in published_names():
+    if not path.exists() and str(path).removeprefix(SCHEME) in published_names():
         raise RobotFileError(
             f"{path}: no such file; `python -m pipeline init {path}` writes one for that robot"
         )
@@ -525,9 +523,6 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
     """
     sizes = ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity")
     _positive(parameters, tuple(name for name in sizes if name in parameters), where)
-    for name, value in parameters.items():
-        if abs(value) > LARGEST:
-            raise RobotFileError(f"{where}: parameters.{name} is beyond any robot; check its unit")
     if "foot_lift" in parameters and parameters["foot_lift"] < 0:
         raise RobotFileError(f"{where}: parameters.foot_lift must not be negative")
     if parameters["gravity"] > LARGEST_GRAVITY:
@@ -538,8 +533,14 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
 
 
 def _check_lengths(parameters: ParameterSet, where: str) -> None:
-    """Refuse metres written for millimetres and the reverse."""
+    """Refuse metres written for millimetres and the reverse, and angles beyond a turn."""
     for name, kind in (GAIT_SCHEMA | BUILD_SCHEMA).items():
+        if kind == "angle" and name in parameters and abs(parameters[name]) > 2 * math.pi:
+            row = parameters.parameter(name)
+            raise RobotFileError(
+                f"{where}: parameters.{name} = {row.value_as_written:g} {row.unit} is more than a "
+                "turn; check its unit"
+            )
         if kind != "length" or name not in parameters:
             continue
         size, row = abs(parameters[name]), parameters.parameter(name)

@@ -47,8 +47,10 @@ MOST_DEGREES = 1440.0
 LONGEST = 10.0
 #: A radius of gyration so many times the robot's size cannot be [1].
 GYRATION = 10.0
-#: A robot that fills a cube of its reach with water is heavy [kg/m^3].
-HEAVY = 1000.0
+#: A robot weighs more than the air in a cube with edges as long as the way from its root to its
+#: furthest mass, less than the water, and cannot weigh what the steel does [kg/m^3]. Published
+#: robots from hand to humanoid lie between 3 and 500, grams for kilograms at a thousand times that.
+AIR, HEAVY, STEEL = 1.2, 1000.0, 7850.0
 #: What says which links move as one; no warning.
 MERGED = "merged over fixed joints"
 #: Of a joint that mimics none.
@@ -394,13 +396,17 @@ def _sizes(root: ET.Element, bodies: Sequence[Body], where: str) -> list[Finding
                 assert origin is not None
                 detail = f"origin {origin.get('xyz')}: {offset:g} m from its parent; millimetres?"
                 findings.append(Finding(_name(joint), "lengths in metres", False, detail))
-    reach = max(away.values(), default=0.0)
+    reach = furthest = max(away.values(), default=0.0)
     for body in bodies:
         mass = float(body.inertia.mass)
-        size = reach + float(np.linalg.norm(body.inertia.lever))
-        if mass <= 0 or size == 0 or not body.joint:
+        lever = float(np.linalg.norm(body.inertia.lever))
+        size = reach + lever
+        if mass <= 0:
             continue
         radius = math.sqrt(max(0.0, float(np.linalg.eigvalsh(body.inertia.inertia)[2])) / mass)
+        furthest = max(furthest, away.get(body.name, 0.0) + lever + radius)
+        if size == 0 or not body.joint:
+            continue
         detail = (
             f"radius of gyration {radius:.3g} m, the longest chain of joints {reach:.3g} m; "
             "inertia in kg*m^2, mass in kg, lengths in m?"
@@ -409,7 +415,21 @@ def _sizes(root: ET.Element, bodies: Sequence[Body], where: str) -> list[Finding
             Finding(body.name, "inertia fits the size", radius <= GYRATION * size, detail)
         )
     total = sum(float(body.inertia.mass) for body in bodies)
-    if reach > 0 and total > HEAVY * reach**3:
-        detail = f"{total:.6g} kg with joints within {reach:.3g} m; masses in kg, lengths in m?"
-        findings.append(Finding(root.get("name", "robot"), "total mass", True, detail, note=True))
-    return findings
+    return [*findings, *_total_mass(root.get("name", "robot"), total, furthest)]
+
+
+def _total_mass(name: str, total: float, size: float) -> list[Finding]:
+    """A robot's mass [kg] against what would fill a cube of its size [m]; none if usual."""
+    volume = size * size * size  # where a power overflows
+    if total <= 0 or size <= 0 or AIR * volume <= total <= HEAVY * volume:
+        return []
+    heavy = total > HEAVY * volume
+    filled = (STEEL if heavy else AIR) * volume
+    detail = (
+        f"{total:.6g} kg within {size:.3g} m of its root, where a cube of that edge full of "
+        f"{'steel' if heavy else 'air'} weighs {filled:.3g} kg; "
+        + ("masses in g" if heavy else "masses in t, lengths in mm")
+        + "? A URDF takes kg and m"
+    )
+    possible = not heavy or total <= filled
+    return [Finding(name, "total mass", possible, detail, note=possible)]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import errno
 import logging
 import os
+import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -122,7 +123,8 @@ def told(out: Path, folder: Path | None = None) -> Iterator[None]:
 
 
 def _meant(text: str, out: Path, folder: Path | None) -> str:
-    return text if folder is None else text.replace(str(folder), str(out))
+    text = text if folder is None else text.replace(str(folder), str(out))
+    return re.sub(rf"/{re.escape(PREFIX)}[^/:\s]*", "", text)  # never a name of our own
 
 
 def _make(out: Path) -> list[Path]:

@@ -91,6 +91,7 @@ def copy(tmp_path):
         ("alternatives.toml", r'\ntitle = "[^"]*"', "\ntitle = 3", "'title' must be text"),
         ("alternatives.toml", r'\nmotor = "[^"]*"', "\nmotor = 3", "'motor' must be text"),
         ("alternatives.toml", r'\nratio = "[^"]*"', "\nratio = 3", "'ratio' must be text"),
+        ("alternatives.toml", r'name = "hypoid"', 'name = " "', r"'element 2 .*name' is empty"),
         ("planetary.toml", r'title = "[^"]*"', "title = 3", "'title' must be text"),
         ("planetary.toml", r'kind = "planetary"\n', "", "missing key 'kind'"),
         ("planetary.toml", 'kind = "planetary"', 'kind = "planetry"', "did you mean 'planetary'"),
@@ -102,6 +103,31 @@ def copy(tmp_path):
             "unknown parameter 'rati'",
         ),
         ("planetary.toml", "title =", "titel =", "did you mean 'title'"),
+        (
+            "alternatives.toml",
+            '"rotor_re40.inertia"',
+            '"rotor_re40.coulomb"',
+            r"\[rotor\]: element 'rotor_inertia': inertia = 'rotor_re40.coulomb' is in 'mN\*m', a "
+            r"unit of torque; expected inertia such as 'kg\*m\^2'",
+        ),
+        (
+            "alternatives.toml",
+            '\nratio = "requirement.ratio"',
+            '\nratio = "hypoid.wheel_radius"',
+            r"\[ideal\]: ratio = .* is in 'mm', a unit of length; expected ratio",
+        ),
+        (
+            "motor_re40_24v.toml",
+            "value = 75.7",
+            "value = 5.7",
+            "peak_current must not be below continuous_current",
+        ),
+        (
+            "motor_re40_24v.toml",
+            r"parameters\.resistance",
+            "parameters.resistence",
+            "missing parameter 'resistance'",
+        ),
         ("hypoid.toml", r"(parameters.friction\]\nvalue = )", r"\1-", "backwards|outside its"),
         ("hypoid.toml", r"(parameters.friction\]\nvalue = [\d.]+)", r"\1.", "malformed TOML.*line"),
     ],
@@ -165,6 +191,22 @@ def test_an_alternative_can_be_taken_out_by_itself(copy):
         catalog = load_catalog(copy)
         assert list(catalog.alternatives) == [n for n in load_catalog().alternatives if n != name]
         assert catalog == load_catalog().only(catalog.alternatives)
+
+
+def test_a_number_that_is_left_out_and_named_nowhere_is_not_asked_for(copy):
+    alternatives, drive = copy / "alternatives.toml", copy / "harmonic_drive.toml"
+    alternatives.write_text(
+        alternatives.read_text().replace('viscous = "harmonic_drive.viscous"\n', "")
+    )
+    text = drive.read_text()
+    with pytest.raises(CatalogError, match=r"harmonic_drive\.toml: parameter 'viscous' is used by"):
+        load_catalog(copy)
+    drive.write_text(re.sub(r"^\[parameters\.viscous\].*?(?=^\[|\Z)", "", text, flags=re.M | re.S))
+    assert "viscous" not in load_catalog(copy).components["harmonic_drive"].parameters
+    # Its law has no use for it: it is refused all the same.
+    alternatives.write_text(re.sub(r"coulomb = \"rotor_re40.*\n", "", alternatives.read_text()))
+    with pytest.raises(CatalogError, match=r"rotor_re40\.toml: parameter 'coulomb' is used by no"):
+        load_catalog(copy)
 
 
 @pytest.mark.parametrize("name", ["../up", "a/b", "two words", "x.y", ""])

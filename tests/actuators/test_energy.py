@@ -213,7 +213,9 @@ def test_root_mean_square_of_a_line_is_exact():
 def test_a_peak_at_its_limit_is_no_breach():
     """The data sheet permits the limit itself, at every instant and root mean square."""
     chain = CHAINS["ideal"]
-    motor = DCMotor("m", 0.03, 0.3, max_speed=800.0, peak_current=2.5 / 0.03, continuous_current=99)
+    motor = DCMotor(
+        "m", 0.03, 0.3, max_speed=800.0, peak_current=2.5 / 0.03, continuous_current=2.5 / 0.03
+    )
     two = np.ones((2, 1))
     s = series([0.0, 4.0], 0 * two, 2.0 * two, 0 * two, 1000.0 * two)  # 800 rad/s, 2.5 N*m
     result = replace(chain, motor=motor).moving(s)

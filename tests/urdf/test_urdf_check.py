@@ -160,9 +160,19 @@ def test_a_mimic_on_a_fixed_joint_moves_nothing() -> None:
     assert not failed(*ARM, *(p.format('<mimic joint="j"/>') for p in parts))
 
 
-def test_masses_in_grams_are_noted() -> None:
-    parts = (link("base"), link("arm", 1000.0, (10, 10, 10)), joint("j", "base", "arm"))
-    assert [note.check for note in notes(*parts)] == ["total mass"]
+@pytest.mark.parametrize(
+    ("factor", "passed", "unit"),
+    [(1e3, False, "in g?"), (100.0, True, "in g?"), (1.0, None, ""), (1e-3, True, "lengths in mm")],
+)
+def test_a_mass_that_does_not_fit_the_size_is_noted_or_refused(
+    factor: float, passed: bool | None, unit: str
+) -> None:
+    """Two links of 1 kg within 0.4 m: air weighs 77 g there, water 64 kg, steel 500 kg."""
+    moments = (0.01 * factor,) * 3
+    parts = (link("base", factor, moments), link("arm", factor, moments), joint("j", "base", "arm"))
+    found = [f for f in check_urdf(robot(*parts), "r.urdf") if f.check == "total mass"]
+    assert [(f.passed, f.note) for f in found] == ([] if passed is None else [(passed, passed)])
+    assert all(unit in f.detail and "A URDF takes kg and m" in f.detail for f in found)
 
 
 def test_a_continuous_joint_needs_no_limit() -> None:

@@ -3,7 +3,8 @@
 Naming compares efforts with inertia times an acceleration that comes from a filtered encoder. Its
 noise grows with the 2.5th power of the cut-off, the effort's with the square root; where the first
 outweighs the second, columns built from accelerations fit noise (an elasticity that is not there).
-The cut-off is lowered until the encoder's noise in the prediction is at most half the effort's.
+The cut-off is lowered until the encoder's noise in the prediction is at most half the effort's, and
+below the rate at which the steps of a rounded position come: their error is no noise there.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pipeline.logs.prepared.cycles import with_repeated_noise
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.settings import LONGEST_KERNEL, Settings
+from pipeline.logs.quality.sampling import new_values
 from pipeline.logs.signals.noise import smoother_noise
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
@@ -37,7 +39,7 @@ MOST_CUTOFF: Final = 30.0
 
 def naming_cutoff(model: MachineModel, prepared: Sequence[Prepared]) -> float:
     """The cut-off for naming [Hz], at most that of the prepared logs."""
-    now = prepared[0].cutoff
+    now = min(prepared[0].cutoff, *(max(step_rate(one)[1], LEAST_CUTOFF) for one in prepared))
     share = 1.0
     for one, m in zip(prepared, observe_all(model, prepared), strict=True):
         felt = encoder_noise(model, one, m)[:, 0]
@@ -48,6 +50,20 @@ def naming_cutoff(model: MachineModel, prepared: Sequence[Prepared]) -> float:
     longest = max(float(one.time[-1] - one.time[0]) for one in prepared)
     least = max(LEAST_CUTOFF, 4.0 / (LONGEST_KERNEL * longest))
     return float(min(now, max(min(share * now, MOST_CUTOFF), least)))
+
+
+def step_rate(one: Prepared) -> tuple[int, float]:
+    """The joint that moves furthest, and how often its position takes a new value [Hz].
+
+    A filter that passes this frequency shows the steps of a rounded position. Joints that hardly
+    move may well stand between two steps, and a joint with a velocity column that has the say
+    needs none: infinite.
+    """
+    j = int(np.nanargmax(np.ptp(one.q, axis=0)))
+    if (one.fusion.weight[:, j] > 0.5).all():
+        return j, np.inf
+    good = one.usable[0][:, j]
+    return j, new_values(one.log.time[good], one.log.position[good, j])
 
 
 def with_encoder_noise(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.identification.compare.bandwidth import LEAST_CUTOFF, step_rate
 from pipeline.identification.compare.long import LongLogs
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.contact import Contact
@@ -129,6 +130,7 @@ def filter_findings(one: Prepared) -> list[Finding]:
     if one.contact is not None:
         detail = f"contact from {one.contact.source}; {len(one.stances)} stretches of one stance"
         out.append(Finding(name, "", "contact", len(one.stances), "1", "ok", detail))
+    out += _resolution(one)
     for j, joint in enumerate(one.joints):
         column = column_name(joint, one.channel)
         usable = float(one.mask[:, j].mean())
@@ -140,3 +142,20 @@ def filter_findings(one: Prepared) -> list[Finding]:
             detail = f"within the bandwidth, from {one.noise_basis}"
             out.append(Finding(name, column, "noise_floor", floor, one.unit, "ok", detail))
     return [*out, *signal_findings(one), *cannot_tell(one.log, one.v, one.effort, one.mask)]
+
+
+def _resolution(one: Prepared) -> list[Finding]:
+    """Refuse positions rounded so that no cut-off at which a robot's motion shows would do."""
+    j, rate = step_rate(one)
+    if rate >= min(one.cutoff, LEAST_CUTOFF):
+        return []
+    quantity = "motor_position" if one.log.position_source == "motor" else "position"
+    change = np.abs(np.diff(one.log.position[:, j]))
+    step = float(change[change > 0].min())
+    detail = (
+        f"moves in steps of {step:.3g} rad, {rate:.3g} a second: a velocity and acceleration up to "
+        f"{LEAST_CUTOFF:g} Hz, as a robot's motion needs, show the steps alone; log positions with "
+        "more digits, or the velocity beside them"
+    )
+    column = column_name(one.joints[j], quantity)
+    return [Finding(one.log.name, column, "resolution", step, "rad", "refused", detail)]

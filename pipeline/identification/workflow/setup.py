@@ -21,6 +21,7 @@ from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelF
 from pipeline.logs.prepared.contact import Contact, find_contact
 from pipeline.logs.prepared.parts import Parts, split
 from pipeline.logs.prepared.stream import Stream, Survey, survey
+from pipeline.logs.quality.finding import refuse
 from pipeline.logs.quality.repeats import refuse_repeats
 from pipeline.logs.reading.expected import Expected, expected_of_model, expected_of_robot
 from pipeline.logs.reading.log import EFFORTS, Log
@@ -274,11 +275,13 @@ def open_logs(given: Setup, options: Options) -> list[Stream]:
         GapError: The mapping cannot be used.
     """
     mapping = load_mapping(options.mapping) if options.mapping else None
+    paths = (*options.logs, *options.holdout)
+    if mapping is not None:
+        mapping.refuse_unknown_logs(paths)
 
     def adjust(log: Log) -> Log:
         return _adjusted(log, given, options)
 
-    paths = (*options.logs, *options.holdout)
     return [Stream(path, given.expected, mapping, adjust) for path in paths]
 
 
@@ -336,6 +339,7 @@ def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
         # By the machine as its files say: what a model file adds changes no bandwidth.
         cutoff = naming_cutoff(given.bare, intake.prepared)
         intake = intake.at(lowered(intake.prepared, cutoff))
+    refuse(intake.findings)
     prepared = intake.prepared
     last = None if surveys else options.prove_last
     parts = split(prepared[:count], holdout=prepared[count:], prove_last=last)

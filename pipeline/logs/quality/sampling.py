@@ -71,6 +71,26 @@ def quantum(x: Array) -> tuple[float, float]:
     return 0.0, 0.0
 
 
+def new_values(time: Array, x: Array) -> float:
+    """How often a channel takes a new value, by the median over its changes [Hz].
+
+    A rounded channel of speed v and step d does v / d times a second, and its error is a sawtooth
+    of that frequency: a filter that lets it pass shows the steps, and no speed between them.
+
+    Args:
+        time: Shape (N,) [s].
+        x: Shape (N,).
+
+    Returns:
+        Infinite where it never changes.
+    """
+    changes = time[1:][np.diff(x) != 0]
+    if changes.size == 0:
+        return np.inf
+    apart = np.diff(changes) if changes.size > 1 else time[-1:] - time[:1]
+    return 1.0 / float(np.median(apart))
+
+
 def _lattice(values: Array) -> tuple[float, float]:
     """Usual spacing of sorted values and the share of spacings that are whole multiples."""
     gaps = np.diff(values)

@@ -54,16 +54,18 @@ All tables are optional::
 from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
 from actuators.checked import checked
-from actuators.errors import one_line
+from actuators.errors import closest, one_line
 from actuators.text_file import UnreadableTextError, read_toml_file
-from actuators.units import from_si, to_si
+from actuators.units import dimension, from_si, to_si
 from pipeline.logs.errors import MappingError
+from pipeline.logs.reading.log_format import BASE_COLUMNS, JOINT_COLUMNS
 from pipeline.logs.reading.mapping_schema import ColumnTable, Constants, MappingTable
 from pipeline.logs.reading.table_file import CsvDialect
 
@@ -116,6 +118,10 @@ class LogRule:
     condition: MappingType[str, float | str]
     constants: MappingType[str, float]
 
+    def names(self, path: Path) -> bool:
+        """Whether a log's file, with or without its ending, is one of those it holds for."""
+        return any(fnmatchcase(name, self.match) for name in (path.stem, path.name))
+
 
 @dataclass(frozen=True)
 class Mapping:
@@ -142,16 +148,35 @@ class Mapping:
     logs: tuple[LogRule, ...] = ()
     ratio: MappingType[str, float] = field(default_factory=dict)
 
-    def rule_for(self, log_name: str) -> LogRule:
-        """What holds for one log: its file's stem is matched against every `[[logs]]`."""
+    def rule_for(self, path: Path) -> LogRule:
+        """What holds for one log: its file's name is matched against every `[[logs]]`."""
         gain, constants = self.gain, dict(self.constants)
         condition: dict[str, float | str] = {}
         for rule in self.logs:
-            if fnmatchcase(log_name, rule.match):
+            if rule.names(path):
                 gain = rule.gain if rule.gain is not None else gain
                 condition |= rule.condition
                 constants |= rule.constants
-        return LogRule(log_name, gain, condition, constants)
+        return LogRule(path.stem, gain, condition, constants)
+
+    def refuse_unknown_logs(self, paths: Sequence[Path]) -> None:
+        """Refuse a `[[logs]]` that names no log where one of the logs is named by none.
+
+        Args:
+            paths: Of the logs that are read together; files beside them count as known, too.
+
+        Raises:
+            MappingError: Names the entry, and the closest log.
+        """
+        unnamed = [p for p in paths if not any(rule.names(p) for rule in self.logs)]
+        known = {*paths, *(p for folder in {p.parent for p in paths} for p in folder.iterdir())}
+        for count, rule in enumerate(self.logs, start=1):
+            if unnamed and not any(rule.names(path) for path in known):
+                hint = closest(rule.match.strip("*?"), sorted(path.stem for path in unnamed))
+                raise MappingError(
+                    f"{self.where}: logs {count}: match = '{one_line(rule.match)}' names no log; "
+                    f"{hint}"
+                )
 
 
 def load_mapping(path: Path) -> Mapping:
@@ -192,10 +217,10 @@ def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
         supply_voltage=read.supply.voltage.si if read.supply.voltage else None,
         supply_column=read.supply.column,
         supply_unit=read.supply.unit,
-        constants=_constants(read.constants),
+        constants=_constants(read.constants, where),
         keep=read.keep.columns,
         logs=tuple(
-            LogRule(log.match, log.gain_per_rad, log.condition, _constants(log.constants))
+            LogRule(log.match, log.gain_per_rad, log.condition, _constants(log.constants, where))
             for log in read.logs
         ),
         ratio=read.gear_ratio,
@@ -207,5 +232,14 @@ def _column(pattern: str, table: ColumnTable) -> ColumnRule:
     return ColumnRule(pattern, table.target or pattern, table.unit, table.zero, scale)
 
 
-def _constants(table: Constants) -> dict[str, float]:
+def _constants(table: Constants, where: str) -> dict[str, float]:
+    """Constants in SI units; one that stands for a column has that column's dimension."""
+    for name, quantity in table.items():
+        _, unit = (JOINT_COLUMNS | BASE_COLUMNS).get(name.rpartition("__")[2], ("", quantity.unit))
+        found, expected = dimension(quantity.unit), dimension(unit)
+        if found != expected:
+            raise MappingError(
+                f"{where}: 'constants.{one_line(name)}.unit': '{quantity.unit}' is a unit of "
+                f"{found}, expected {expected}"
+            )
     return {name: quantity.si for name, quantity in table.items()}

@@ -95,13 +95,21 @@ def _of(expected: str, quantity: QuantityTable) -> QuantityTable:
     return quantity
 
 
+def _positive(quantity: QuantityTable) -> QuantityTable:
+    if not quantity.si > 0:
+        raise ValueError("must be positive")
+    return quantity
+
+
 def _sampling(rate: QuantityTable) -> QuantityTable:
     if not 0 < rate.si < 1e9:
         raise ValueError("must be positive and below 1 GHz")
     return rate
 
 
-Voltage = Annotated[QuantityTable, AfterValidator(partial(_of, "voltage"))]
+Voltage = Annotated[
+    QuantityTable, AfterValidator(partial(_of, "voltage")), AfterValidator(_positive)
+]
 Rate = Annotated[
     QuantityTable, AfterValidator(partial(_of, "frequency")), AfterValidator(_sampling)
 ]

@@ -126,11 +126,50 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         if column not in mapping.keep and (meant := misspelt(name, expected))
     }
     plan = ReadingPlan(
-        table, expected, mapping, mapping.rule_for(path.stem), sources, tuple(ignored), near
+        table, expected, mapping, mapping.rule_for(path), sources, tuple(ignored), near
     )
     _check_misspelt(plan)
+    _check_names(plan)
     _check_columns(plan)
     return plan
+
+
+def _check_names(plan: ReadingPlan) -> None:
+    """Refuse a name of the mapping that neither the file nor the robot has."""
+    table, expected, mapping = plan.table, plan.expected, plan.mapping
+    owners = {_target(column, mapping)[1].rpartition("__")[0] for column in table.header} - {""}
+    for name in mapping.joints:
+        if name not in owners:
+            raise GapError(
+                f"{mapping.where}: joints: no column of {table.where} is of '{one_line(name)}'; "
+                f"{closest(name, sorted(owners))}"
+            )
+    for name in plan.rule.constants:
+        constant = parse_column(name, expected, f"{mapping.where}: constants")
+        meant = "" if constant else misspelt(name, expected)
+        if meant:
+            raise GapError(
+                f"{mapping.where}: constants: '{one_line(name)}' is none of the log format; did "
+                f"you mean '{meant}'?"
+            )
+    for what, column in (
+        ("time", mapping.time_column),
+        *((f"torque_enabled.{j}", c) for j, c in mapping.torque_enabled.items()),
+        *(("keep", c) for c in mapping.keep),
+        ("supply", mapping.supply_column),
+    ):
+        if column is not None and column not in table.header:
+            raise GapError(
+                f"{mapping.where}: {what}: column '{one_line(column)}' is not in {table.where}; "
+                f"{suggest_column(column, table.header)}"
+            )
+    named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values(), *mapping.ratio)
+    for joint in named:
+        if joint not in expected.joints:
+            raise GapError(
+                f"{mapping.where}: '{one_line(joint)}' is no joint of {expected.robot}; "
+                f"{closest(joint, expected.joints)}"
+            )
 
 
 def _check_misspelt(plan: ReadingPlan) -> None:
@@ -151,6 +190,15 @@ def _known_columns(expected: Expected) -> list[str]:
 
 def _resolve(column: str, mapping: Mapping) -> tuple[ColumnRule, str]:
     """The rule for a column and its name in the log format."""
+    found, name = _target(column, mapping)
+    owner, separator, quantity = name.rpartition("__")
+    if separator and owner in mapping.joints:
+        name = f"{mapping.joints[owner]}__{quantity}"
+    return found, name
+
+
+def _target(column: str, mapping: Mapping) -> tuple[ColumnRule, str]:
+    """The same, its joint called as the log calls it."""
     if mapping.time_column == column:
         return ColumnRule(column, TIME, mapping.time_unit), TIME
     found, name = _IDENTITY, column
@@ -161,9 +209,6 @@ def _resolve(column: str, mapping: Mapping) -> tuple[ColumnRule, str]:
             found, name = rule, target
     if name == TIME and found is _IDENTITY and mapping.time_unit != "s":
         found = ColumnRule(column, TIME, mapping.time_unit)
-    owner, separator, quantity = name.rpartition("__")
-    if separator and owner in mapping.joints:
-        name = f"{mapping.joints[owner]}__{quantity}"
     return found, name
 
 
@@ -182,7 +227,7 @@ def _check_unit(rule: ColumnRule, target: Target, where: str) -> None:
 
 
 def _check_columns(plan: ReadingPlan) -> None:
-    table, expected, mapping = plan.table, plan.expected, plan.mapping
+    table, mapping = plan.table, plan.mapping
     where = table.where
     have = {(t.owner, t.quantity) for t in plan.sources}
     if ("", "time") not in have and mapping.sample_rate is None:
@@ -196,23 +241,6 @@ def _check_columns(plan: ReadingPlan) -> None:
         )
     _check_positions(plan, have)
     _check_efforts(plan, have)
-    for what, column in (
-        *((f"torque_enabled.{j}", c) for j, c in mapping.torque_enabled.items()),
-        *(("keep", c) for c in mapping.keep),
-        *((("supply", mapping.supply_column),) if mapping.supply_column else ()),
-    ):
-        if column not in table.header:
-            raise GapError(
-                f"{mapping.where}: {what}: column '{one_line(column)}' is not in {where}; "
-                f"{suggest_column(column, table.header)}"
-            )
-    named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values(), *mapping.ratio)
-    for joint in named:
-        if joint not in expected.joints:
-            raise GapError(
-                f"{mapping.where}: '{one_line(joint)}' is no joint of {expected.robot}; "
-                f"{closest(joint, expected.joints)}"
-            )
 
 
 def _check_positions(plan: ReadingPlan, have: set[tuple[str, str]]) -> None:

@@ -82,7 +82,7 @@ class Extra:
     Attributes:
         kind: What.
         joint: Column of the joint; `EVERY` for all.
-        order: Periods per radian of a ripple's sine, as ``sin(order q)``.
+        order: Periods per turn [1] of a ripple's sine, as ``sin(order q)``, q in rad.
     """
 
     kind: Kind

@@ -8,9 +8,9 @@ import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
 
-from actuators.errors import closest, one_line
+from actuators.errors import one_line
 from pipeline.errors import RobotFileError
-from pipeline.robot.published import SCHEME, published_names, published_robot
+from pipeline.robot.published import SCHEME, named_robot
 from pipeline.robot.urdf_source import read_urdf
 
 #: Poses of an SRDF that are meant to stand, those before others.
@@ -49,23 +49,18 @@ def source_of(given: str) -> Source:
     """A URDF by path, or by its name in ``example-robot-data``.
 
     Raises:
-        RobotFileError: It is neither.
-        UrdfError: The file cannot be read.
+        RobotFileError: It is a robot file.
+        UrdfError: It is neither, or the file cannot be read.
     """
     path = Path(given)
     if path.suffix.lower() == ".toml":
         raise RobotFileError(f"{given}: a robot file; init starts from a URDF or a robot's name")
-    if path.is_file() or path.suffix or len(path.parts) > 1:
+    known = named_robot(given)
+    if known is None:
         beside = [path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf"]
         srdf = next((p for p in beside if p.is_file()), None)
         return Source(path.stem, path, read_urdf(path), False, srdf, "")
-    if given not in published_names():
-        raise RobotFileError(
-            f"{one_line(given)}: no such file, and no robot of example-robot-data; "
-            f"{closest(given, published_names())}"
-        )
-    known = published_robot(given)
-    return Source(given, known.urdf, read_urdf(known.urdf), True, known.srdf, known.pose)
+    return Source(known.name, known.urdf, read_urdf(known.urdf), True, known.srdf, known.pose)
 
 
 def standing_pose(source: Source) -> tuple[str, dict[str, float]] | None:

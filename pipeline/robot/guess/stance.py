@@ -13,7 +13,9 @@ those of the best mark, a product of four marks from 0 to 1 of which none may be
 
 Legs are chosen one after the other, each against the margin that the others leave, twice round.
 
-Right legs mirror left ones where their hips do.
+Right legs mirror left ones where their hips do. Postures drawn by chance stand a little before or
+behind their hips: where front hips mirror rear ones, each foot moves to the middle between its
+place and the mirror image of its counterpart's, if the legs reach it.
 """
 
 from __future__ import annotations
@@ -158,9 +160,11 @@ class Standing:
             f"firmly and leave a stroke: the best of a search of {_POSTURES} postures of each leg"
         )
         for _, level, posture in sorted(found, key=lambda one: one[0], reverse=True):
-            stance = self._reached(level, posture, reason, 0.0)
-            if stance is not None and (self._smallest(stance.posture[None])[0] >= regular).all():
-                yield stance
+            for feet in (self._balanced(level), level):
+                stance = self._reached(feet, posture, reason, 0.0)
+                if stance and (self._smallest(stance.posture[None])[0] >= regular).all():
+                    yield stance
+                    break
 
     def _marks(self, q: Array, feet: Array, regular: Array) -> Array:
         """Of postures by leg: torque, limits and singularity, shape (M, L)."""
@@ -286,6 +290,17 @@ class Standing:
         for leg, other in self._pairs().items():
             out[leg] = out[other] * [1, -1, 1]
         return out
+
+    def _balanced(self, feet: Array) -> Array:
+        """Feet with front and rear as mirror images, shape (L, 3) [m]; as they are without such."""
+        hips, size = self.chains.offset[0], self.chains.reach
+        there, back = np.array([2.0 * hips[:, 0].mean(), 0.0, 0.0]), [-1.0, 1.0, 1.0]
+        apart = np.linalg.norm((there + hips * back)[:, None] - hips, axis=-1)
+        other = apart.argmin(axis=1)
+        off = np.maximum(apart.min(axis=1), np.abs(size - size[other]))
+        if (off > _MIRRORED * size).any() or (other[other] != np.arange(other.size)).any():
+            return feet
+        return np.asarray((feet + there + feet[other] * back) / 2)
 
 
 def _origins(chains: LegChains, q: Array) -> Array:

@@ -23,7 +23,7 @@ ROBOT_FILES = {
     "two joints": (r', "rm_joint_3"', "", r"legs.rm: names 2 joints; a built leg has 3"),
     "unknown station": (r'"middle"', '"midle"', r"station = 'midle'; did you mean 'middle'"),
     "sets of no legs": (r"^tripods = .*?$", "tripods = 2", r"gait.tripods: must be two lists"),
-    "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass is beyond any robot"),
+    "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
     "unknown leg": (r'feet = \["lf"', 'feet = ["fl"', r"standing.feet: leg 'fl' is not known"),
     "unknown path": (
         r'path = "\w+"',
@@ -82,7 +82,7 @@ CHANGES = {
         r"no such number; did you mean 'harmonic_drive.load'",
     ),
     "not a number": ("femur_mass=heavy", r"femur_mass=heavy: expected a number"),
-    "number with unit": ("femur_mass=1 kg", r"expected a number in the unit its file writes"),
+    "number with unit": ("femur_mass=1 kg", r"expected a number in kg, without the unit"),
     "NaN": ("femur_mass=nan", r"femur_mass=nan: expected a finite number"),
     "infinite": ("gait_period=1e999", r"expected a finite number"),
     "negative mass": ("femur_mass=-1", r"femur_mass = -1 kg must be positive"),
@@ -92,6 +92,11 @@ CHANGES = {
     "unknown path": ("gait.transfer_path=cubik", r"did you mean 'cubic'"),
     "negative friction": ("harmonic_drive.load=-0.1", r"outside its bounds \[0, 0.5\]"),
     "ratios apart": ("harmonic_drive.ratio=90", r"'requirement.ratio' asks for 400"),
+    "radians for degrees": ("joint_1_axis_angle=1e5", r"= 100000 deg is more than a turn; check"),
+    "beyond any machine": (
+        "motor_re40_24v.supply_voltage=1e300",
+        r"1e\+300 V is beyond any machine",
+    ),
     "beyond the joints": ("joint_1_range=5", r"'\w+_joint_1' would have to reach .* deg at t ="),
     "knee too short": ("tibia_length=100", r"mm beyond its reach; shorten the stroke"),
 }
@@ -131,6 +136,22 @@ GAITS = {
     "never in the air": (["gait.duty_factor=1"], 2, r"at 1 it never steps"),
     "gait of other legs": (["gait.name=crawl"], 2, r"for 4 legs, the robot has 6; for these: trip"),
     "no such gait": (["gait.name=riple"], 2, r"--set gait.name=riple: .*did you mean 'ripple'"),
+    "a dynamic gait": (["gait.name=Flying trot"], 2, r"dynamic gait: .* fewer than 3 .*: crawl"),
+    "a list for a name": (['gait.name=["trot"]'], 2, r"expected the name of a gait: crawl"),
+    "no sets": (["gait.sets=[]"], 2, r"gait.sets must part the legs"),
+    "text for lists": (
+        ["gait.sets=lf,rm"],
+        2,
+        r'must be lists of leg names such as \[\["lf", "lr"',
+    ),
+    "half a table": (["gait.phase={lf=0"], 2, r"gait.phase: malformed TOML"),
+    "no table": (["gait.phase=3"], 2, r"number for each leg such as \{lf = 0, lm = 0.167"),
+    "no leg": (["standing.feet=lf,lx"], 2, r"'lx' is not known; .*standing.feet=lf,lm,lr"),
+    "a stroke that follows from others": (
+        ["gait.speed=0.1 m/s", "gait.period=2 s", "foot_stroke=230"],
+        2,
+        r"--set foot_stroke: it changes nothing",
+    ),
     "no such key": (["gait.speeed=1 m/s"], 2, r"unknown key of \[gait\] 'speeed'; did you mean"),
     "no unit": (["gait.speed=1"], 2, r"gait.speed = 1.0 has no unit; expected text such as"),
     "contradiction": (
@@ -238,10 +259,18 @@ def test_urdf_of_ones_own(
     refused(capsys, tmp_path / "out", code, message)
 
 
+def test_a_mass_that_the_urdf_does_not_take(
+    root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot = own_robot(root, tmp_path, "</robot>", "</robot>")
+    code = command("walk", tmp_path / "out", "--set", "total_mass=50", robot=robot)
+    refused(capsys, tmp_path / "out", code, r"bodies .* are those of own.urdf.*gait.payload_mass")
+
+
 @pytest.mark.parametrize(
     ("robot", "message"),
     [
-        ("nowhere.toml", r"nowhere.toml: no such file; give the robot file with --robot"),
+        ("nowhere.toml", r"nowhere.toml: no such file; name a robot file \(TOML\)"),
         (".", r"is a folder"),
         ("hexapod.urdf", r"a URDF says nothing of legs and gait; give a robot file"),
         ("leg.toml", r"a robot on a stand neither stands nor walks; give one with a floating base"),
@@ -292,7 +321,7 @@ def test_two_feet_are_refused(
     refused(capsys, tmp_path / "out", code, r"stands on 2 feet; .* at least 3")
 
 
-@pytest.mark.parametrize("place", ["a file", "below a file", "no folder can be made"])
+@pytest.mark.parametrize("place", ["a file", "below a file", "no folder", "no file"])
 def test_output_that_cannot_be_written(
     tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], place: str
 ) -> None:
@@ -300,14 +329,15 @@ def test_output_that_cannot_be_written(
     out = {
         "a file": tmp_path / "file",
         "below a file": tmp_path / "file" / "out",
-        "no folder can be made": Path("/proc/legwatt-out"),
+        "no folder": Path("/proc/legwatt-out"),
+        "no file": Path("/proc"),
     }[place]
     code = command("stand", out)
     error = capsys.readouterr().err
     assert code == 2
     assert error.count("\n") == 1
     assert "choose another folder" in error
-    assert str(out) in error
+    assert error.startswith(f"{out}: ")  # no name of our own
     assert (tmp_path / "file").read_text(encoding="utf-8") == "mine"
     assert {p.name for p in tmp_path.iterdir()} == {"file"}
 

@@ -183,3 +183,42 @@ def test_a_head_is_held_and_counts(root: Path, tmp_path: Path) -> None:
     tracking = walk.table("foot_tracking").frame()
     assert (tracking["directions"] == 3).all()
     assert tracking["deviation_time_s"].isna().all()
+
+
+def test_what_is_wrong_with_the_file_that_is_to_be_is_said_of_that_file(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    urdf, out = tmp_path / "a.urdf", tmp_path / "mine.toml"
+    text = (root / "urdf" / "hexapod.urdf").read_text(encoding="utf-8")
+    urdf.write_text(text.replace("rm_joint_1", "rm;joint_1"), encoding="utf-8")
+    assert main(["init", str(urdf), "--out", str(out)]) == 2
+    assert capsys.readouterr().err.startswith(f"{out}: legs.")
+
+
+@pytest.mark.parametrize("name", ["solo13", "zzz", "cassie", "urdf"])
+def test_check_and_init_know_the_same_names(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "urdf").mkdir()
+    monkeypatch.chdir(tmp_path)
+    said = []
+    for verb in ("check", "init"):
+        assert main([verb, name]) == 2
+        said.append(capsys.readouterr().err)
+    assert said[0] == said[1]
+
+
+def test_check_takes_a_name_as_robot_files_write_it(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", "example-robot-data:solo12"]) == 0
+    assert "90 of 90 checks passed" in capsys.readouterr().out
+
+
+def test_urdf_says_what_it_built_and_what_not(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own, built = root / "urdf" / "solo12.toml", tmp_path / "hexapod.toml"
+    built.write_bytes((root / "urdf" / "hexapod.toml").read_bytes())
+    assert main(["urdf", str(own), str(built)]) == 0
+    first, second = capsys.readouterr().out.splitlines()
+    assert first == f"{own}: nothing built, its URDF solo12.urdf is its own (no robot.build)"
+    assert second == f"{tmp_path / 'hexapod.urdf'}: built from {built}"

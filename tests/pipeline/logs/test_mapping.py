@@ -165,6 +165,7 @@ def test_decimal_commas_with_a_dialect(
         ("[time]\ncolumn = 't'\nsample_rate = {value = 5, unit = 'Hz'}", ("not both",)),
         ("[csv]\ndelimiter = 'x'", ("delimiter",)),
         ("[csv]\ndecimal = ','", ("both",)),
+        ("[supply]\nvoltage = {value = -7.4, unit = 'V'}", ("supply.voltage", "positive")),
         ("[controller]\nlaw = 'pid'", ("pid", "duty")),
         ("[controller]\ntorque_off_bridge = 'opn'", ("did you mean 'open'",)),
         ("[[log]]\nmatch = 'x'", ("did you mean 'logs'",)),
@@ -172,6 +173,10 @@ def test_decimal_commas_with_a_dialect(
         ("[[logs]]\ngain_per_rad = 1", ("match",)),
         ("a = [", ("malformed",)),
         ("[constants]\nx = 3", ("constants", "table")),
+        (
+            "[constants.a__temperature_degC]\nvalue = 3\nunit = 'N'",
+            ("constants.a__temperature_degC", "'N' is a unit of force, expected temperature"),
+        ),
     ],
 )
 def test_a_bad_mapping_gives_one_clear_line(
@@ -199,6 +204,12 @@ def test_a_bad_mapping_gives_one_clear_line(
         ("[keep]\ncolumns = ['y']", ("'y'",)),
         ("effort = 'voltage'", ("voltage",)),
         ("[time]\nsample_rate = {value = 5, unit = 'Hz'}", ("drop one",)),
+        ("[time]\ncolumn = 'tme_s'", ("time: column 'tme_s' is not in log.csv", "time_s")),
+        ("[joints]\nshoulder = 'a'", ("joints: no column of log.csv is of 'shoulder'", "a, b")),
+        (
+            "[constants.a__temperatur_degC]\nvalue = 3\nunit = 'degC'",
+            ("constants: 'a__temperatur_degC'", "did you mean 'a__temperature_degC'"),
+        ),
     ],
 )
 def test_a_mapping_that_does_not_fit_the_log(
@@ -214,3 +225,17 @@ def test_a_mapping_that_does_not_fit_the_log(
         read_log(write(columns), two_joints, rules)
     for word in words:
         assert word in str(error.value), str(error.value)
+
+
+def test_logs_of_which_none_is_there_are_refused_where_one_is_named_by_no_entry(
+    columns: dict[str, Array], write: Write, mapping: Callable[[str], Mapping]
+) -> None:
+    one, other = write(columns, "run_kp100.csv"), write(columns, "run_kp200.csv")
+    mapping("[[logs]]\nmatch = '*_kp100'").refuse_unknown_logs([other])  # beside it
+    mapping("[[logs]]\nmatch = 'run_kp100.csv'").refuse_unknown_logs([one])
+    named = mapping("[[logs]]\nmatch = '*_kp100'\n[[logs]]\nmatch = '*_kp800'")
+    named.refuse_unknown_logs([one])  # of another folder
+    with pytest.raises(GapError, match=r"logs 2: match = '\*_kp800' names no log"):
+        named.refuse_unknown_logs([other])
+    with pytest.raises(GapError, match="logs 1: match = 'run_kp10' names no log; did you mean"):
+        mapping("[[logs]]\nmatch = 'run_kp10'").refuse_unknown_logs([one])

@@ -14,7 +14,7 @@ from pipeline.logs.errors import GapError
 from pipeline.logs.quality.finding import Quality
 from pipeline.logs.quality.glitches import glitches
 from pipeline.logs.quality.quality import judge
-from pipeline.logs.quality.sampling import held, quantum
+from pipeline.logs.quality.sampling import held, new_values, quantum
 from pipeline.logs.quality.skew import skew
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
@@ -209,6 +209,13 @@ def test_quantisation_is_not_mistaken_for_holding(two_joints: Expected) -> None:
     assert not checks(quality, "masked")
     found = [f.value for f in quality.findings if f.check == "quantum"]
     assert found == pytest.approx([step, step], rel=1e-3)
+
+
+def test_a_rounded_ramp_takes_new_values_at_its_speed_over_its_step() -> None:
+    t = np.arange(5000) / 1000
+    assert new_values(t, np.round(0.7 * t / 0.1) * 0.1) == pytest.approx(7.0, rel=0.01)
+    assert new_values(t, 0.7 * t) == pytest.approx(1000.0)
+    assert new_values(t, np.zeros_like(t)) == np.inf
 
 
 def test_quantum_of_a_slow_and_a_continuous_channel() -> None:

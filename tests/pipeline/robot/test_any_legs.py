@@ -132,7 +132,7 @@ def test_published_quadrupeds_stand_and_carry_their_weight(root: Path, name: str
         (
             '"walker.urdf"',
             '"example-robot-data:solo21"',
-            "robot.urdf: 'solo21' is no robot of .*so",
+            "robot.urdf: 'solo21' is no file and no robot of .*so",
         ),
         ('"walker.urdf"', '"example-robot-data:cassie"', "describes it in cassie.*not in a URDF"),
     ],

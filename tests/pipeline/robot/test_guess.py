@@ -93,6 +93,7 @@ def test_the_hexapods_own_legs_are_found_again(root: Path, hexapod: Robot, tmp_p
     feet = guess.stance.feet
     assert np.ptp(feet[:, 2]) < 1e-9
     np.testing.assert_allclose(feet[:3], feet[3:] * [1, -1, 1], atol=1e-9)  # mirrored
+    np.testing.assert_allclose(feet[:3], feet[2::-1] * [-1, 1, 1], atol=1e-9)  # lf, lm, lr
     lower, upper = (robot.layout.by_leg(limit[None])[0] for limit in robot.limits)
     assert (guess.stance.posture > lower).all()
     assert (guess.stance.posture < upper).all()
@@ -108,13 +109,17 @@ POSED = ("a1", "anymal_c", "go2", "hyq", "solo12", "solo8")
 
 @pytest.mark.parametrize("name", POSED)
 def test_the_search_stands_about_as_publishers_pose_their_robots(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Feet within half a height of the pose's, at a height within a quarter of its."""
+    """Feet within half a height of the pose's, at a height within a quarter of its; balanced."""
     published = guess_robot(name, support_margin).stance
     monkeypatch.setattr("pipeline.robot.guess.guess.standing_pose", lambda source: None)
-    guess = guess_robot(name, support_margin)
-    sought = guess.stance
+    guess, robot = guessed(name, tmp_path)
+    sought, hips = guess.stance, robot.chains.offset[0]
+    corners = sought.feet[np.lexsort(np.round(hips[:, 1::-1].T, 6))].reshape(2, 2, 3)
+    there = [2 * hips[:, 0].mean(), 0, 0]
+    np.testing.assert_allclose(corners[:, ::-1], corners * [1, -1, 1], atol=1e-9)  # left, right
+    np.testing.assert_allclose(corners[::-1], corners * [-1, 1, 1] + there, atol=1e-9)
     height = -published.feet[:, 2].mean()
     off = np.linalg.norm((sought.feet - published.feet)[:, :2], axis=1)
     assert (off < 0.5 * height).all()
@@ -250,7 +255,7 @@ def test_meshes_that_are_missing_leave_the_numbers_as_they_are(tmp_path: Path) -
         ("ur5", {}, r"one foot found \(ee_link\); .*--foot; chains end in ee_link"),
         ("iris", {}, r"iris: no joint moves; a leg has at least one actuated joint"),
         ("cassie", {}, r"cassie.sdf, not in a URDF"),
-        ("solo21", {}, r"no such file, and no robot of example-robot-data; did you mean 'solo"),
+        ("solo21", {}, r"no file and no robot of example-robot-data; did you mean 'solo"),
         ("nowhere/x.urdf", {}, r"nowhere/x.urdf: no such file"),
         ("x.toml", {}, r"x.toml: a robot file; init starts from a URDF"),
         ("quadruped", {}, r"limits of 'BL_KFE', .*: lower equals upper"),

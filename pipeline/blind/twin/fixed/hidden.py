@@ -65,7 +65,7 @@ Drawn = tuple[Hidden, Case]
 
 
 def _joint(rng: np.random.Generator, case: Case) -> tuple[int, str]:
-    """A joint that bears enough for an effect to be one: half the largest torque, or chance."""
+    """Any joint, all equally likely: its column and its name."""
     j = int(rng.integers(case.course.q.shape[1]))
     return j, case.machine.joints[j]
 
