@@ -256,8 +256,9 @@ def fixed_before(published: Mapping[str, Published]) -> set[str]:
     The posture gives Table III, the motor's constants give Tables IV and V.
     """
     out = {p.id for p in published.values() if p.role in ("input", "symmetry")} | set(EXACT)
-    standing = {e.id for e in entries(published) if e.alternative != "reversible"}
-    return out | {name for name in standing if not name.endswith("_leg_energy_3s")}
+    out |= {e.id for e in entries(published) if e.alternative != "reversible"}
+    # Energies are made of what the others fix, or put in by a prior that need not give them.
+    return {name for name in out if not name.endswith("_leg_energy_3s")}
 
 
 def extra_target(published: Mapping[str, Published], standing_legs: int) -> Target:

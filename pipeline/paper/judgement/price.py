@@ -35,6 +35,7 @@ class Price:
         gear_friction: Coulomb friction of the planetary gear [mN*m].
         gear_prior: Centre of what gear data say of it [mN*m].
         gear_interval: Their 95 % belief [mN*m].
+        gear_known: 95 % of the posterior of it [mN*m]; NaN without.
         gear_heat: What it dissipates in the middle right leg in one cycle [J].
         leg_energy: What that leg draws in one cycle with the irreversible actuator [J].
         no_load: No-load current of the motor [A].
@@ -45,6 +46,7 @@ class Price:
     gear_friction: float
     gear_prior: float
     gear_interval: tuple[float, float]
+    gear_known: tuple[float, float]
     gear_heat: float
     leg_energy: float
     no_load: float
@@ -68,8 +70,11 @@ def price(
     heat = loss_energies(walking).get(GEAR_ELEMENT, np.zeros(len(walking.joint.joints)))
     own = [j for j, name in enumerate(walking.joint.joints) if name.startswith(PUBLISHED_LEG)]
     limit = NOTABLE * data_sheet()["no_load_current"]
-    share = math.nan
+    share, known = math.nan, (math.nan, math.nan)
     if results is not None:
+        own_gear = results["posterior"]["numbers"][GEAR_FRICTION]
+        ends = (gear.value(own_gear["low"]), gear.value(own_gear["high"]))
+        known = (from_si(ends[0], gear.unit), from_si(ends[1], gear.unit))
         viscous = prior.keys.index(ROTOR_VISCOUS)
         currents = [
             no_load_current(
@@ -85,6 +90,7 @@ def price(
         from_si(catalog.parameter(GEAR_FRICTION).value, gear.unit),
         from_si(gear.centre, gear.unit),
         (from_si(gear.interval[0], gear.unit), from_si(gear.interval[1], gear.unit)),
+        known,
         float(heat[own].sum()),
         actuators.energy[ALTERNATIVE][PUBLISHED_LEG],
         no_load_current(catalog.parameter(TORQUE_CONSTANT).value, *values),
