@@ -160,12 +160,11 @@ def _price(judged: Judged) -> str:
     assert p is not None  # asked for with all the paper's actuators alone
     _, high = p.gear_interval
     return (
-        '**The price of the fit:** "almost 15" asks for more friction than gear data suggest. Of the '
-        f"planetary gear's constant friction they say {p.gear_prior:g} mN·m, at most {high:g}; the "
-        f"posterior says {span(p.gear_known)}, the nearest set, used here, takes "
-        f"{p.gear_friction:.1f} and angles of the hypoid gear that cost more. This friction alone "
-        f"turns {p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle into heat. "
-        f"In {percent(p.no_load_share, 1)} of the posterior the motor draws over "
+        '**The price of the fit:** "almost 15" needs a planetary gear with '
+        f"{p.gear_friction:.1f} mN·m of constant friction (95 % of the posterior: "
+        f"{span(p.gear_known)}), where gear data suggest {p.gear_prior:g} mN·m, at most {high:.0f}; "
+        f"it alone turns {p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle "
+        f"into heat. In {percent(p.no_load_share, 1)} of the posterior the motor draws over "
         f"{percent(NOTABLE - 1)} more current without load than the "
         f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
     )

@@ -75,11 +75,11 @@ class Effort:
         seed: Of everything random.
     """
 
-    starts: int = 3
+    starts: int = 4
     robots: int = 300
     ensembles: int = 2
     steps: int = 3000
-    left_out_steps: int = 900
+    left_out_steps: int = 800
     sets: int = 250
     left_out_sets: int = 60
     prior_draws: int = 300

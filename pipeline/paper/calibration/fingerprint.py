@@ -40,7 +40,9 @@ def fingerprint(
     for row in published.values():
         out[f"published.{row.id}"] = repr((row.unit, row.value, row.half_width, row.role))
     for free in prior.free:
-        out[f"prior.{free.key}"] = repr((free.centre, free.interval, free.bounds, free.logarithmic))
+        out[f"prior.{free.key}"] = repr(
+            (free.centre, free.deviation, free.bounds, free.logarithmic)
+        )
     return out
 
 

@@ -1,9 +1,4 @@
-"""Prior knowledge of the unpublished numbers, as coordinates in which it is a unit Gaussian.
-
-The centre is the median, and the interval's ends lie at -1.96 and 1.96: where they are unequally
-far from the centre, the belief is as wide on each side as the interval says, and the interval holds
-95 % of it all the same, or more where the bounds cut off what lies outside.
-"""
+"""Prior knowledge of the unpublished numbers, as coordinates in which it is a unit Gaussian."""
 
 from __future__ import annotations
 
@@ -15,6 +10,7 @@ from typing import Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import model_validator
+from scipy.special import ndtr, ndtri
 
 from actuators.checked import Number, Pair, Table, checked
 from actuators.errors import UnitError, one_line
@@ -24,8 +20,6 @@ from pipeline.paper.errors import PriorError
 
 Array = NDArray[np.float64]
 PRIOR_FILE = Path(__file__).parent / "prior.toml"
-#: Half of a 95 % interval in standard deviations.
-_SIGMAS = 1.96
 
 
 @dataclass(frozen=True)
@@ -35,7 +29,7 @@ class Free:
     Attributes:
         key: ``robot.<name>`` or ``<component>.<name>``.
         centre: Prior centre, SI.
-        interval: Holds 95 % of the belief before the bounds cut it off, SI.
+        deviation: One standard deviation, SI or of the natural logarithm.
         bounds: Hard, SI.
         logarithmic: Whether the belief spreads over factors.
         unit: As written.
@@ -45,7 +39,7 @@ class Free:
 
     key: str
     centre: float
-    interval: tuple[float, float]
+    deviation: float
     bounds: tuple[float, float]
     logarithmic: bool
     unit: str
@@ -53,13 +47,11 @@ class Free:
     reason: str
 
     @property
-    def _sides(self) -> tuple[float, float, float]:
-        """Centre and one standard deviation below and above it, in SI or natural logarithms."""
-        low, middle, high = (
-            math.log(x) if self.logarithmic else x
-            for x in (self.interval[0], self.centre, self.interval[1])
-        )
-        return middle, (middle - low) / _SIGMAS, (high - middle) / _SIGMAS
+    def interval(self) -> tuple[float, float]:
+        """What 95 % of the belief spans inside the bounds, as much left out below as above, SI."""
+        low, high = (ndtr(self.coordinate(bound)) for bound in self.bounds)
+        ends = ndtri(low + np.array([0.025, 0.975]) * (high - low))
+        return self.value(ends[0]), self.value(ends[1])
 
     def value(self, z: float) -> float:
         """SI value at a coordinate, kept inside the bounds against rounding."""
@@ -67,15 +59,16 @@ class Free:
 
     def at(self, z: Array) -> Array:
         """SI values at coordinates (W,)."""
-        middle, below, above = self._sides
-        raw = middle + np.where(z < 0, below, above) * z
-        return np.clip(np.exp(raw) if self.logarithmic else raw, *self.bounds)
+        if self.logarithmic:
+            raw = self.centre * np.exp(self.deviation * z)
+        else:
+            raw = self.centre + self.deviation * z
+        return np.clip(raw, *self.bounds)
 
     def coordinate(self, value: float) -> float:
         """Coordinate of an SI value."""
-        middle, below, above = self._sides
-        away = (math.log(value) if self.logarithmic else value) - middle
-        return away / (below if away < 0 else above)
+        away = math.log(value / self.centre) if self.logarithmic else value - self.centre
+        return away / self.deviation
 
 
 @dataclass(frozen=True)
@@ -133,10 +126,10 @@ def load_prior(path: Path = PRIOR_FILE) -> Prior:
 class _Written(Table):
     """A free number as it stands in the file."""
 
-    expected = "value, unit, interval, bounds, scale, source and reason"
+    expected = "value, unit, deviation, bounds, scale, source and reason"
     value: Number
     unit: str
-    interval: Pair
+    deviation: Number
     bounds: Pair
     scale: Literal["linear", "log"]
     source: str
@@ -148,14 +141,14 @@ class _Written(Table):
             dimension(self.unit)
         except UnitError as error:
             raise ValueError(str(error)) from None
-        (low, high), (least, most) = self.interval, self.bounds
-        if not low < high or not least < most:
-            raise ValueError("interval and bounds must be [low, high]")
+        least, most = self.bounds
+        if not least < most:
+            raise ValueError("bounds must be [low, high]")
         if not least <= self.value <= most:
             raise ValueError("the bounds exclude the value; widen them or move it")
-        if not low < self.value < high:
-            raise ValueError("the value must lie inside the interval; widen it or move it")
-        if self.scale == "log" and min(to_si(x, self.unit) for x in (low, least, self.value)) <= 0:
+        if self.deviation <= (1 if self.scale == "log" else 0):
+            raise ValueError('deviation must be positive; a factor above 1 with scale = "log"')
+        if self.scale == "log" and min(to_si(x, self.unit) for x in (least, self.value)) <= 0:
             raise ValueError("a logarithmic scale needs positive numbers")
         return self
 
@@ -164,15 +157,16 @@ def _free(key: str, entry: object, file: str) -> Free:
     """One free number in SI units."""
     written = checked(_Written, entry, f"{file}: '{one_line(key)}'", PriorError)
 
-    def si(pair: tuple[float, float]) -> tuple[float, float]:
-        return to_si(pair[0], written.unit), to_si(pair[1], written.unit)
-
+    logarithmic = written.scale == "log"
+    deviation = (
+        math.log(written.deviation) if logarithmic else to_si(written.deviation, written.unit)
+    )
     return Free(
         key=key,
         centre=to_si(written.value, written.unit),
-        interval=si(written.interval),
-        bounds=si(written.bounds),
-        logarithmic=written.scale == "log",
+        deviation=deviation,
+        bounds=(to_si(written.bounds[0], written.unit), to_si(written.bounds[1], written.unit)),
+        logarithmic=logarithmic,
         unit=written.unit,
         source=written.source,
         reason=written.reason,
