@@ -93,7 +93,6 @@ def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
     init = verbs.add_parser("init", help="write a robot file for a URDF or a robot's name")
     init.add_argument(
         "source",
-        type=named_path,
         help="URDF, or a robot that example-robot-data ships, e.g. solo12",
     )
     init.add_argument("--out", type=named_path, help="robot file; NAME.toml here by default")
@@ -138,7 +137,7 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
 def _run_init(options: argparse.Namespace) -> int:
     from pipeline.cli.init import run_init
 
-    return run_init(str(options.source), options.out, feet=options.foot, base=options.base)
+    return run_init(options.source, options.out, feet=options.foot, base=options.base)
 
 
 def _run_check(options: argparse.Namespace) -> int:
