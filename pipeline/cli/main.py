@@ -108,7 +108,6 @@ def _robot_verbs(verbs: argparse._SubParsersAction[_Parser]) -> None:
     init = _verb(verbs, "init", "write a robot file for a URDF or a robot's name")
     init.add_argument(
         "source",
-        type=named_path,
         help="URDF, or a robot that example-robot-data ships, e.g. solo12",
     )
     init.add_argument("--out", type=named_path, help="robot file; NAME.toml here by default")
@@ -168,7 +167,7 @@ def _run_options(sub: argparse.ArgumentParser) -> None:
 def _run_init(options: argparse.Namespace) -> int:
     from pipeline.cli.init import run_init
 
-    return run_init(str(options.source), options.out, feet=options.foot, base=options.base)
+    return run_init(options.source, options.out, feet=options.foot, base=options.base)
 
 
 def _run_init_actuator(options: argparse.Namespace) -> int:

@@ -537,9 +537,10 @@ def _check_lengths(parameters: ParameterSet, where: str) -> None:
     for name, kind in (GAIT_SCHEMA | BUILD_SCHEMA).items():
         if kind == "angle" and name in parameters and abs(parameters[name]) > 2 * math.pi:
             row = parameters.parameter(name)
+            number = f"{row.value_as_written:g}"
+            hint = f"is {number} deg meant?" if row.unit == "rad" else "check its unit"
             raise RobotFileError(
-                f"{where}: parameters.{name} = {row.value_as_written:g} {row.unit} is more than a "
-                "turn; check its unit"
+                f"{where}: parameters.{name} = {number} {row.unit} is more than a turn; {hint}"
             )
         if kind != "length" or name not in parameters:
             continue

@@ -57,9 +57,10 @@ def source_of(given: str) -> Source:
         raise RobotFileError(f"{given}: a robot file; init starts from a URDF or a robot's name")
     known = named_robot(given)
     if known is None:
+        text = read_urdf(path)
         beside = [path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf"]
         srdf = next((p for p in beside if p.is_file()), None)
-        return Source(path.stem, path, read_urdf(path), False, srdf, "")
+        return Source(path.stem, path, text, False, srdf, "")
     return Source(known.name, known.urdf, read_urdf(known.urdf), True, known.srdf, known.pose)
 
 

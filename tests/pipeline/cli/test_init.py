@@ -195,7 +195,7 @@ def test_what_is_wrong_with_the_file_that_is_to_be_is_said_of_that_file(
     assert capsys.readouterr().err.startswith(f"{out}: legs.")
 
 
-@pytest.mark.parametrize("name", ["solo13", "zzz", "cassie", "urdf"])
+@pytest.mark.parametrize("name", ["solo13", "zzz", "cassie", "urdf", "."])
 def test_check_and_init_know_the_same_names(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

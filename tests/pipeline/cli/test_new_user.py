@@ -64,7 +64,7 @@ NUMBERS = {
     "limits in degrees": (
         r'(joint_2_upper\]\nvalue = )80\nunit = "deg"(.*?)interval = \[45, 100\]',
         r'\g<1>115\nunit = "rad"\2interval = [100, 120]',
-        r"robot.toml: lf_joint_2: limits in radians fails \(115 rad are 18.3 turns; degrees\?",
+        r"robot.toml: parameters.joint_2_upper = 115 rad is more than a turn; is 115 deg meant\?",
     ),
     "half an interval": (r"interval = \[80, 200\]", "interval = [80]", r"must be \[low, high\]"),
     "interval of NaN": (r"interval = \[80, 200\]", "interval = [nan, 1]", r"must be a finite num"),

@@ -44,8 +44,6 @@ def with_values(hexapod: Robot, **values: float) -> ParameterSet:
         ({"joint_2_lower": 0.5, "joint_2_upper": 0.5}, "joint_2_lower must be below joint_2_upper"),
         ({"joint_3_lower": 0.6, "joint_3_upper": 0.5}, "joint_3_lower must be below joint_3_upper"),
         ({"joint_effort_limit": 1e9}, ""),
-        ({"joint_effort_limit": 1.001e9}, "joint_effort_limit is beyond any robot"),
-        ({"trunk_com_left": -1.001e9}, "trunk_com_left is beyond any robot"),
         ({"trunk_com_left": -1e-6}, ""),
         ({"trunk_com_left": -10.0}, ""),
         ({"trunk_com_left": -10.001}, "trunk_com_left = .* is longer than in any walking robot"),
@@ -55,6 +53,8 @@ def with_values(hexapod: Robot, **values: float) -> ParameterSet:
         ({"gravity": 30.0}, ""),
         ({"gravity": 30.001}, "gravity is beyond any planet"),
         ({"joint_1_axis_angle": 0.0}, ""),
+        ({"joint_1_axis_angle": 6.28}, ""),
+        ({"joint_1_axis_angle": -6.29}, "joint_1_axis_angle = .* deg is more than a turn"),
     ],
 )
 def test_edges_of_what_a_built_robot_can_have(
