@@ -52,7 +52,7 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
         of = channel if h.cause in _OF_EFFORTS else _position(log)
         lines = "; ".join(_lines(log, last, h, joints))
         seen = (
-            f"the bodies would have to be {size:.3g} times as heavy"
+            f"else every body is {size:.3g} times as heavy as the robot's file says"
             if common
             else f"the motion leaves {before} of the {channel} unexplained as logged, {after} so"
         )

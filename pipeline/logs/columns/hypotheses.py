@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 #: Factors on an effort: nearer to one they are a gain or bodies that differ.
-FACTORS: Final = (*np.geomspace(3.0, 3000.0, 10), *np.geomspace(3.0, 3000.0, 10) ** -1.0)
+LEAST, MOST = 2.5, 3000.0
+FACTORS: Final = tuple(s for f in np.geomspace(3.0, MOST, 10) for s in (f, 1.0 / f))
 #: Factors on a position that is read at a motor, or in degrees.
 RATIOS: Final = tuple(np.geomspace(3.0, 300.0, 11))
 #: Delays of an effort [s]: shorter ones are a delay of the machine's own.

@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from pipeline.logs.columns.explaining import FLOOR, Bodies, Explaining, Score
 from pipeline.logs.columns.hypotheses import (
     CAUSES,
+    LEAST,
+    MOST,
     Hypothesis,
     Reading,
     as_named,
@@ -33,7 +35,7 @@ ENOUGH: Final = 20.0
 ALIKE: Final = 10.0
 #: Share of an effort that may be left, root mean square, where a hypothesis is to explain it.
 WELL: Final = 0.5
-#: Hypotheses about positions that are tried with all bodies open.
+#: Hypotheses about positions that are tried with all bodies open, and any whose size is refined.
 _TRIED: Final = 4
 _STEPS: Final = 8
 #: Turns of the search for a size, each over a third of the one before.
@@ -146,17 +148,18 @@ class _Search:
         }
         # Bodies that are far from the model's may hide a joint's column: then none is beyond doubt.
         suspected = self._live if now.penalty > ENOUGH or not odd else odd
-        every = [*of_efforts(start, self._live, suspected), *_first(rough)]
+        every = [*of_efforts(start, self._live, suspected), *(t.hypothesis for t in _first(rough))]
         tried = [self._try(h, now) for h in every]
         good = [
             t for t in tried if np.mean(t.score.share[list(t.hypothesis.joints)] ** 2) < WELL**2
         ]
-        if not good:
+        # Sizes were tried in large steps: the first few are refined before they are compared.
+        refined = [self._refined(h, start, now) for h in _first(good)]
+        if not refined:
             return None
-        most = max(t.gain for t in good)
-        best = {t.hypothesis.cause: t for t in sorted(good, key=lambda t: t.gain)}
-        likely = (best[cause] for cause in CAUSES if cause in best)
-        return self._refined(next(t for t in likely if t.gain > most - ALIKE), start, now)
+        most = max(t.gain for t in refined)
+        best = {t.hypothesis.cause: t for t in sorted(refined, key=lambda t: t.gain)}
+        return next(best[c] for c in CAUSES if c in best and best[c].gain > most - ALIKE)
 
     def _refined(self, best: _Tried, start: Reading, now: Score) -> _Tried:
         cause, size = best.hypothesis.cause, best.hypothesis.size
@@ -166,7 +169,8 @@ class _Search:
         for _ in range(_REFINED):
             size = best.hypothesis.size
             sizes = (size * step, size / step) if factor else (size + step, size - step)
-            others = (self._try(best.hypothesis.resized(s, start), now) for s in sizes)
+            possible = [s for s in sizes if not factor or LEAST < max(s, 1.0 / s) < MOST]
+            others = (self._try(best.hypothesis.resized(s, start), now) for s in possible)
             best = max((best, *others), key=lambda t: t.gain)
             step = step**0.5 if factor else 0.5 * step
         return best
@@ -176,9 +180,9 @@ class _Search:
 _STEP: Final = {"scale": 1.5, "late": 0.02, "position_scale": 1.3, "position_zero": 0.25}
 
 
-def _first(tried: Iterable[_Tried]) -> list[Hypothesis]:
+def _first(tried: Iterable[_Tried]) -> list[_Tried]:
     """The best few, of each cause and place the best."""
-    best: dict[tuple[str, Sequence[int]], Hypothesis] = {}
+    best: dict[tuple[str, Sequence[int]], _Tried] = {}
     for t in sorted(tried, key=lambda t: -t.gain):
-        best.setdefault((t.hypothesis.cause, t.hypothesis.joints), t.hypothesis)
+        best.setdefault((t.hypothesis.cause, t.hypothesis.joints), t)
     return list(best.values())[:_TRIED]
