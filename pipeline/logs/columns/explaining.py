@@ -85,15 +85,16 @@ class Score:
     x: Array
     held: Mask
 
-    def gain(self, other: Score, independent: Array) -> float:
+    def gain(self, other: Score, independent: Array, *, sharp: bool = False) -> float:
         """By how much S falls with another hypothesis: both are judged above the higher floor.
 
         Args:
             other: Score of it.
             independent: Samples, shape (J,).
+            sharp: Without a floor, to choose between sizes of one hypothesis.
         """
         live = np.flatnonzero(independent > 0.0)
-        floor = np.maximum(self.floor, other.floor)[live]
+        floor = np.maximum(self.floor, other.floor)[live] * (0.01 if sharp else 1.0)
         falls = np.log(np.maximum(self.share[live], floor) / np.maximum(other.share[live], floor))
         return float(2.0 * independent[live] @ falls) + self.penalty - other.penalty
 

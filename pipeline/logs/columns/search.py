@@ -93,11 +93,12 @@ def search(along: Along) -> Mended:
 
 @dataclass(frozen=True, eq=False)
 class _Tried:
-    """A hypothesis, its score and what it gains."""
+    """A hypothesis, its score, what it gains, and that without a floor."""
 
     hypothesis: Hypothesis
     score: Score
     gain: float
+    sharp: float
 
 
 class _Search:
@@ -135,7 +136,8 @@ class _Search:
         score = self._model(h.reading, rough=rough).score(
             self._effort(h.reading, rough=rough), near
         )
-        return _Tried(h, score, now.gain(score, self.independent))
+        gains = (now.gain(score, self.independent, sharp=sharp) for sharp in (False, True))
+        return _Tried(h, score, *gains)
 
     def step(self, start: Reading, now: Score) -> _Tried | None:
         """The simplest hypothesis that explains about as much as the best, its size refined."""
@@ -171,7 +173,7 @@ class _Search:
             sizes = (size * step, size / step) if factor else (size + step, size - step)
             possible = [s for s in sizes if not factor or LEAST < max(s, 1.0 / s) < MOST]
             others = (self._try(best.hypothesis.resized(s, start), now) for s in possible)
-            best = max((best, *others), key=lambda t: t.gain)
+            best = max((best, *others), key=lambda t: t.sharp)
             step = step**0.5 if factor else 0.5 * step
         return best
 
