@@ -13,7 +13,6 @@ LONGER = {
     "pipeline/blind/twin/sensors.py:measure": 62,
     "pipeline/blind/twin/simulator.py:Simulation.run": 148,
     "pipeline/blind/twin/trial.py:make_trial": 82,
-    "pipeline/identification/compare/model_check.py:compare_with_prediction": 73,
     "pipeline/identification/selection/select.py:select": 68,
     "pipeline/logs/prepared/prepare.py:prepare": 70,
     "pipeline/robot/urdf_builder.py:_leg": 71,

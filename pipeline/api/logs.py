@@ -86,8 +86,8 @@ class Identified(Result):
 
     @property
     def unexplained(self) -> bool:
-        """Whether the model as written leaves more than noise somewhere."""
-        return self.story.weighed.unexplained
+        """Whether more than noise is left, or the log may not say what it seems to."""
+        return self.story.unexplained
 
     def _write(self, out: Path, decimal: str) -> None:
         super()._write(out, decimal)

@@ -137,7 +137,7 @@ def answer(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
     out = [
         words.where_words(story.where.rows),
         words.what_words(
-            naming, story.where.measurements[0].channels, unexplained=weighed.unexplained
+            naming, story.where.measurements[0].channels, unexplained=story.unexplained
         ),
         *filter(None, [bodies_words(bodies)]),
         words.shrink_words(naming.found, _joints(story), _whole(story), naming.unit, story.noise),
@@ -146,7 +146,9 @@ def answer(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
         out.append(words.energy_words(story.energy, story.given.alternative))
     undecided = words.rival_words(naming.found, bool(story.decides))
     out += [undecided] if undecided else []
-    return (*out, words.left_words(weighed.left))
+    if weighed.unexplained or not story.suspected:
+        out.append(words.left_words(weighed.left))
+    return (*words.suspected_words(story.suspected), *out)
 
 
 def _joints(story: Story) -> list[str]:

@@ -385,6 +385,13 @@ def one_way_words(measurements: Sequence[Measurement], joints: Sequence[int]) ->
     return out
 
 
+def suspected_words(suspected: Sequence[str]) -> tuple[str, ...]:
+    """What speaks against the log itself, before anything that was found in it."""
+    return tuple(
+        f"**Nothing below is an explanation while this stands:** {text}." for text in suspected
+    )
+
+
 def left_words(remainders: Sequence[Remainder]) -> str:
     """What stays unexplained and what it looks like."""
     left = [r for r in remainders if r.significant]

@@ -112,7 +112,7 @@ def run(options: Options, progress: Progress) -> int:
     _say_warnings(given, where.intake.findings)
     _say_answer(told.story, bodies, options.out)
     logger.info("what took long: %s", progress.took())
-    return UNEXPLAINED if told.story.weighed.unexplained else EXPLAINED
+    return UNEXPLAINED if told.story.unexplained else EXPLAINED
 
 
 def _answer_tables(told: Told, given: Setup) -> list[Table]:

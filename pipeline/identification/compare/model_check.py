@@ -1,14 +1,11 @@
-"""A log against the first simulation of its motion: what only the model betrays.
+"""A log against the first simulation of its motion: rows that are left, the log of another robot.
 
-Milliamperes for amperes, degrees for radians, a flipped or exchanged column, the log of another
-robot. A real gap, however large an effect is missing, must pass.
+A real gap, however large an effect is missing, must pass.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from itertools import combinations
 from typing import Final
 
 import numpy as np
@@ -20,15 +17,12 @@ from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.quality.drift import Course, friction_drift
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.quality.skew import skew
-from pipeline.logs.quality.unit_check import DEG, WRONG, column_name, nearest
-from pipeline.simulation.predict import Prediction, Simulator
+from pipeline.logs.quality.unit_check import column_name
+from pipeline.simulation.predict import Prediction
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-#: Correlation from which two joints' efforts are each other's, and below which not their own.
-_ALIKE: Final = 0.8
-_UNLIKE: Final = 0.4
 #: Median correlation below which a log has little in common with the simulation: lags are searched,
 #: which finds up to 0.5 by chance. Friction alone can do that, so it is said and no more.
 _WEAK: Final = 0.45
@@ -39,39 +33,23 @@ _CHANCE: Final = 0.05
 #: Spread of an effort over the simulated one that the machine's parts leave open: mass 3 %, torque
 #: constant 2 %, inertia 10 % of its part, three times each together.
 _SCALE: Final = 0.2
-#: Squared misfit per variance of the effort beyond which positions are tried as degrees ...
-_SENSELESS: Final = 1.0
-#: ... and what of it may be left, and at most, where they are.
-_DEGREES_LEAVE: Final = 0.1
-_DEGREES_MISS: Final = 0.3
 
 
-def against_model(
-    m: Measurement, prediction: Prediction, ratio: Array | None = None
-) -> list[Finding]:
+def against_model(m: Measurement, prediction: Prediction) -> list[Finding]:
     """A log against a first simulation of its motion, before anything is fitted.
-
-    Positions come first: where they are wrong, no effort can be right.
 
     Args:
         m: The log at its bandwidth.
         prediction: By the model as given.
-        ratio: Gear ratios, shape (J,).
     """
     left = rows_left(m)
     if any(f.verdict == "refused" for f in left):
         return left
     predicted = m.smooth(prediction.effort)[..., 0]
-    turned = _positions_in_degrees(m, prediction, predicted)
-    if turned:
-        return turned
     dt = 1.0 / m.rate
     out = [
         *left,
-        *_exchanged(m, predicted),
-        *compare_with_prediction(
-            m, m.effort[..., 0], predicted, m.mask, dt, m.channels[0], ratio=ratio
-        ),
+        *compare_with_prediction(m, m.effort[..., 0], predicted, m.mask, dt, m.channels[0]),
     ]
     weak = any(f.check == "correlation" for f in out)
     return [*out, *(_of_another_motion(m, predicted) if weak else ())]
@@ -174,89 +152,10 @@ def _of_another_motion(m: Measurement, predicted: Array) -> list[Finding]:
     return [Finding(m.name, "", "another_motion", chance, "1", "refused", detail)]
 
 
-def _exchanged(m: Measurement, predicted: Array) -> list[Finding]:
-    """Pairs of joints each of whose efforts is the other's."""
-    rows = np.flatnonzero(m.mask.all(axis=1))
-    if rows.size < 50:
-        return []
-    x, y = m.effort[rows, :, 0], predicted[rows]
-    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-    size = np.outer(np.linalg.norm(x, axis=0), np.linalg.norm(y, axis=0))
-    alike = (x.T @ y) / np.maximum(size, 1e-300)
-    out = []
-    for i, j in combinations(range(len(m.joints)), 2):
-        crossed = min(alike[i, j], alike[j, i])
-        own = max(alike[i, i], alike[j, j])
-        if crossed > _ALIKE and own < _UNLIKE:
-            column = column_name(m.joints[i], m.channels[0])
-            detail = (
-                f"follows the simulation of {m.joints[j]} and the other way round (correlation "
-                f"{crossed:.2f}, its own {own:.2f}): exchange the two in a mapping file"
-            )
-            out.append(Finding(m.name, column, "exchanged", crossed, "1", "refused", detail))
-    return out
-
-
-def _positions_in_degrees(
-    m: Measurement, prediction: Prediction, predicted: Array
-) -> list[Finding]:
-    """Positions that make sense of the efforts once they are taken for degrees.
-
-    All columns together are tried first, then each alone.
-    """
-
-    def misfit(of: Array) -> float:
-        square = np.where(m.mask, m.effort[..., 0] - of, np.nan) ** 2
-        effort = np.where(m.mask, m.effort[..., 0], np.nan)
-        live = m.mask.sum(axis=0) >= 50
-        spread = np.nanvar(effort[:, live], axis=0)
-        return float(np.mean(np.nanmean(square[:, live], axis=0) / np.maximum(spread, 1e-300)))
-
-    if not (m.mask.sum(axis=0) >= 50).any():
-        return []
-    now = misfit(predicted)
-    if now <= _SENSELESS:
-        return []
-    joints = len(m.joints)
-    best, which = np.inf, range(0)
-    for tried in (range(joints), *(range(j, j + 1) for j in range(joints))):
-        factor = np.ones(joints)
-        factor[tried.start : tried.stop] = 1.0 / DEG
-        scaled = replace(
-            m, q=m.q * factor, v=m.v * factor, a=m.a * factor, rest_speed=m.rest_speed * factor
-        )
-        left = misfit(m.smooth(Simulator(scaled).predict(prediction.model).effort)[..., 0])
-        if left < best:
-            best, which = left, tried
-    if best > _DEGREES_LEAVE * now or best > _DEGREES_MISS:
-        return []
-    quantity = "motor_position" if m.at_motor else "position"
-    detail = (
-        f"taken for degrees the {m.channels[0]}s follow from the motion (squared misfit "
-        f"{best:.2g} of their variance), taken for radians they do not ({now:.3g}); give its unit "
-        "in a mapping file"
-    )
-    return [
-        Finding(m.name, column_name(m.joints[j], quantity), "degrees", now, "1", "refused", detail)
-        for j in which
-    ]
-
-
 def compare_with_prediction(
-    m: Measurement,
-    measured: Array,
-    predicted: Array,
-    mask: Mask,
-    dt: float,
-    channel: str,
-    *,
-    ratio: Array | None = None,
+    m: Measurement, measured: Array, predicted: Array, mask: Mask, dt: float, channel: str
 ) -> list[Finding]:
-    """Efforts against a first simulation of the same motion: unit, sign, side of the gear, skew.
-
-    A factor of a hundred or a thousand is a unit where the shapes agree. A joint that carries
-    little can show it through friction alone (a wrist without load), so that there shapes must
-    agree closely.
+    """Efforts against a first simulation of the same motion: spread and skew.
 
     Args:
         m: The log.
@@ -265,14 +164,9 @@ def compare_with_prediction(
         mask: Rows to compare, shape (N, J).
         dt: [s].
         channel: Which effort.
-        ratio: Gear ratios, shape (J,), to recognise torque at the motor side.
     """
     out = []
     agree = []
-    sizes = [
-        float(np.std(predicted[mask[:, j], j])) if mask[:, j].any() else 0.0
-        for j in range(len(m.joints))
-    ]
     for j, joint in enumerate(m.joints):
         x = np.where(mask[:, j], measured[:, j], np.nan)
         seen = skew(x, np.where(mask[:, j], predicted[:, j], np.nan), dt, longest=0.1)
@@ -282,29 +176,12 @@ def compare_with_prediction(
         column = column_name(joint, channel)
         good = np.isfinite(x)
         size = float(np.std(x[good]) / max(np.std(predicted[good, j]), 1e-300))
-        unit = nearest(size, WRONG[channel], near=3.0) if size > 30 or size < 0.003 else None
-        loaded = sizes[j] >= 0.3 * max(sizes) and (size > 300 or size < 0.003)
-        gear = None if ratio is None or channel != "torque" else abs(1.0 / float(ratio[j]))
-        strong = abs(seen.correlation) > 0.7
-        if gear is not None and strong and gear / 1.5 < size < 1.5 * gear and gear < 0.2:
-            detail = f"is {size:.3g} times the simulated: torque at the motor side? scale it by "
-            detail += f"{1 / gear:.4g} in a mapping file"
-            out.append(_finding(m, column, "factor", size, "1", "refused", detail))
-        elif unit is not None and abs(seen.correlation) > (0.5 if loaded else 0.9):
-            detail = f"is {size:.3g} times the simulated: looks like {unit}; give its unit in a "
-            detail += "mapping file"
-            out.append(_finding(m, column, "factor", size, "1", "refused", detail))
-        elif seen.correlation < -0.8:
-            detail = "runs against the simulation: flip it, or the position, in a mapping file"
-            out.append(_finding(m, column, "sign", seen.correlation, "1", "refused", detail))
-        else:
-            detail = f"{size:.3g} times the simulated, correlation {seen.correlation:.2f}"
-            scaled = seen.correlation > 0.9 and not 1.0 - _SCALE < size < 1.0 / (1.0 - _SCALE)
-            if scaled:
-                detail += ": the model lacks something, or the column reads a multiple"
-            verdict = "warning" if scaled else "ok"
-            out.append(_finding(m, column, "factor", size, "1", verdict, detail))
-        if strong and seen.correlation > 0.9:
+        detail = f"{size:.3g} times the simulated, correlation {seen.correlation:.2f}"
+        scaled = seen.correlation > 0.9 and not 1.0 - _SCALE < size < 1.0 / (1.0 - _SCALE)
+        if scaled:
+            detail += ": the model lacks something, or the column reads a multiple"
+        out.append(_finding(m, column, "factor", size, "1", "warning" if scaled else "ok", detail))
+        if seen.correlation > 0.9:
             # No verdict: friction that the model lacks shifts an effort as a late channel does.
             detail = f"{1e3 * seen.lag:.3g} ms behind the simulation of the same motion"
             out.append(_finding(m, column, "skew", seen.lag, "s", "ok", detail))

@@ -9,13 +9,14 @@ from pipeline.identification.compare.bandwidth import with_encoder_noise
 from pipeline.identification.compare.circumstances import Tally, Where, edges_of, where
 from pipeline.identification.compare.intake import Intake
 from pipeline.identification.compare.long import LongLogs
-from pipeline.identification.compare.model_check import against_model, drifts
+from pipeline.identification.compare.model_check import against_model, drifts, rows_left
 from pipeline.identification.compare.observe import observe
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.quality.finding import refuse
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.along_logs import wrong_columns
 from pipeline.simulation.predict import Prediction, Simulator
 
 
@@ -51,10 +52,14 @@ def find_where(
     seen = observe(model, intake.prepared, parts)
     measurements = with_encoder_noise(given.bare, intake.prepared, seen)
     predictions = predict(model, measurements)
-    findings = [
+    log, ratio = intake.prepared[0].log, given.expected.ratio
+    findings = [f for m in measurements for f in rows_left(m) if f.verdict == "refused"]
+    findings += [] if findings else wrong_columns(given.bare, measurements, log, ratio)
+    refuse(findings)
+    findings += [
         finding
         for m, prediction in zip(measurements, predictions, strict=True)
-        for finding in against_model(m, prediction, given.expected.ratio)
+        for finding in against_model(m, prediction)
     ]
     refuse(findings)
     findings += drifts(measurements, predictions)

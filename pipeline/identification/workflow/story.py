@@ -22,6 +22,7 @@ from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import Weighed, weigh_found
+from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.machine.machine import MachineModel
 from pipeline.progress import Progress
 from pipeline.simulation.edited import Effects, effects
@@ -56,6 +57,17 @@ class Story:
     signatures: dict[str, str]
     decides: str
     remarks: tuple[str, ...]
+
+    @property
+    def suspected(self) -> tuple[str, ...]:
+        """Why columns may not be what their names say, in words."""
+        found = self.where.intake.findings
+        return tuple(f.detail for f in found if f.check == SUSPECTED and f.verdict == "warning")
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether more than noise is left, or the log may not say what it seems to."""
+        return self.weighed.unexplained or bool(self.suspected)
 
     @property
     def noise(self) -> float:

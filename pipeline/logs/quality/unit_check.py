@@ -38,6 +38,8 @@ WRONG: Final[Mapping[str, Mapping[float, str]]] = {
 }
 #: Relative distance from a factor within which it is taken for it.
 NEAR: Final = 0.25
+#: Travel of a joint below which a log is hardly one of degrees [rad].
+_LEAST_TRAVEL: Final = 0.05
 #: Rows of velocity and position that are compared.
 _COMPARED_ROWS: Final = 50_000
 
@@ -76,13 +78,13 @@ def position_units(log: Log, expected: Expected, ok: Mask) -> list[Finding]:
         limits = f"the joint's limits are {low:.4g} to {high:.4g} rad"
         turned = q / DEG
         fits = turned.min() >= low - margin and turned.max() <= high + margin
-        if fits and outside > 0.2:
+        if fits and outside > 0.2 and np.ptp(turned) > _LEAST_TRAVEL:
             detail = f"{span}, {limits}: looks like degrees; give its unit in a mapping file"
             verdict = "refused"
         elif outside > 0.5:
             detail = (
-                f"{span}, {limits}: the log of another robot, or another zero; set zero or flip "
-                "in a mapping file"
+                f"{span}, {limits}: another zero or sign, a motor's angle, another joint's column "
+                "or the log of another robot; set zero, flip, scale or as in a mapping file"
             )
             verdict = "refused"
         else:

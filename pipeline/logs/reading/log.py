@@ -5,13 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuators.errors import closest
 from pipeline.logs.errors import LogContentError
+
+if TYPE_CHECKING:
+    from pipeline.logs.reading.mapping import ColumnRule
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -81,6 +84,7 @@ class Log:
         derived: Channels that were computed from others by the mapping, with the formula.
         sha256: Of the file.
         source: The file's name.
+        rules: Owner and quantity to the file's column and the mapping's rule for it.
     """
 
     name: str
@@ -119,6 +123,7 @@ class Log:
     derived: Mapping[str, str] = field(default_factory=dict)
     sha256: str = ""
     source: Path = Path()
+    rules: Mapping[tuple[str, str], tuple[str, ColumnRule]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n, j = self.position.shape

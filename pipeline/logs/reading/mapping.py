@@ -20,6 +20,7 @@ All tables are optional::
     zero = 12.5                             # subtracted, in the file's unit
     scale = 1.0                             # dimensionless; with unit = "1" it brings to SI
     flip = true                             # the file's positive sense is the joint's negative
+    late = 0.05                             # by which the column comes late [s]
 
     [joints]                                # the log's name of a joint = the robot's name
     shoulder = "joint_1"
@@ -80,6 +81,7 @@ class ColumnRule:
         unit: Of the file; None for the log format's own.
         zero: Subtracted, in the file's unit.
         scale: Dimensionless factor, sign included.
+        late: By which the column comes late [s].
     """
 
     pattern: str
@@ -87,6 +89,7 @@ class ColumnRule:
     unit: str | None = None
     zero: float = 0.0
     scale: float = 1.0
+    late: float = 0.0
 
     def matched(self, column: str) -> str | None:
         """The column of the log format a column of the file becomes, or None."""
@@ -229,7 +232,7 @@ def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
 
 def _column(pattern: str, table: ColumnTable) -> ColumnRule:
     scale = -table.scale if table.flip else table.scale
-    return ColumnRule(pattern, table.target or pattern, table.unit, table.zero, scale)
+    return ColumnRule(pattern, table.target or pattern, table.unit, table.zero, scale, table.late)
 
 
 def _constants(table: Constants, where: str) -> dict[str, float]:

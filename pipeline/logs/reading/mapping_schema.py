@@ -150,6 +150,7 @@ class ColumnTable(Table):
     zero: Small = 0.0
     scale: Factor = 1.0
     flip: bool = False
+    late: Small = 0.0
 
 
 class ControllerTable(Table):

@@ -29,11 +29,12 @@ _IDENTITY: Final = ColumnRule("", "")
 
 @dataclass(frozen=True)
 class Source:
-    """A column of the file and the affine map that brings it into the log's unit."""
+    """A column of the file, the affine map that brings it into the log's unit, and its rule."""
 
     column: str
     factor: float
     offset: float
+    rule: ColumnRule
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
                 "both give the same channel; keep one"
             )
         _check_unit(rule, target, mapping.where)
-        sources[target] = Source(column, *rule.affine(target.unit))
+        sources[target] = Source(column, *rule.affine(target.unit), rule)
     useful = {_resolve(source.column, mapping)[0] for source in sources.values()}
     for rule in mapping.columns:
         if rule in used_rules and rule not in useful:

@@ -89,8 +89,7 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
     where, expected, mapping = plan.table.where, plan.expected, plan.mapping
     n = next(iter(data.values())).size
     arrays, force = _arrays(plan, data, n, first_row)
-    if mapping.sample_rate is not None:
-        arrays["time"] = (first_row + np.arange(n)) / mapping.sample_rate
+    arrays["time"] = _time(plan, data, n, first_row)
     fresh = _check_time(arrays["time"], where, first_row)
     sides = sides_of(
         arrays.pop("position", None),
@@ -122,9 +121,18 @@ def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, diges
         chosen_effort=mapping.effort,
         sha256=digest,
         source=plan.table.path,
+        rules={(t.owner, t.quantity): (s.column, s.rule) for t, s in plan.sources.items()},
         **arrays,
     )
     return log if fresh.all() else log.rows(fresh)
+
+
+def _time(plan: ReadingPlan, data: dict[str, Array], n: int, first_row: int) -> Array:
+    """Of every row, (N,) [s]; in the file's order, whatever it is."""
+    if plan.mapping.sample_rate is not None:
+        return (first_row + np.arange(n)) / plan.mapping.sample_rate
+    source = next(s for target, s in plan.sources.items() if target.kind == "time")
+    return source.factor * data[source.column] + source.offset
 
 
 def _arrays(
@@ -139,12 +147,15 @@ def _arrays(
     arrays: dict[str, Any] = {}
     force: dict[tuple[str, str], Array] = {}
     by_joint: dict[str, dict[str, Array]] = {}
+    time = _time(plan, data, n, first_row)
     for target, source in plan.sources.items():
         values = data[source.column]
         _check_values(values, source.column, where, first_row)
         if (source.factor, source.offset) != (1.0, 0.0):
             values = source.factor * values + source.offset
             _check_values(values, source.column, f"{where} through {mapping.where}", first_row)
+        if source.rule.late and target.kind != "time":
+            values = np.interp(time + source.rule.late, time, values, left=np.nan, right=np.nan)
         if target.kind == "joint":
             by_joint.setdefault(target.quantity, {})[target.owner] = values
         elif target.kind == "foot":

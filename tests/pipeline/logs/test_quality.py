@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.units import to_si
-from pipeline.identification.compare.model_check import compare_with_prediction
 from pipeline.logs.errors import GapError
 from pipeline.logs.quality.finding import Quality
 from pipeline.logs.quality.glitches import glitches
@@ -268,32 +267,13 @@ def test_skew_of_a_fraction_of_a_row(lag: float) -> None:
     assert seen.factor == pytest.approx(2.5, rel=1e-2)
 
 
-def test_comparison_with_a_first_simulation(two_joints: Expected) -> None:
+def test_a_small_motion_outside_of_the_limits_is_not_taken_for_degrees(
+    two_joints: Expected,
+) -> None:
     q, _, e = good()
-    log = made_log(q, e)
-    mask = np.ones(e.shape, dtype=np.bool_)
-
-    def against(measured: Array) -> list[str]:
-        found = compare_with_prediction(
-            log, measured, e, mask, 0.002, "torque", ratio=two_joints.ratio
-        )
-        return [f.detail for f in found if f.verdict == "refused"]
-
-    rng = np.random.default_rng(1)
-    friction = 20 * np.sign(np.gradient(q, axis=0)) + rng.normal(0, 1, e.shape)
-    assert against(e + friction) == []
-    assert "mN*m" in against(1e3 * e)[0]
-    assert "motor side" in against(e / 100)[0]
-    assert "runs against" in against(-e)[0]
-
-
-def test_a_wrist_that_carries_only_friction_is_no_unit_error(two_joints: Expected) -> None:
-    q, _, e = good()
-    tiny = e * np.array([1.0, 1e-3])
-    friction = np.sign(np.gradient(q, axis=0)) * np.array([0.0, 5.0])
-    mask = np.ones(e.shape, dtype=np.bool_)
-    found = compare_with_prediction(made_log(q, e), tiny + friction, tiny, mask, 0.002, "torque")
-    assert "refused" not in {f.verdict for f in found}
+    message = refused(made_log(0.5 * q + 3.5, e), two_joints)
+    assert "degrees" not in message
+    assert "set zero, flip, scale or as" in message
 
 
 @pytest.mark.parametrize(("at", "length"), [(0, 1), (1, 1), (3999, 1), (700, 1), (700, 4)])

@@ -1,0 +1,1 @@
+"""Whether columns are what their names say, by what a motion asks of the machine."""

@@ -1,0 +1,218 @@
+"""How well a machine's model explains efforts, its bodies and friction being open within reason.
+
+At joint j a model says (inverse dynamics b, linear in the bodies)
+
+    y_j = b_j + B_j theta + F_j phi_j + e_j
+
+with B the change of b with masses, centres and payloads, theta around zero within the spread that
+models of machines have, and F friction that takes energy, the rotor's inertia and an offset. A
+hypothesis about columns is another y or another motion. Its score, minus twice the logarithm of
+its density with the scatter of each joint profiled out, is
+
+    S = sum_j n_j log max(RSS_j, floor_j^2) / TSS_j + sum theta^2 / spread^2,
+
+floor_j what honest models leave, n_j independent samples. The sum of squares TSS makes efforts in
+other units comparable.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Share of an effort, root mean square, that honest models leave: less says nothing about columns.
+FLOOR: Final = 0.1
+#: ... and of what laws of friction explain: no law of a few terms is nearer on every machine.
+FRICTION_FLOOR: Final = 0.3
+#: Offset of an effort sensor over the effort's root mean square, one standard deviation.
+_OFFSET: Final = 0.1
+#: Independent samples of a joint beyond which more of the same motion adds nothing ...
+_MOST: Final = 100.0
+#: ... and as many as are taken before any remainder was seen.
+_USUAL: Final = 20.0
+_OWN: Final = 5
+_TURNS: Final = 6
+_TINY: Final = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """What a model says along a motion.
+
+    Attributes:
+        base: Effort by the model as given, shape (N, J).
+        columns: Its change per unit of each open parameter, shape (P, N, J).
+        spread: Of these parameters, one standard deviation, shape (P,).
+        least: Their lower bounds, shape (P,).
+        relative: Which are changes over a value that is known by its order: their spread is that of
+            the logarithm, shape (P,).
+        v: Velocity, shape (N, J) [rad/s].
+        a: Acceleration, shape (N, J) [rad/s^2].
+        rest: Speed within which friction changes its sign, shape (J,) [rad/s].
+    """
+
+    base: Array
+    columns: Array
+    spread: Array
+    least: Array
+    relative: Mask
+    v: Array
+    a: Array
+    rest: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Score:
+    """How well one hypothesis explains the efforts.
+
+    Attributes:
+        share: Left of each joint's effort, root mean square, shape (J,); NaN without rows.
+        floor: What honest models leave of it, shape (J,).
+        penalty: Of the bodies.
+        x: Bodies' parameters, then those of each joint's own columns.
+        held: Which of them are at their bounds.
+    """
+
+    share: Array
+    floor: Array
+    penalty: float
+    x: Array
+    held: Mask
+
+    def gain(self, other: Score, independent: Array, *, sharp: bool = False) -> float:
+        """By how much S falls with another hypothesis: both are judged above the higher floor.
+
+        Args:
+            other: Score of it.
+            independent: Samples, shape (J,).
+            sharp: Without a floor, to choose between sizes of one hypothesis.
+        """
+        live = np.flatnonzero(independent > 0.0)
+        floor = np.maximum(self.floor, other.floor)[live] * (0.01 if sharp else 1.0)
+        falls = np.log(np.maximum(self.share[live], floor) / np.maximum(other.share[live], floor))
+        return float(2.0 * independent[live] @ falls) + self.penalty - other.penalty
+
+    def room(self, independent: Array) -> float:
+        """By how much it could fall at most."""
+        falls = np.log(np.maximum(np.nan_to_num(self.share), FLOOR) / FLOOR)
+        return float(2.0 * independent @ falls) + self.penalty
+
+
+class Explaining:
+    """Scores of efforts along one motion by one model."""
+
+    def __init__(self, bodies: Bodies, mask: Mask) -> None:
+        """Begin.
+
+        Args:
+            bodies: By the model.
+            mask: Rows that count, shape (N, J).
+        """
+        self.bodies = bodies
+        self._rows = [np.flatnonzero(mask[:, j]) for j in range(mask.shape[1])]
+        self.joints = [j for j, rows in enumerate(self._rows) if rows.size > _OWN]
+        self.independent = np.where(mask.sum(axis=0) > _OWN, _USUAL, 0.0)
+        p = bodies.spread.size
+        self._design, self._gram = {}, {}
+        for j in self.joints:
+            x = np.hstack([bodies.columns[:, self._rows[j], j].T, self._own(j)])
+            self._design[j], self._gram[j] = x, x.T @ x / x.shape[0]
+        self._at = {j: slice(p + _OWN * k, p + _OWN * (k + 1)) for k, j in enumerate(self.joints)}
+        own = np.tile([0.0] * (_OWN - 1) + [-np.inf], len(self.joints))
+        self._least = np.concatenate([bodies.least, own])
+
+    def _own(self, j: int) -> Array:
+        """Friction, dry, viscous and of the load, rotor's inertia and offset, each of size one."""
+        b, rows = self.bodies, self._rows[j]
+        way, v = np.tanh(b.v[rows, j] / b.rest[j]), b.v[rows, j]
+        load = np.abs(b.base[rows, j]) * way
+        own = np.stack([way, v, load, b.a[rows, j], np.ones_like(v)], axis=1)
+        return own / (np.sqrt((own**2).mean(axis=0)) + _TINY)
+
+    def score(self, y: Array, near: Score | None = None) -> Score:
+        """Score efforts.
+
+        Args:
+            y: Shape (N, J).
+            near: Of a similar hypothesis, from which to start.
+        """
+        p = self.bodies.spread.size
+        square, cross, total = {}, {}, {}
+        for j in self.joints:
+            rows = self._rows[j]
+            t = y[rows, j] - self.bodies.base[rows, j]
+            square[j], cross[j] = float(t @ t) / t.size, self._design[j].T @ t / t.size
+            total[j] = float(y[rows, j] @ y[rows, j]) / t.size + _TINY
+        prior = np.full(self._least.size, 1e-9)
+        prior[:p] = self.bodies.spread**-2.0
+        for j in self.joints:
+            prior[self._at[j].stop - 1] = 1.0 / (_OFFSET**2 * total[j])
+        share = np.full(len(self._rows), np.nan)
+        share[self.joints] = 1.0
+        held = np.zeros(prior.size, dtype=np.bool_) if near is None else near.held
+        floor, last = np.full(len(self._rows), FLOOR**2), None
+        for _ in range(_TURNS):
+            a, c = np.diag(prior), np.zeros(prior.size)
+            for j in self.joints:
+                weight = self.independent[j] / (total[j] * (share[j] + floor[j]))
+                gram, at = weight * self._gram[j], self._at[j]
+                a[:p, :p] += gram[:p, :p]
+                a[:p, at] += gram[:p, p:]
+                a[at, :p] += gram[p:, :p]
+                a[at, at] += gram[p:, p:]
+                c[:p] += weight * cross[j][:p]
+                c[at] += weight * cross[j][p:]
+            x, held = _bounded(a, c, self._least, held)
+            grown = np.where(np.abs(x[:p]) > 1e-6, x[:p], 1e-6)
+            stretch = np.log1p(np.maximum(grown, -0.99)) / grown
+            prior[:p] = np.where(self.bodies.relative, stretch, 1.0) ** 2 / self.bodies.spread**2
+            for j in self.joints:
+                own = np.concatenate([x[:p], x[self._at[j]]])
+                rest = square[j] - 2.0 * own @ cross[j] + own @ self._gram[j] @ own
+                share[j] = max(float(rest), 0.0) / total[j]
+                lost, gram = own[p : p + 3], self._gram[j][p : p + 3, p : p + 3]
+                floor[j] = FLOOR**2 + FRICTION_FLOOR**2 * float(lost @ gram @ lost) / total[j]
+            now = Score(np.sqrt(share), np.sqrt(floor), float(prior @ x**2), x, held)
+            if last is not None and abs(last.gain(now, self.independent)) < 0.5:
+                break
+            last = now
+        return now
+
+    def count_independent(self, y: Array) -> None:
+        """Count the independent samples in what the model leaves of efforts, shape (N, J).
+
+        For a variance they are the rows over the sum of squares of the autocorrelation (Bayley and
+        Hammersley 1946).
+        """
+        p, seen = self.bodies.spread.size, self.score(y)
+        for j in self.joints:
+            own = np.concatenate([seen.x[:p], seen.x[self._at[j]]])
+            rest = y[self._rows[j], j] - self.bodies.base[self._rows[j], j] - self._design[j] @ own
+            rest -= rest.mean()
+            spectrum = np.abs(np.fft.rfft(rest, 2 * rest.size)) ** 2
+            rho = np.fft.irfft(spectrum)[1 : rest.size // 2] / max(float(rest @ rest), _TINY)
+            self.independent[j] = min(rest.size / (1.0 + 2.0 * float(rho @ rho)), _MOST)
+
+
+def _bounded(a: Array, c: Array, least: Array, held: Mask) -> tuple[Array, Mask]:
+    """Least squares by normal equations with lower bounds, by an active set. Returns it, too."""
+    scale = 1.0 / np.sqrt(np.diag(a))
+    x = np.zeros(c.size)
+    for _ in range(20):
+        free = ~held
+        x = np.where(held, least, 0.0)
+        s = scale[free]
+        right = c[free] - a[np.ix_(free, held)] @ x[held]
+        x[free] = s * np.linalg.solve(a[np.ix_(free, free)] * np.outer(s, s), s * right)
+        below = free & (x < least)
+        back = held & (scale * (a @ x - c) < -1e-9)
+        if not below.any() and not back.any():
+            break
+        held = held | below if below.any() else held & ~back
+    return np.maximum(x, least), held

@@ -1,0 +1,196 @@
+"""Wrong columns in words, with the lines of a mapping file that mend them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.columns.explaining import Bodies
+from pipeline.logs.columns.hypotheses import Hypothesis, Reading, as_named
+from pipeline.logs.columns.search import Mended
+from pipeline.logs.quality.finding import Finding
+from pipeline.logs.quality.unit_check import DEG, WRONG, column_name
+from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.mapping import ColumnRule
+
+Array = NDArray[np.float64]
+#: Check under which a suspicion stands that no fit may explain away.
+SUSPECTED: Final = "columns"
+#: Relative distance from a factor that has a name, within which a factor is taken for it.
+_NEAR: Final = 1.4
+#: What is left of an effort that is a velocity, over itself and over what bodies ask for, ...
+_COPY: Final = 0.1
+#: ... and its factor's distance from a unit's.
+_SAME: Final = 0.05
+_FEWEST: Final = 50
+_ROUNDED: Final = 1e-9
+_OF_EFFORTS: Final = ("sign", "exchanged", "scale", "late")
+
+
+def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Finding]:
+    """What the search found, one finding per step; refused but for a common scale of all efforts.
+
+    From motion alone torques that are all too large by a factor, and bodies that are all too light
+    by it, look the same: that is suspicious, and no more, where the factor is no unit's.
+
+    Args:
+        log: Of the logs that were searched together, the first.
+        mended: From `search`.
+        ratio: Gear ratios, shape (J,), or None.
+    """
+    channel, joints = log.effort.channel, log.joints
+    named = [(h, *_named(h, channel, ratio)) for h, _ in mended.steps]
+    last = _together([(h, size) for h, size, _ in named], len(joints))
+    out = []
+    for (h, size, what), (_, gain) in zip(named, mended.steps, strict=True):
+        live = int(np.isfinite(mended.before).sum())
+        common = h.cause == "scale" and len(h.joints) == live and not what
+        before, after = (_percent(x, h.joints) for x in (mended.before, mended.after))
+        of = channel if h.cause in _OF_EFFORTS else _position(log)
+        lines = "; ".join(_lines(log, last, h, joints))
+        seen = (
+            f"else every body is {size:.3g} times as heavy as the robot's file says"
+            if common
+            else f"the motion leaves {before} of the {channel} unexplained as logged, {after} so"
+        )
+        detail = f"{_words(h, size, joints, channel)}{what}: {seen}; in a mapping file: {lines}"
+        verdict = "warning" if common else "refused"
+        column = "" if len(h.joints) == live > 1 else column_name(joints[h.joints[0]], of)
+        out.append(Finding(log.name, column, SUSPECTED, gain, "1", verdict, detail))
+    return out
+
+
+def copies(log: Log, y: Array, bodies: Bodies, mask: NDArray[np.bool_]) -> list[Finding]:
+    """Efforts that are velocities under a wrong name.
+
+    Viscous friction alone makes such an effort, too: it counts where bodies ask for more than what
+    such friction leaves.
+
+    Args:
+        log: The log.
+        y: Efforts, shape (N, J).
+        bodies: By the model along its motion.
+        mask: Rows that count, shape (N, J).
+    """
+    out = []
+    for j, joint in enumerate(log.joints):
+        rows = mask[:, j]
+        if rows.sum() < _FEWEST or not y[rows, j].any() or not bodies.v[rows, j].any():
+            continue
+        x, e = bodies.v[rows, j], y[rows, j]
+        factor = float(x @ e) / float(x @ x)
+        left = float(np.std(e - factor * x))
+        near = min(abs(abs(factor) / unit - 1.0) for unit in (1.0, *WRONG["velocity"]))
+        if near > _SAME or left > _COPY * min(
+            float(np.std(e)), float(np.std(bodies.base[rows, j]))
+        ):
+            continue
+        detail = (
+            f"is {factor:.4g} times the velocity and nothing else, though its bodies ask for a "
+            f"{log.effort.channel}: a velocity under a wrong name; in a mapping file: "
+            f'columns."{_file_column(log, joint, log.effort.channel)}" = '
+            f'{{as = "{column_name(joint, "velocity")}"}}, or leave it out'
+        )
+        column = column_name(joint, log.effort.channel)
+        out.append(Finding(log.name, column, SUSPECTED, factor, "1", "refused", detail))
+    return out
+
+
+def _percent(share: Array, joints: Sequence[int]) -> str:
+    return f"{100.0 * float(np.sqrt(np.mean(share[list(joints)] ** 2))):.0f} %"
+
+
+def _named(h: Hypothesis, channel: str, ratio: Array | None) -> tuple[float, str]:
+    """Size, and what it is: a unit or a gear ratio where it is near one."""
+    known: dict[float, str] = {}
+    if h.cause == "scale":
+        known = {f: f", it is in {unit}" for f, unit in WRONG[channel].items()}
+    elif h.cause == "position_scale":
+        known = {DEG: ", it is in degrees"}
+    of = {abs(float(ratio[j])) for j in h.joints} if ratio is not None else set()
+    if len(of) == 1 and h.cause in ("scale", "position_scale"):
+        one = of.pop()
+        known[1.0 / one if h.cause == "scale" else one] = ", it is that of the motor"
+    for factor, what in known.items():
+        if factor / _NEAR < h.size < factor * _NEAR:
+            return factor, what
+    return float(f"{h.size:.2g}"), ""
+
+
+def _words(h: Hypothesis, size: float, joints: Sequence[str], channel: str) -> str:
+    names = " and ".join(joints[j] for j in h.joints[:2])
+    return {
+        "sign": f"the sign of the {channel} is turned",
+        "exchanged": f"the {channel}s of {names} are exchanged",
+        "scale": f"the {channel} is {size:.3g} times what it should be",
+        "late": f"the {channel} is {1e3 * size:.3g} ms late",
+        "both_exchanged": f"{names} are exchanged, positions and {channel}s",
+        "position_sign": "the sign of the position is turned",
+        "position_scale": f"the position is {size:.3g} times what it should be",
+        "position_zero": f"the zero of the position is {size:.2g} rad off",
+    }[h.cause]
+
+
+def _together(steps: Sequence[tuple[Hypothesis, float]], joints: int) -> Reading:
+    """The reading that all steps with their named sizes make."""
+    reading = as_named(joints)
+    for h, size in steps:
+        reading = h.resized(size, reading).reading
+    return reading
+
+
+def _lines(log: Log, r: Reading, h: Hypothesis, joints: Sequence[str]) -> list[str]:
+    """Rules of a mapping file for the columns that one step is about."""
+    position = _position(log)
+    efforts = h.cause in _OF_EFFORTS or h.cause == "both_exchanged"
+    own = all(
+        _file_column(log, joints[j], position) == column_name(joints[j], position) for j in h.joints
+    )
+    if h.cause == "both_exchanged" and own:
+        pairs = (f'{joints[r.position_of[j]]} = "{joints[j]}"' for j in h.joints)
+        return [f"joints = {{{', '.join(pairs)}}}"]
+    out = []
+    for j in sorted(h.joints):
+        if efforts:
+            change = (float(r.effort_factor[j]), 0.0, float(r.late[j]))
+            out.append(_line(log, log.effort.channel, joints[r.effort_of[j]], joints[j], change))
+        if h.cause not in _OF_EFFORTS:
+            change = (float(r.position_factor[j]), float(r.zero[j]), 0.0)
+            out.append(_line(log, position, joints[r.position_of[j]], joints[j], change))
+    quantity = log.effort.channel if efforts else position
+    ending = column_name("", quantity)
+    alike = {keys for _, keys in out}
+    if len(alike) == 1 and 1 < len(out) == len(joints) and all(c.endswith(ending) for c, _ in out):
+        out = [(column_name("*", quantity), alike.pop())]
+    return [f'columns."{column}" = {{{keys}}}' for column, keys in out]
+
+
+def _position(log: Log) -> str:
+    return "motor_position" if log.position_source == "motor" else "position"
+
+
+def _file_column(log: Log, joint: str, quantity: str) -> str:
+    return log.rules[joint, quantity][0] if log.rules else column_name(joint, quantity)
+
+
+def _line(
+    log: Log, quantity: str, source: str, target: str, change: tuple[float, float, float]
+) -> tuple[str, str]:
+    """Column of the file and the keys of its rule, after a further factor, zero and delay."""
+    factor, zero, late = change
+    column, wanted = _file_column(log, source, quantity), column_name(target, quantity)
+    rule = log.rules[source, quantity][1] if log.rules else ColumnRule("", "")
+    slope = rule.affine("rad" if quantity.endswith("position") else log.effort.unit)[0]
+    zero, scale = rule.zero - zero / (factor * slope), rule.scale * factor
+    keys = {
+        f'as = "{wanted}"': column != wanted,
+        f'unit = "{rule.unit}"': rule.unit is not None,
+        f"zero = {zero:.4g}": zero != 0.0,
+        f"scale = {abs(scale):.4g}": abs(abs(scale) - 1.0) > _ROUNDED,
+        "flip = true": scale < 0.0,
+        f"late = {rule.late + late:.3g}": rule.late + late != 0.0,
+    }
+    return column, ", ".join(key for key, needed in keys.items() if needed)

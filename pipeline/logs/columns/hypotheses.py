@@ -1,0 +1,151 @@
+"""Ways in which columns of a log are commonly not what their names say.
+
+A `Reading` says which column, times what, shifted by what, is a joint's effort and position. What
+identification names itself is left to it: factors, delays and zeros near none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: Factors on an effort: nearer to one they are a gain or bodies that differ.
+LEAST, MOST = 2.5, 3000.0
+FACTORS: Final = tuple(s for f in np.geomspace(3.0, MOST, 10) for s in (f, 1.0 / f))
+#: Factors on a position that is read at a motor, or in degrees.
+RATIOS: Final = tuple(np.geomspace(3.0, 300.0, 11))
+#: Delays of an effort [s]: shorter ones are a delay of the machine's own.
+DELAYS: Final = (-0.2, -0.12, -0.07, -0.04, 0.04, 0.07, 0.12, 0.2)
+#: Zeros of a position [rad].
+ZEROS: Final = tuple(k * np.pi / 6 for k in range(-5, 7) if k)
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What each joint's effort and position are read from.
+
+    Attributes:
+        effort_of: Column of the effort, shape (J,).
+        effort_factor: On it, shape (J,).
+        late: By which it comes late, shape (J,) [s].
+        position_of: Column of the position, shape (J,).
+        position_factor: On it, shape (J,).
+        zero: Added to it, shape (J,) [rad].
+    """
+
+    effort_of: Index
+    effort_factor: Array
+    late: Array
+    position_of: Index
+    position_factor: Array
+    zero: Array
+
+    def at(self, which: Sequence[int], **values: object) -> Reading:
+        """The same with other values at some joints."""
+        changes = {}
+        for name, value in values.items():
+            changes[name] = getattr(self, name).copy()
+            changes[name][list(which)] = value
+        return replace(self, **changes)
+
+    @property
+    def motion(self) -> bytes:
+        """Equal for readings with equal positions."""
+        return b"".join(x.tobytes() for x in (self.position_of, self.position_factor, self.zero))
+
+
+def as_named(joints: int) -> Reading:
+    """Every column is what its name says."""
+    own, one, none = np.arange(joints), np.ones(joints), np.zeros(joints)
+    return Reading(own, one, none, own, one, none)
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One way in which columns may be wrong.
+
+    Attributes:
+        cause: Key of `CAUSES`.
+        joints: Whose columns.
+        reading: That mends it.
+        size: Factor, delay or zero; one where there is none to choose.
+    """
+
+    cause: str
+    joints: tuple[int, ...]
+    reading: Reading
+    size: float = 1.0
+
+    def resized(self, size: float, start: Reading) -> Hypothesis:
+        """The same with another size, from the reading that is mended."""
+        return _sized(self.cause, self.joints, size, start)
+
+
+#: The simplest first: where several explain a log as well, the first of them is taken.
+CAUSES: Final = (
+    *("sign", "exchanged", "scale", "late"),
+    *("both_exchanged", "position_sign", "position_scale", "position_zero"),
+)
+
+
+def _sized(cause: str, joints: tuple[int, ...], size: float, r: Reading) -> Hypothesis:
+    which = list(joints)
+    mended = {
+        "sign": lambda: r.at(which, effort_factor=-r.effort_factor[which]),
+        "scale": lambda: r.at(which, effort_factor=r.effort_factor[which] / size),
+        "late": lambda: r.at(which, late=r.late[which] + size),
+        "position_sign": lambda: r.at(which, position_factor=-r.position_factor[which]),
+        "position_scale": lambda: r.at(which, position_factor=r.position_factor[which] / size),
+        "position_zero": lambda: r.at(which, zero=r.zero[which] - size),
+        "exchanged": lambda: r.at(which, effort_of=r.effort_of[which[::-1]]),
+        "both_exchanged": lambda: r.at(
+            which, effort_of=r.effort_of[which[::-1]], position_of=r.position_of[which[::-1]]
+        ),
+    }
+    return Hypothesis(cause, joints, mended[cause](), size)
+
+
+_SIZES: Final = {"sign": (1.0,), "scale": FACTORS, "late": DELAYS}
+_POSITION_SIZES: Final = {"position_sign": (1.0,), "position_scale": RATIOS, "position_zero": ZEROS}
+
+
+def _together(
+    r: Reading, joints: Sequence[int], sizes: Mapping[str, tuple[float, ...]]
+) -> Iterator[Hypothesis]:
+    for cause, values in sizes.items():
+        if len(joints) > 1 and cause != "position_zero":
+            yield from (_sized(cause, tuple(joints), float(size), r) for size in values)
+
+
+def _alone(
+    r: Reading, joints: Sequence[int], sizes: Mapping[str, tuple[float, ...]]
+) -> Iterator[Hypothesis]:
+    for cause, values in sizes.items():
+        for j in joints:
+            yield from (_sized(cause, (j,), float(size), r) for size in values)
+
+
+def of_efforts(r: Reading, live: Sequence[int], odd: Sequence[int]) -> Iterator[Hypothesis]:
+    """About efforts alone, of joints that are compared; of single ones where they are odd."""
+    yield from _together(r, live, _SIZES)
+    yield from _alone(r, odd, _SIZES)
+    for pair in combinations(live, 2):
+        if set(pair) & set(odd):
+            yield _sized("exchanged", pair, 1.0, r)
+
+
+def of_positions(r: Reading, live: Sequence[int], odd: Sequence[int]) -> Iterator[Hypothesis]:
+    """About positions, too; of single ones where efforts are explained badly."""
+    yield from _together(r, live, _POSITION_SIZES)
+    yield from _alone(r, odd, _POSITION_SIZES)
+    for pair in combinations(live, 2):
+        if set(pair) & set(odd):
+            yield _sized("both_exchanged", pair, 1.0, r)

@@ -1,0 +1,190 @@
+"""Columns that are not what their names say: the simplest reading by which a motion explains them.
+
+One hypothesis after another is held against the log; see `explaining`. The one that takes most is
+taken where it takes more than models that are wrong can give away, and the search goes on from
+there. A right log costs one fit: what could be gained at all is too little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.columns.explaining import FLOOR, Bodies, Explaining, Score
+from pipeline.logs.columns.hypotheses import (
+    CAUSES,
+    LEAST,
+    MOST,
+    Hypothesis,
+    Reading,
+    as_named,
+    of_efforts,
+    of_positions,
+)
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+#: Fall of the score from which a reading counts, in units of minus twice a log-likelihood.
+ENOUGH: Final = 20.0
+#: Score within which causes count as alike, of which the simplest, the first of `CAUSES`, is taken.
+ALIKE: Final = 10.0
+#: Share of an effort that may be left, root mean square, where a hypothesis is to explain it.
+WELL: Final = 0.5
+#: Hypotheses about positions that are tried with all bodies open, and any whose size is refined.
+_TRIED: Final = 4
+_STEPS: Final = 8
+#: Turns of the search for a size, each over a third of the one before.
+_REFINED: Final = 5
+
+
+class Along(Protocol):
+    """Logs of one machine, and what its model says along other readings of their positions.
+
+    Rough: on few rows, with nothing but the scale of its bodies open.
+    """
+
+    def effort(self, late: float, *, rough: bool) -> Array:
+        """Efforts as logged, of columns taken to be late by some time [s], shape (N, J)."""
+        ...
+
+    def mask(self, reading: Reading, *, rough: bool) -> Mask:
+        """Rows that count, shape (N, J)."""
+        ...
+
+    def bodies(self, reading: Reading, *, rough: bool) -> Bodies:
+        """By the model."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Mended:
+    """What the search found.
+
+    Attributes:
+        steps: Hypotheses, one after the other, and by how much each lowers the score.
+        before: Share of each joint's effort that is left as logged, shape (J,).
+        after: ... and with all steps.
+    """
+
+    steps: tuple[tuple[Hypothesis, float], ...]
+    before: Array
+    after: Array
+
+
+def search(along: Along) -> Mended:
+    """Find the reading of a log's columns that its motion asks for."""
+    one = _Search(along)
+    reading, score = one.reading, one.now
+    before = score.share
+    steps: list[tuple[Hypothesis, float]] = []
+    while len(steps) < _STEPS and score.room(one.independent) >= ENOUGH:
+        found = one.step(reading, score)
+        if found is None or found.gain < ENOUGH:
+            break
+        steps.append((found.hypothesis, found.gain))
+        reading, score = found.hypothesis.reading, found.score
+    return Mended(tuple(steps), before, score.share)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """A hypothesis, its score, what it gains, and that without a floor."""
+
+    hypothesis: Hypothesis
+    score: Score
+    gain: float
+    sharp: float
+
+
+class _Search:
+    """Scores of readings; models along motions are kept while they are asked for."""
+
+    def __init__(self, along: Along) -> None:
+        self._along = along
+        self._models: dict[tuple[bytes, bool], Explaining] = {}
+        self.reading = as_named(along.mask(as_named(0), rough=False).shape[1])
+        model = self._model(self.reading, rough=False)
+        model.count_independent(self._effort(self.reading, rough=False))
+        self.independent = model.independent
+        self._live = tuple(model.joints)
+        self.now = model.score(self._effort(self.reading, rough=False))
+
+    def _effort(self, r: Reading, *, rough: bool) -> Array:
+        efforts = [
+            self._along.effort(float(late), rough=rough)[:, k]
+            for k, late in zip(r.effort_of, r.late, strict=True)
+        ]
+        return np.stack(efforts, axis=1) * r.effort_factor
+
+    def _model(self, r: Reading, *, rough: bool) -> Explaining:
+        key = (r.motion, rough)
+        if key not in self._models:
+            bodies = self._along.bodies(r, rough=rough)
+            model = Explaining(bodies, self._along.mask(r, rough=rough))
+            if self._models:
+                model.independent = self.independent
+            self._models[key] = model
+        return self._models[key]
+
+    def _try(self, h: Hypothesis, now: Score, *, rough: bool = False) -> _Tried:
+        near = None if h.reading.motion != self.reading.motion or rough else now
+        score = self._model(h.reading, rough=rough).score(
+            self._effort(h.reading, rough=rough), near
+        )
+        gains = (now.gain(score, self.independent, sharp=sharp) for sharp in (False, True))
+        return _Tried(h, score, *gains)
+
+    def step(self, start: Reading, now: Score) -> _Tried | None:
+        """The simplest hypothesis that explains about as much as the best, its size refined."""
+        odd = np.flatnonzero(now.share > FLOOR).tolist()
+        least = self._try(Hypothesis("", (), start), now, rough=True).score
+        rough = [self._try(h, least, rough=True) for h in of_positions(start, self._live, odd)]
+        first = self._models[self.reading.motion, False]
+        self._models = {
+            k: v for k, v in self._models.items() if v is first or k == (start.motion, False)
+        }
+        # Bodies that are far from the model's may hide a joint's column: then none is beyond doubt.
+        suspected = self._live if now.penalty > ENOUGH or not odd else odd
+        every = [*of_efforts(start, self._live, suspected), *(t.hypothesis for t in _first(rough))]
+        tried = [self._try(h, now) for h in every]
+        good = [
+            t for t in tried if np.mean(t.score.share[list(t.hypothesis.joints)] ** 2) < WELL**2
+        ]
+        # Sizes were tried in large steps: the first few are refined before they are compared.
+        refined = [self._refined(h, start, now) for h in _first(good)]
+        if not refined:
+            return None
+        most = max(t.gain for t in refined)
+        best = {t.hypothesis.cause: t for t in sorted(refined, key=lambda t: t.gain)}
+        return next(best[c] for c in CAUSES if c in best and best[c].gain > most - ALIKE)
+
+    def _refined(self, best: _Tried, start: Reading, now: Score) -> _Tried:
+        cause, size = best.hypothesis.cause, best.hypothesis.size
+        if cause not in _STEP:
+            return best
+        step, factor = _STEP[cause], cause in ("scale", "position_scale")
+        for _ in range(_REFINED):
+            size = best.hypothesis.size
+            sizes = (size * step, size / step) if factor else (size + step, size - step)
+            possible = [s for s in sizes if not factor or LEAST < max(s, 1.0 / s) < MOST]
+            others = (self._try(best.hypothesis.resized(s, start), now) for s in possible)
+            best = max((best, *others), key=lambda t: t.sharp)
+            step = step**0.5 if factor else 0.5 * step
+        return best
+
+
+#: First step of the search for a size: half of what lies between two that were tried.
+_STEP: Final = {"scale": 1.5, "late": 0.02, "position_scale": 1.3, "position_zero": 0.25}
+
+
+def _first(tried: Iterable[_Tried]) -> list[_Tried]:
+    """The best few, of each cause and place the best."""
+    best: dict[tuple[str, Sequence[int]], _Tried] = {}
+    for t in sorted(tried, key=lambda t: -t.gain):
+        best.setdefault((t.hypothesis.cause, t.hypothesis.joints), t)
+    return list(best.values())[:_TRIED]

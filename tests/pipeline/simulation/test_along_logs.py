@@ -1,0 +1,181 @@
+"""Columns that are not what they say: named with the line that mends them, and never without cause.
+
+The arm's torques come from Pinocchio alone, with bodies that are not the URDF's, a payload that it
+does not know, and friction.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pinocchio as pin
+import pytest
+
+from pipeline.identification.workflow.locate import find_where
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup, take_in
+from pipeline.logs.columns.findings import SUSPECTED
+from pipeline.logs.errors import LogContentError
+from pipeline.logs.quality.finding import Finding
+
+RATE = 200.0
+LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="{m}"/>
+<inertia ixx="{i}" ixy="0" ixz="0" iyy="{i}" iyz="0" izz="{i}"/></inertial></link>
+<joint name="j{k}" type="continuous"><parent link="{parent}"/><child link="l{k}"/>
+<origin xyz="{at} 0 0"/><axis xyz="{axis}"/></joint>"""
+LIMIT = '<limit lower="-9" upper="9" effort="9" velocity="9"/>'
+Spoil = Callable[[pd.DataFrame], None]
+
+
+@pytest.fixture(scope="module")
+def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    links = [
+        LINK.format(k=k, parent=f"l{k - 1}" if k else "base", at=at, axis=axis, m=m, x=x, i=i)
+        for k, (at, axis, m, x, i) in enumerate(
+            [
+                (0.0, "0 1 0", 3.0, 0.2, 0.04),
+                (0.4, "0.6 0.8 0", 2.0, 0.15, 0.02),
+                (0.3, "0 1 0", 1.0, 0.1, 0.005),
+            ]
+        )
+    ]
+    path = tmp_path_factory.mktemp("arm") / "arm.urdf"
+    path.write_text(f'<robot name="arm"><link name="base"/>{"".join(links)}</robot>', "utf-8")
+    return path
+
+
+def logged(
+    urdf: Path, seed: int, *, off: float, payload: float, quick: float = 1.0
+) -> pd.DataFrame:
+    """A log of an arm whose bodies differ from the URDF's by up to a share."""
+    rng = np.random.default_rng(seed)
+    text = urdf.read_text("utf-8").replace("continuous", "revolute")
+    model = pin.buildModelFromXML(text.replace("</joint>", f"{LIMIT}</joint>"))
+    for i in range(1, model.njoints):
+        body, scale = model.inertias[i], float(np.exp(np.log1p(off) * rng.uniform(-1.0, 1.0)))
+        lever = body.lever + 0.1 * off * rng.uniform(-1.0, 1.0, 3)
+        model.inertias[i] = pin.Inertia(scale * body.mass, lever, scale * body.inertia)
+    model.inertias[3] += pin.Inertia(payload, np.array([0.2, 0.0, 0.0]), np.zeros((3, 3)))
+    t = np.arange(2400) / RATE
+    w = 2 * np.pi * np.array([0.17, 0.53, 1.1])[:, None] * quick * rng.uniform(0.8, 1.2, (3, 3))
+    phase = w[:, None, :] * t[None, :, None] + rng.uniform(0, 6, (3, 1, 3))
+    size = np.array([0.8, 0.3, 0.1])[:, None, None]
+    q = np.array([0.3, 0.5, -0.6]) + (size * np.sin(phase)).sum(axis=0)
+    v = (size * w[:, None] * np.cos(phase)).sum(axis=0)
+    a = -(size * w[:, None] ** 2 * np.sin(phase)).sum(axis=0)
+    tau = np.array([pin.rnea(model, model.createData(), *x) for x in zip(q, v, a, strict=True)])
+    spread = tau.std(axis=0)
+    tau += spread * (0.15 * np.tanh(v / 0.02) + 0.05 * v + 0.02 * rng.standard_normal(q.shape))
+    out = pd.DataFrame({"time_s": t})
+    for k in range(3):
+        out[f"j{k}__position_rad"] = q[:, k] + 1e-5 * rng.standard_normal(t.size)
+        out[f"j{k}__torque_Nm"] = tau[:, k]
+    return out
+
+
+def judged(log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "") -> list[Finding]:
+    """Warnings about columns.
+
+    Raises:
+        LogContentError: The log is refused.
+    """
+    path, file = folder / "log.parquet", folder / "mapping.toml"
+    log.to_parquet(path)
+    file.write_text(mapping, encoding="utf-8")
+    options = Options((path,), robot=urdf, step="where", mapping=file)
+    given = setup(options)
+    where = find_where(given, given.model, *take_in(given, options))
+    return [f for f in where.intake.findings if f.check == SUSPECTED]
+
+
+def times(quantity: str, factor: float, joints: str = "012") -> Spoil:
+    def spoil(log: pd.DataFrame) -> None:
+        for j in joints:
+            log[f"j{j}__{quantity}"] *= factor
+
+    return spoil
+
+
+def exchanged(*quantities: str) -> Spoil:
+    def spoil(log: pd.DataFrame) -> None:
+        for quantity in quantities:
+            names = [f"j0__{quantity}", f"j2__{quantity}"]
+            log[names] = log[names[::-1]].to_numpy()
+
+    return spoil
+
+
+def late(log: pd.DataFrame) -> None:
+    for j in range(3):
+        log[f"j{j}__torque_Nm"] = log[f"j{j}__torque_Nm"].shift(10).bfill()
+
+
+def other_zero(log: pd.DataFrame) -> None:
+    log["j1__position_rad"] += 1.5
+
+
+def velocity(log: pd.DataFrame) -> None:
+    log["j1__torque_Nm"] = np.gradient(log["j1__position_rad"], log["time_s"])
+
+
+CAUSES = {
+    "one sign": (times("torque_Nm", -1.0, "1"), "the sign of the torque is turned"),
+    "all signs": (times("torque_Nm", -1.0), "the sign of the torque is turned"),
+    "one scale": (
+        times("torque_Nm", 5.0, "1"),
+        r"is (4\.[5-9]|5|5\.[1-5]) times what it should be",
+    ),
+    "one too small": (
+        times("torque_Nm", 0.01, "0"),
+        r"is 0\.0(0[89]|1[012]?)\d* times what it should be",
+    ),
+    "millinewton metres": (times("torque_Nm", 1e3), "it is in mN"),
+    "torques": (exchanged("torque_Nm"), "the torques of j0 and j2 are exchanged"),
+    "joints": (exchanged("torque_Nm", "position_rad"), "j0 and j2 are exchanged, positions"),
+    "motor": (times("position_rad", 9.0, "2"), "the position is (8|9).* times what it should"),
+    "zero": (other_zero, "the zero of the position is 1.[4-6] rad off"),
+    "late": (late, "the torque is (4[6-9]|5[0-4]) ms late"),
+    "velocity": (velocity, "a velocity under a wrong name"),
+}
+
+
+@pytest.mark.parametrize("name", CAUSES)
+def test_a_wrong_column_is_refused_and_its_line_mends_it(
+    urdf: Path, tmp_path: Path, name: str
+) -> None:
+    spoil, says = CAUSES[name]
+    log = logged(urdf, 3, off=0.2, payload=0.3, quick=2.0 if name == "late" else 1.0)
+    spoil(log)
+    with pytest.raises(LogContentError, match=says) as refused:
+        judged(log, urdf, tmp_path)
+    lines = re.search(r"in a mapping file: ([^(]*\})", str(refused.value))
+    assert lines is not None
+    assert judged(log, urdf, tmp_path, lines[1].replace("; ", "\n")) == []
+
+
+@pytest.mark.parametrize("factor", [5.0, 1 / 9, 0.01])
+def test_a_common_scale_is_no_more_than_suspicious(
+    urdf: Path, tmp_path: Path, factor: float
+) -> None:
+    log = logged(urdf, 4, off=0.2, payload=0.0)
+    times("torque_Nm", factor)(log)
+    (found,) = judged(log, urdf, tmp_path)
+    assert found.verdict == "warning"
+    size = re.search(r"torque is ([\d.]+) times what it should be", found.detail)
+    assert size is not None
+    assert float(size[1]) == pytest.approx(factor, rel=0.4)
+    line = re.search(r"in a mapping file: (.*)", found.detail)
+    assert line is not None
+    assert judged(log, urdf, tmp_path, line[1]) == []
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_bodies_that_are_off_and_a_payload_are_no_wrong_columns(
+    urdf: Path, tmp_path: Path, seed: int
+) -> None:
+    log = logged(urdf, seed, off=0.5, payload=(0.0, 1.5)[seed % 2])
+    assert judged(log, urdf, tmp_path) == []
