@@ -12,7 +12,7 @@ from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.model_writer import model_text
 from pipeline.robot.published import published_names
 from pipeline.robot.robot_file import DEFAULT_ROBOT
-from pipeline.simulation.force_choice import ForceChoice
+from pipeline.simulation.ground_forces.force_choice import ForceChoice
 from pipeline.simulation.settings import PAPER_FORCES, Settings, settings
 from reports.atomic import write_text
 

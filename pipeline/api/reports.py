@@ -19,7 +19,7 @@ from pipeline.api.tables import (
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import RobotFileError
 from pipeline.progress import Progress
-from pipeline.simulation.force_choice import ForceChoice
+from pipeline.simulation.ground_forces.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand
 from reports.folder.staging import staged

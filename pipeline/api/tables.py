@@ -17,7 +17,7 @@ from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.foot_tracking import foot_tracking
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.force_choice import RULES
+from pipeline.simulation.ground_forces.force_choice import RULES
 from pipeline.simulation.settings import PAPER_FORCES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, compare_rules, walk
 from reports.table import Table

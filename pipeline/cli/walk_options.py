@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pipeline.cli.named_path import named_path
 
 if TYPE_CHECKING:
-    from pipeline.simulation.force_choice import ForceChoice
+    from pipeline.simulation.ground_forces.force_choice import ForceChoice
 
 
 def add_machine_options(sub: argparse.ArgumentParser) -> None:
@@ -79,6 +79,6 @@ def add_force_options(sub: argparse.ArgumentParser) -> None:
 
 def force_choice(options: argparse.Namespace) -> ForceChoice:
     """What the command line says of the ground's forces."""
-    from pipeline.simulation.force_choice import ForceChoice
+    from pipeline.simulation.ground_forces.force_choice import ForceChoice
 
     return ForceChoice(options.forces, options.power_of, options.friction_coefficient)

@@ -22,8 +22,8 @@ from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.simulation.changes import changed
 from pipeline.simulation.edited import IDEAL, Effects, effects
-from pipeline.simulation.force_choice import ForceChoice
-from pipeline.simulation.least_power import Adjust
+from pipeline.simulation.ground_forces.force_choice import ForceChoice
+from pipeline.simulation.ground_forces.least_power import Adjust
 from pipeline.simulation.memory import refuse_beyond_memory
 from pipeline.simulation.walk_stand import Regeneration
 

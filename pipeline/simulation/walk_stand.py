@@ -21,8 +21,8 @@ from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.standing import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.force_choice import RuleCost, recovered_share, rule_costs
-from pipeline.simulation.least_power import Adjust
+from pipeline.simulation.ground_forces.force_choice import RuleCost, recovered_share, rule_costs
+from pipeline.simulation.ground_forces.least_power import Adjust
 
 Array = NDArray[np.float64]
 

@@ -163,8 +163,8 @@ def _price(judged: Judged) -> str:
         '**The price of the fit:** "almost 15" needs a planetary gear with '
         f"{p.gear_friction:.1f} mN·m of constant friction (95 % of the posterior: "
         f"{span(p.gear_known)}), where gear data suggest {p.gear_prior:g}, at most {high:.0f} "
-        f"mN·m; it alone turns {p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per cycle "
-        f"into heat. In {percent(p.no_load_share, 1)} of the posterior the motor draws over "
+        f"mN·m; it alone turns {p.gear_heat:.0f} of the {p.leg_energy:.0f} J that a leg draws per "
+        f"cycle into heat. In {percent(p.no_load_share, 1)} of the posterior the motor draws over "
         f"{percent(NOTABLE - 1)} more current without load than the "
         f"{1e3 * p.no_load_sheet:.0f} mA of its data sheet."
     )

@@ -16,8 +16,8 @@ from pipeline.motion.motion import Segment
 from pipeline.motion.standing import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.force_choice import LEAST_POWER, RULES, recovered_share
-from pipeline.simulation.least_power import LeastPower, PowerOfJoints
+from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES, recovered_share
+from pipeline.simulation.ground_forces.least_power import LeastPower, PowerOfJoints
 from pipeline.simulation.walk_stand import Regeneration, compare_rules
 from tests.pipeline.dynamics.test_force_rules import shown, swinging
 

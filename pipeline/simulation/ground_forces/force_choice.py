@@ -14,7 +14,7 @@ from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, ForceRule, GroundFor
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.errors import GaitError
 from pipeline.machine.drivetrains import Actuators
-from pipeline.simulation.least_power import Adjust, LeastPower
+from pipeline.simulation.ground_forces.least_power import Adjust, LeastPower
 
 LEAST_TORQUE, LEAST_POWER = "least_torque", "least_power"
 RULES = (LEAST_TANGENTIAL, LEAST_TORQUE, LEAST_POWER)

@@ -28,7 +28,7 @@ from pipeline.dynamics.force_rules import Descent, Stance
 from pipeline.dynamics.joint_demand import JointDemand
 from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Segment
-from pipeline.simulation.power_law import NOTHING, PowerLaw, power_law
+from pipeline.simulation.ground_forces.power_law import NOTHING, PowerLaw, power_law
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
