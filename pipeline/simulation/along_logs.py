@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs.columns.explaining import Bodies
+from pipeline.logs.columns.explaining import FLOOR, Bodies
 from pipeline.logs.columns.findings import column_findings, copies
 from pipeline.logs.columns.hypotheses import Reading, as_named
 from pipeline.logs.columns.search import search
@@ -19,6 +19,7 @@ from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import Bodies as Edited
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
+from pipeline.simulation.rigid_bodies import legs_are_separate
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,6 +34,8 @@ _SHIFT: Final = 0.3
 #: what an end carries over the mass of all that moves, and how far out over the links' length.
 _CARRIED: Final = 0.2
 _OUT: Final = 0.5
+#: Share of an effort that is left where a rule stands for the forces of the ground.
+_BY_RULE: Final = 0.3
 #: Bodies lighter than this share of what the model says are none.
 _LIGHTEST: Final = 0.1
 
@@ -128,7 +131,13 @@ class AlongLogs:
             np.concatenate([m.v for m in ms]),
             np.concatenate([m.a for m in ms]),
             rest,
+            np.flatnonzero([s == _CARRIED and low == 0.0 for _, _, s, low in opened]),
+            FLOOR if all(_ground_known(self._model, m) for m in ms) else _BY_RULE,
         )
+
+
+def _ground_known(model: MachineModel, m: Measurement) -> bool:
+    return not model.floating or legs_are_separate(model, m)
 
 
 def _later(m: Measurement, late: float) -> Array:

@@ -55,6 +55,8 @@ class Bodies:
         v: Velocity, shape (N, J) [rad/s].
         a: Acceleration, shape (N, J) [rad/s^2].
         rest: Speed within which friction changes its sign, shape (J,) [rad/s].
+        ends: Which parameters are masses that ends carry; their three moments follow, shape (E,).
+        floor: Share of an effort, root mean square, that honest models of this kind leave.
     """
 
     base: Array
@@ -65,6 +67,8 @@ class Bodies:
     v: Array
     a: Array
     rest: Array
+    ends: NDArray[np.intp]
+    floor: float = FLOOR
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +102,9 @@ class Score:
         falls = np.log(np.maximum(self.share[live], floor) / np.maximum(other.share[live], floor))
         return float(2.0 * independent[live] @ falls) + self.penalty - other.penalty
 
-    def room(self, independent: Array) -> float:
-        """By how much it could fall at most."""
-        falls = np.log(np.maximum(np.nan_to_num(self.share), FLOOR) / FLOOR)
+    def room(self, independent: Array, floor: float) -> float:
+        """By how much it could fall at most, where a share is left at least."""
+        falls = np.log(np.maximum(np.nan_to_num(self.share), floor) / floor)
         return float(2.0 * independent @ falls) + self.penalty
 
 
@@ -114,7 +118,7 @@ class Explaining:
             bodies: By the model.
             mask: Rows that count, shape (N, J).
         """
-        self.bodies = bodies
+        self.bodies, self.mask = bodies, mask
         self._rows = [np.flatnonzero(mask[:, j]) for j in range(mask.shape[1])]
         self.joints = [j for j, rows in enumerate(self._rows) if rows.size > _OWN]
         self.independent = np.where(mask.sum(axis=0) > _OWN, _USUAL, 0.0)
@@ -156,7 +160,7 @@ class Explaining:
         share = np.full(len(self._rows), np.nan)
         share[self.joints] = 1.0
         held = np.zeros(prior.size, dtype=np.bool_) if near is None else near.held
-        floor, last = np.full(len(self._rows), FLOOR**2), None
+        floor, last = np.full(len(self._rows), self.bodies.floor**2), None
         for _ in range(_TURNS):
             a, c = np.diag(prior), np.zeros(prior.size)
             for j in self.joints:
@@ -177,7 +181,8 @@ class Explaining:
                 rest = square[j] - 2.0 * own @ cross[j] + own @ self._gram[j] @ own
                 share[j] = max(float(rest), 0.0) / total[j]
                 lost, gram = own[p : p + 3], self._gram[j][p : p + 3, p : p + 3]
-                floor[j] = FLOOR**2 + FRICTION_FLOOR**2 * float(lost @ gram @ lost) / total[j]
+                rubbed = float(lost @ gram @ lost) / total[j]
+                floor[j] = self.bodies.floor**2 + FRICTION_FLOOR**2 * rubbed
             now = Score(np.sqrt(share), np.sqrt(floor), float(prior @ x**2), x, held)
             if last is not None and abs(last.gain(now, self.independent)) < 0.5:
                 break

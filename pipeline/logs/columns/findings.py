@@ -42,6 +42,13 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
         ratio: Gear ratios, shape (J,), or None.
     """
     channel, joints = log.effort.channel, log.joints
+    if mended.pushed:
+        detail = (
+            f"the {channel}s follow where the ends of the machine are pushed up, as by the ground: "
+            "contact forces are missing in a machine on a fixed base; write a robot file with legs "
+            'and base = "level"'
+        )
+        return [Finding(log.name, "", SUSPECTED, mended.pushed, "1", "refused", detail)]
     named = [(h, *_named(h, channel, ratio)) for h, _ in mended.steps]
     last = _together([(h, size) for h, size, _ in named], len(joints))
     out = []

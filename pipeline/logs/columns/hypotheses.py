@@ -134,9 +134,10 @@ def _alone(
 
 
 def of_efforts(r: Reading, live: Sequence[int], odd: Sequence[int]) -> Iterator[Hypothesis]:
-    """About efforts alone, of joints that are compared; of single ones where they are odd."""
+    """About efforts alone, of joints that are compared; pairs with one that is explained badly."""
     yield from _together(r, live, _SIZES)
-    yield from _alone(r, odd, _SIZES)
+    # Bodies that give way to a wrong column leave the misfit at another joint.
+    yield from _alone(r, live, _SIZES)
     for pair in combinations(live, 2):
         if set(pair) & set(odd):
             yield _sized("exchanged", pair, 1.0, r)

@@ -8,13 +8,13 @@ there. A right log costs one fit: what could be gained at all is too little.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs.columns.explaining import FLOOR, Bodies, Explaining, Score
+from pipeline.logs.columns.explaining import Bodies, Explaining, Score
 from pipeline.logs.columns.hypotheses import (
     CAUSES,
     LEAST,
@@ -38,6 +38,9 @@ WELL: Final = 0.5
 #: Hypotheses about positions that are tried with all bodies open, and any whose size is refined.
 _TRIED: Final = 4
 _STEPS: Final = 8
+#: Force on an end over what it may carry, one standard deviation; the least over all weight.
+_PUSHED: Final = 10.0
+_CARRIED_AT_LEAST: Final = 0.1
 #: Turns of the search for a size, each over a third of the one before.
 _REFINED: Final = 5
 
@@ -69,23 +72,29 @@ class Mended:
         steps: Hypotheses, one after the other, and by how much each lowers the score.
         before: Share of each joint's effort that is left as logged, shape (J,).
         after: ... and with all steps.
+        pushed: By how much it falls where the ends of the machine are pushed up from outside, if
+            that explains more than any reading; else zero.
     """
 
     steps: tuple[tuple[Hypothesis, float], ...]
     before: Array
     after: Array
+    pushed: float = 0.0
 
 
 def search(along: Along) -> Mended:
     """Find the reading of a log's columns that its motion asks for."""
     one = _Search(along)
     reading, score = one.reading, one.now
-    before = score.share
+    before, pushed = score.share, one.pushed()
     steps: list[tuple[Hypothesis, float]] = []
-    while len(steps) < _STEPS and score.room(one.independent) >= ENOUGH:
+    while len(steps) < _STEPS and score.room(one.independent, one.floor) >= ENOUGH:
         found = one.step(reading, score)
+        if pushed >= max(ENOUGH, 0.0 if found is None else found.gain):
+            return Mended((), before, score.share, pushed)
         if found is None or found.gain < ENOUGH:
             break
+        pushed = 0.0
         steps.append((found.hypothesis, found.gain))
         reading, score = found.hypothesis.reading, found.score
     return Mended(tuple(steps), before, score.share)
@@ -110,7 +119,7 @@ class _Search:
         self.reading = as_named(along.mask(as_named(0), rough=False).shape[1])
         model = self._model(self.reading, rough=False)
         model.count_independent(self._effort(self.reading, rough=False))
-        self.independent = model.independent
+        self.independent, self.floor = model.independent, model.bodies.floor
         self._live = tuple(model.joints)
         self.now = model.score(self._effort(self.reading, rough=False))
 
@@ -131,6 +140,21 @@ class _Search:
             self._models[key] = model
         return self._models[key]
 
+    def pushed(self) -> float:
+        """What forces that push several ends up, as feet on the ground, gain over the reading."""
+        model = self._model(self.reading, rough=False)
+        ends = model.bodies.ends
+        if ends.size < 2 or self.now.room(self.independent, self.floor) < ENOUGH:
+            return 0.0
+        spread, least = model.bodies.spread.copy(), model.bodies.least.copy()
+        for what in ends + np.arange(4)[:, None]:  # the mass, then its moments
+            spread[what], least[what] = _PUSHED * spread[what], -np.inf
+        freed = Explaining(replace(model.bodies, spread=spread, least=least), model.mask)
+        freed.independent = self.independent
+        score = freed.score(self._effort(self.reading, rough=False))
+        up = np.sum(score.x[ends] < -_CARRIED_AT_LEAST) >= 2
+        return self.now.gain(score, self.independent) if up else 0.0
+
     def _try(self, h: Hypothesis, now: Score, *, rough: bool = False) -> _Tried:
         near = None if h.reading.motion != self.reading.motion or rough else now
         score = self._model(h.reading, rough=rough).score(
@@ -141,16 +165,14 @@ class _Search:
 
     def step(self, start: Reading, now: Score) -> _Tried | None:
         """The simplest hypothesis that explains about as much as the best, its size refined."""
-        odd = np.flatnonzero(now.share > FLOOR).tolist()
+        odd = np.flatnonzero(now.share > self.floor).tolist()
         least = self._try(Hypothesis("", (), start), now, rough=True).score
         rough = [self._try(h, least, rough=True) for h in of_positions(start, self._live, odd)]
         first = self._models[self.reading.motion, False]
         self._models = {
             k: v for k, v in self._models.items() if v is first or k == (start.motion, False)
         }
-        # Bodies that are far from the model's may hide a joint's column: then none is beyond doubt.
-        suspected = self._live if now.penalty > ENOUGH or not odd else odd
-        every = [*of_efforts(start, self._live, suspected), *(t.hypothesis for t in _first(rough))]
+        every = [*of_efforts(start, self._live, odd), *(t.hypothesis for t in _first(rough))]
         tried = [self._try(h, now) for h in every]
         good = [
             t for t in tried if np.mean(t.score.share[list(t.hypothesis.joints)] ** 2) < WELL**2

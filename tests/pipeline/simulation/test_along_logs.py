@@ -48,13 +48,18 @@ def urdf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def revolute(urdf: Path) -> str:
+    """The URDF with limits, so that Pinocchio takes one number per joint."""
+    text = urdf.read_text("utf-8").replace("continuous", "revolute")
+    return text.replace("</joint>", f"{LIMIT}</joint>")
+
+
 def logged(
     urdf: Path, seed: int, *, off: float, payload: float, quick: float = 1.0
 ) -> pd.DataFrame:
     """A log of an arm whose bodies differ from the URDF's by up to a share."""
     rng = np.random.default_rng(seed)
-    text = urdf.read_text("utf-8").replace("continuous", "revolute")
-    model = pin.buildModelFromXML(text.replace("</joint>", f"{LIMIT}</joint>"))
+    model = pin.buildModelFromXML(revolute(urdf))
     for i in range(1, model.njoints):
         body, scale = model.inertias[i], float(np.exp(np.log1p(off) * rng.uniform(-1.0, 1.0)))
         lever = body.lever + 0.1 * off * rng.uniform(-1.0, 1.0, 3)
@@ -179,3 +184,41 @@ def test_bodies_that_are_off_and_a_payload_are_no_wrong_columns(
 ) -> None:
     log = logged(urdf, seed, off=0.5, payload=(0.0, 1.5)[seed % 2])
     assert judged(log, urdf, tmp_path) == []
+
+
+def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
+    """Two legs carry a trunk that a bare URDF fixes: the ground pushes their ends up."""
+    legs = [
+        LINK.format(
+            k=k, parent="base" if k % 2 == 0 else f"l{k - 1}", at=at, axis="0 1 0", m=m, x=x, i=i
+        )
+        for k, (at, m, x, i) in enumerate(2 * [(0.0, 0.8, 0.1, 3e-3), (0.2, 0.4, 0.1, 2e-3)])
+    ]
+    urdf = tmp_path / "stands.urdf"
+    urdf.write_text(f'<robot name="stands"><link name="base"/>{"".join(legs)}</robot>', "utf-8")
+    model = pin.buildModelFromXML(revolute(urdf))
+    pushed = model.copy()
+    for i in (2, 4):  # 40 N up at the end of the leg
+        pushed.inertias[i] = pin.Inertia.FromDynamicParameters(
+            model.inertias[i].toDynamicParameters()
+            + -40 / 9.81 * np.array([1, 0.2, 0, 0, 0, 0, 0.04, 0, 0, 0.04])
+        )
+    rng = np.random.default_rng(5)
+    t = np.arange(2400) / RATE
+    w = 2 * np.pi * rng.uniform(0.2, 0.6, 4)
+    q, v, a = (0.4 * w**k * np.sin(w * t[:, None] + k * np.pi / 2) for k in range(3))
+    q += np.array([0.7, -1.4, 0.7, -1.4])
+    tau = [pin.rnea(model, model.createData(), *x) for x in zip(q, v, a, strict=True)]
+    own, held = model.createData(), pushed.createData()
+    gravity = [
+        pin.computeGeneralizedGravity(pushed, held, x)
+        - pin.computeGeneralizedGravity(model, own, x)
+        for x in q
+    ]
+    log = pd.DataFrame({"time_s": t})
+    total = np.array(tau) + np.array(gravity) + 0.2 * np.tanh(v / 0.02)
+    for k in range(4):
+        log[f"j{k}__position_rad"] = q[:, k] + 1e-5 * rng.standard_normal(t.size)
+        log[f"j{k}__torque_Nm"] = total[:, k] + 0.02 * rng.standard_normal(t.size)
+    with pytest.raises(LogContentError, match="contact forces are missing"):
+        judged(log, urdf, tmp_path)
