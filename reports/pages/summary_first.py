@@ -20,7 +20,7 @@ def numbers_first(judged: Judged) -> tuple[Number, ...]:
     out = [_number(said[name], judged) for name in _FIRST if name in said]
     met, of = headline(judged.judgement.reproduction)["prediction"]
     if of and judged.by.results is not None:
-        label = "*predicted:* printed numbers that were neither put in nor fitted, nor follow from those"
+        label = "*predicted:* printed numbers neither put in nor fitted, nor following from those"
         out.append(Number(f"{met} of {of}", label, "good" if met == of else "bad"))
     return tuple(out)
 
