@@ -1,6 +1,7 @@
 """From the catalogue's files to chains: components, alternatives, and edits of their parameters."""
 
 import dataclasses
+import logging
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from actuators.units import dimension, si_unit
 CATALOG: Final = Path(__file__).parents[1] / "catalog"
 WINDING: Final = "winding"  # the motor's row among the losses
 _RATIO_TOLERANCE: Final = 1e-9  # relative
+_logger: Final = logging.getLogger("legwatt")
 
 
 @dataclass(frozen=True)
@@ -183,15 +185,28 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
 
 
 def _refuse_unused(catalog: Catalog) -> None:
-    """Raise where a component in use holds a parameter that no alternative names."""
-    used = {r for alternative in catalog.alternatives.values() for r in alternative.references}
+    """Raise where a parameter that no alternative names was forgotten; say so where it is left.
+
+    Forgotten is one that the law of an element takes which names others of the component.
+    """
+    alternatives = catalog.alternatives.values()
+    used = {r for alternative in alternatives for r in alternative.references}
+    taken = {
+        f"{r.partition('.')[0]}.{argument}"
+        for alternative in alternatives
+        for e in alternative.elements
+        for r in e.arguments.values()
+        for argument in LAWS[e.law].arguments
+    }
     for component in catalog.components.values():
         for name in () if component.kind == MOTOR_KIND else component.parameters:
-            if f"{component.name}.{name}" not in used:
-                raise CatalogError(
-                    f"{component.name}.toml: parameter '{name}' is used by no alternative: "
-                    f"name it in {ALTERNATIVES_FILE} or remove it"
-                )
+            reference = f"{component.name}.{name}"
+            if reference in used:
+                continue
+            said = f"{component.name}.toml: parameter '{name}' is used by no alternative"
+            if reference in taken:
+                raise CatalogError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
+            _logger.warning("%s", said)
 
 
 def _check_motor(alternative: Alternative, catalog: Catalog) -> None:

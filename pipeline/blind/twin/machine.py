@@ -21,6 +21,7 @@ _MOTOR = {
     "supply_voltage": "voltage",
     "continuous_current": "current",
     "peak_current": "current",
+    "mass": "mass",
 }
 _ROTOR = {"coulomb": "torque", "viscous": "viscous friction", "inertia": "inertia"}
 
