@@ -110,7 +110,8 @@ def test_of_all_rules_least_power_costs_the_least_energy(
     energy = {(cost.alternative, cost.rule): cost.energy for cost in costs}
     assert set(energy) == {(name, rule) for name in chains for rule in RULES}
     for name in chains:
-        assert energy[name, LEAST_POWER] == min(energy[name, rule] for rule in RULES)
+        least = min(energy[name, rule] for rule in RULES)
+        assert energy[name, LEAST_POWER] <= least * (1 + 1e-9)  # the rule, down to round-off
 
 
 def test_on_a_bus_without_friction_least_power_is_least_torque(
