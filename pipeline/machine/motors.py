@@ -74,5 +74,5 @@ def motors_of(
         mass=(float(masses.min()), float(masses.max())),
         total=float(masses.sum(axis=1).max()) if (masses > 0).all() else 0.0,
         robot=robot,
-        stated=stated or bool(own),
+        stated=stated or bool(own or own.source),
     )

@@ -3,6 +3,7 @@
     [actuators]
     folder = "our_actuators"            # actuator files, from the robot file; the catalogue's else
     alternative = "reversible"          # how the machine is built, where it is one of them
+    source = "..."                      # who says that these are its motors
 
     [[actuators.joint]]
     joints = ["*_joint_1"]              # names, * and ? as in file names
@@ -44,7 +45,7 @@ from pipeline.robot.robot_file import RobotSpec
 #: The alternative of a machine whose joints are built as different ones.
 AS_BUILT: Final = "as_built"
 RATIO: Final = "ratio"
-_KEYS: Final = ("folder", "alternative", "joint")
+_KEYS: Final = ("folder", "alternative", "source", "joint")
 _JOINT_KEYS: Final = ("joints", "alternative", "parameters")
 
 
@@ -59,6 +60,7 @@ class OwnActuators:
         built: Joint to the alternative as which it alone is built.
         numbers: Joint to the numbers that it alone has.
         groups: The file's entries, in words, with their numbers.
+        source: Who says that these are its motors; empty where nobody does.
     """
 
     where: str = ""
@@ -67,6 +69,7 @@ class OwnActuators:
     built: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
     groups: tuple[tuple[str, tuple[Parameter, ...]], ...] = ()
+    source: str = ""
 
     @property
     def usual(self) -> str:
@@ -167,7 +170,9 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
     """
     table, where = spec.actuator_table, f"{spec.path}: actuators"
     _known(table, _KEYS, where)
-    alternative = _alternative(table, catalog, where)
+    alternative, source = _alternative(table, catalog, where), table.get("source", "")
+    if not isinstance(source, str):
+        raise RobotFileError(f"{where}.source: expected a text")
     entries = table.get("joint", [])
     if not isinstance(entries, list) or not all(isinstance(e, Mapping) for e in entries):
         raise RobotFileError(f"{where}: joints are written [[actuators.joint]]")
@@ -199,7 +204,7 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
             f"{where}: an alternative of the actuator files is called '{AS_BUILT}', as the machine "
             "whose joints differ; rename it"
         )
-    out = OwnActuators(where, spec.joints, alternative, built, numbers, tuple(groups))
+    out = OwnActuators(where, spec.joints, alternative, built, numbers, tuple(groups), source)
     out.every(out.catalog(catalog))  # what loads works
     return out
 

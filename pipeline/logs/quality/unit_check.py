@@ -79,7 +79,10 @@ def position_units(log: Log, expected: Expected, ok: Mask) -> list[Finding]:
         turned = q / DEG
         fits = turned.min() >= low - margin and turned.max() <= high + margin
         if fits and outside > 0.2 and np.ptp(turned) > _LEAST_TRAVEL:
-            detail = f"{span}, {limits}: looks like degrees; give its unit in a mapping file"
+            detail = (
+                f"{span}, {limits}: looks like degrees, or a motor's angle; in a mapping file: "
+                f'unit = "deg", or scale = 1 over the gear ratio'
+            )
             verdict = "refused"
         elif outside > 0.5:
             detail = (
