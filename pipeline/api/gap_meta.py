@@ -35,6 +35,6 @@ def metadata(options: Options, given: Setup) -> dict[str, Any]:
             "prove_last": options.prove_last,
         },
         "conventions": "SI units; torque, velocity, current and voltage positive in the joint's "
-        "direction; gap is measured less predicted",
+        "direction; gap is measured minus predicted",
         "warnings": list(given.warnings),
     }

@@ -96,8 +96,13 @@ def _numbers(story: Story) -> tuple[Number, ...]:
     listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
     effects = f"effect{'s' * (len(found) != 1)} found"
     return (
-        Number(f"{words.number(before)} {unit}", "measured less predicted, model as it was"),
-        Number(f"{words.number(after)} {unit}", "with what was found, held-out data", ended),
+        Number(
+            f"{words.number(before)} {unit}",
+            "gap, root mean square: measured minus predicted, model as it was",
+        ),
+        Number(
+            f"{words.number(after)} {unit}", "the same with what was found, on held-out data", ended
+        ),
         Number(f"{words.number(story.noise)} {unit}", "noise floor of the logs"),
         Number(str(len(found)), effects + listed),
     )

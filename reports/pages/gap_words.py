@@ -58,7 +58,7 @@ def where_words(rows: Sequence[Where]) -> str:
     ratio = worst.gap / worst.noise_floor if worst.noise_floor > 0 else math.inf
     text = (
         f"**Where:** model and machine disagree most at **{worst.joint}**: the gap (root mean "
-        f"square of measured less predicted) is {number(worst.gap)} {worst.unit}, "
+        f"square of measured minus predicted) is {number(worst.gap)} {worst.unit}, "
         f"{number(ratio, 2)} times the noise floor and {percent(worst.share_of_total)} of the "
         "squared gap of all joints"
     )

@@ -121,11 +121,11 @@ def _numbers_first(
     return (
         Number(
             f"{' to '.join(number_text(powers[n]) for n in ends)} W",
-            f"to walk: {' to '.join(titles[n] for n in ends)}",
+            f"to walk, by type of drive: {' to '.join(titles[n] for n in ends)}",
         ),
         Number(
             f"{number_text(motors.total)} kg" if motors.total else "\N{EN DASH}",
-            f"of motors in a robot of {number_text(motors.robot)} kg"
+            f"would these motors weigh; the robot's file says {number_text(motors.robot)} kg in all"
             if motors.total
             else "the motors' mass, which their files do not state",
             "bad" if motors.too_heavy else "quiet",
@@ -162,8 +162,8 @@ def _answer(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
     return (what, cost, *_fitted_and_known(given, tables))
 
 
-def _fitted_and_known(given: Settings, tables: Mapping[str, Table]) -> tuple[str, str]:
-    """A sentence on what was fitted, and one on what is known and what assumed."""
+def _fitted_and_known(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
+    """A sentence each on what was fitted, predicted, and what is known and assumed."""
     c = tables["parameters"].columns
     own = [basis for group, basis in zip(c["group"], c["basis"], strict=True)
            if group != given.robot.spec.name]  # fmt: skip
@@ -179,6 +179,8 @@ def _fitted_and_known(given: Settings, tables: Mapping[str, Table]) -> tuple[str
     known = count["datasheet"] + count["published"] + count["derived"]
     return (
         f"**Fitted:** {here}{more}.",
+        "**Predicted:** every watt here, for these motors and no others; nothing that was measured "
+        "on this robot is on this page.",
         f"**Known:** bodies and joints by the URDF, {known} numbers of the actuators by data sheet "
         f"or publication; {count['assumed']} are assumed. Every one with its source is under "
         "*What went in*.",

@@ -20,8 +20,10 @@ def numbers_first(judged: Judged) -> tuple[Number, ...]:
     out = [_number(said[name], judged) for name in _FIRST if name in said]
     met, of = headline(judged.judgement.reproduction)["prediction"]
     if of and judged.by.results is not None:
-        label = "*predicted:* printed numbers neither put in nor fitted, nor following from those"
-        out.append(Number(f"{met} of {of}", label, "good" if met == of else "bad"))
+        label = (
+            "*predicted:* printed numbers that nothing put in or fitted decides, and that come out"
+        )
+        out.append(Number(f"{met} of {of}", label, "quiet" if met == of else "bad"))
     return tuple(out)
 
 
@@ -51,7 +53,7 @@ def first_sentences(judged: Judged) -> tuple[str, ...]:
     total = sum(of for _, of in count.values())
     fitted = (
         f"**Fitted:** the friction of motors and gears, to {count['target'][1]} of the {total} "
-        "numbers that the paper prints; that these agree is no evidence."
+        "numbers that the paper prints: that the model agrees with these proves nothing."
     )
     predicted = [r for r in rows.values() if r.published.role == "prediction"]
     each = "; ".join(
@@ -74,13 +76,14 @@ def _named(where: str, quantity: str, joint: str) -> str:
 def _known(judged: Judged) -> tuple[str, ...]:
     """What data sheets and literature say of the paper's ratios before anything is fitted."""
     parts = [
-        f"{span(c.prior)} (paper: {c.sentence.printed}) with {c.sentence.name.rpartition('_')[2]}"
+        f"{span(c.prior)} (paper: {c.sentence.printed}; so in {percent(c.prior_share)} of all "
+        f"draws) with {c.sentence.name.rpartition('_')[2]}"
         for c in judged.judgement.conclusions
         if c.sentence.name in _FIRST and c.sentence.name != EVEN
     ]
     if not parts:
         return ()
     return (
-        "**Known without the fit:** data sheets and literature alone put walking at "
-        f"{' and '.join(parts)} gears, times the ideal drive's energy (95 %).",
+        "**Known without the fit:** by data sheets and literature alone walking takes, times the "
+        f"ideal drive's energy and with 95 % probability, {' and '.join(parts)} gears.",
     )

@@ -52,7 +52,8 @@ def test_the_title_names_robot_and_gait(page: tuple[Page, Path]) -> None:
 def test_the_first_paragraphs_say_robot_cost_what_is_fitted_and_known(
     page: tuple[Page, Path], solo: Run
 ) -> None:
-    what, cost, fitted, known = page[0].answer
+    what, cost, fitted, predicted, known = page[0].answer
+    assert "every watt" in predicted
     assert "2.5" in what
     assert "4 legs of 3 joints" in what
     given, _, _, tables = solo

@@ -39,8 +39,8 @@ class Where:
         by: How the rows are sorted; `WHOLE` for all of them.
         band: Which of them.
         rows: Compared rows.
-        gap: Root mean square of measured less predicted, in `unit`.
-        mean: Of measured less predicted, in `unit`.
+        gap: Root mean square of measured minus predicted, in `unit`.
+        mean: Of measured minus predicted, in `unit`.
         noise_floor: Standard deviation of the noise in the bandwidth, in `unit`.
         unit: Of the compared channel.
         share_of_total: Of the squared gap of all joints [1].

@@ -132,4 +132,4 @@ def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: boo
     bottom.set_xlabel("time [s]")
     if first:
         top.set_ylabel(f"{channel} [{unit_text(trace.unit)}]")
-        bottom.set_ylabel(f"measured less predicted [{unit_text(trace.unit)}]")
+        bottom.set_ylabel(f"measured minus predicted [{unit_text(trace.unit)}]")

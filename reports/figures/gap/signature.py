@@ -71,7 +71,7 @@ def gap_signature_figure(signature: Signature, *, title: str, subtitle: str = ""
     _half(right, x, after, s, "with the effect", BLUE)
     limit = 1.1 * float(np.quantile(np.abs(np.concatenate([before, after])), 0.998))
     left.set_ylim(-limit, limit)
-    left.set_ylabel(f"measured less predicted [{unit_text(s.unit)}]")
+    left.set_ylabel(f"measured minus predicted [{unit_text(s.unit)}]")
     headline(figure, title, subtitle)
     return figure
 
