@@ -11,22 +11,24 @@ from numpy.typing import NDArray
 
 from pipeline.identification.compare.bandwidth import LEAST_CUTOFF, step_rate
 from pipeline.identification.compare.long import LongLogs
-from pipeline.logs.errors import LogContentError
+from pipeline.logs.columns.findings import explained
+from pipeline.logs.errors import LogContentError, PreparationError
 from pipeline.logs.prepared.contact import Contact
 from pipeline.logs.prepared.cycles import period, with_repeated_noise
 from pipeline.logs.prepared.prepare import Prepared, prepare
 from pipeline.logs.prepared.read_off import signal_findings
 from pipeline.logs.prepared.settings import Settings, choose_settings
 from pipeline.logs.quality.cannot_tell import cannot_tell
-from pipeline.logs.quality.finding import Finding
+from pipeline.logs.quality.finding import Finding, refuse
 from pipeline.logs.quality.quality import judge
-from pipeline.logs.quality.unit_check import column_name
+from pipeline.logs.quality.unit_check import OF_LIMITS, column_name
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.mapping import Mapping as MappingFile
 from pipeline.logs.reading.read import read_log
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -93,31 +95,56 @@ def prepare_logs(
     cutoff: float | None = None,
     largest: Mapping[str, Array] | None = None,
     contact: Callable[[Log], Contact | None] | None = None,
+    wrong_columns: Callable[[Sequence[Prepared]], Sequence[Finding]] | None = None,
 ) -> Intake:
     """Judge and prepare logs that were read already; see `take_in`.
+
+    Args:
+        logs: As read.
+        expected: The robot's names, limits and ratios.
+        cutoff: Of the low-pass, instead of the one the data ask for [Hz].
+        largest: Channel to the largest magnitude the drive can give, shape (J,).
+        contact: How to tell which feet stand.
+        wrong_columns: The search that says what a position beyond its limits is, and the line that
+            mends it.
 
     Raises:
         GapError: A log is unusable or does not fit the others.
     """
-    qualities = []
-    for log in logs:
-        quality = judge(log, expected, largest=largest)
-        quality.refuse()
-        qualities.append(quality)
+    qualities = [judge(log, expected, largest=largest) for log in logs]
+    for quality in qualities:
+        quality.refuse(overlooked=OF_LIMITS if wrong_columns else ())
+    beyond = [f for q in qualities for f in q.findings if f.verdict == "refused"]
+    if beyond and wrong_columns:
+        try:
+            ready = _prepared(logs, [q.usable for q in qualities], cutoff, contact)
+            refuse(explained(beyond, wrong_columns(ready)))
+        except PreparationError:
+            refuse(beyond)
+    prepared = _prepared(logs, [q.usable for q in qualities], cutoff, contact)
+    found = tuple(finding for quality in qualities for finding in quality.findings)
+    return Intake((), (), prepared[0].settings, found).at(prepared)
+
+
+def _prepared(
+    logs: Sequence[Log],
+    usable: Sequence[tuple[Mask, Mask]],
+    cutoff: float | None,
+    contact: Callable[[Log], Contact | None] | None,
+) -> list[Prepared]:
+    """Logs at one grid and bandwidth."""
     channels = {log.effort.channel for log in logs}
     if len(channels) > 1:
         raise LogContentError(
             f"the logs are compared in different channels ({', '.join(sorted(channels))}); set "
             "effort in a mapping file"
         )
-    settings = choose_settings(logs, [q.usable for q in qualities], cutoff=cutoff)
+    settings = choose_settings(logs, usable, cutoff=cutoff)
     prepared = [
-        prepare(log, settings, usable=q.usable, contact=contact(log) if contact else None)
-        for log, q in zip(logs, qualities, strict=True)
+        prepare(log, settings, usable=good, contact=contact(log) if contact else None)
+        for log, good in zip(logs, usable, strict=True)
     ]
-    prepared = with_repeated_noise(prepared)
-    found = tuple(finding for quality in qualities for finding in quality.findings)
-    return Intake((), (), settings, found).at(prepared)
+    return with_repeated_noise(prepared)
 
 
 def filter_findings(one: Prepared) -> list[Finding]:

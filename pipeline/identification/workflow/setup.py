@@ -15,13 +15,15 @@ from pipeline.errors import RobotFileError
 from pipeline.identification.compare.bandwidth import lowered, naming_cutoff
 from pipeline.identification.compare.intake import Intake, prepare_logs
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
+from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.mimics import mimics_in, refuse_moved
 from pipeline.identification.workflow.options import Options
 from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.logs.prepared.contact import Contact, find_contact
 from pipeline.logs.prepared.parts import Parts, split
+from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.stream import Stream, Survey, survey
-from pipeline.logs.quality.finding import refuse
+from pipeline.logs.quality.finding import Finding, refuse
 from pipeline.logs.quality.repeats import refuse_repeats
 from pipeline.logs.reading.expected import Expected, expected_of_model, expected_of_robot
 from pipeline.logs.reading.log import EFFORTS, Log
@@ -38,6 +40,7 @@ from pipeline.robot.check import check_urdf, refuse_impossible, source_of, toler
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.robot.urdf_source import read_urdf
+from pipeline.simulation.along_logs import wrong_columns
 from pipeline.simulation.changes import changed
 
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
@@ -332,8 +335,18 @@ def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
     refuse_repeats(logs)
     refuse_moved(given.mimics, logs, given.expected)
     largest, contact = _largest(given), _contact(given, options.gait_start)
+
+    def suspects(prepared: Sequence[Prepared]) -> Sequence[Finding]:
+        seen = observe_all(given.bare, prepared)
+        return wrong_columns(given.bare, seen, logs[0], given.expected.ratio)
+
     intake = prepare_logs(
-        logs, given.expected, cutoff=options.cutoff, largest=largest, contact=contact
+        logs,
+        given.expected,
+        cutoff=options.cutoff,
+        largest=largest,
+        contact=contact,
+        wrong_columns=suspects,
     )
     if options.cutoff is None and options.step != "read":
         # By the machine as its files say: what a model file adds changes no bandwidth.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -68,6 +69,21 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
         column = "" if len(h.joints) == live > 1 else column_name(joints[h.joints[0]], of)
         out.append(Finding(log.name, column, SUSPECTED, gain, "1", verdict, detail))
     return out
+
+
+def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Finding]:
+    """Positions beyond their limits, those first whose column the motion explains.
+
+    Args:
+        beyond: Refused by limits.
+        named: From `column_findings`; of all joints together where they name no column.
+    """
+    out = []
+    for f in beyond:
+        said = [n for n in named if n.column in ("", f.column) and "position" in n.detail]
+        if said:
+            out.append(replace(f, detail=f"{f.detail.split(': ')[0]}: {said[0].detail}"))
+    return out or list(beyond)
 
 
 def copies(log: Log, y: Array, bodies: Bodies, mask: NDArray[np.bool_]) -> list[Finding]:
@@ -191,10 +207,12 @@ def _line(
     column, wanted = _file_column(log, source, quantity), column_name(target, quantity)
     rule = log.rules[source, quantity][1] if log.rules else ColumnRule("", "")
     slope = rule.affine("rad" if quantity.endswith("position") else log.effort.unit)[0]
-    zero, scale = rule.zero - zero / (factor * slope), rule.scale * factor
+    zero, scale, unit = rule.zero - zero / (factor * slope), rule.scale * factor, rule.unit
+    if unit is None and abs(abs(factor) * DEG - 1.0) < _ROUNDED and quantity.endswith("position"):
+        scale, unit = scale * DEG, "deg"
     keys = {
         f'as = "{wanted}"': column != wanted,
-        f'unit = "{rule.unit}"': rule.unit is not None,
+        f'unit = "{unit}"': unit is not None,
         f"zero = {zero:.4g}": zero != 0.0,
         f"scale = {abs(scale):.4g}": abs(abs(scale) - 1.0) > _ROUNDED,
         "flip = true": scale < 0.0,

@@ -40,6 +40,8 @@ WRONG: Final[Mapping[str, Mapping[float, str]]] = {
 NEAR: Final = 0.25
 #: Travel of a joint below which a log is hardly one of degrees [rad].
 _LEAST_TRAVEL: Final = 0.05
+#: Checks of positions that the search for wrong columns can say more about.
+OF_LIMITS: Final = ("share_outside_limits", "speed")
 #: Rows of velocity and position that are compared.
 _COMPARED_ROWS: Final = 50_000
 

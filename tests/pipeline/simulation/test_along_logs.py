@@ -162,6 +162,25 @@ def test_a_wrong_column_is_refused_and_its_line_mends_it(
     assert judged(log, urdf, tmp_path, lines[1].replace("; ", "\n")) == []
 
 
+@pytest.mark.parametrize(
+    ("factor", "says"),
+    [(9.0, "the position is (8|9).* times"), (180 / np.pi, ".* it is in degrees.*unit")],
+)
+def test_a_position_beyond_its_limits_gets_the_line_that_mends_it(
+    urdf: Path, tmp_path: Path, factor: float, says: str
+) -> None:
+    """Limits refuse such a log before its efforts are compared; the motion tells the two apart."""
+    limited = tmp_path / "limited.urdf"
+    limited.write_text(revolute(urdf).replace('effort="9"', 'effort="90"'), "utf-8")
+    log = logged(urdf, 3, off=0.2, payload=0.3)
+    times("position_rad", factor, "1")(log)
+    with pytest.raises(LogContentError, match=f"(limits are|limit is).*: {says}") as refused:
+        judged(log, limited, tmp_path)
+    lines = re.search(r"in a mapping file: ([^(]*\})", str(refused.value))
+    assert lines is not None
+    assert judged(log, limited, tmp_path, lines[1]) == []
+
+
 @pytest.mark.parametrize("factor", [5.0, 1 / 9, 0.01])
 def test_a_common_scale_is_no_more_than_suspicious(
     urdf: Path, tmp_path: Path, factor: float
