@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.internal_forces import Bounds, internal_basis, out_of_bounds
 from pipeline.errors import GaitError
 from pipeline.motion.motion import Segment
@@ -29,50 +30,28 @@ _TIE = 1e-9
 
 @dataclass(frozen=True)
 class Stance:
-    """Standing legs over one segment, as a rule sees them.
+    """Standing legs over one segment, as a rule sees them: K feet, Q joints that they load.
 
     Attributes:
         segment: The motion.
-        joints: All joints.
-        position: Of all joints, shape (N, J) [rad].
-        velocity: Shape (N, J) [rad/s].
-        acceleration: Shape (N, J) [rad/s^2].
-        torque: Without the ground's forces, shape (N, J) [N*m].
-        columns: Of the standing legs' joints among all, shape (K, M); see `robot.leg_columns`.
-        real: Which of them are a leg's own, shape (K, M), Q in all.
-        unit_torque: Torque that a force of 1 N along each axis of the ground's frame puts into the
-            joints of its leg, shape (N, K, 3, M) [N*m/N].
+        demand: Of all joints, without the ground's forces.
+        loaded: Columns of the standing legs' joints among all, shape (Q,).
+        foot: Which of the K feet loads each of them, shape (Q,).
+        unit_torque: Torque that a force of 1 N on that foot along each axis of the ground's frame
+            puts into the joint, shape (N, Q, 3) [N*m/N].
         feet: In a frame whose z axis is the ground's normal [m], shape (N, K, 3).
         force: The least tangential forces in the same frame [N], shape (N, K, 3).
         friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
     """
 
     segment: Segment
-    joints: tuple[str, ...]
-    position: Array
-    velocity: Array
-    acceleration: Array
-    torque: Array
-    columns: NDArray[np.intp]
-    real: NDArray[np.bool_]
+    demand: JointDemand
+    loaded: NDArray[np.intp]
+    foot: NDArray[np.intp]
     unit_torque: Array
     feet: Array
     force: Array
     friction_coefficient: float | None
-
-    @property
-    def loaded(self) -> NDArray[np.intp]:
-        """Columns of the standing legs' joints, shape (Q,)."""
-        return self.columns[self.real]
-
-    def leg_torque(self, force: Array, rows: Rows = ALL) -> Array:
-        """What forces on the feet put into their legs' joints, shape (n, K, M) [N*m].
-
-        Args:
-            force: At some samples, shape (n, K, 3) [N].
-            rows: Which.
-        """
-        return np.einsum("nkim,nki->nkm", self.unit_torque[rows], force)
 
     def loaded_torque(self, force: Array, rows: Rows = ALL) -> Array:
         """What the standing legs' joints must apply, shape (n, Q) [N*m].
@@ -81,8 +60,8 @@ class Stance:
             force: At some samples, shape (n, K, 3) [N].
             rows: Which.
         """
-        from_ground = self.leg_torque(force, rows)[:, self.real]
-        return np.asarray(self.torque[rows][:, self.loaded] - from_ground)
+        from_ground = np.einsum("nqi,nqi->nq", self.unit_torque[rows], force[:, self.foot])
+        return np.asarray(self.demand.torque[rows][:, self.loaded] - from_ground)
 
 
 class ForceRule(Protocol):
@@ -120,10 +99,8 @@ class Descent:
     def __init__(self, stance: Stance) -> None:
         self._stance = stance
         self._basis = internal_basis(stance.feet)
-        n, _, _, d = self._basis.shape
-        torque = -np.einsum("nkim,nkid->nkmd", stance.unit_torque, self._basis)
         #: Change of joint torques with z, shape (N, Q, D).
-        self._effect = torque.reshape(n, -1, d)[:, stance.real.ravel()]
+        self._effect = -np.einsum("nqi,nqid->nqd", stance.unit_torque, self._basis[:, stance.foot])
         self._bounds: dict[int, Bounds] = {}  # by sample
 
     @property

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.dynamics.joint_demand import JointDemand
+from pipeline.dynamics.demand import JointDemand
 from pipeline.machine.drivetrains import Actuators, Drivetrains
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel, machine_of_robot

@@ -1,9 +1,9 @@
 """Torque at the joints that bodies, gravity and ground ask for along a measured motion.
 
 Inverse dynamics in one batch (`rneaInParallel`). Where a walking robot's foot forces are measured,
-they are the ground's forces and tell how the base accelerates. Else the base moves as its standing
-feet let it (they do not move, and the base does not rotate), and the ground's forces are those of
-`pipeline.dynamics.contact_forces` with the least tangential parts.
+they are the ground's forces and give the acceleration of the base. Else the base moves as its
+standing feet let it (they do not move, and the base does not rotate), and the ground's forces are
+those with the least tangential parts (`pipeline.dynamics.feet_on_ground`).
 """
 
 from __future__ import annotations
@@ -16,15 +16,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pipeline.dynamics.contact_forces import least_tangential_forces
+from pipeline.dynamics.feet_on_ground import FeetOnGround, inverse_dynamics
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import Bodies, MachineModel
-from pipeline.robot.kinematics import (
-    foot_force_torques,
-    foot_jacobian_rates,
-    foot_jacobians,
-    foot_positions,
-)
+from pipeline.robot.kinematics import foot_jacobian_rates, foot_jacobians
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -82,7 +77,7 @@ class RigidBodies:
     def __init__(self, measurement: Measurement) -> None:
         self.measurement = measurement
         self._base: tuple[Array, Array] | None = None
-        self._ground: tuple[Array, object, Array] | None = None
+        self._measured: tuple[float, Array] | None = None
 
     def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
         """Joint torques, shape (N, J) [N*m].
@@ -91,49 +86,65 @@ class RigidBodies:
             machine: Its bodies, ground and legs.
             motion: Position, velocity and acceleration of the joints, each (N, J).
         """
-        m = self.measurement
         model = changed_model(machine.rigid, machine.bodies)
-        n = motion[0].shape[0]
-        index_q = np.array([model.joints[model.getJointId(j)].idx_q for j in machine.joints])
-        index_v = np.array([model.joints[model.getJointId(j)].idx_v for j in machine.joints])
-        q = np.tile(pin.neutral(model), (n, 1))
-        v, a = np.zeros((n, model.nv)), np.zeros((n, model.nv))
-        _place_joints(model, q, index_q, motion[0])
-        v[:, index_v], a[:, index_v] = motion[1], motion[2]
+        q, v, a, joints = _configuration(machine, model, motion)
+        turn = self._turn(motion[0].shape[0]) if machine.floating else None
         if machine.floating:
-            q[:, 3:7] = _base_turn(m, n).as_quat()
+            q[:, 3:7] = turn.as_quat() if turn is not None else [0.0, 0.0, 0.0, 1.0]
             v[:, :3], a[:, :6] = self._base_motion(machine)
-        threads = _threads(n)
-        pool = pin.ModelPool(model, threads)
-        result = pin.rneaInParallel(threads, pool, q.T, v.T, a.T)
-        generalised = np.asarray(result).T.reshape(v.shape)
-        torque: Array = generalised[:, index_v]
+        threads = _threads(len(q))
+        generalised = inverse_dynamics(model, (q, v, a), pin.ModelPool(model, threads), threads)
+        torque: Array = generalised[:, joints]
         if machine.floating and machine.legs is not None:
             torque = torque - self._ground_torque(machine, motion[0], generalised[:, :6])
         return torque
 
+    def _turn(self, n: int) -> Rotation | None:
+        """Base to world, R_y(pitch) R_x(roll), at every sample; None where it is level."""
+        from scipy.spatial.transform import Rotation
+
+        m = self.measurement
+        if m.base_roll is None and m.base_pitch is None:
+            return None
+        angles = [np.zeros(n) if x is None else x for x in (m.base_pitch, m.base_roll)]
+        return Rotation.from_euler("YX", np.stack(angles, axis=1))
+
     def _base_motion(self, machine: MachineModel) -> tuple[Array, Array]:
+        """Velocity (N, 3) and acceleration (N, 6) of the base in its own frame.
+
+        The measured motion tells what the base did, whatever an effect makes of it.
+        """
         if self._base is None:
-            # What the base did is told by the measured motion, whatever an effect makes of it.
             m = self.measurement
-            velocity, acceleration = _base_motion(machine, m, (m.q, m.v, m.a))
+            velocity, acceleration = _carried_by_feet(machine, m)
             if legs_are_separate(machine, m):
-                acceleration = _measured_acceleration(machine, m, velocity)
+                turn = self._turn(len(m))
+                spatial = _measured_acceleration(machine, m, velocity, turn)
             else:
-                acceleration = np.hstack([acceleration, np.zeros_like(acceleration)])
-            self._base = (velocity, acceleration)
+                spatial = np.hstack([acceleration, np.zeros_like(acceleration)])
+            self._base = (velocity, spatial)
         return self._base
 
     def _ground_torque(self, machine: MachineModel, q: Array, wrench: Array) -> Array:
-        m = self.measurement
-        rotation = _base_rotation(m, q.shape[0])
-        if legs_are_separate(machine, m) and q is m.q:
-            # Measured forces ask for nothing of the bodies.
-            if self._ground is None or self._ground[1] != machine.bodies.squeeze:
-                torque = _ground_torque(machine, m, q, wrench, rotation)
-                self._ground = (q, machine.bodies.squeeze, torque)
-            return self._ground[2]
-        return _ground_torque(machine, m, q, wrench, rotation)
+        """What the ground's forces put into the joints, shape (N, J) [N*m]."""
+        m, squeeze = self.measurement, machine.bodies.squeeze
+        # Measured forces ask for nothing of the bodies.
+        measured = legs_are_separate(machine, m) and q is m.q
+        if measured and self._measured is not None and self._measured[0] == squeeze:
+            return self._measured[1]
+        assert machine.legs is not None
+        assert machine.layout is not None
+        legs, turn = machine.layout.by_leg(q), self._turn(len(q))
+        out = np.empty(q.shape)
+        for start in range(0, len(q), _BLOCK):
+            s = slice(start, start + _BLOCK)
+            own = None if turn is None else turn[s].as_matrix()
+            feet = FeetOnGround(machine.legs, legs[s], own)
+            force = _ground_forces(machine, m, s, feet, wrench[s])
+            out[s] = machine.layout.by_joint(feet.torque(force))
+        if measured:
+            self._measured = (squeeze, out)
+        return out
 
 
 def _threads(rows: int) -> int:
@@ -148,55 +159,45 @@ def legs_are_separate(machine: MachineModel, m: Measurement) -> bool:
     return m.foot_force is not None and not bool(np.isnan(m.foot_force[0]).any())
 
 
-def _place_joints(model: pin.Model, q: Array, index_q: NDArray[np.intp], position: Array) -> None:
-    for k, start in enumerate(index_q):
-        joint = next(j for j in model.joints if j.idx_q == start and j.nv == 1)
-        if joint.nq == 2:  # a continuous joint is written as cosine and sine
-            q[:, start], q[:, start + 1] = np.cos(position[:, k]), np.sin(position[:, k])
-        else:
-            q[:, start] = position[:, k]
-
-
-def _base_turn(m: Measurement, n: int) -> Rotation:
-    """Base to world, R_y(pitch) R_x(roll), at every sample."""
-    from scipy.spatial.transform import Rotation
-
-    zero = np.zeros(n)
-    roll = zero if m.base_roll is None else m.base_roll
-    pitch = zero if m.base_pitch is None else m.base_pitch
-    return Rotation.from_euler("YX", np.stack([pitch, roll], axis=1))
-
-
-def _base_rotation(m: Measurement, n: int) -> Array | None:
-    """The same as matrices, shape (N, 3, 3); None where the base is level throughout."""
-    if m.base_roll is None and m.base_pitch is None:
-        return None
-    return np.asarray(_base_turn(m, n).as_matrix())
-
-
-def _base_motion(
-    machine: MachineModel, m: Measurement, motion: tuple[Array, Array, Array]
-) -> tuple[Array, Array]:
-    """Linear velocity and acceleration of the base in its own frame, each (N, 3)."""
+def _configuration(
+    machine: MachineModel, model: pin.Model, motion: tuple[Array, Array, Array]
+) -> tuple[Array, Array, Array, NDArray[np.intp]]:
+    """Pinocchio's q, v, a with the base at rest, and the joints' columns among v."""
+    joints = [model.joints[model.getJointId(name)] for name in machine.joints]
+    columns = np.array([joint.idx_v for joint in joints])
     n = motion[0].shape[0]
-    velocity, acceleration = np.zeros((n, 3)), np.zeros((n, 3))
+    q, v, a = np.tile(pin.neutral(model), (n, 1)), np.zeros((n, model.nv)), np.zeros((n, model.nv))
+    for joint, position in zip(joints, motion[0].T, strict=True):
+        if joint.nq == 2:  # a continuous joint is written as cosine and sine
+            q[:, joint.idx_q], q[:, joint.idx_q + 1] = np.cos(position), np.sin(position)
+        else:
+            q[:, joint.idx_q] = position
+    v[:, columns], a[:, columns] = motion[1], motion[2]
+    return q, v, a, columns
+
+
+def _carried_by_feet(machine: MachineModel, m: Measurement) -> tuple[Array, Array]:
+    """Linear velocity and acceleration of a base that its standing feet carry, each (N, 3)."""
+    velocity, acceleration = np.zeros((len(m), 3)), np.zeros((len(m), 3))
     legs, layout = machine.legs, machine.layout
     if legs is None or layout is None or m.standing is None:
         return velocity, acceleration
-    q, v, a = (layout.by_leg(x) for x in motion)
-    for start in range(0, n, _BLOCK):
+    q, v, a = (layout.by_leg(x) for x in (m.q, m.v, m.a))
+    for start in range(0, len(m), _BLOCK):
         s = slice(start, start + _BLOCK)
         jacobian = foot_jacobians(legs, q[s])[1]
         rate = np.einsum("nlij,nlj->nli", jacobian, v[s])
-        bend = np.einsum("nlij,nlj->nli", jacobian, a[s]) + foot_jacobian_rates(legs, q[s], v[s])
+        second = np.einsum("nlij,nlj->nli", jacobian, a[s]) + foot_jacobian_rates(legs, q[s], v[s])
         weight = m.standing[s].astype(float)
         weight /= np.maximum(weight.sum(axis=1, keepdims=True), 1.0)
         velocity[s] = -np.einsum("nl,nli->ni", weight, rate)
-        acceleration[s] = -np.einsum("nl,nli->ni", weight, bend)
+        acceleration[s] = -np.einsum("nl,nli->ni", weight, second)
     return velocity, acceleration
 
 
-def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Array) -> Array:
+def _measured_acceleration(
+    machine: MachineModel, m: Measurement, velocity: Array, turn: Rotation | None
+) -> Array:
     """Spatial acceleration of the base from the measured foot forces, own frame, (N, 6).
 
     The feet's wrench less what joints' motion and gravity ask is the composite inertia times the
@@ -206,27 +207,15 @@ def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Arra
     assert machine.legs is not None
     assert machine.layout is not None
     assert m.foot_force is not None
-    model = machine.rigid
-    n = m.q.shape[0]
-    index_q = np.array([model.joints[model.getJointId(j)].idx_q for j in machine.joints])
-    index_v = np.array([model.joints[model.getJointId(j)].idx_v for j in machine.joints])
-    q = np.tile(pin.neutral(model), (n, 1))
-    v, a = np.zeros((n, model.nv)), np.zeros((n, model.nv))
-    _place_joints(model, q, index_q, m.q)
-    q[:, 3:7] = _base_turn(m, n).as_quat()
-    v[:, index_v], a[:, index_v] = m.v, m.a
+    model, n = machine.rigid, len(m)
+    q, v, a, _ = _configuration(machine, model, (m.q, m.v, m.a))
+    q[:, 3:7] = turn.as_quat() if turn is not None else [0.0, 0.0, 0.0, 1.0]
     v[:, :3] = velocity
+    threads = _threads(n)
+    asked = inverse_dynamics(model, (q, v, a), pin.ModelPool(model, threads), threads)[:, :6]
     weightless = model.copy()
     weightless.gravity.linear = np.zeros(3)
-    threads = _threads(n)
-    pool, floating = pin.ModelPool(model, threads), pin.ModelPool(weightless, threads)
-
-    def base_wrench(among: pin.ModelPool, acceleration: Array, speed: Array) -> Array:
-        torque = pin.rneaInParallel(threads, among, q.T, speed.T, acceleration.T)
-        return np.asarray(torque).T.reshape(v.shape)[:, :6]
-
-    asked = base_wrench(pool, a, v)
-    still = np.zeros_like(v)
+    pool, still = pin.ModelPool(weightless, threads), np.zeros_like(v)
     # A composite body's spatial inertia is [[m 1, -m [c]x], [m [c]x, J]]: what turning asks for
     # tells all of it but the mass.
     inertia = np.zeros((n, 6, 6))
@@ -234,51 +223,30 @@ def _measured_acceleration(machine: MachineModel, m: Measurement, velocity: Arra
     for k in range(3, 6):
         unit = still.copy()
         unit[:, k] = 1.0
-        inertia[:, :, k] = base_wrench(floating, unit, still)
+        generalised = inverse_dynamics(weightless, (q, still, unit), pool, threads)
+        inertia[:, :, k] = generalised[:, :6]
     inertia[:, 3:, :3] = inertia[:, :3, 3:].transpose(0, 2, 1)
-    feet = foot_positions(machine.legs, machine.layout.by_leg(m.q))
-    rotation = _base_rotation(m, n)
-    force = m.foot_force if rotation is None else np.einsum("nji,nfj->nfi", rotation, m.foot_force)
-    given = np.hstack([force.sum(axis=1), np.cross(feet, force).sum(axis=1)])
+    own = None if turn is None else turn.as_matrix()
+    feet = FeetOnGround(machine.legs, machine.layout.by_leg(m.q), own)
+    force = feet.to_base(m.foot_force)
+    given = np.hstack([force.sum(axis=1), np.cross(feet.in_base, force).sum(axis=1)])
     acceleration = np.linalg.solve(inertia, (given - asked)[..., None])[..., 0]
     return np.asarray(acceleration - acceleration.mean(axis=0))
 
 
-def _ground_torque(
-    machine: MachineModel, m: Measurement, q: Array, wrench: Array, rotation: Array | None
+def _ground_forces(
+    machine: MachineModel, m: Measurement, s: slice, feet: FeetOnGround, wrench: Array
 ) -> Array:
-    """What the ground's forces put into the joints, shape (N, J) [N*m]."""
-    assert machine.legs is not None
-    assert machine.layout is not None
-    n = q.shape[0]
-    legs = machine.layout.by_leg(q)
-    out = np.empty((n, len(machine.joints)))
-    for start in range(0, n, _BLOCK):
-        s = slice(start, min(start + _BLOCK, n))
-        turn = None if rotation is None else rotation[s]
-        force = _foot_forces(machine, m, s, foot_positions(machine.legs, legs[s]), wrench[s], turn)
-        out[s] = machine.layout.by_joint(foot_force_torques(machine.legs, legs[s], force))
-    return out
-
-
-def _foot_forces(
-    machine: MachineModel, m: Measurement, s: slice, feet: Array, wrench: Array, turn: Array | None
-) -> Array:
-    """Forces of the ground on the feet in the base frame, shape (n, F, 3)."""
-    measured = None if m.foot_force is None else m.foot_force[s]
-    if measured is None or np.isnan(measured).any():
-        world = _computed(m, s, feet, wrench, turn, feet.shape[1])
-        if measured is not None:
-            known = ~np.isnan(measured)
-            world = np.where(known, np.nan_to_num(measured), world)
-    else:
-        world = np.array(measured)
+    """Forces of the ground on the feet in the world's directions, shape (n, L, 3)."""
+    shape = feet.in_base.shape[:2]
+    standing = np.ones(shape, dtype=np.bool_) if m.standing is None else m.standing[s]
+    measured = np.full((*shape, 3), np.nan) if m.foot_force is None else m.foot_force[s]
+    force = np.array(measured)
+    if np.isnan(force).any():
+        force = np.where(np.isnan(force), feet.least_tangential(wrench, standing), force)
     if machine.bodies.squeeze:
-        standing = np.ones(feet.shape[:2]) if m.standing is None else m.standing[s]
-        world[..., 1] += machine.bodies.squeeze * outward(machine.left, standing)
-    if turn is None:
-        return world
-    return np.einsum("nji,nfj->nfi", turn, world)
+        force[..., 1] += machine.bodies.squeeze * outward(machine.left, standing)
+    return force
 
 
 def outward(left: Sequence[bool], standing: NDArray[np.generic]) -> Array:
@@ -293,27 +261,4 @@ def outward(left: Sequence[bool], standing: NDArray[np.generic]) -> Array:
     for side, sign in ((own, 1.0), (~own, -1.0)):
         part = (standing * side).astype(float)
         out += sign * part / np.maximum(part.sum(axis=1, keepdims=True), 1.0)
-    return out
-
-
-def _computed(
-    m: Measurement, s: slice, feet: Array, wrench: Array, turn: Array | None, count: int
-) -> Array:
-    """Least tangential forces of the standing feet in the world's directions, (n, F, 3)."""
-    n = feet.shape[0]
-    standing = np.ones((n, count), dtype=bool) if m.standing is None else m.standing[s]
-    world_feet, world_wrench = feet, wrench
-    if turn is not None:
-        world_feet = np.einsum("nij,nfj->nfi", turn, feet)
-        world_wrench = np.concatenate(
-            [np.einsum("nij,nj->ni", turn, wrench[:, k : k + 3]) for k in (0, 3)], axis=1
-        )
-    out = np.zeros((n, count, 3))
-    codes = standing @ (1 << np.arange(count))
-    for code in np.unique(codes):
-        rows = np.flatnonzero(codes == code)
-        members = np.flatnonzero(standing[rows[0]])
-        if members.size >= 3:
-            part = least_tangential_forces(world_wrench[rows], world_feet[np.ix_(rows, members)])
-            out[np.ix_(rows, members)] = part
     return out

@@ -13,8 +13,9 @@ from actuators.energy.regeneration import Supply, supply
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
+from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.force_rules import PAPER, GroundForces
-from pipeline.dynamics.joint_demand import JointDemand, MotionDemand, motion_demand, segment_demand
+from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
 from pipeline.dynamics.stability import stability_margins
 from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Motion, Segment

@@ -7,7 +7,7 @@ from typing import Any
 
 from actuators.chain import HoldingResult
 from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.joint_demand import JointDemand
+from pipeline.dynamics.demand import JointDemand
 from reports.table import Table, table_from_rows
 
 #: Time over which the paper adds up standing energy: that of one gait cycle [s].

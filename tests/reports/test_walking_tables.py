@@ -7,7 +7,8 @@ import pytest
 
 from actuators.energy.regeneration import Supply
 from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.joint_demand import JointDemand, MotionDemand
+from pipeline.dynamics.demand import JointDemand
+from pipeline.dynamics.joint_demand import MotionDemand
 from reports.tables.walking import robot_energy
 
 LEGS = {"a": ("a1", "a2"), "b": ("b1",)}

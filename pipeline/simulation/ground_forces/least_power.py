@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.shaft import ShaftSeries
+from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.force_rules import Descent, Stance
-from pipeline.dynamics.joint_demand import JointDemand
 from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Segment
 from pipeline.simulation.ground_forces.power_law import NOTHING, PowerLaw, power_law
@@ -110,28 +110,14 @@ class PowerOfJoints:
     """What the supply gives to every joint at some samples of a segment, for any torque."""
 
     def __init__(self, rule: LeastPower, stance: Stance) -> None:
-        self._rule, self._stance = rule, stance
-        self._loaded = stance.loaded
+        self._rule, self._stance, self._loaded = rule, stance, stance.loaded
+        d = stance.demand
         self._series = ShaftSeries.at_joint(
-            stance.joints,
-            stance.segment.time,
-            stance.position,
-            stance.velocity,
-            stance.acceleration,
-            stance.torque,
+            d.joints, d.time, d.position, d.velocity, d.acceleration, d.torque
         )
-        self._beside = np.zeros_like(stance.torque)  # springs and ripples beside the motors
-        if rule.adjust is not None:
-            demand = JointDemand(
-                stance.joints,
-                stance.segment.time,
-                stance.position,
-                stance.velocity,
-                stance.acceleration,
-                stance.torque,
-                stance.segment.name,
-            )
-            self._beside = rule.adjust(stance.segment, demand).torque - stance.torque
+        self._torque, self._beside = d.torque, np.zeros_like(d.torque)
+        if rule.adjust is not None:  # springs and ripples in parallel with the motors
+            self._beside = rule.adjust(stance.segment, d).torque - d.torque
 
     def at(self, rows: Rows, torque: Array) -> Array:
         """Power out of the supply for torques of the standing legs' joints, shape (n, Q) [W]."""
@@ -151,7 +137,7 @@ class PowerOfJoints:
     def _asked(self, rows: Rows, legs: Array) -> tuple[Array, Array]:
         """The motors' torque and electrical power at the standing legs' joints."""
         s = self._series
-        torque = self._stance.torque[rows] + self._beside[rows]
+        torque = self._torque[rows] + self._beside[rows]
         torque[:, self._loaded] = legs + self._beside[rows][:, self._loaded]
         side = ShaftSeries(
             s.joints,

@@ -28,7 +28,9 @@ class Seen:
     shown: list[Stance] = field(default_factory=list)
 
     def forces(self, stance: Stance) -> np.ndarray:
-        self.shown.append(replace(stance, torque=stance.torque.copy()))
+        self.shown.append(
+            replace(stance, demand=replace(stance.demand, torque=stance.demand.torque.copy()))
+        )
         return stance.force
 
 

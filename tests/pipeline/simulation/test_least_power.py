@@ -9,9 +9,10 @@ import pytest
 from scipy.optimize import minimize
 
 from actuators.loading.build import load_catalog
+from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.force_rules import GroundForces, LeastTorque
 from pipeline.dynamics.internal_forces import internal_basis
-from pipeline.dynamics.joint_demand import JointDemand, segment_demand
+from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
 from pipeline.motion.standing import standing_posture
 from pipeline.motion.walking import walking_motion
