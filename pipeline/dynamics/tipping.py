@@ -10,7 +10,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from pipeline.errors import GaitError
 from pipeline.motion.gait import body_rotation, gait_of, gait_table
 from pipeline.motion.motion import Segment
 from pipeline.motion.support import support_edges
@@ -31,6 +30,9 @@ def margin_and_remedy(robot: Robot, segment: Segment, sample: int, margin: float
         sample: When it tips.
         margin: Of static stability then [m].
     """
+    words = f"static margin {1e3 * margin:.1f} mm"
+    if segment.foot_target is None:
+        return f"{words}; check which feet stand, or shift the body towards them"
     said = [
         f"{what} takes {1e3 * -inward:.0f} mm ({how})"
         for inward, what, how in sorted(_shifts(robot, segment, sample))
@@ -39,18 +41,10 @@ def margin_and_remedy(robot: Robot, segment: Segment, sample: int, margin: float
     general = ["spread the feet", "shorten the stroke"]
     if margin > 0:  # the bodies' acceleration tips it
         general.append("walk slower (gait.period)")
-    if segment.time.size > 1 and not _sways(robot):
+    if segment.time.size > 1 and gait_of(robot.spec).margin is None:
         general.append('let the body sway (gait.sway = "least")')
-    words = f"{', '.join(general[:-1])} or {general[-1]}"
-    margin_text = f"static margin {1e3 * margin:.1f} mm"
-    return f"{margin_text}: {', '.join(said)}; or {words}" if said else f"{margin_text}; {words}"
-
-
-def _sways(robot: Robot) -> bool:
-    try:
-        return gait_of(robot.spec).margin is not None
-    except GaitError:  # a motion that no gait made
-        return True
+    remedy = f"{', '.join(general[:-1])} or {general[-1]}"
+    return f"{words}: {', '.join(said)}; or {remedy}" if said else f"{words}; {remedy}"
 
 
 def _shifts(robot: Robot, segment: Segment, sample: int) -> list[tuple[float, str, str]]:

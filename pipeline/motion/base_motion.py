@@ -75,11 +75,15 @@ def base_quaternions(ground: Ground, body: Array, heading: Array) -> Array:
         return np.tile([0.0, 0.0, 0.0, 1.0], (heading.size, 1))  # upright to the last bit
     yaw = Rotation.from_rotvec(heading[:, None] * [0.0, 0.0, 1.0])
     whole = Rotation.from_matrix(ground.rotation) * yaw * Rotation.from_matrix(body)
-    out = whole.as_quat()
-    # One sign along a motion: a quaternion and its negative are the same orientation.
+    return one_sign(whole.as_quat())
+
+
+def one_sign(quaternion: Array) -> Array:
+    """Quaternions (N, 4) without jumps of sign: one and its negative are the same orientation."""
+    out = np.array(quaternion)
     flips = np.cumprod(np.where((out[1:] * out[:-1]).sum(axis=1) < 0, -1.0, 1.0))
     out[1:] *= flips[:, None]
-    return np.asarray(out)
+    return out
 
 
 @dataclass(frozen=True)
