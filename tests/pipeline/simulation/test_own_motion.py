@@ -13,10 +13,10 @@ from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.errors import InvalidMotionError, StanceError
 from pipeline.motion.base_motion import base_in_world
 from pipeline.motion.motion import Motion
-from pipeline.motion.trajectory import ATTITUDE, PLACE, motion_of_table, read_motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.own_motion import ATTITUDE, PLACE, motion_of_table, read_motion
 
 
 def written(robot: Robot, motion: Motion, *, base: bool = False) -> pd.DataFrame:
