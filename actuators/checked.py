@@ -172,6 +172,8 @@ def _place(loc: tuple[int | str, ...], table: object) -> str:
     out = ""
     here: Any = table
     for part in loc:
+        if part == "[key]":  # of pydantic, for a key that is wrong
+            break
         here = here[part] if _has(here, part) else None
         if isinstance(part, int):
             name = here.get("name") if isinstance(here, Mapping) else None

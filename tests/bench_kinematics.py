@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.inverse_kinematics import reach, solve_rates
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.start_posture import neutral_postures
 
 #: Aim of the project.
 DAMPED_OVER_CLOSED = 3.0

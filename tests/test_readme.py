@@ -9,8 +9,8 @@ import pytest
 
 from pipeline.logs.reading.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
 from pipeline.logs.reading.mapping_schema import ColumnTable, MappingTable
-from pipeline.robot import robot_file
-from pipeline.robot.robot_file import GAIT_SCHEMA
+from pipeline.robot.robot_numbers import GAIT_SCHEMA
+from pipeline.robot.robot_tables import OwnLegTable, RobotTable
 from tests.pages import pages
 from tests.readme import BLOCKS, PAGES, SHOWN, number, renewed
 
@@ -65,7 +65,7 @@ def test_every_column_of_the_log_format_is_described(root: Path) -> None:
 
 def test_every_key_of_robot_and_mapping_files_is_described(root: Path) -> None:
     robot = (root / "urdf/README.md").read_text(encoding="utf-8")
-    for key in (*GAIT_SCHEMA, *robot_file._ROBOT_KEYS, *robot_file._LEG_KEYS):
+    for key in (*GAIT_SCHEMA, *RobotTable.model_fields, *OwnLegTable.model_fields):
         assert f"`{key}`" in robot, key
     logs = (root / "pipeline/logs/README.md").read_text(encoding="utf-8")
     fields = {**MappingTable.model_fields, **ColumnTable.model_fields}

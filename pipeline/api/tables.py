@@ -15,7 +15,7 @@ from actuators.energy.limits import limit_rows, standing_rows
 from actuators.loading.build import CATALOG
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
-from pipeline.robot.foot_tracking import foot_tracking
+from pipeline.robot.inverse.foot_tracking import foot_tracking
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.ground_forces.force_choice import RULES
 from pipeline.simulation.settings import PAPER_FORCES, Settings

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import GaitError
+from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.inverse_kinematics import solve_positions
 from pipeline.robot.robot import Robot
-from pipeline.robot.start_posture import neutral_postures
 
 Array = NDArray[np.float64]
 

@@ -77,7 +77,7 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
 
     Returns:
         Joint positions [rad, m], shape (N, L, K). A leg that lacks a direction puts its foot as
-        near as it gets; `pipeline.robot.foot_tracking` tells how near.
+        near as it gets; `pipeline.robot.inverse.foot_tracking` tells how near.
 
     Raises:
         OutOfReachError: A target is not reached; names leg, instant and how far it is off.

@@ -2,81 +2,36 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from actuators.errors import closest, one_line
-from actuators.parameters import REQUIRED_KEYS, ParameterSet, parameters_from_table
+from pydantic import ValidationError
+
+from actuators.checked import checked
+from actuators.errors import closest
+from actuators.parameters import ParameterSet, parameters_from_table
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import si_unit
 from pipeline.errors import RobotFileError
 from pipeline.robot.published import SCHEME, published_names, urdf_path
+from pipeline.robot.robot_numbers import BUILD_SCHEMA, GAIT_NUMBERS, GAIT_SCHEMA, check_parameters
+from pipeline.robot.robot_tables import (
+    BuiltFileTable,
+    BuiltLegTable,
+    FileTable,
+    OwnFileTable,
+    OwnLegTable,
+)
 
-#: Numbers every walking robot needs, with their dimension.
 #: Of the project, from the folder it is run in.
 DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
-GAIT_SCHEMA = {
-    "total_mass": "mass",
-    "foot_stroke": "length",
-    "foot_lift": "length",
-    "walking_speed": "velocity",
-    "gait_period": "time",
-    "gravity": "acceleration",
-}
-#: Numbers from which `pipeline.robot.urdf_builder` builds the hexapod and the leg on a stand.
-BUILD_SCHEMA = {
-    "body_length": "length",
-    "robot_width": "length",
-    "hip_spacing": "length",
-    "joint_1_axis_angle": "angle",
-    "joint_2_lateral": "length",
-    "body_height": "length",
-    "coxa_length": "length",
-    "femur_length": "length",
-    "tibia_length": "length",
-    "trunk_height": "length",
-    "link_width": "length",
-    "hip_link_mass": "mass",
-    "femur_mass": "mass",
-    "tibia_mass": "mass",
-    "femur_com": "ratio",
-    "tibia_com": "ratio",
-    "trunk_com_left": "length",
-    "joint_1_range": "angle",
-    "joint_2_lower": "angle",
-    "joint_2_upper": "angle",
-    "joint_3_lower": "angle",
-    "joint_3_upper": "angle",
-    "joint_effort_limit": "torque",
-    "joint_velocity_limit": "angular velocity",
-}
-BUILDS = ("hexapod", "leg_stand")
-#: Joints of a built leg: hip, femur, tibia.
-BUILT_JOINTS = 3
-#: Lengths of walking robots lie between these; outside, a unit is wrong by a thousand [m].
-SMALLEST_LENGTH, LARGEST_LENGTH = 1e-3, 10.0
-#: No planet pulls more [m/s^2].
-LARGEST_GRAVITY = 30.0
-#: Lengths that may be nothing, or lie on either side.
-_ANY_LENGTH = ("coxa_length", "joint_2_lateral", "trunk_com_left")
-STATIONS = {"front": 1.0, "middle": 0.0, "rear": -1.0}
-
-_TOP_KEYS = {
-    *("extends", "robot", "parameters", "legs", "held", "gait", "standing", "assumed"),
-    "actuators",
-}
-_ROBOT_KEYS = {"name", "urdf", "base_link", "base", "build", "zero_pose", "note"}
-_LEG_KEYS = {"joints", "foot", "side", "station", "neutral_foot", "start_posture"}
-_STANDING_KEYS = {"feet"}
-#: A gait's numbers among the parameters; ``[gait]`` may state its own instead.
-GAIT_NUMBERS = frozenset({"foot_stroke", "foot_lift", "walking_speed", "gait_period"})
+#: Hips of a built robot along x, in units of `hip_spacing`.
+STATIONS: Final = {"front": 1.0, "middle": 0.0, "rear": -1.0}
 #: Keys of ``[gait]`` that say which legs stand when, the duty factor aside.
-FOOTFALLS = ("name", "sets", "tripods", "phase")
-_MOST_EXTENDED = 20
-_COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven"}
+FOOTFALLS: Final = ("name", "sets", "tripods", "phase")
+_MOST_EXTENDED: Final = 20
 
 
 @dataclass(frozen=True)
@@ -225,47 +180,40 @@ def load_robot_file(path: Path) -> RobotSpec:
         )
     table, sources = _extended(path, ())
     where = str(path)
-    _known_keys(table, _TOP_KEYS, where, "table")
-    _refuse_missing(table, where)
-    robot = table["robot"]
-    _known_keys(robot, _ROBOT_KEYS, where, "key of [robot]")
-    build = robot.get("build")
-    if build is not None and build not in BUILDS:
-        raise RobotFileError(f"{where}: robot.build = '{build}'; {closest(str(build), BUILDS)}")
-    base = robot.get("base", "floating")
-    if base not in ("floating", "fixed"):
-        raise RobotFileError(f"{where}: robot.base = '{base}'; expected 'floating' or 'fixed'")
-    schema = GAIT_SCHEMA | (BUILD_SCHEMA if build else {})
+    build = table["robot"].get("build") if isinstance(table.get("robot"), dict) else None
+    schema = OwnFileTable if build is None else BuiltFileTable
+    numbers = GAIT_SCHEMA | (BUILD_SCHEMA if build else {})
+    _refuse_missing(schema, numbers, table, where)
+    file = checked(schema, table, where, RobotFileError)
     parameters = parameters_from_table(
-        table["parameters"], schema, f"{where}: parameters", optional=GAIT_NUMBERS
+        file.parameters, numbers, f"{where}: parameters", optional=GAIT_NUMBERS
     )
     check_parameters(parameters, build, where)
-    legs = _legs(table["legs"], parameters, build, where)
-    names = [leg.name for leg in legs]
-    held = _held(table.get("held", {}), legs, where)
-    standing = table.get("standing", {})
-    _known_keys(standing, _STANDING_KEYS, where, "key of [standing]")
+    legs = tuple(_leg(name, leg, parameters) for name, leg in file.legs.items())
+    names = list(file.legs)
+    _refuse_shared(legs, file.held, where)
+    feet = names if file.standing.feet is None else list(file.standing.feet)
     return RobotSpec(
         path=path,
         sources=sources,
-        name=_text(robot, "name", where),
-        urdf=urdf_path(_text(robot, "urdf", where), path),
-        base_link=_text(robot, "base_link", where),
-        floating=base == "floating",
+        name=file.robot.name,
+        urdf=urdf_path(file.robot.urdf, path),
+        base_link=file.robot.base_link,
+        floating=file.robot.base == "floating",
         build=build,
-        zero_pose=str(robot.get("zero_pose", "")),
+        zero_pose=file.robot.zero_pose,
         parameters=parameters,
         legs=legs,
-        gait=table.get("gait", {}),
-        standing_feet=leg_list(standing.get("feet", names), names, f"{where}: standing.feet"),
-        held=held,
-        assumed=_assumed(table.get("assumed", {}), where),
-        actuator_table=table.get("actuators", {}),
+        gait=file.gait,
+        standing_feet=leg_list(feet, names, f"{where}: standing.feet"),
+        held=tuple(file.held.items()),
+        assumed=tuple(file.assumed.items()),
+        actuator_table=file.actuators,
     )
 
 
 def _extended(path: Path, seen: tuple[Path, ...]) -> tuple[dict[str, Any], tuple[Path, ...]]:
-    table = read_toml(path)  # first, so that a name that is no file's is told as such
+    table = read_toml(path)  # first: a name that is no file is reported as such
     if path.resolve() in [p.resolve() for p in seen]:
         raise RobotFileError(f"{path}: extends itself through {seen[-1]}")
     if len(seen) >= _MOST_EXTENDED:
@@ -300,55 +248,35 @@ def merged_gait(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str,
     return kept | dict(above)
 
 
-def _refuse_missing(table: Mapping[str, Any], where: str) -> None:
-    """All keys that are missing, in one line: whoever writes a file need not run it for each.
+def _refuse_missing(
+    schema: type[FileTable], numbers: Mapping[str, str], table: Mapping[str, Any], where: str
+) -> None:
+    """Name all keys that a file lacks, so that who writes one need not run it for each.
 
     Raises:
-        RobotFileError: At least one is missing, or a table is none.
+        RobotFileError: At least one is missing.
     """
-
-    def under(key: str) -> Mapping[str, Any]:
-        value = table.get(key, {})
-        return value if isinstance(value, dict) else {}
-
-    built = "build" in under("robot")
-    schema = GAIT_SCHEMA | (BUILD_SCHEMA if built else {})
-    leg_keys = ("joints", "foot", "side", "station" if built else "neutral_foot")
-    missing = [f"robot.{key}" for key in ("name", "urdf", "base_link") if key not in under("robot")]
-    if not under("legs"):
-        missing.append(f"[legs.NAME] with {', '.join(leg_keys)}")
-    for leg, entry in under("legs").items():
-        if isinstance(entry, dict):
-            missing += [f"legs.{leg}.{key}" for key in leg_keys if key not in entry]
+    if any(not isinstance(table.get(key, {}), dict) for key in FileTable.model_fields):
+        return
+    lacking = []
+    try:
+        schema.model_validate({"robot": {}, "legs": {}, "parameters": {}} | table)
+    except ValidationError as wrong:
+        errors = wrong.errors(include_url=False, include_context=False)
+        lacking = [".".join(map(str, e["loc"])) for e in errors if e["type"] == "missing"]
+    if not table.get("legs"):
+        foot = "neutral_foot" if schema is OwnFileTable else "station"
+        lacking.append(f"[legs.NAME] with joints, foot, side, {foot}")
     # A gait that states numbers of its own is asked for the rest when it walks.
-    own = set(under("gait")) - {"transfer_path", "tripods"}
-    missing += [
+    own = set(table.get("gait", {})) - {"transfer_path", "tripods"}
+    optional = GAIT_NUMBERS if own else frozenset()
+    lacking += [
         f"parameters.{name} [{si_unit(kind)}]"
-        for name, kind in schema.items()
-        if name not in under("parameters") and not (own and name in GAIT_NUMBERS)
+        for name, kind in numbers.items()
+        if name not in table.get("parameters", {}) and name not in optional
     ]
-    for name, entry in under("parameters").items():
-        if isinstance(entry, dict):
-            missing += [f"parameters.{name}.{key}" for key in REQUIRED_KEYS if key not in entry]
-    tables = ("robot", "legs", "held", "gait", "parameters", "standing", "assumed", "actuators")
-    wrong = [k for k in tables if not isinstance(table.get(k, {}), dict)]
-    if wrong:
-        raise RobotFileError(f"{where}: {wrong[0]} must be a table, [{wrong[0]}]")
-    if missing:
-        raise RobotFileError(f"{where}: missing: {', '.join(missing)}; see urdf/hexapod.toml")
-
-
-def _known_keys(table: Mapping[str, Any], known: set[str], where: str, what: str) -> None:
-    for key in table:
-        if key not in known:
-            raise RobotFileError(f"{where}: unknown {what} '{key}'; {closest(key, sorted(known))}")
-
-
-def _text(table: Mapping[str, Any], key: str, where: str) -> str:
-    value = table.get(key)
-    if not isinstance(value, str) or not value:
-        raise RobotFileError(f"{where}: '{key}' is missing or not a text")
-    return value
+    if lacking:
+        raise RobotFileError(f"{where}: missing: {', '.join(lacking)}; see urdf/hexapod.toml")
 
 
 def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
@@ -372,224 +300,37 @@ def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
     return tuple(value)
 
 
-def _legs(
-    table: dict[str, Any], parameters: ParameterSet, build: str | None, where: str
-) -> tuple[LegSpec, ...]:
-    legs = [_leg(name, entry, parameters, build, where) for name, entry in table.items()]
-    if not legs:
-        raise RobotFileError(f"{where}: [legs] names no leg")
-    joints_seen = [joint for leg in legs for joint in leg.joints]
-    for joint in joints_seen:
-        if joints_seen.count(joint) > 1:
-            raise RobotFileError(f"{where}: joint '{joint}' belongs to two legs")
-    return tuple(legs)
-
-
-def _leg(
-    name: str, entry: object, parameters: ParameterSet, build: str | None, where: str
-) -> LegSpec:
-    place = f"{where}: legs.{one_line(name)}"
-    _refuse_name(name, place)
-    if not isinstance(entry, dict):
-        raise RobotFileError(f"{place}: expected a table with joints, foot and side")
-    _known_keys(entry, _LEG_KEYS, where, f"key of [legs.{name}]")
-    joints = _leg_joints(entry, place)
-    side = entry.get("side")
-    if side not in ("left", "right"):
-        raise RobotFileError(f"{place}: side = '{side}'; expected 'left' or 'right'")
-    station = entry.get("station", "")
-    if build:
-        if not isinstance(station, str) or station not in STATIONS:
-            raise RobotFileError(
-                f"{place}: station = '{one_line(station)}'; {closest(str(station), list(STATIONS))}"
-            )
-        if len(joints) != BUILT_JOINTS:
-            raise RobotFileError(
-                f"{place}: names {len(joints)} joints; a built leg has {BUILT_JOINTS}"
-            )
-        neutral = built_neutral_foot(parameters, side, station)
+def _leg(name: str, leg: OwnLegTable | BuiltLegTable, parameters: ParameterSet) -> LegSpec:
+    if isinstance(leg, BuiltLegTable):
+        neutral = built_neutral_foot(parameters, leg.side, leg.station)
     else:
-        x, y, z = _numbers(entry, "neutral_foot", 3, None, place)
-        neutral = (x, y, z)
-    for k, at in enumerate(neutral):
-        if abs(at) > LARGEST_LENGTH:
-            raise RobotFileError(
-                f"{place}: neutral_foot has {at:g} at place {k + 1}; it is written in metres, "
-                "are these millimetres?"
-            )
-    start = _numbers(entry, "start_posture", len(joints), (0.0,) * len(joints), place)
-    for k, angle in enumerate(start):
-        if abs(angle) > 2 * math.pi:
-            raise RobotFileError(
-                f"{place}: start_posture has {angle:g} at place {k + 1}; it is written in "
-                f"radians, are these degrees ({math.radians(angle):.4g} rad)?"
-            )
+        neutral = leg.neutral_foot
     return LegSpec(
-        name,
-        joints,
-        _text(entry, "foot", place),
-        side,
-        station,
-        neutral,
-        start,
-        "start_posture" in entry,
+        name=name,
+        joints=leg.joints,
+        foot=leg.foot,
+        side=leg.side,
+        station=leg.station,
+        neutral_foot=neutral,
+        start_posture=leg.start_posture or (0.0,) * len(leg.joints),
+        start_stated=leg.start_posture is not None,
     )
 
 
-def _leg_joints(entry: Mapping[str, Any], place: str) -> tuple[str, ...]:
-    joints = entry.get("joints")
-    if not isinstance(joints, list) or not all(isinstance(j, str) for j in joints):
-        raise RobotFileError(f"{place}: joints must be a list of names, base outward")
-    if not joints:
-        raise RobotFileError(f"{place}: joints is empty; a leg has at least one actuated joint")
-    for joint in joints:
-        _refuse_name(joint, f"{place}: joints")
-    return tuple(joints)
-
-
-def _refuse_name(name: str, place: str) -> None:
-    """Names become columns and files: no separators, nothing invisible.
+def _refuse_shared(legs: tuple[LegSpec, ...], held: Mapping[str, float], where: str) -> None:
+    """A joint belongs to one leg, or is held.
 
     Raises:
-        RobotFileError: It holds one.
+        RobotFileError: One does not.
     """
-    bad = [c for c in name if c in '/\\,;"' or not c.isprintable()]
-    if not name.strip() or bad:
-        what = f"holds {bad[0]!r}" if bad else "is empty"
-        raise RobotFileError(f"{place}: a name {what}; names become columns and file names")
-
-
-def _numbers(
-    entry: Mapping[str, Any], key: str, count: int, default: tuple[float, ...] | None, where: str
-) -> tuple[float, ...]:
-    value = entry.get(key, default)
-    some = _COUNTS.get(count, str(count))
-    if not isinstance(value, (list, tuple)) or not all(_is_number(x) for x in value):
-        raise RobotFileError(f"{where}: {key} must be {some} numbers")
-    if len(value) != count:
-        raise RobotFileError(f"{where}: {key} must be {some} numbers, not {len(value)}")
-    return tuple(_finite(x, f"{where}: {key} must be {some} finite numbers") for x in value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _finite(value: Any, else_said: str) -> float:
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not math.isfinite(number):
-        raise RobotFileError(else_said)
-    return number
-
-
-def _held(
-    table: Mapping[str, Any], legs: tuple[LegSpec, ...], where: str
-) -> tuple[tuple[str, float], ...]:
-    """Joints outside the legs and where they are held [rad, m]."""
-    of_leg = {joint: leg.name for leg in legs for joint in leg.joints}
-    out = []
-    for joint, value in table.items():
-        place = f"{where}: held.{one_line(joint)}"
-        _refuse_name(joint, place)
-        if joint in of_leg:
-            raise RobotFileError(f"{place}: the joint belongs to leg '{of_leg[joint]}'; take one")
-        if not _is_number(value):
-            raise RobotFileError(f"{place}: expected the position it is held at [rad, m]")
-        out.append((joint, _finite(value, f"{place}: expected a finite number")))
-    return tuple(out)
-
-
-def _assumed(table: Mapping[str, Any], where: str) -> tuple[tuple[str, str], ...]:
-    """Guesses and their reasons."""
-    for key, reason in table.items():
-        if not isinstance(reason, str) or not reason.strip():
-            raise RobotFileError(f"{where}: assumed.{one_line(key)}: expected the reason, a text")
-    return tuple((key, reason) for key, reason in table.items())
-
-
-def check_parameters(parameters: ParameterSet, build: str | None, where: str) -> None:
-    """Refuse numbers that no robot or gait can have, after loading and after a change.
-
-    Args:
-        parameters: All of a robot file's.
-        build: Which builder makes the URDF, or None for a URDF of the user's own.
-        where: For the message.
-
-    Raises:
-        RobotFileError: A mass, length or period that is not positive, or a contradiction.
-    """
-    sizes = ("total_mass", "foot_stroke", "walking_speed", "gait_period", "gravity")
-    _positive(parameters, tuple(name for name in sizes if name in parameters), where)
-    if "foot_lift" in parameters and parameters["foot_lift"] < 0:
-        raise RobotFileError(f"{where}: parameters.foot_lift must not be negative")
-    if parameters["gravity"] > LARGEST_GRAVITY:
-        raise RobotFileError(f"{where}: parameters.gravity is beyond any planet; check its unit")
-    if build:
-        _check_build(parameters, where)
-    _check_lengths(parameters, where)
-
-
-def _check_lengths(parameters: ParameterSet, where: str) -> None:
-    """Refuse metres written for millimetres and the reverse, and angles beyond a turn."""
-    for name, kind in (GAIT_SCHEMA | BUILD_SCHEMA).items():
-        if kind == "angle" and name in parameters and abs(parameters[name]) > 2 * math.pi:
-            row = parameters.parameter(name)
-            number = f"{row.value_as_written:g}"
-            hint = f"is {number} deg meant?" if row.unit == "rad" else "check its unit"
+    owner: dict[str, str] = {}
+    for leg in legs:
+        for joint in leg.joints:
+            if joint in owner:
+                raise RobotFileError(f"{where}: joint '{joint}' belongs to two legs")
+            owner[joint] = leg.name
+    for joint in held:
+        if joint in owner:
             raise RobotFileError(
-                f"{where}: parameters.{name} = {number} {row.unit} is more than a turn; {hint}"
+                f"{where}: held.{joint}: the joint belongs to leg '{owner[joint]}'; take one"
             )
-        if kind != "length" or name not in parameters:
-            continue
-        size, row = abs(parameters[name]), parameters.parameter(name)
-        small = 0 < size < SMALLEST_LENGTH and name not in _ANY_LENGTH
-        if small or size > LARGEST_LENGTH:
-            what = "shorter" if small else "longer"
-            number = f"{row.value_as_written:g}"
-            other = {("mm", True): "m", ("m", False): "mm"}.get((row.unit, small))
-            hint = f"is {number} {other} meant?" if other else "check its unit"
-            raise RobotFileError(
-                f"{where}: parameters.{name} = {number} {row.unit} is {what} than in any walking "
-                f"robot; {hint}"
-            )
-
-
-def _positive(parameters: ParameterSet, names: tuple[str, ...], where: str) -> None:
-    for name in names:
-        if parameters[name] <= 0:
-            written = parameters.parameter(name)
-            raise RobotFileError(
-                f"{where}: parameters.{name} = {written.value_as_written:g} {written.unit} must be "
-                "positive"
-            )
-
-
-def _check_build(parameters: ParameterSet, where: str) -> None:
-    _positive(
-        parameters,
-        (
-            *("body_length", "robot_width", "hip_spacing", "body_height", "femur_length"),
-            *("tibia_length", "hip_link_mass", "femur_mass", "tibia_mass", "trunk_height"),
-            *("link_width", "joint_1_range", "joint_effort_limit", "joint_velocity_limit"),
-        ),
-        where,
-    )
-    if parameters["coxa_length"] < 0:
-        raise RobotFileError(f"{where}: parameters.coxa_length must not be negative")
-    for joint in ("joint_2", "joint_3"):
-        if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]:
-            raise RobotFileError(f"{where}: parameters.{joint}_lower must be below {joint}_upper")
-    for name in ("femur_com", "tibia_com"):
-        if not 0 <= parameters[name] <= 1:
-            raise RobotFileError(
-                f"{where}: parameters.{name} = {parameters[name]:g} lies outside the link; "
-                "expected 0 to 1, a fraction of its length"
-            )
-    if parameters["joint_2_lateral"] < parameters["coxa_length"]:
-        raise RobotFileError(
-            f"{where}: joint_2_lateral is smaller than coxa_length, so joint 1 would lie beyond "
-            "the mid-plane"
-        )

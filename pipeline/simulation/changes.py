@@ -17,7 +17,8 @@ from pipeline.errors import GaitError, RobotFileError
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.gait_table import changed_table, gait_keys
-from pipeline.robot.robot_file import GAIT_NUMBERS, RobotSpec, check_parameters, leg_list
+from pipeline.robot.robot_file import RobotSpec, leg_list
+from pipeline.robot.robot_numbers import GAIT_NUMBERS, check_parameters
 
 #: What a change of the table ``[gait]`` begins with.
 GAIT = "gait."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.robot.foot_tracking import FootTracking
+from pipeline.robot.inverse.foot_tracking import FootTracking
 from reports.table import Table, table_from_rows
 
 

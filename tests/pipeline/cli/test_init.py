@@ -192,7 +192,7 @@ def test_what_is_wrong_with_the_file_that_is_to_be_is_said_of_that_file(
     text = (root / "urdf" / "hexapod.urdf").read_text(encoding="utf-8")
     urdf.write_text(text.replace("rm_joint_1", "rm;joint_1"), encoding="utf-8")
     assert main(["init", str(urdf), "--out", str(out)]) == 2
-    assert capsys.readouterr().err.startswith(f"{out}: legs.")
+    assert capsys.readouterr().err.startswith(f"{out}: 'legs.")
 
 
 @pytest.mark.parametrize("name", ["solo13", "zzz", "cassie", "urdf", "."])

@@ -35,7 +35,7 @@ BYTES = {
     "42 MB": (lambda t: b"#" * 42_000_000, r"has 42 MB, expected at most"),
     "a list of robots": (
         lambda t: t.replace("[robot]", "[[robot]]").encode(),
-        r"robot must be a t",
+        r"'robot' must be a table",
     ),
     "itself": (lambda t: b'extends = "robot.toml"', r"extends itself"),
     "a parent of no name": (lambda t: b'extends = ""', r"is a folder, a file is expected"),
@@ -68,10 +68,10 @@ NUMBERS = {
     ),
     "half an interval": (r"interval = \[80, 200\]", "interval = [80]", r"must be \[low, high\]"),
     "interval of NaN": (r"interval = \[80, 200\]", "interval = [nan, 1]", r"must be a finite num"),
-    "leg with a slash": (r"^\[legs\.lf\]", '[legs."a/b"]', r"legs.a/b: a name holds '/'"),
+    "leg with a slash": (r"^\[legs\.lf\]", '[legs."a/b"]', r"'legs.a/b': a name holds '/'"),
     "leg without a name": (r"^\[legs\.lf\]", '[legs.""]', r"a name is empty"),
-    "joint with a path": (r'"lf_joint_2"', '"../x"', r"legs.lf: joints: a name holds '/'"),
-    "joint with a comma": (r'"lf_joint_2"', '"a,b"', r"legs.lf: joints: a name holds ','"),
+    "joint with a path": (r'"lf_joint_2"', '"../x"', r"'legs.lf.joints 2': a name holds '/'"),
+    "joint with a comma": (r'"lf_joint_2"', '"a,b"', r"'legs.lf.joints 2': a name holds ','"),
     "joint of two legs": (r'"lf_joint_2"', '"lm_joint_2"', r"'lm_joint_2' belongs to two legs"),
     "several missing": (
         r'^urdf = .*?^base_link = [^\n]*$|^transfer_path = "\w+"$',
@@ -81,7 +81,7 @@ NUMBERS = {
     "half a number": (
         r'(total_mass\]\nvalue = 40\n)unit = "kg"\nbasis = "published"\n',
         r"\1",
-        r"missing: parameters.total_mass.unit, parameters.total_mass.basis; see",
+        r"parameters: 'total_mass': missing keys 'unit', 'basis'",
     ),
     "feet that nobody stands on": (r'feet = \["lf", "lr", "rm"\]', "feet = []", r"on 0 feet; .*3"),
 }
@@ -200,22 +200,22 @@ PLACES = {
     "feet in millimetres": (
         r"neutral_foot = \[[^\]]*\]",
         "neutral_foot = [270, 260, -295]",
-        r"legs.lf: neutral_foot has 270 at place 1; it is written in metres, are these milli",
+        r"'legs.lf.neutral_foot': has 270 at place 1; it is written in metres, are these milli",
     ),
     "feet of NaN": (
         r"neutral_foot = \[[^\]]*\]",
         "neutral_foot = [nan, 0.26, -0.29]",
-        r"legs.lf: neutral_foot must be three finite numbers",
+        r"'legs.lf.neutral_foot' must be a finite number",
     ),
     "feet of many digits": (
         r"neutral_foot = \[[^\]]*\]",
         f"neutral_foot = [{10**400}, 0.26, -0.29]",
-        r"legs.lf: neutral_foot must be three finite numbers",
+        r"'legs.lf.neutral_foot' must be a finite number",
     ),
     "posture in degrees": (
         r"(neutral_foot = \[[^\]]*\])",
         r"\1\nstart_posture = [0, 45, -90]",
-        r"start_posture has 45 at place 2; it is written in radians, are these degrees \(0.7854 r",
+        r"start_posture': has 45 at place 2; it is written in radians, are these degrees \(0.7854",
     ),
     "the knee the other way": (
         r"(neutral_foot = \[[^\]]*\])",

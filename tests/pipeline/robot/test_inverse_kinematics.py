@@ -10,16 +10,16 @@ import pytest
 from scipy.optimize import minimize
 
 from pipeline.errors import OutOfReachError
-from pipeline.robot.foot_tracking import foot_tracking
 from pipeline.robot.inverse.closed_form import closed_form, closed_form_legs
 from pipeline.robot.inverse.damped import approach
+from pipeline.robot.inverse.foot_tracking import foot_tracking
 from pipeline.robot.inverse.least_motion import Freedom, freedoms
+from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.inverse_kinematics import reach, solve_positions, solve_rates
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.start_posture import neutral_postures
 from tests.pipeline.robot.walkers import MIXED, Leg, walker
 
 T = np.linspace(0.0, 1.0, 401)

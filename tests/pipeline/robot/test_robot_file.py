@@ -12,7 +12,8 @@ from actuators.parameters import ParameterSet
 from actuators.units import from_si
 from pipeline.errors import RobotFileError
 from pipeline.robot.robot import Robot
-from pipeline.robot.robot_file import built_neutral_foot, check_parameters, load_robot_file
+from pipeline.robot.robot_file import built_neutral_foot, load_robot_file
+from pipeline.robot.robot_numbers import check_parameters
 
 
 def with_values(hexapod: Robot, **values: float) -> ParameterSet:
@@ -158,20 +159,32 @@ def test_a_circle_of_files_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("pattern", "replacement", "message"),
     [
-        (r'side = "left"', 'side = "port"', "side = 'port'; expected 'left' or 'right'"),
+        (r'side = "left"', 'side = "port"', "'legs.lf.side' = 'port': known: left, right"),
         (r'"lf_joint_2"', '"lf_joint_1"', "joint 'lf_joint_1' belongs to two legs"),
         (r'"lm_joint_2"', '"lf_joint_1"', "joint 'lf_joint_1' belongs to two legs"),
-        (r'base = "floating"', 'base = "flying"', "robot.base = 'flying'; expected 'floating'"),
+        (
+            r'base = "floating"',
+            'base = "flying"',
+            "'robot.base' = 'flying': did you mean 'floating'",
+        ),
         (r'build = "hexapod"', 'build = "hexpod"', "did you mean 'hexapod'"),
         (r'feet = \["lf", "lr"', 'feet = ["lf", "lf"', "a leg is named twice"),
-        (r"feet = \[.*?\]", 'feet = "lf"', "standing.feet: expected a list of leg names"),
-        (r'foot = "lf_foot_link"', "foot = 3", "'foot' is missing or not a text"),
-        (r'foot = "lf_foot_link"', 'foot = ""', "'foot' is missing or not a text"),
-        (r"joints = \[.*?\]", 'joints = "a"', "joints must be a list of names"),
-        (r'(side = "left")', r"\1" + "\nstart_posture = [0, 1]", "start_posture must be three"),
-        (r'(side = "left")', r"\1" + "\nstart_posture = [0, 1, true]", "must be three numbers"),
-        (r"^\[gait\]", "[gate]", "unknown table 'gate'; did you mean 'gait'"),
-        (r"^\[standing\].*?(?=^\[)", "[[standing]]\n", r"standing must be a table, \[standing\]"),
+        (r"feet = \[.*?\]", 'feet = "lf"', "'standing.feet' must be a list"),
+        (r'foot = "lf_foot_link"', "foot = 3", "'legs.lf.foot' must be text in quotation"),
+        (r'foot = "lf_foot_link"', 'foot = ""', "'legs.lf.foot' is empty"),
+        (r"joints = \[.*?\]", 'joints = "a"', "'legs.lf.joints' must be a list"),
+        (
+            r'(side = "left")',
+            r"\1" + "\nstart_posture = [0, 1]",
+            "as many numbers as there are joints, 3",
+        ),
+        (
+            r'(side = "left")',
+            r"\1" + "\nstart_posture = [0, 1, true]",
+            "must be a number, not True",
+        ),
+        (r"^\[gait\]", "[gate]", "unknown table 'gate': did you mean 'gait'"),
+        (r"^\[standing\].*?(?=^\[)", "[[standing]]\n", "'standing' must be a table"),
     ],
 )
 def test_what_no_robot_file_may_say(

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from pipeline.errors import GaitError, OutOfReachError
+from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.start_posture import neutral_postures
 
 
 @pytest.fixture(scope="module")
