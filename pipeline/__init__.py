@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from actuators.loading.own_folder import init_actuator
+    from pipeline.api.demand import Demand, demand, energy
     from pipeline.api.init import init
     from pipeline.api.logs import compare, forward, identify, read_log, validate
     from pipeline.api.machine import Machine, load
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 _HOME = {
     **dict.fromkeys(("Machine", "load"), "pipeline.api.machine"),
     **dict.fromkeys(("stand", "walk"), "pipeline.api.motion"),
+    **dict.fromkeys(("Demand", "demand", "energy"), "pipeline.api.demand"),
     **dict.fromkeys(
         ("read_log", "compare", "identify", "validate", "forward"), "pipeline.api.logs"
     ),
@@ -33,8 +35,11 @@ _HOME = {
     "reports": "pipeline.api.reports",
 }
 __all__ = [
+    "Demand",
     "Machine",
     "compare",
+    "demand",
+    "energy",
     "forward",
     "identify",
     "init",

@@ -26,7 +26,7 @@ def metadata(options: Options, given: Setup) -> dict[str, Any]:
         "versions": {name: version(name) for name in PACKAGES},
         "options": {
             "step": options.step,
-            "set": list(options.changes),
+            "set": [f"{key}={value}" for key, value in options.changes.items()],
             "base": options.base or "as the log and the robot say",
             "alternative": given.alternative or "none: the torque is the joint's",
             "effort": options.effort or "the log's most direct",

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Where
 from pipeline.identification.results import (
@@ -17,14 +20,17 @@ from pipeline.identification.results import (
     Naming,
 )
 from pipeline.identification.selection.deciding_motion import Deciding
+from pipeline.identification.workflow.forward import Drive, by_model
 from pipeline.logs.errors import EffectError
 from pipeline.logs.quality.finding import Finding
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.found_bodies import FoundBody
 from reports.table import Table
+from reports.tables import forward as forward_tables
 from reports.tables import gap as tables
 
 JOINED = "+"
+Array = NDArray[np.float64]
 
 
 def quality_table(findings: Sequence[Finding]) -> Table:
@@ -140,3 +146,45 @@ def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
 def motion_table(motion: Deciding, joints: Sequence[str]) -> Table:
     """`deciding_motion.csv`."""
     return tables.deciding_motion(motion.time, joints, motion.position)
+
+
+def forward_table(drives: Sequence[Drive], joints: Sequence[str]) -> Table:
+    """Rows of `forward.csv`: by model, log and joint, then over all logs."""
+    rows = []
+    for model, own in by_model(drives).items():
+        for j, joint in enumerate(joints):
+            misses = [(d.log.name, d.miss[:, j]) for d in own]
+            misses.append(("all", np.concatenate([miss for _, miss in misses])))
+            rows += [_row(model, log, joint, miss) for log, miss in misses]
+    return forward_tables.forward(rows)
+
+
+def _row(model: str, log: str, joint: str, miss: Array) -> dict[str, object]:
+    size = np.abs(miss[np.isfinite(miss)])
+    return {
+        "model": model,
+        "log": log,
+        "joint": joint,
+        "position_rms_rad": float(np.sqrt(np.mean(size**2))),
+        "position_mean_abs_rad": float(np.mean(size)),
+        "position_largest_rad": float(size.max()),
+        "rows": int(size.size),
+    }
+
+
+def rollout_tables(drives: Sequence[Drive], joints: Sequence[str]) -> list[Table]:
+    """One wide table per log: what the machine did, the model as it was, and with all effects."""
+    models = by_model(drives)
+    first, last = next(iter(models.values())), list(models.values())[-1]
+    return [
+        forward_tables.rollout(
+            before.log.name,
+            joints,
+            before.log.time,
+            before.log.position,
+            before.rollout.position,
+            after.rollout.position,
+            after.rollout.voltage,
+        )
+        for before, after in zip(first, last, strict=True)
+    ]

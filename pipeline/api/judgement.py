@@ -1,8 +1,6 @@
-"""Tables and pages of what was held against the paper."""
+"""Tables of what was held against the paper."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 from pipeline.paper.calibration.store import calibrated_numbers
 from pipeline.paper.judgement.basis import Basis, Judged
@@ -35,17 +33,3 @@ def judged(given: Settings, by: Basis) -> tuple[Judged, list[Table]]:
             tables.sensitivities(sensitivity_rows(by.results)),
         ]
     return Judged(judgement, by), out
-
-
-def pages(given: Settings, judged: Judged, every: list[Table], out: Path) -> int:
-    """Fig. 21 for every subject, then the summary that shows all figures.
-
-    Returns:
-        How many figures and pages.
-    """
-    from pipeline.api.figures import write_fig_21
-    from reports.pages.summary import write_summary
-
-    titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
-    count = write_fig_21(judged.judgement, titles, out)
-    return count + write_summary(given, judged, every, out)

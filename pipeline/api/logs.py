@@ -7,9 +7,15 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.api.gap_bodies import bodies_of, bodies_tables, write_model
-from pipeline.api.gap_forward import forward_table, rollout_tables
 from pipeline.api.gap_meta import metadata
-from pipeline.api.gap_tables import candidates_table, found_table, quality_table, where_table
+from pipeline.api.gap_tables import (
+    candidates_table,
+    forward_table,
+    found_table,
+    quality_table,
+    rollout_tables,
+    where_table,
+)
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result, by_name
 from pipeline.effects.model_file import edits_in
@@ -123,7 +129,7 @@ def read_log(
     run = _Run(machine, [path], [], more)
     intake, _, _ = take_in(run.given, run.options)
     tables = [quality_table(judged(intake).findings)]
-    return MeasuredLog(by_name(tables), "gap read", run.meta, Path(path), more["mapping"])
+    return MeasuredLog("gap read", by_name(tables), run.meta, Path(path), more["mapping"])
 
 
 def compare(logs: Any, machine: Machine, **options: Any) -> Comparison:
@@ -140,7 +146,7 @@ def compare(logs: Any, machine: Machine, **options: Any) -> Comparison:
     run = _Run(machine, logs, (), {**options, "step": "where"})
     where = run.where()
     tables = [quality_table(where.intake.findings), where_table(where.rows)]
-    return Comparison(by_name(tables), "gap where", run.meta)
+    return Comparison("gap where", by_name(tables), run.meta)
 
 
 def identify(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Identified:
@@ -160,8 +166,7 @@ def identify(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> 
     told = tell(run.given, where, run.options, Progress())
     model = machine
     if told.model_file:
-        edits = edits_in(told.model_file)
-        model = replace(machine, model=replace(run.given.file, edits=edits))
+        model = machine.with_model(replace(run.given.file, edits=edits_in(told.model_file)))
     return run.told(where, told.story, model)
 
 
@@ -198,7 +203,7 @@ def forward(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> D
     joints = run.given.model.joints
     tables = [forward_table(drives, joints), *rollout_tables(drives, joints)]
     last = [d for d in drives if d.model == drives[-1].model]
-    return Driven(by_name(tables), "gap forward", run.meta, rms(last))
+    return Driven("gap forward", by_name(tables), run.meta, rms(last))
 
 
 class _Run:
@@ -214,14 +219,17 @@ class _Run:
             tuple(map(_path, _several(logs))),
             holdout=tuple(map(_path, _several(test))),
             robot=machine.path,
-            gait=machine.gait,
-            actuators=machine.actuators,
+            gait=machine.files.gait,
+            actuators=machine.files.actuators,
             changes=machine.changes,
             **named,
         )
         check_options(self.options, machine.model)
         self.given: Setup = setup(self.options, machine.model)
-        self.meta = metadata(self.options, self.given)
+
+    def meta(self) -> dict[str, Any]:
+        """What every sidecar says of the run."""
+        return metadata(self.options, self.given)
 
     def where(self) -> Whereabouts:
         """Steps 1 and 2."""
@@ -240,7 +248,7 @@ class _Run:
         bodies = bodies_of(self.given, story.weighed.text)
         tables += bodies_tables(bodies)
         verb = f"gap {self.options.step}"
-        return Identified(by_name(tables), verb, self.meta, model, story, bodies)
+        return Identified(verb, by_name(tables), self.meta, model, story, bodies)
 
 
 def _several(logs: Any) -> list[Any]:

@@ -1,64 +1,146 @@
-"""A machine to ask: robot, actuators, and the effects that a log showed it to have."""
+"""A loaded machine: robot, actuators, and the effects that a log showed it to have."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
+from actuators.errors import closest
+from actuators.loading.build import CATALOG, load_catalog
 from pipeline.api.init import robot_file_of
-from pipeline.effects.model_file import ModelFile, read_model_file
+from pipeline.effects.model_file import Edit, EditParameter, ModelFile, new_model_file
+from pipeline.effects.registry import effect_named
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.model_writer import model_text
+from pipeline.logs.errors import EffectError
 from pipeline.robot.published import published_names
-from pipeline.robot.robot_file import DEFAULT_ROBOT
-from pipeline.simulation.ground_forces.force_choice import ForceChoice
-from pipeline.simulation.settings import PAPER_FORCES, Settings, settings
+from pipeline.simulation.edited import IDEAL
+from pipeline.simulation.settings import Files, Settings, read_files, settings
 from reports.atomic import write_text
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Machine:
-    """What `load` returns and every other function takes.
+    """What `load` returns and every other function takes; changes give a new one.
 
     Attributes:
-        path: Robot file, or the URDF of a robot on a fixed base.
-        actuators: Folder of actuator files; None for the project's catalogue.
-        changes: Numbers that differ from the files', ``KEY=VALUE`` each, as ``--set`` takes them.
-        model: Effects on top of the files; None without.
-        gait: Gait file to walk instead of the robot file's gait; None without.
+        files: What the files say.
+        changes: Numbers that differ from the files', by name.
+        loaded: Robot and actuators with the changes; None for the URDF of a robot on a fixed base,
+            with which logs are compared and nothing else done.
     """
 
-    path: Path
-    actuators: Path | None = None
-    changes: tuple[str, ...] = ()
-    model: ModelFile | None = None
-    gait: Path | None = None
+    files: Files
+    changes: Mapping[str, object] = field(default_factory=dict)
+    loaded: Settings | None = field(default=None, repr=False)
 
-    def settings(
+    @property
+    def path(self) -> Path:
+        """Robot file, or the URDF of a robot on a fixed base."""
+        return self.files.robot
+
+    @property
+    def model(self) -> ModelFile | None:
+        """Effects on top of the files; None without."""
+        return self.files.model
+
+    @property
+    def ready(self) -> Settings:
+        """Robot and actuators.
+
+        Raises:
+            RobotFileError: Of a bare URDF, which has no actuators.
+        """
+        if self.loaded is None:
+            raise RobotFileError(f"{self.path}: a URDF alone has no actuators; give a robot file")
+        return self.loaded
+
+    def walking(self, **options: Any) -> Settings:
+        """The machine ready to stand and walk; see `pipeline.simulation.settings.Settings.walking`.
+
+        Raises:
+            PipelineError: The robot stands on a fixed base, or an option is out of range.
+        """
+        if self.loaded is None or not self.loaded.robot.floating:
+            raise RobotFileError(
+                f"{self.path}: a robot on a stand neither stands nor walks; "
+                "give one with a floating base"
+            )
+        return self.loaded.walking(**options)
+
+    def with_values(self, values: Mapping[str, object]) -> Machine:
+        """The same machine with other numbers; no file is read for an actuator's or the gait's.
+
+        Args:
+            values: Name of a number to its value, in the unit its file writes: ``hip_spacing``,
+                ``harmonic_drive.load``; what ``[gait]`` states, ``gait.slope_forward``, with its
+                unit in the text (``"5 deg"``); ``standing.feet``.
+
+        Raises:
+            PipelineError: No such number, or a value that cannot be.
+        """
+        return self._of(self.files, {**self.changes, **values})
+
+    def with_actuators(self, folder: str | Path) -> Machine:
+        """The same machine with the actuators of a folder.
+
+        Raises:
+            ActuatorError: A file of the folder cannot be used.
+        """
+        path = Path(folder)
+        return self._of(replace(self.files, catalog=load_catalog(path), actuators=path))
+
+    def with_effect(
         self,
+        effect: str,
+        place: str | Sequence[str],
+        values: Mapping[str, float],
         *,
-        samples: int,
-        quasi_static: bool = False,
-        regeneration: str = "none",
-        forces: ForceChoice = PAPER_FORCES,
-        compare_forces: bool = False,
-        walks: bool = True,
-    ) -> Settings:
-        """The machine ready to stand and walk; see `pipeline.simulation.settings.settings`."""
-        return settings(
-            robot=self.path,
-            model=self.model,
-            gait=self.gait,
-            changes=self.changes,
-            samples=samples,
-            quasi_static=quasi_static,
-            regeneration=regeneration,
-            actuators=self.actuators,
-            forces=forces,
-            compare_forces=compare_forces,
-            walks=walks,
+        alternative: str | None = None,
+    ) -> Machine:
+        """The same machine with one effect more, as a model file states it.
+
+        Args:
+            effect: Of the catalogue of effects, e.g. ``coulomb_friction``.
+            place: Joint, joints, link or ground.
+            values: The effect's parameters by name, in SI units.
+            alternative: Actuator that it belongs to; by default the one of the effects that are
+                there, the robot file's, or the first that is not ideal.
+
+        Raises:
+            GapError: No such effect, parameter or place, or a value out of bounds.
+        """
+        known = {p.name: p for p in effect_named(effect).parameters}
+        for name in values:
+            if name not in known:
+                raise EffectError(f"{effect} has no parameter '{name}': {closest(name, [*known])}")
+        parameters = tuple(
+            EditParameter(name, float(values[name]), p.unit, (float(values[name]),) * 2)
+            for name, p in known.items()
+            if name in values
         )
+        places = (place,) if isinstance(place, str) else tuple(place)
+        edit = Edit(effect, places, parameters, basis="assumed", source="set by with_effect")
+        file = self.model or ModelFile(self.path, "", self._usual())
+        if alternative is not None:
+            file = replace(file, alternative=alternative)
+        return self.with_model(file.with_edits([edit]))
+
+    def _usual(self) -> str:
+        own = self.loaded.own.usual if self.loaded else ""
+        return own or next((n for n in self.files.catalog.alternatives if n != IDEAL), "")
+
+    def with_model(self, file: ModelFile) -> Machine:
+        """The same machine with these effects in place of its own."""
+        return self._of(replace(self.files, model=file, model_path=None))
+
+    def _of(self, files: Files, changes: Mapping[str, object] | None = None) -> Machine:
+        changes = self.changes if changes is None else changes
+        if files.spec is None:
+            return Machine(files, changes)
+        return Machine(files, changes, settings(files, changes, self.loaded))
 
     def save(self, path: str | Path) -> Path:
         """Write the effects as a model file, which `load` and the command line's ``--model`` read.
@@ -69,11 +151,14 @@ class Machine:
             RobotFileError: The machine has no effects.
             ReportError: The file cannot be written.
         """
-        if self.model is None:
+        file, target = self.model, Path(path)
+        if file is None:
             raise RobotFileError(f"{self.path}: the machine has no effects to write")
-        file = Path(path)
-        write_text(file, model_text(self.model, file.absolute().parent))
-        return file
+        if not file.robot_sha256:  # made by `with_effect`
+            folder = self.files.actuators or CATALOG
+            file = new_model_file(self.path, file.alternative, folder).with_edits(file.edits)
+        write_text(target, model_text(file, target.absolute().parent))
+        return target
 
 
 def load(
@@ -84,7 +169,7 @@ def load(
     gait: str | Path | None = None,
     changes: Mapping[str, object] | None = None,
 ) -> Machine:
-    """Name a machine by its files, and refuse what cannot be used.
+    """Load a machine, and refuse what cannot be used.
 
     Args:
         robot: Robot file (.toml), the URDF of a robot on a fixed base, or the name of a robot in
@@ -93,26 +178,20 @@ def load(
         model: Model file with effects that `identify` found.
         actuators: Folder of actuator files; the project's catalogue by default.
         gait: File with a table ``[gait]`` to walk instead of the robot file's.
-        changes: Name of a number to its value, in the unit its file writes: ``hip_spacing``,
-            ``harmonic_drive.load``; what ``[gait]`` states, ``gait.slope_forward`` with its unit in
-            the text; ``standing.feet``.
+        changes: Numbers that differ from the files'; see `Machine.with_values`.
 
     Raises:
         PipelineError: Robot file or URDF cannot be used; one line says where and what to do.
         ActuatorError: An actuator file cannot be used.
         GapError: The model file cannot be used.
     """
-    folder = Path(actuators) if actuators else None
-    file = None
-    if model is not None:
-        file = read_model_file(Path(model), folder)
-    path = Path(robot) if robot is not None else file.robot if file else DEFAULT_ROBOT
-    if not path.exists() and str(robot) in published_names():
+    path = Path(robot) if robot is not None else None
+    if path is not None and not path.exists() and str(robot) in published_names():
         path = robot_file_of(str(robot))
-    texts = tuple(f"{name}={value}" for name, value in (changes or {}).items())
-    machine = Machine(path, folder, texts, file, Path(gait) if gait else None)
-    if path.suffix.lower() == ".toml":
-        machine.settings(samples=51, walks=False)
-    elif not path.is_file():
-        raise RobotFileError(f"{path}: no such robot file; name a robot file or URDF")
-    return machine
+    files = read_files(
+        path,
+        model=Path(model) if model else None,
+        gait=Path(gait) if gait else None,
+        actuators=Path(actuators) if actuators else None,
+    )
+    return Machine(files)._of(files, changes or {})

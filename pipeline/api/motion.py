@@ -5,21 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from actuators.errors import CatalogError, closest
 from pipeline.api.machine import Machine
-from pipeline.api.result import Result, by_name
-from pipeline.api.tables import (
-    IDEAL,
-    metadata,
-    table_of_parameters,
-    tables_of_standing,
-    tables_of_walking,
-    walked,
-)
+from pipeline.api.result import Result
+from pipeline.api.tables import metadata, tables_of_standing, tables_of_walking, walked
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
-from pipeline.errors import RobotFileError
 from pipeline.machine.drivetrains import Actuators
 from pipeline.simulation import walk_stand
+from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from reports.table import Table
@@ -100,11 +92,10 @@ def stand(
         ActuatorError: No such alternative.
     """
     choice = _choice(forces, actuator, friction_coefficient)
-    given = _legged(machine, machine.settings(samples=SAMPLES, forces=choice, walks=False))
-    chains = _chains(given, actuator)
+    given = machine.walking(forces=choice, walks=False)
+    chains = _beside_ideal(given, actuator)
     result = walk_stand.stand(given.machine, chains, adjust=given.adjust, forces=given.ground)
-    tables = [*tables_of_standing(given, result), table_of_parameters(given)]
-    return Stand(by_name(tables), "stand", metadata(given), result)
+    return Stand("stand", tables_of_standing(given, result), lambda: metadata(given), result)
 
 
 def walk(
@@ -138,18 +129,15 @@ def walk(
         PipelineError: The robot stands on a fixed base, or an argument is out of range.
         ActuatorError: No such alternative.
     """
-    made = machine.settings(
+    given = machine.walking(
         samples=samples,
         quasi_static=quasi_static,
         regeneration=regeneration,
         forces=_choice(forces, actuator, friction_coefficient),
         compare_forces=compare_forces,
     )
-    given = _legged(machine, made)
-    chains = _chains(given, actuator)
-    result = walked(given, chains)
-    tables = [*tables_of_walking(given, result), table_of_parameters(given)]
-    return Walk(by_name(tables), "walk", metadata(given), result)
+    result = walked(given, _beside_ideal(given, actuator))
+    return Walk("walk", tables_of_walking(given, result), lambda: metadata(given), result)
 
 
 def _choice(rule: str, actuator: str | None, friction_coefficient: float | None) -> ForceChoice:
@@ -157,19 +145,8 @@ def _choice(rule: str, actuator: str | None, friction_coefficient: float | None)
     return ForceChoice(rule, own, friction_coefficient)
 
 
-def _legged(machine: Machine, given: Settings) -> Settings:
-    if not given.robot.floating:
-        raise RobotFileError(
-            f"{machine.path}: a robot on a stand neither stands nor walks; "
-            "give one with a floating base"
-        )
-    return given
-
-
-def _chains(given: Settings, actuator: str | None) -> Mapping[str, Actuators]:
-    chains = given.chains()
+def _beside_ideal(given: Settings, actuator: str | None) -> Mapping[str, Actuators]:
     if actuator is None:
-        return chains
-    if actuator not in chains:
-        raise CatalogError(f"no alternative '{actuator}'; {closest(actuator, list(chains))}")
-    return {name: chain for name, chain in chains.items() if name in (IDEAL, actuator)}
+        return given.chains()
+    given.chain(actuator)  # refuses one that there is not
+    return given.chains(*(n for n in given.catalog.alternatives if n in (IDEAL, actuator)))

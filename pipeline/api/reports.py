@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.api.machine import Machine
+from pipeline.api.result import Computed
 from pipeline.api.tables import (
     inputs_of,
     metadata,
-    table_of_parameters,
     tables_of_standing,
     tables_of_walking,
     walked,
 )
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
-from pipeline.errors import RobotFileError
 from pipeline.progress import Progress
 from pipeline.simulation.ground_forces.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
@@ -72,7 +71,7 @@ def reports(
         PipelineError: Unusable input.
         ReportError: The folder cannot be written.
     """
-    given = machine.settings(
+    given = machine.walking(
         samples=samples,
         quasi_static=quasi_static,
         regeneration=regeneration,
@@ -80,14 +79,6 @@ def reports(
         compare_forces=compare_forces,
     )
     return write(given, "reports", Path(folder), decimal)
-
-
-def _refuse_stand(given: Settings) -> None:
-    if not given.robot.floating:
-        raise RobotFileError(
-            f"{given.robot.spec.path}: a robot on a stand neither stands nor walks; "
-            "give one with a floating base"
-        )
 
 
 def write(
@@ -113,38 +104,41 @@ def write(
         PipelineError: Unusable input.
         ReportError: The folder cannot be written.
     """
-    _refuse_stand(given)
     progress = progress or Progress()
     said: list[str] = []
-    tables: list[Table] = []
-    standing = walking = None
-    if verb in ("stand", "reports"):
+    named: Computed = {}
+    standing = walking = judged = None
+    if verb != "walk":
         progress.step("standing")
         logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
         standing = stand(given.machine, given.chains(), adjust=given.adjust, forces=given.ground)
-        tables += tables_of_standing(given, standing)
-    if verb in ("walk", "reports"):
+        named |= tables_of_standing(given, standing)
+    if verb != "stand":
         progress.step("walking")
         logger.info("walking one cycle, %d samples per segment", given.samples)
         walking = walked(given, given.chains())
         progress.step("tables of walking")
-        tables += tables_of_walking(given, walking)
-    tables.append(table_of_parameters(given))
-    judgement = None
+        named |= tables_of_walking(given, walking)
+    tables = [table() for table in named.values()]
     if verb == "reports":
         progress.step("comparing with the paper")
-        judgement, more = _held_against_the_paper(given, said)
+        judged, more = _held_against_the_paper(given, said)
         tables += more
     progress.step("writing tables")
+    meta = metadata(given)
     with staged(folder, verb, inputs=inputs_of(given)) as out:
         for table in tables:
-            write_table(table, out, meta=metadata(given), decimal=decimal)
+            write_table(table, out, meta=meta, decimal=decimal)
         files = len(tables)
         if standing is not None and walking is not None:
-            files += _pictures(given, (standing, walking), judgement, tables, out, said, progress)
+            progress.step("drawing figures")
+            files += _pictures(given, (standing, walking), judged, tables, out, said, progress)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
-    remarks = given.effects.remarks if given.effects else ()
-    return (*_first_lines(given, tables, judgement), *said, *given.remarks, *remarks)
+    return (*_first_lines(given, tables, judged), *said, *_remarks(given))
+
+
+def _remarks(given: Settings) -> tuple[str, ...]:
+    return (*given.remarks, *(given.effects.remarks if given.effects else ()))
 
 
 def _first_lines(
@@ -159,22 +153,22 @@ def _first_lines(
 
 def _held_against_the_paper(given: Settings, said: list[str]) -> tuple[Judged | None, list[Table]]:
     """The judgement of the paper's robot, of no other; what there is to say is added to `said`."""
-    from pipeline.api import judgement as judging
+    from pipeline.api.judgement import judged
     from pipeline.api.pictures.scene import Scenery
     from pipeline.paper.judgement.basis import basis
 
-    judged: Judged | None = None
+    result: Judged | None = None
     tables: list[Table] = []
     by = basis(given)
     if isinstance(by, str):
         said.append(f"not held against the paper: {by}")
     elif by is not None:
         logger.info("holding the run against the paper")
-        judged, tables = judging.judged(given, by)
+        result, tables = judged(given, by)
         said += [by.word] if by.word else []
     remark = Scenery(given.robot).shapes.remark
     said += [remark] if remark else []
-    return judged, tables
+    return result, tables
 
 
 def _pictures(
@@ -187,13 +181,13 @@ def _pictures(
     progress: Progress,
 ) -> int:
     """Figures and pages; how many files."""
-    from pipeline.api import judgement as judging
-    from pipeline.api.figures import write_figures
+    from pipeline.api.figures import write_fig_21, write_figures
     from reports.pages.robot_page import write_robot_page
+    from reports.pages.summary import write_summary
 
-    progress.step("drawing figures")
     files = write_figures(given, *results, out, paper=judged is not None, done=progress.done)
-    if judged is not None:
-        return files + judging.pages(given, judged, tables, out)
-    remarks = given.effects.remarks if given.effects else ()
-    return files + write_robot_page(given, tables, out, [*said, *given.remarks, *remarks])
+    if judged is None:
+        return files + write_robot_page(given, tables, out, [*said, *_remarks(given)])
+    titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
+    files += write_fig_21(judged.judgement, titles, out)
+    return files + write_summary(given, judged, tables, out)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -13,23 +14,24 @@ from reports.folder.staging import staged
 from reports.table import Table
 from reports.writer import write_table
 
+#: Tables by file name, computed when they are asked for.
+Computed = dict[str, Callable[[], Table]]
+
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Tables by name; each is an attribute, too, and has `.frame()`.
+    """Tables by name; some are attributes, too. A table has `.frame()`.
 
     Attributes:
-        tables: As the command line writes them, by file name.
         verb: Of the command line that writes the same.
-        meta: What every sidecar says of the run.
     """
 
-    tables: Mapping[str, Table]
     verb: str
-    meta: Mapping[str, Any] = field(repr=False)
+    _tables: Mapping[str, Table | Callable[[], Table]] = field(repr=False)
+    _meta: Callable[[], dict[str, Any]] = field(repr=False)
 
     def table(self, name: str) -> Table:
-        """One table.
+        """One table, computed when it is first asked for.
 
         Args:
             name: As the file is called, e.g. ``walking_energy``.
@@ -37,9 +39,26 @@ class Result:
         Raises:
             TableError: There is none; the message offers the closest.
         """
-        if name not in self.tables:
-            raise TableError(f"no table '{name}'; {closest(name, list(self.tables))}")
-        return self.tables[name]
+        if name not in self._tables:
+            raise TableError(f"no table '{name}'; {closest(name, list(self._tables))}")
+        if name not in self._computed:
+            made = self._tables[name]
+            self._computed[name] = made if isinstance(made, Table) else made()
+        return self._computed[name]
+
+    @cached_property
+    def _computed(self) -> dict[str, Table]:
+        return {}
+
+    @property
+    def tables(self) -> dict[str, Table]:
+        """All of them, as the command line writes them."""
+        return {name: self.table(name) for name in self._tables}
+
+    @cached_property
+    def meta(self) -> dict[str, Any]:
+        """What every sidecar says of the run: inputs by hash, versions, options."""
+        return self._meta()
 
     def save(self, folder: str | Path, *, decimal: str = ".") -> Path:
         """Write every table as CSV with its sidecar; a run that the folder held is replaced.
@@ -57,7 +76,7 @@ class Result:
 
     def _write(self, out: Path, decimal: str) -> None:
         for table in self.tables.values():
-            write_table(table, out, meta=dict(self.meta), decimal=decimal)
+            write_table(table, out, meta=self.meta, decimal=decimal)
 
 
 def by_name(tables: Sequence[Table]) -> dict[str, Table]:

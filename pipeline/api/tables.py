@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -13,10 +14,11 @@ from tqdm import tqdm
 
 from actuators.energy.limits import limit_rows, standing_rows
 from actuators.loading.build import CATALOG
+from pipeline.api.result import Computed
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.inverse.foot_tracking import foot_tracking
-from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.ground_forces.force_choice import RULES
 from pipeline.simulation.settings import PAPER_FORCES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, compare_rules, walk
@@ -28,37 +30,37 @@ from reports.tables import walking as walking_tables
 from reports.tables.gait import walking_base, walking_gait
 from reports.tables.walking import HELD
 
-IDEAL = "ideal"
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
-def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
+def tables_of_standing(given: Settings, standing: Standing) -> Computed:
+    """The tables of standing still, by name."""
+    demand, holding = standing.demand, standing.holding
+    return {
+        "standing_limits": lambda: _standing_limits(given, standing),
+        "standing": lambda: standing_tables.standing(demand, holding),
+        "standing_energy": lambda: standing_tables.standing_energy(demand, holding, _legs(given)),
+        "standing_posture": lambda: standing_tables.standing_posture(demand),
+        "standing_contacts": lambda: standing_tables.standing_contacts(standing.contacts),
+        "parameters": lambda: _parameters(given),
+    }
+
+
+def _legs(given: Settings) -> dict[str, tuple[str, ...]]:
     """Each leg's joints, and those outside the legs together."""
+    spec = given.robot.spec
     legs = {leg.name: leg.joints for leg in spec.legs}
     held = tuple(joint for joint, _ in spec.held)
     return legs | {HELD: held} if held else legs
 
 
-def tables_of_standing(given: Settings, standing: Standing) -> list[Table]:
-    """The tables of standing still."""
-    return [
-        _standing_limits(given, standing),
-        standing_tables.standing(standing.demand, standing.holding),
-        standing_tables.standing_energy(
-            standing.demand, standing.holding, leg_joints(given.robot.spec)
-        ),
-        standing_tables.standing_posture(standing.demand),
-        standing_tables.standing_contacts(standing.contacts),
-    ]
-
-
 def _standing_limits(given: Settings, standing: Standing) -> Table:
     joints = standing.demand.joints
     rows = {}
-    for name, chain in given.chains().items():
-        motors = [joint.chain.motor for joint in drivetrains_of(chain, joints).joints]
-        if name in standing.holding:
-            rows[name] = standing_rows(standing.holding[name], joints, motors)
+    for name, holding in standing.holding.items():
+        drivetrains = drivetrains_of(given.chain(name), joints)
+        motors = [joint.chain.motor for joint in drivetrains.joints]
+        rows[name] = standing_rows(holding, joints, motors)
     return walking_tables.motor_limits(rows, "standing_limits")
 
 
@@ -83,71 +85,80 @@ def walked(
     )
 
 
-def tables_of_walking(given: Settings, walking: Walking) -> list[Table]:
-    """The tables of one walking cycle."""
-    legs = leg_joints(given.robot.spec)
-    chains = given.chains()
-    p, gait = given.robot.spec.parameters, gait_of(given.robot.spec)
-    tables = [
-        walking_tables.walking_joint_demand(walking.demand, given.robot.sliding_joints),
-        walking_tables.walking_contact_forces(walking.demand),
-        walking_gait(gait),
-        walking_base(walking.motion),
-        walking_tables.walking_stability(walking.demand, walking.margins),
-        *_foot_tracking(given, walking),
-        walking_tables.walking_stage_energy(
-            walking.results, {n: a.stage_names for n, a in given.catalog.alternatives.items()}
-        ),
-        walking_tables.walking_losses(walking.results, walking.supplies),
-        walking_tables.walking_energy(walking.supplies, legs, IDEAL),
-        walking_tables.robot_energy(
-            walking.demand,
-            walking.supplies,
-            legs,
-            given.machine.mass * p["gravity"],  # the mass that the forces rest on
-            gait.speed,
-        ),
-        walking_tables.motor_limits({n: limit_rows(r) for n, r in walking.results.items()}),
-    ]
-    if not given.quasi_static:
-        static = walked(given, chains, quasi_static=True)
-        tables += walking_tables.quasi_static_difference(
-            walking.demand, static.demand, walking.supplies, static.supplies, legs
+def tables_of_walking(given: Settings, walking: Walking) -> Computed:
+    """The tables of one walking cycle, by name."""
+    demand, supplies, results = walking.demand, walking.supplies, walking.results
+    spec, legs = given.robot.spec, _legs(given)
+    gait = gait_of(spec)
+    stages = {name: a.stage_names for name, a in given.catalog.alternatives.items()}
+    weight = given.machine.mass * spec.parameters["gravity"]  # that the forces rest on [N]
+
+    @cache
+    def static() -> tuple[Table, Table]:
+        other = walked(given, given.chains(*results), quasi_static=True)
+        return walking_tables.quasi_static_difference(
+            demand, other.demand, supplies, other.supplies, legs
         )
-    if given.compare_forces:
-        tables.append(_force_rules(given, walking, chains))
-    return tables
+
+    tables: Computed = {
+        "walking_joint_demand": lambda: walking_tables.walking_joint_demand(
+            demand, given.robot.sliding_joints
+        ),
+        "walking_contact_forces": lambda: walking_tables.walking_contact_forces(demand),
+        "walking_gait": lambda: walking_gait(gait),
+        "walking_base": lambda: walking_base(walking.motion),
+        "walking_stability": lambda: walking_tables.walking_stability(demand, walking.margins),
+        "foot_tracking": lambda: _foot_tracking(given, walking),
+        "walking_stage_energy": lambda: walking_tables.walking_stage_energy(results, stages),
+        "walking_losses": lambda: walking_tables.walking_losses(results, supplies),
+        "walking_energy": lambda: walking_tables.walking_energy(supplies, legs, IDEAL),
+        "robot_energy": lambda: walking_tables.robot_energy(
+            demand, supplies, legs, weight, gait.speed
+        ),
+        "motor_limits": lambda: walking_tables.motor_limits(
+            {name: limit_rows(result) for name, result in results.items()}
+        ),
+        "quasi_static_torque": lambda: static()[0],
+        "quasi_static_energy": lambda: static()[1],
+        "walking_force_rules": lambda: _force_rules(given, walking),
+        "parameters": lambda: _parameters(given),
+    }
+    absent = {
+        "foot_tracking": all(part.foot_target is None for part in walking.motion.segments),
+        "quasi_static_torque": given.quasi_static,
+        "quasi_static_energy": given.quasi_static,
+        "walking_force_rules": not given.compare_forces,
+    }
+    return {name: table for name, table in tables.items() if not absent.get(name)}
 
 
-def _foot_tracking(given: Settings, walking: Walking) -> list[Table]:
+def _foot_tracking(given: Settings, walking: Walking) -> Table:
     """How well the legs follow, where the motion says where the feet should be."""
     pieces = [
         (segment.time, given.robot.leg_positions(segment.configuration), segment.foot_target)
         for segment in walking.motion.segments
         if segment.foot_target is not None
     ]
-    if not pieces:
-        return []
-    return [kinematics_tables.foot_tracking(foot_tracking(given.robot.chains, pieces))]
+    return kinematics_tables.foot_tracking(foot_tracking(given.robot.chains, pieces))
 
 
-def _force_rules(given: Settings, walking: Walking, chains: Mapping[str, Actuators]) -> Table:
+def _force_rules(given: Settings, walking: Walking) -> Table:
     """What each rule of the ground's forces costs."""
     costs = compare_rules(
         given.machine,
-        chains,
+        given.chains(*walking.results),
         walking.motion,
         quasi_static=given.quasi_static,
         regeneration=given.regeneration,
         adjust=given.adjust,
         friction_coefficient=given.forces.friction_coefficient,
     )
-    count = len(chains) * len(RULES)
+    count = len(walking.results) * len(RULES)
     shown = tqdm(costs, "rules", count, leave=False, disable=not sys.stderr.isatty())
     return walking_tables.force_rules(list(shown), given.forces.friction_coefficient)
 
 
-def table_of_parameters(given: Settings) -> Table:
+def _parameters(given: Settings) -> Table:
     """Every number that went in."""
     groups = [(given.robot.spec.name, given.robot.spec.parameters.rows())]
     groups += [(c.name, c.parameters.rows()) for c in given.catalog.components.values()]
@@ -159,8 +170,8 @@ def inputs_of(given: Settings) -> list[Path]:
     """Every file that was read."""
     spec = given.robot.spec
     files = [*spec.sources, *([] if spec.build else [spec.urdf])]
-    files += sorted((given.actuators or Path(CATALOG)).glob("*.toml"))
-    return [*files, *(path for path in (given.gait, given.model) if path)]
+    files += sorted((given.files.actuators or CATALOG).glob("*.toml"))
+    return [*files, *(path for path in (given.files.gait, given.files.model_path) if path)]
 
 
 def metadata(given: Settings) -> dict[str, Any]:
@@ -172,7 +183,7 @@ def metadata(given: Settings) -> dict[str, Any]:
         "urdf_sha256": hashlib.sha256(given.robot.urdf.encode()).hexdigest(),
         "versions": {name: version(name) for name in PACKAGES},
         "options": {
-            "set": list(given.changes),
+            "set": [f"{key}={value}" for key, value in given.changes.items()],
             "samples_per_segment": given.samples,
             "quasi_static": given.quasi_static,
             "regeneration": given.regeneration.policy,

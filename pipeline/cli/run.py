@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 
+from pipeline.api.machine import load
 from pipeline.api.reports import write
 from pipeline.cli.decimal_option import decimal_of
-from pipeline.cli.walk_options import force_choice
+from pipeline.cli.walk_options import changes_of, force_choice
 from pipeline.progress import Progress
-from pipeline.simulation.settings import Settings, settings
+from pipeline.simulation.settings import Settings
 
 
 def run(options: argparse.Namespace, progress: Progress) -> int:
@@ -29,15 +30,17 @@ def run(options: argparse.Namespace, progress: Progress) -> int:
 
 def settings_of(options: argparse.Namespace) -> Settings:
     """What the command line asks for, loaded."""
-    return settings(
-        robot=options.robot,
+    machine = load(
+        options.robot,
         model=options.model,
         gait=options.gait,
-        changes=options.set,
+        actuators=options.actuators,
+        changes=changes_of(options.set),
+    )
+    return machine.walking(
         samples=options.samples,
         quasi_static=options.quasi_static,
         regeneration=options.regeneration,
-        actuators=options.actuators,
         forces=force_choice(options),
         compare_forces=options.compare_forces,
         walks=options.verb != "stand",

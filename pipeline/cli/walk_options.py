@@ -3,12 +3,30 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from actuators.errors import one_line
 from pipeline.cli.named_path import named_path
+from pipeline.errors import RobotFileError
 
 if TYPE_CHECKING:
     from pipeline.simulation.ground_forces.force_choice import ForceChoice
+
+
+def changes_of(texts: Iterable[str]) -> dict[str, str]:
+    """Keys and values of ``--set KEY=VALUE``; the last counts where a key comes twice.
+
+    Raises:
+        RobotFileError: One is something else.
+    """
+    changes = {}
+    for text in texts:
+        key, _, value = (part.strip() for part in text.partition("="))
+        if not key or not value:
+            raise RobotFileError(f"--set {one_line(text)}: expected KEY=VALUE")
+        changes[key] = value
+    return changes
 
 
 def add_machine_options(sub: argparse.ArgumentParser) -> None:

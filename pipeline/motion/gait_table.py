@@ -324,26 +324,27 @@ def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
     return spec.with_gait(**table)
 
 
-def changed_table(table: Mapping[str, Any], key: str, value: str) -> dict[str, Any]:
+def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str, Any]:
     """The table with one key changed as ``--set gait.KEY=VALUE`` writes it.
 
     Args:
         table: Before.
         key: Without ``gait.``; ``KEY.LEG`` for one leg of a number by leg.
-        value: As written; a bare number is a share, lists and tables are as in TOML.
+        value: As TOML gives it, or as written there; a bare number is a share.
 
     Raises:
         GaitError: A list or table that TOML does not read.
     """
     first, _, leg = key.partition(".")
     new: Any = value
-    with contextlib.suppress(ValueError):
-        new = float(value)
-    if value.startswith(("[", "{")):
-        try:
-            new = parsed(f"value = {value}")["value"]
-        except UnreadableTextError as error:
-            raise GaitError(f"gait.{key}: {error}") from None
+    if isinstance(value, str):
+        with contextlib.suppress(ValueError):
+            new = float(value)
+        if value.startswith(("[", "{")):
+            try:
+                new = parsed(f"value = {value}")["value"]
+            except UnreadableTextError as error:
+                raise GaitError(f"gait.{key}: {error}") from None
     if not leg:
         return merged_gait(table, {first: new})
     known = table.get(first)

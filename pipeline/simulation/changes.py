@@ -1,9 +1,9 @@
-"""Numbers that differ from the files' for one run, ``KEY=VALUE`` each, as ``--set`` takes them."""
+"""Numbers that differ from the files' for one run, by the keys that ``--set`` takes."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import overload
 
@@ -30,21 +30,21 @@ _THOUSAND = (200.0, 5000.0)
 
 @overload
 def changed(
-    spec: RobotSpec, catalog: Catalog, changes: Sequence[str]
+    spec: RobotSpec, catalog: Catalog, changes: Mapping[str, object]
 ) -> tuple[RobotSpec, Catalog, list[str]]: ...
 @overload
 def changed(
-    spec: None, catalog: Catalog, changes: Sequence[str]
+    spec: None, catalog: Catalog, changes: Mapping[str, object]
 ) -> tuple[None, Catalog, list[str]]: ...
 def changed(
-    spec: RobotSpec | None, catalog: Catalog, changes: Sequence[str]
+    spec: RobotSpec | None, catalog: Catalog, changes: Mapping[str, object]
 ) -> tuple[RobotSpec | None, Catalog, list[str]]:
     """Robot and actuators with changed numbers.
 
     Args:
         spec: Robot file; None for a bare URDF, which has no numbers of its own.
         catalog: Actuator components and alternatives.
-        changes: ``KEY=VALUE`` each, in the unit that the key's file writes.
+        changes: Key to value, in the unit that the key's file writes; a number or its text.
 
     Returns:
         Both, and what a reader should know of the changes.
@@ -53,10 +53,7 @@ def changed(
         RobotFileError: No such number, or none that can be; names it and the closest match.
     """
     remarks = []
-    for change in changes:
-        key, equals, value = (part.strip() for part in change.partition("="))
-        if not equals or not key or not value:
-            raise RobotFileError(f"--set {one_line(change)}: expected KEY=VALUE")
+    for key, value in changes.items():
         before = spec
         spec, catalog = _one(spec, catalog, key, value)
         if before is not None and spec is not None:
@@ -69,7 +66,7 @@ def changed(
 
 
 def _one(
-    spec: RobotSpec | None, catalog: Catalog, key: str, value: str
+    spec: RobotSpec | None, catalog: Catalog, key: str, value: object
 ) -> tuple[RobotSpec | None, Catalog]:
     """One change; numbers in the unit their file writes."""
     place = f"--set {one_line(key)}={one_line(value)}"
@@ -77,7 +74,9 @@ def _one(
         return _other_gait(spec, key.removeprefix(GAIT), value, place), catalog
     if spec is not None and key == STANDING_FEET:
         names = [leg.name for leg in spec.legs]
-        feet = names if value == "all" else [name.strip(" []\"'") for name in value.split(",")]
+        feet = names if value == "all" else value
+        if isinstance(feet, str):
+            feet = [name.strip(" []\"'") for name in feet.split(",")]
         try:
             return replace(spec, standing_feet=leg_list(feet, names, place)), catalog
         except RobotFileError as error:
@@ -103,9 +102,8 @@ def _one(
         raise RobotFileError(f"{place}: {error}") from None
 
 
-def _refuse_unused(spec: RobotSpec, changes: Sequence[str]) -> None:
+def _refuse_unused(spec: RobotSpec, keys: Iterable[str]) -> None:
     """Raise where a changed number of the gait changes nothing, since ``[gait]`` has its own."""
-    keys = [change.partition("=")[0].strip() for change in changes]
     for key in (key for key in keys if key in GAIT_NUMBERS):
         try:
             other = spec.with_parameters({key: 1.01 * spec.parameters[key]})
@@ -125,7 +123,7 @@ def _walked(spec: RobotSpec) -> tuple[bytes, ...]:
     return tuple(np.asarray(x).tobytes() for x in (gait.period, gait.twist, gait.stride, gait.lift))
 
 
-def _other_gait(spec: RobotSpec, key: str, value: str, place: str) -> RobotSpec:
+def _other_gait(spec: RobotSpec, key: str, value: object, place: str) -> RobotSpec:
     """The robot with one key of ``[gait]`` changed, its number with the unit in the text."""
     try:
         new = replace(spec, gait=changed_table(spec.gait, key, value))
@@ -156,11 +154,11 @@ def _hint(key: str, known: list[str]) -> str:
     return hint if hint.startswith("did") else "parameters.csv of any run lists all names"
 
 
-def _number(place: str, text: str, unit: str) -> float:
-    """A finite number in Python's and TOML's writing."""
+def _number(place: str, value: object, unit: str) -> float:
+    """A finite number, or its text in Python's and TOML's writing."""
     try:
-        number = float(text)
-    except ValueError:
+        number = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
         bare = "" if unit == "1" else f" in {unit}, without the unit"
         raise RobotFileError(f"{place}: expected a number{bare}") from None
     if not math.isfinite(number):

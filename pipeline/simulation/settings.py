@@ -1,9 +1,10 @@
-"""From files and changed numbers to a robot and its actuators."""
+"""A robot and its actuators as files and changed numbers state them, and how the robot walks."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from actuators.errors import CatalogError
@@ -34,45 +35,160 @@ PAPER_FORCES = ForceChoice()
 
 
 @dataclass(frozen=True)
-class Settings:
-    """What a run computes with.
+class Files:
+    """What a machine's files say, before numbers are changed.
 
     Attributes:
-        robot: Loaded and checked.
+        robot: Robot file, or the URDF of a robot on a fixed base.
+        spec: The robot file's contents; None for a URDF.
         catalog: Actuator components and alternatives.
-        regeneration: Policy.
-        samples: Per half period of the gait.
-        quasi_static: Whether the links' inertial terms are left out.
-        changes: What ``--set`` changed, as written.
-        remarks: What a reader of the numbers should know of the robot and the changes.
         actuators: Folder of the user's own actuator files; None for the project's catalogue.
+        gait: The gait file; None without one.
+        model: Effects of the model file; None without one.
+        model_path: The model file; None without one.
+    """
+
+    robot: Path
+    spec: RobotSpec | None = field(repr=False)
+    catalog: Catalog = field(repr=False)
+    actuators: Path | None = None
+    gait: Path | None = None
+    model: ModelFile | None = None
+    model_path: Path | None = None
+
+
+def read_files(
+    robot: Path | None = None,
+    *,
+    model: Path | None = None,
+    gait: Path | None = None,
+    actuators: Path | None = None,
+) -> Files:
+    """Read what names a machine.
+
+    Args:
+        robot: Robot file or URDF; the model file's or the project's hexapod by default.
+        model: Model file with effects.
+        gait: File with a table ``[gait]`` to walk instead of the robot file's.
+        actuators: Folder of actuator files; the robot file's or the project's by default.
+
+    Raises:
+        PipelineError: The robot file or the gait file cannot be used.
+        ActuatorError: A catalogue file cannot be used.
+        GapError: The model file cannot be used.
+    """
+    file = read_model_file(model, actuators) if model else None
+    path = robot or (file.robot if file else DEFAULT_ROBOT)
+    spec = None
+    if path.suffix.lower() != ".urdf":
+        spec = spec_with_gait(path, gait)
+        actuators = actuators or actuator_folder(spec)
+    elif not path.is_file():
+        raise RobotFileError(f"{path}: no such robot file; name a robot file or URDF")
+    return Files(path, spec, load_catalog(actuators or CATALOG), actuators, gait, file, model)
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """A loaded machine, and how it stands and walks.
+
+    Attributes:
+        files: What the files say.
+        changes: Numbers that differ from the files', by the keys of ``--set``.
+        bare: The robot without the payload of its gait.
+        robot: Loaded and checked, with the payload.
+        catalog: Actuator components and alternatives.
         own: What single joints have of their own.
         effects: Of the model file; None without one.
-        model: The model file; None without one.
-        gait: The gait file; None without one.
+        notes: What a reader of the numbers should know of the changes.
+        warnings: The same of the robot's bodies.
+        samples: Per half period of the gait.
+        quasi_static: Whether the links' inertial terms are left out.
+        regeneration: What becomes of returned energy.
         forces: How the ground's forces are chosen.
         compare_forces: Whether the rules for them are to be compared.
     """
 
+    files: Files
+    changes: Mapping[str, object]
+    bare: Robot
     robot: Robot
     catalog: Catalog
-    regeneration: Regeneration
-    samples: int
-    quasi_static: bool
-    changes: tuple[str, ...]
-    remarks: tuple[str, ...] = ()
-    actuators: Path | None = None
-    own: OwnActuators = field(default_factory=OwnActuators)
+    own: OwnActuators
     effects: Effects | None = None
-    model: Path | None = None
-    gait: Path | None = None
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    samples: int = SAMPLES
+    quasi_static: bool = False
+    regeneration: Regeneration = field(default_factory=Regeneration)
     forces: ForceChoice = PAPER_FORCES
     compare_forces: bool = False
 
-    def chains(self) -> Mapping[str, Actuators]:
-        """Every alternative, with the model file's effects in it."""
-        chains = self.own.every(self.catalog)
-        return chains if self.effects is None else self.effects.chains(chains)
+    def walking(
+        self,
+        *,
+        samples: int = SAMPLES,
+        quasi_static: bool = False,
+        regeneration: str = "none",
+        forces: ForceChoice = PAPER_FORCES,
+        compare_forces: bool = False,
+        walks: bool = True,
+    ) -> Settings:
+        """The same machine, to walk in this way; defaults are the command line's.
+
+        Args:
+            samples: Per half period of the gait.
+            quasi_static: Whether the links' inertial terms are left out.
+            regeneration: ``none``, ``bus`` or a fraction of returned energy that is used again.
+            forces: Rule and friction of the ground's forces.
+            compare_forces: Whether what the rules cost is to be compared.
+            walks: Whether a gait cycle will be computed, which must fit into memory.
+
+        Raises:
+            GaitError: Too few samples or too many, or forces that cannot be.
+            RobotFileError: No such regeneration.
+        """
+        if samples < LEAST_SAMPLES:
+            raise GaitError(
+                f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
+                "for energies within 1 %"
+            )
+        if walks:
+            refuse_beyond_memory(samples, len(self.robot.joints), len(self.catalog.alternatives))
+        spec = self.robot.spec
+        friction = gait_table(spec).friction_coefficient if spec.floating else None
+        return replace(
+            self,
+            samples=samples,
+            quasi_static=quasi_static,
+            regeneration=regeneration_of(regeneration),
+            forces=forces.on(friction).checked(self.catalog.alternatives),
+            compare_forces=compare_forces,
+        )
+
+    @cached_property
+    def _chains(self) -> dict[str, Actuators]:
+        return {}
+
+    def chain(self, alternative: str) -> Actuators:
+        """An alternative with the model file's effects in it, built when it is first asked for.
+
+        Raises:
+            CatalogError: No such alternative.
+        """
+        if alternative not in self._chains:
+            chain = self.own.actuators(self.catalog, alternative)
+            self._chains[alternative] = self.effects.chain(chain) if self.effects else chain
+        return self._chains[alternative]
+
+    def chains(self, *names: str) -> Mapping[str, Actuators]:
+        """Alternatives by name, all by default; see `chain`."""
+        return {name: self.chain(name) for name in names or self.catalog.alternatives}
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What a reader of the numbers should know of the changes and the robot."""
+        return (*self.notes, *self.warnings)
 
     @property
     def machine(self) -> Robot:
@@ -88,7 +204,7 @@ class Settings:
             self.own.every(self.catalog),
             self.robot.joints,
             self.machine.mass,
-            stated=self.actuators is not None,
+            stated=self.files.actuators is not None,
         )
 
     @property
@@ -103,106 +219,69 @@ class Settings:
 
 
 def settings(
-    *,
-    robot: Path | None = None,
-    model: Path | ModelFile | None = None,
-    gait: Path | None = None,
-    changes: Sequence[str] = (),
-    samples: int = SAMPLES,
-    quasi_static: bool = False,
-    regeneration: str = "none",
-    actuators: Path | None = None,
-    forces: ForceChoice = PAPER_FORCES,
-    compare_forces: bool = False,
-    walks: bool = True,
+    files: Files, changes: Mapping[str, object] | None = None, before: Settings | None = None
 ) -> Settings:
-    """Load robot, actuators and effects, and apply changes; defaults are the command line's.
+    """Apply changed numbers to what the files say, and build robot, actuators and effects.
 
     Args:
-        robot: Robot file; the model file's or the hexapod by default.
-        model: Model file with effects that `gap` found, or what it holds.
-        gait: File with a table ``[gait]`` to walk instead of the robot file's.
-        changes: ``KEY=VALUE`` each, as ``--set`` takes them.
-        samples: Per half period of the gait.
-        quasi_static: Whether the links' inertial terms are left out.
-        regeneration: ``none``, ``bus`` or a fraction of returned energy that is used again.
-        actuators: Folder of actuator files; the project's catalogue by default.
-        forces: Rule and friction of the ground's forces.
-        compare_forces: Whether what the rules cost is to be compared.
-        walks: Whether a gait cycle will be computed, which must fit into memory.
+        files: From `read_files`, of a robot file.
+        changes: Key to value, in the unit that the key's file writes.
+        before: Made of the same robot: what of it stays is not built again.
 
     Raises:
-        PipelineError: The robot file or a change cannot be used.
-        ActuatorError: A catalogue file or a changed parameter cannot be used.
-        GapError: The model file cannot be used, or its effects do not fit the robot.
+        PipelineError: A robot that cannot be, or a change that cannot be used.
+        ActuatorError: A changed parameter cannot be used.
+        GapError: Effects do not fit the robot.
     """
-    _refuse_few(samples)
-    path = model if isinstance(model, Path) else None
-    file = read_model_file(model, actuators) if isinstance(model, Path) else model
-    spec = spec_with_gait(robot or (file.robot if file else DEFAULT_ROBOT), gait)
-    actuators = actuators or actuator_folder(spec)
-    spec, catalog, remarks = changed(spec, load_catalog(actuators or CATALOG), changes)
-    catalog = (own := own_actuators(spec, catalog)).catalog(catalog)
-    loaded, warnings = _loaded(spec)
-    if walks:
-        refuse_beyond_memory(samples, len(loaded.joints), len(catalog.alternatives))
+    assert files.spec is not None
+    changes = changes or {}
+    spec, catalog, notes = changed(files.spec, files.catalog, changes)
+    own = own_actuators(spec, catalog)
+    catalog = own.catalog(catalog)
+    bare, warnings = _bare(spec, before)
+    robot = before.robot if before and bare is before.bare else with_payload(bare)
+    effects = _effects(files, robot, catalog, own) if files.model else None
     return Settings(
-        robot=loaded,
-        catalog=catalog,
-        regeneration=_regeneration(regeneration),
-        samples=samples,
-        quasi_static=quasi_static,
-        changes=tuple(changes),
-        remarks=(*remarks, *warnings),
-        actuators=actuators,
-        own=own,
-        effects=_effects(file, path or Path("model.toml"), loaded, catalog, own) if file else None,
-        model=path,
-        gait=gait,
-        forces=forces.on(_friction(spec)).checked(catalog.alternatives),
-        compare_forces=compare_forces,
+        files, dict(changes), bare, robot, catalog, own, effects, tuple(notes), tuple(warnings)
     )
 
 
-def _friction(spec: RobotSpec) -> float | None:
-    return gait_table(spec).friction_coefficient if spec.floating else None
-
-
-def _loaded(spec: RobotSpec) -> tuple[Robot, Sequence[str]]:
-    """The robot with its payload, and what of it a reader should know."""
+def _bare(spec: RobotSpec, before: Settings | None) -> tuple[Robot, Sequence[str]]:
+    """The robot without its payload, and what of its bodies a reader should know."""
+    if before is not None:
+        old = before.robot.spec
+        if spec == old:
+            return before.bare, before.warnings
+        if replace(spec, gait=old.gait, standing_feet=old.standing_feet) == old:
+            return replace(before.bare, spec=spec), before.warnings
     bare = load_robot(spec)
-    return with_payload(bare), refuse_impossible(bare)
+    return bare, refuse_impossible(bare)
 
 
-def _refuse_few(samples: int) -> None:
-    if samples < LEAST_SAMPLES:
-        raise GaitError(
-            f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
-            "for energies within 1 %"
-        )
-
-
-def _effects(
-    file: ModelFile, path: Path, robot: Robot, catalog: Catalog, own: OwnActuators
-) -> Effects:
-    """A model file's effects on this robot."""
-    names = tuple(edit.effect for edit in file.edits)
+def _effects(files: Files, robot: Robot, catalog: Catalog, own: OwnActuators) -> Effects:
+    """The model file's effects on this robot."""
+    file = files.model
+    assert file is not None
     others = [name for name in catalog.alternatives if name != IDEAL]
     if not (file.alternative or others):
         raise CatalogError("effects need an actuator with a motor of its own; add an alternative")
-    alternative = file.alternative or others[0]
     return effects(
         robot,
-        own.actuators(catalog, alternative),
-        lambda m: apply_edits(m, file.edits),
-        names,
-        path.name,
+        own.actuators(catalog, file.alternative or others[0]),
+        lambda machine: apply_edits(machine, file.edits),
+        tuple(edit.effect for edit in file.edits),
+        files.model_path.name if files.model_path else "model.toml",
         found_with=file.alternative,
         warnings=file.changed,
     )
 
 
-def _regeneration(text: str) -> Regeneration:
+def regeneration_of(text: str) -> Regeneration:
+    """What an option says of returned energy: ``none``, ``bus`` or a fraction.
+
+    Raises:
+        RobotFileError: It says something else.
+    """
     if text in ("none", "bus"):
         return Regeneration(text)
     try:

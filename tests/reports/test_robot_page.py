@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from pipeline.api.figures import drawings
-from pipeline.api.tables import table_of_parameters, tables_of_standing, tables_of_walking
-from pipeline.simulation.settings import Settings, settings
+from pipeline.api.machine import load
+from pipeline.api.tables import tables_of_standing, tables_of_walking
+from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand, walk
 from reports.figures.several import save_figures
 from reports.html import html, write_html
@@ -27,12 +28,12 @@ Run = tuple[Settings, Standing, Walking, Mapping[str, Table]]
 
 @pytest.fixture(scope="module")
 def solo(root: Path) -> Run:
-    given = settings(robot=root / "urdf" / "solo12.toml", samples=51)
+    given = load(root / "urdf" / "solo12.toml").walking(samples=51)
     chains = given.chains()
     standing = stand(given.machine, chains)
     walking = walk(given.machine, chains, samples=given.samples)
-    tables = [*tables_of_standing(given, standing), *tables_of_walking(given, walking)]
-    return given, standing, walking, {t.name: t for t in (*tables, table_of_parameters(given))}
+    tables = tables_of_standing(given, standing) | tables_of_walking(given, walking)
+    return given, standing, walking, {name: table() for name, table in tables.items()}
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +89,7 @@ def test_whose_motors_are_assumed_stands_first(page: tuple[Page, Path], solo: Ru
 
 def test_motors_that_are_stated_are_no_assumption(root: Path) -> None:
     folder = root / "tests" / "pipeline" / "data_files" / "xl330_actuators"
-    motors = settings(robot=root / "urdf" / "solo12.toml", actuators=folder, walks=False).motors
+    motors = load(root / "urdf" / "solo12.toml", actuators=folder).ready.motors
     text = motors_text(motors)
     assert motors.stated
     assert "as stated for this robot, XL330-M288" in text

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pipeline.cli.decimal_option import add_decimal_option, decimal_of
 from pipeline.cli.named_path import named_path
-from pipeline.cli.walk_options import add_gait_option
+from pipeline.cli.walk_options import add_gait_option, changes_of
 from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
 
 
@@ -114,5 +114,5 @@ def options_of(given: argparse.Namespace) -> Options:
     )
     named = {f.name: getattr(given, f.name) for f in fields(Options) if hasattr(given, f.name)}
     named |= {"step": step, "logs": tuple(Path(item) for item in logs)}
-    named |= {"holdout": tuple(given.holdout), "changes": tuple(given.changes)}
+    named |= {"holdout": tuple(given.holdout), "changes": changes_of(given.changes)}
     return Options(**{**named, "decimal": decimal_of(given)})

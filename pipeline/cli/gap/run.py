@@ -16,14 +16,15 @@ from pipeline.api.gap_figures import (
     write_waterfall,
     write_where_map,
 )
-from pipeline.api.gap_forward import forward_table, rollout_tables
 from pipeline.api.gap_meta import inputs_of, metadata
 from pipeline.api.gap_tables import (
     base_table,
     candidates_table,
+    forward_table,
     found_table,
     motion_table,
     quality_table,
+    rollout_tables,
     where_table,
 )
 from pipeline.cli.gap.options import options_of

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -34,7 +35,7 @@ class Options:
         mapping: Mapping file for foreign columns.
         alternative: Actuator between joint and supply, by name.
         actuators: Folder of actuator files of one's own.
-        changes: Numbers that differ from the files', ``KEY=VALUE`` each.
+        changes: Numbers that differ from the files', by their keys.
         effort: Channel to compare; the log's most direct by default.
         cutoff: Bandwidth of the comparison [Hz]; the data's own by default.
         prove_last: Last share of every log that only proves; blocks in between by default.
@@ -53,7 +54,7 @@ class Options:
     mapping: Path | None = None
     alternative: str | None = None
     actuators: Path | None = None
-    changes: tuple[str, ...] = ()
+    changes: Mapping[str, object] = field(default_factory=dict)
     effort: str | None = None
     cutoff: float | None = None
     prove_last: float | None = None

@@ -182,14 +182,9 @@ def _parts(path: Path, options: Options) -> _Parts:
     if not path.is_file():
         fact = "is a folder" if path.is_dir() else "no such robot file"
         raise RobotFileError(f"{path}: {fact}; name a robot file or URDF with --robot")
-    told = (
-        [
-            f"numbers changed for this run alone: {', '.join(options.changes)}; a model file does "
-            "not hold them"
-        ]
-        if options.changes
-        else []
-    )
+    numbers = ", ".join(f"{key}={value}" for key, value in options.changes.items())
+    told = [f"numbers changed for this run alone: {numbers}; a model file does not hold them"]
+    told = told if numbers else []
     spec = _spec(path, options.base, options.gait)
     if spec is None:
         folder = options.actuators or CATALOG

@@ -9,7 +9,6 @@ import runpy
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -109,7 +108,7 @@ def test_changed_numbers_reach_a_comparison_with_logs(
     same(tmp_path, where, {"where"})
     assert f"{key}=33" in where.meta["warnings"][0]
     with pytest.raises(PipelineError, match="no such number; did you mean"):
-        lw.compare(log, replace(changed, changes=("hip_spacin=3",)))
+        lw.compare(log, changed.with_values({"hip_spacin": 3}))
 
 
 @pytest.fixture(scope="module")

@@ -12,12 +12,14 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
+import pipeline as lw
 from actuators.errors import ActuatorError
 from actuators.loading.build import load_catalog
 from actuators.units import to_si
+from pipeline.cli.walk_options import changes_of
 from pipeline.errors import PipelineError
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.simulation.settings import Settings, settings
+from pipeline.simulation.settings import Settings
 from tests.command_line import Command, exit_code, rows_of, sidecar_of, stand_and_walk
 
 ROBOT = Path(__file__).parents[3] / "urdf" / "hexapod.toml"
@@ -26,8 +28,8 @@ CATALOG = load_catalog()
 NUMBERS = [*SPEC.parameters, *(f"{component}.{p.name}" for component, p in CATALOG.rows())]
 
 
-def with_changes(*changes: str, **options: Any) -> Settings:
-    return settings(robot=ROBOT, changes=changes, **options)
+def with_changes(*changes: str) -> Settings:
+    return lw.load(ROBOT, changes=changes_of(changes)).ready
 
 
 def outcome(change: str) -> tuple[Settings | None, str]:

@@ -10,13 +10,14 @@ import pytest
 from actuators.chain import Chain
 from actuators.energy.energy import stage_energy
 from actuators.loading.build import load_catalog
+from pipeline.api.machine import load
 from pipeline.effects.model_file import Edit, EditParameter, base_model, new_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.simulation.settings import Settings, settings
+from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import stand, walk
 
 OWN = """
@@ -44,11 +45,11 @@ def robot_file(root: Path, folder: Path, table: str, robot: str = "hexapod") -> 
 
 @pytest.fixture(scope="module")
 def given(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Settings:
-    return settings(robot=robot_file(root, tmp_path_factory.mktemp("own"), OWN), samples=51)
+    return load(robot_file(root, tmp_path_factory.mktemp("own"), OWN)).walking(samples=51)
 
 
 def test_without_a_table_all_joints_share_one_chain(root: Path) -> None:
-    chains = settings(robot=root / "urdf" / "hexapod.toml", samples=51).chains()
+    chains = load(root / "urdf" / "hexapod.toml").walking(samples=51).chains()
     assert all(isinstance(chain, Chain) for chain in chains.values())
 
 
@@ -116,7 +117,7 @@ def test_a_folder_of_actuator_files_is_found_beside_the_robot_file(
         actuator_folder(load_robot_file(path))
     (tmp_path / "ours").symlink_to(root / "actuators" / "catalog")
     assert actuator_folder(load_robot_file(path)) == tmp_path / "ours"
-    assert settings(robot=path, samples=51).actuators == tmp_path / "ours"
+    assert load(path).files.actuators == tmp_path / "ours"
 
 
 JOINT = '[[actuators.joint]]\njoints = ["rm_joint_2"]\n'
@@ -157,7 +158,7 @@ def test_what_is_found_against_the_machine_as_built_counts_there_alone(given: Se
     value = EditParameter("torque", 2.0, "N*m", (2.0, 2.0))
     edit = Edit("coulomb_friction", ("rm_joint_2",), (value,), source="log.csv")
     file = new_model_file(given.robot.spec.path, AS_BUILT).with_edits([edit])
-    edited = settings(robot=given.robot.spec.path, model=file, samples=51)
+    edited = load(given.robot.spec.path).with_model(file).walking(samples=51)
     walking = walk(edited.machine, edited.chains(), samples=51, adjust=edited.adjust)
     told = [n for n, r in walking.results.items() if "coulomb_friction" in r.losses]
     assert told == [AS_BUILT]
