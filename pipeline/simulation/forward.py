@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
-from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
 
@@ -94,23 +93,14 @@ def servo_input(log: Log) -> ServoInput:
     Raises:
         LogContentError: Goal, supply or gain is missing, or what a switched-off drive does.
     """
-    missing = [
-        name
-        for name, value in (
-            ("goal positions", log.goal_position),
-            ("a supply voltage", log.supply),
-            ("the controller's gain_per_rad", log.gain),
-        )
-        if value is None
-    ]
-    if missing:
+    goal, supply, gain = log.goal_position, log.supply, log.gain
+    if goal is None or supply is None or gain is None:
+        named = {"goal positions": goal, "a supply voltage": supply}
+        named["the controller's gain_per_rad"] = gain
+        missing = " and ".join(name for name, value in named.items() if value is None)
         raise LogContentError(
-            f"{log.name}: a forward simulation needs {' and '.join(missing)}; name them in the "
-            "mapping file"
+            f"{log.name}: a forward simulation needs {missing}; name them in the mapping file"
         )
-    assert log.goal_position is not None
-    assert log.supply is not None
-    assert log.gain is not None
     off = np.zeros(log.position.shape, dtype=np.bool_) if log.torque_off is None else log.torque_off
     if off.any() and log.torque_off_bridge is None:
         raise LogContentError(
@@ -118,16 +108,16 @@ def servo_input(log: Log) -> ServoInput:
             'torque_off_bridge is "open" or "shorted"'
         )
     first = np.isfinite(log.position[:_FIRST_ROWS]).all(axis=1)
-    if first.sum() < 2 or not np.isfinite(log.goal_position[~off]).all():
+    if first.sum() < 2 or not np.isfinite(goal[~off]).all():
         raise LogContentError(f"{log.name}: first positions or goals are empty; cut the log")
     t = log.time[:_FIRST_ROWS][first]
     slope, start = np.polyfit(t - log.time[0], log.position[:_FIRST_ROWS][first], 1)
     return ServoInput(
         name=log.name,
         time=log.time,
-        goal=np.where(np.isfinite(log.goal_position), log.goal_position, 0.0),
-        supply=log.supply,
-        gain=log.gain,
+        goal=np.where(np.isfinite(goal), goal, 0.0),
+        supply=supply,
+        gain=gain,
         off=off,
         open_bridge=log.torque_off_bridge == "open",
         position=np.asarray(start),
@@ -138,35 +128,56 @@ def servo_input(log: Log) -> ServoInput:
 
 @dataclass(frozen=True, eq=False)
 class _Instant:
-    """What the servos are told at one instant, and how warm their motors are."""
+    """Servos at one instant: goals, supply, and the constants of their warm motors."""
 
+    servo: ServoInput
     goal: Array
     supply: float
     off: Mask
     constant: Array
     resistance: Array
 
+    def electrical(self, position: Array, speed: Array) -> tuple[Array, Array]:
+        """Voltage and current of the motors, each (J,).
+
+        Args:
+            position: As the sensors read [rad].
+            speed: Of the motors [rad/s].
+        """
+        duty = np.clip(self.servo.gain * (self.goal - position), -1.0, 1.0)
+        idle = np.nan if self.servo.open_bridge else 0.0
+        voltage = np.where(self.off, idle, self.supply * duty)
+        current = (voltage - self.constant * speed) / self.resistance
+        return voltage, np.where(self.off & self.servo.open_bridge, 0.0, current)
+
 
 class ForwardSimulator:
     """Forward simulation of one machine.
 
     Args:
-        model: Fixed base, a motor in every joint, transmissions without play or coupling.
+        model: Fixed base, a motor in every joint, transmissions without backlash or coupling.
 
     Raises:
         ModelError: The model has something else.
 
     Note:
-        Transmissions are taken as rigid: a compliance that naming has estimated as a tolerance
+        Transmissions are taken as rigid: an elastic deflection that was estimated as a tolerance
         moves the joint by far less than a servo's error.
     """
 
     def __init__(self, model: MachineModel) -> None:
         if model.floating:
             raise ModelError(f"{model.name}: a forward simulation stands on a fixed base only")
-        self.model = model
-        for actuator in model.actuators:
-            _refuse(actuator)
+        for a in model.actuators:
+            if a.motor is None:
+                raise ModelError(
+                    f"joint '{a.name}': no motor; name the actuator with --alternative"
+                )
+            if a.coupled_to or a.backlash:
+                raise ModelError(
+                    f"joint '{a.name}': a coupled or loose transmission cannot be simulated forward"
+                )
+        self.model, self._actuators = model, model.actuators
         self._rigid = changed_model(model.rigid, model.bodies)
         self._data = self._rigid.createData()
         self._columns = np.array(
@@ -188,11 +199,10 @@ class ForwardSimulator:
         own = np.array([0.0 if a.heating is None else a.heating.initial for a in self._actuators])
         for row in range(n):
             constant, resistance = self._warm(servo, row, own)
-            now = _Instant(
-                servo.goal[row], float(servo.supply[row]), servo.off[row], constant, resistance
-            )
+            goal, supply = servo.goal[row], float(servo.supply[row])
+            now = _Instant(servo, goal, supply, servo.off[row], constant, resistance)
             position[row], velocity[row] = q + self._offset, v
-            voltage[row], current[row] = self._electrical(servo, now, q, v)
+            voltage[row], current[row] = now.electrical(q + self._offset, self._ratio * v)
             if row + 1 == n:
                 break
             width = float(servo.time[row + 1] - servo.time[row])
@@ -202,15 +212,11 @@ class ForwardSimulator:
                 share = (k + 0.5) / steps
                 middle = replace(
                     now,
-                    goal=(1 - share) * servo.goal[row] + share * servo.goal[row + 1],
-                    supply=float((1 - share) * servo.supply[row] + share * servo.supply[row + 1]),
+                    goal=(1 - share) * goal + share * servo.goal[row + 1],
+                    supply=float((1 - share) * supply + share * servo.supply[row + 1]),
                 )
-                q, v = self._step(servo, middle, q, v, width / steps)
+                q, v = self._step(middle, q, v, width / steps)
         return Rollout(servo.time, position, velocity, voltage, current)
-
-    @property
-    def _actuators(self) -> tuple[JointModel, ...]:
-        return self.model.actuators
 
     def _warm(self, servo: ServoInput, row: int, own: Array) -> tuple[Array, Array]:
         """Torque constants and resistances of the warm motors, each (J,)."""
@@ -233,24 +239,12 @@ class ForwardSimulator:
                 out[k] = node.temperature_rise(np.array([0.0, width]), np.full(2, loss))[-1]
         return out
 
-    def _electrical(
-        self, servo: ServoInput, now: _Instant, q: Array, v: Array
-    ) -> tuple[Array, Array]:
-        """Voltage and current of the motors, each (J,)."""
-        error = now.goal - (q + self._offset)
-        voltage = now.supply * np.clip(servo.gain * error, -1.0, 1.0)
-        voltage = np.where(now.off, np.nan if servo.open_bridge else 0.0, voltage)
-        current = (voltage - now.constant * self._ratio * v) / now.resistance
-        return voltage, np.where(now.off & servo.open_bridge, 0.0, current)
-
-    def _step(
-        self, servo: ServoInput, now: _Instant, q: Array, v: Array, width: float
-    ) -> tuple[Array, Array]:
+    def _step(self, now: _Instant, q: Array, v: Array, width: float) -> tuple[Array, Array]:
         """One step of the midpoint rule, cut where a joint comes to rest: friction may hold it."""
         for _ in range(2 * v.size + 1):
-            direction, a = self._accelerations(servo, now, q, v, None)
+            direction, a = self._accelerations(now, q, v, None)
             half = q + 0.5 * width * v, v + 0.5 * width * a
-            _, a = self._accelerations(servo, now, *half, direction)
+            _, a = self._accelerations(now, *half, direction)
             new = v + width * a
             back = (new * direction < 0.0) & (v != 0.0)
             if not back.any():
@@ -263,12 +257,11 @@ class ForwardSimulator:
         return q, v
 
     def _accelerations(
-        self, servo: ServoInput, now: _Instant, q: Array, v: Array, given: Array | None
+        self, now: _Instant, q: Array, v: Array, given: Array | None
     ) -> tuple[Array, Array]:
         """Directions of motion (zero where a joint is held) and accelerations, each (J,).
 
         Args:
-            servo: The input.
             now: The present instant.
             q: Joint positions.
             v: Joint velocities.
@@ -281,7 +274,7 @@ class ForwardSimulator:
             load[k] = actuator.beside(q[k], load[k])
         mass = np.asarray(pin.crba(self._rigid, self._data, full))
         mass = (np.triu(mass) + np.triu(mass, 1).T)[np.ix_(self._columns, self._columns)]
-        _, current = self._electrical(servo, now, q, v)
+        _, current = now.electrical(q + self._offset, self._ratio * v)
         torque = now.constant * current
         if given is not None:
             return given, self._solved(mass, load, q, v, given, torque)
@@ -289,20 +282,13 @@ class ForwardSimulator:
         for _ in range(direction.size + 1):
             a = self._solved(mass, load, q, v, direction, torque)
             needed = mass @ a + load
-            freed = False
-            for k in np.flatnonzero(direction == 0.0).tolist():
-                push = self._breaking_away(k, float(needed[k]), float(torque[k]))
-                if push:
-                    direction[k], freed = push, True
-            if not freed:
+            held = np.flatnonzero(direction == 0.0)
+            for k in held.tolist():  # a motor's torque outside the interval starts the joint
+                low, high = self._actuators[k].holding(needed[[k]], needed[[k]])
+                direction[k] = float(torque[k] > high[0]) - float(torque[k] < low[0])
+            if not direction[held].any():
                 break
         return direction, a
-
-    def _breaking_away(self, joint: int, needed: float, torque: float) -> float:
-        """Sense in which a motor's torque starts a joint that is held; 0 where it does not."""
-        load = np.array([needed])
-        low, high = self._actuators[joint].holding(load, load)
-        return float(torque > high[0]) - float(torque < low[0])
 
     def _solved(
         self, mass: Array, load: Array, q: Array, v: Array, direction: Array, torque: Array
@@ -349,17 +335,3 @@ class ForwardSimulator:
         out = np.zeros(self._rigid.nv)
         out[self._columns] = values
         return out
-
-
-def _refuse(actuator: JointModel) -> None:
-    """Refuse a joint that cannot be simulated forward.
-
-    Raises:
-        ModelError: It has no motor, or a transmission that is not rigid and its own.
-    """
-    if actuator.motor is None:
-        raise ModelError(f"joint '{actuator.name}': no motor; name the actuator with --alternative")
-    if actuator.coupled_to or actuator.backlash:
-        raise ModelError(
-            f"joint '{actuator.name}': a coupled or loose transmission cannot be simulated forward"
-        )

@@ -77,24 +77,32 @@ class Simulator:
         m = self.measurement
         if model.joints != m.joints:
             raise ModelError(f"{model.name}: the model's joints are not those of log '{m.name}'")
-        changed = self._changed(model, near)
-        if near is None or self._moves_bodies(model, near, changed):
+        before = None if near is None else near.model
+        actuators = enumerate(model.actuators)
+        changed = {k for k, a in actuators if before is None or a is not before.actuators[k]}
+        if near is None or self._moves_bodies(model, near.model, changed):
             q, torque = self._rigid(model)
-            if near is None:
-                changed = tuple(range(len(m.joints)))
-            else:
+            if near is not None:
                 differs = np.abs(torque - near.torque).max(axis=0)
                 scale = 1e-12 * (1.0 + np.abs(torque).max(axis=0))
-                changed = tuple({*changed, *np.flatnonzero(differs > scale).tolist()})
+                changed |= set(np.flatnonzero(differs > scale).tolist())
         else:
             q, torque = near.q, near.torque
-        changed = self._with_coupled(model, near, changed)
+        # A changed joint's motor takes part in the torque of the joint it is coupled to.
+        coupled = [
+            machine.index(machine.actuators[k].coupled_to)
+            for machine in (model, before or model)
+            for k in changed
+            if machine.actuators[k].coupled_to
+        ]
+        computed = tuple(sorted({*changed, *coupled}))
         n, j = m.q.shape
         effort = np.empty((n, j, len(m.channels))) if near is None else near.effort.copy()
         motor = np.empty((n, j)) if near is None else near.motor_torque.copy()
-        for k in self._order(model, changed):
+        # Coupled motors first: what they supply to the other joint must be known.
+        for k in sorted(computed, key=lambda k: not model.actuators[k].coupled_to):
             motor[:, k], effort[:, k] = self._joint(model, k, q, torque, motor)
-        return Prediction(model, q, torque, motor, effort, changed)
+        return Prediction(model, q, torque, motor, effort, computed)
 
     def difference(self, base: Prediction, model: MachineModel) -> Difference:
         """Prediction of a model less that of another, at the joints where they differ."""
@@ -104,41 +112,15 @@ class Simulator:
         live = [k for k in range(len(joints)) if delta[:, k].any()]
         return Difference(tuple(joints[k] for k in live), delta[:, live])
 
-    def _changed(self, model: MachineModel, near: Prediction | None) -> tuple[int, ...]:
-        if near is None:
-            return ()
-        before = near.model.actuators
-        return tuple(k for k, a in enumerate(model.actuators) if a is not before[k])
-
-    def _moves_bodies(
-        self, model: MachineModel, near: Prediction, changed: tuple[int, ...]
-    ) -> bool:
-        if model.rigid is not near.model.rigid or model.bodies != near.model.bodies:
+    def _moves_bodies(self, model: MachineModel, near: MachineModel, changed: set[int]) -> bool:
+        """Whether bodies move or weigh otherwise."""
+        if model.rigid is not near.rigid or model.bodies != near.bodies:
             return True
-        for k in changed:
-            new, old = model.actuators[k], near.model.actuators[k]
-            if new.encoder_offset != old.encoder_offset:
-                return True
-            wound = _winding(new) != _winding(old)
-            if self.measurement.at_motor and wound:
-                return True
-        return False
-
-    def _with_coupled(
-        self, model: MachineModel, near: Prediction | None, changed: tuple[int, ...]
-    ) -> tuple[int, ...]:
-        """Add joints whose torque a changed joint's motor takes part in."""
-        out = set(changed)
-        for machine in (model, *((near.model,) if near else ())):
-            for k in changed:
-                other = machine.actuators[k].coupled_to
-                if other:
-                    out.add(machine.index(other))
-        return tuple(sorted(out))
-
-    def _order(self, model: MachineModel, joints: tuple[int, ...]) -> list[int]:
-        """Coupled motors first: what they supply to the other joint must be known."""
-        return sorted(joints, key=lambda k: (not model.actuators[k].coupled_to, k))
+        return any(
+            new.encoder_offset != old.encoder_offset
+            or (self.measurement.at_motor and _deflection(new) != _deflection(old))
+            for new, old in ((model.actuators[k], near.actuators[k]) for k in changed)
+        )
 
     def _rigid(self, model: MachineModel) -> tuple[Array, Array]:
         m = self.measurement
@@ -147,15 +129,14 @@ class Simulator:
         torque = self._bodies.torque(model, (q, m.v, m.a))
         if not m.at_motor or not any(a.wound for a in model.actuators):
             return q, torque
-        # The encoder sits on the motor: the link lags behind by what winds up.
-        wind = np.zeros_like(q)
+        # The encoder sits on the motor: the link lags behind by the elastic deflection.
+        deflection = np.zeros_like(q)
         for k, a in enumerate(model.actuators):
             if a.wound:
-                wind[:, k] = m.lowpass(a.wind(self._load(model, k, q, torque)))
-        rate = m.derivative(wind)
-        bend = m.derivative(rate)
-        q = q - wind
-        return q, self._bodies.torque(model, (q, m.v - rate, m.a - bend))
+                deflection[:, k] = m.lowpass(a.wind(self._load(model, k, q, torque)))
+        rate = m.derivative(deflection)
+        q = q - deflection
+        return q, self._bodies.torque(model, (q, m.v - rate, m.a - m.derivative(rate)))
 
     def _load(self, model: MachineModel, k: int, q: Array, torque: Array) -> Array:
         """What one motor's transmission has to supply, at the joint side, (N,) [N*m]."""
@@ -192,9 +173,9 @@ class Simulator:
         load = self._load(model, k, q, torque)
         position, velocity, acceleration = (drives.turned(k, x) for x in (m.q, m.v, m.a))
         if a.wound and not m.at_motor:
-            wind = m.lowpass(a.wind(load))
-            rate = m.derivative(wind)
-            position, velocity = position + wind, velocity + rate
+            deflection = m.lowpass(a.wind(load))
+            rate = m.derivative(deflection)
+            position, velocity = position + deflection, velocity + rate
             acceleration = acceleration + m.derivative(rate)
         shaft = a.at_motor(self._side(k, (position, velocity, acceleration), load))
         shaft_torque, speed = shaft.torque[:, 0], shaft.velocity[:, 0]
@@ -280,7 +261,7 @@ class Simulator:
                 )
 
 
-def _winding(a: JointModel) -> tuple[float, float, float]:
+def _deflection(a: JointModel) -> tuple[float, float, float]:
     return a.compliance, a.backlash, a.crossing
 
 

@@ -1,4 +1,4 @@
-"""Ties the rooms together: a robot's demand through every actuator alternative."""
+"""Standing, walking and any other motion: a robot's demand through every actuator alternative."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.chain import ChainResult, HoldingResult
-from actuators.energy.regeneration import Supply, supply
+from actuators.energy.regeneration import BUS, Supply, supply
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
@@ -20,9 +20,9 @@ from pipeline.dynamics.stability import stability_margins
 from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.standing import standing_posture
-from pipeline.motion.walking import walking_motion
+from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.ground_forces.force_choice import RuleCost, recovered_share, rule_costs
+from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES, ForceChoice
 from pipeline.simulation.ground_forces.least_power import Adjust
 
 Array = NDArray[np.float64]
@@ -43,7 +43,10 @@ class Regeneration:
     @property
     def recovered(self) -> float:
         """Share of returned power that counts as gained at an instant."""
-        return recovered_share(self.policy, self.fraction)
+        return 1.0 if self.policy == BUS else self.fraction
+
+
+NOTHING_RETURNS = Regeneration()
 
 
 @dataclass(frozen=True)
@@ -65,12 +68,12 @@ class Standing:
 
 @dataclass(frozen=True)
 class Walking:
-    """The robot over one gait cycle.
+    """The robot over one gait cycle, or another motion.
 
     Attributes:
-        motion: The gait.
+        motion: The gait's, or the user's own.
         demand: At the joints.
-        margins: Static stability by segment [m].
+        margins: Static stability by segment [m]; none on a fixed base.
         results: By alternative.
         supplies: What each alternative takes from the supply.
     """
@@ -82,6 +85,25 @@ class Walking:
     supplies: Mapping[str, Supply]
 
 
+@dataclass(frozen=True)
+class RuleCost:
+    """What one rule of the ground's forces costs with one alternative over a cycle.
+
+    Attributes:
+        alternative: Name.
+        rule: One of `RULES`.
+        energy: Out of the supply [J].
+        root_mean_square_torque: Over joints and samples [N*m].
+        friction_needed: Greatest tangential over normal force [1].
+    """
+
+    alternative: str
+    rule: str
+    energy: float
+    root_mean_square_torque: float
+    friction_needed: float
+
+
 def joint_series(demand: MotionDemand, joints: Sequence[str] | None = None) -> ShaftSeries:
     """The joints' side of the actuators: segments in a row, split at velocity zeros.
 
@@ -91,17 +113,12 @@ def joint_series(demand: MotionDemand, joints: Sequence[str] | None = None) -> S
     """
     names = tuple(joints or demand.joints)
     columns = [demand.joints.index(joint) for joint in names]
-
-    def joined(name: str) -> Array:
-        parts = [getattr(part, name) for part in demand.segments]
-        return np.concatenate([part[:, columns] if joints else part for part in parts])
-
     time = np.concatenate([part.time for part in demand.segments])
-    return split_at_reversals(
-        ShaftSeries.at_joint(
-            names, time, *(joined(n) for n in ("position", "velocity", "acceleration", "torque"))
-        )
+    quantities = (
+        np.concatenate([getattr(part, name)[:, columns] for part in demand.segments])
+        for name in ("position", "velocity", "acceleration", "torque")
     )
+    return split_at_reversals(ShaftSeries.at_joint(names, time, *quantities))
 
 
 def stand(
@@ -142,7 +159,7 @@ def demand_along(
     adjust: Adjust | None = None,
     forces: GroundForces = PAPER,
 ) -> MotionDemand:
-    """What a gait demands of the actuators; see `walk` for the arguments."""
+    """What a motion demands of the actuators; see `walk` for the arguments."""
     demand = motion_demand(robot, motion, forces=forces, quasi_static=quasi_static)
     if adjust is None:
         return demand
@@ -150,30 +167,24 @@ def demand_along(
     return replace(demand, segments=tuple(adjust(segment, part) for segment, part in pairs))
 
 
-def walking_demand(
-    robot: Robot, *, samples: int, quasi_static: bool = False, adjust: Adjust | None = None
-) -> tuple[Motion, MotionDemand]:
-    """One cycle and what it demands of the joints; see `walk`."""
-    motion = walking_motion(robot, samples=samples)
-    return motion, demand_along(robot, motion, quasi_static=quasi_static, adjust=adjust)
-
-
 def walk(
     robot: Robot,
     chains: Mapping[str, Actuators],
     *,
-    samples: int,
+    samples: int = DEFAULT_SAMPLES,
+    motion: Motion | None = None,
     quasi_static: bool = False,
-    regeneration: Regeneration | None = None,
+    regeneration: Regeneration = NOTHING_RETURNS,
     adjust: Adjust | None = None,
     forces: GroundForces = PAPER,
 ) -> Walking:
-    """Walk one cycle.
+    """Walk one cycle of the robot file's gait, or move as given.
 
     Args:
-        robot: With a floating base.
+        robot: The robot, with a floating base where it walks.
         chains: By alternative.
-        samples: Per half period.
+        samples: Per half period of the gait.
+        motion: In place of the gait, for example from `pipeline.simulation.own_motion`.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy; none by default.
         adjust: Changes the demand on the actuators; see `pipeline.simulation.edited`.
@@ -182,17 +193,20 @@ def walk(
     Raises:
         StanceError: A foot would have to pull or slide.
     """
-    policy = regeneration or Regeneration()
-    motion = walking_motion(robot, samples=samples)
+    motion = motion or walking_motion(robot, samples=samples)
     demand = demand_along(robot, motion, quasi_static=quasi_static, adjust=adjust, forces=forces)
     series = joint_series(demand)
     results = {name: chain.moving(series) for name, chain in chains.items()}
+    steady = motion.segments if robot.floating else ()
     return Walking(
         motion,
         demand,
-        tuple(stability_margins(robot, segment) for segment in motion.segments),
+        tuple(stability_margins(robot, segment) for segment in steady),
         results,
-        {name: supply(r, policy.policy, policy.fraction) for name, r in results.items()},
+        {
+            name: supply(result, regeneration.policy, regeneration.fraction)
+            for name, result in results.items()
+        },
     )
 
 
@@ -202,34 +216,42 @@ def compare_rules(
     motion: Motion,
     *,
     quasi_static: bool = False,
-    regeneration: Regeneration | None = None,
+    regeneration: Regeneration = NOTHING_RETURNS,
     adjust: Adjust | None = None,
     friction_coefficient: float | None = None,
 ) -> Iterator[RuleCost]:
-    """What every rule of the ground's forces costs along a gait; see `walk` for the arguments.
+    """What every rule of the ground's forces costs along a motion, one after the other.
 
     Args:
         robot: With a floating base.
         chains: By alternative.
-        motion: The gait.
+        motion: The gait's.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy; none by default.
         adjust: Changes the demand on the actuators.
         friction_coefficient: For all rules; None for no limit.
     """
-    policy = regeneration or Regeneration()
-
-    def demanded(forces: GroundForces) -> tuple[MotionDemand, ShaftSeries]:
-        demand = demand_along(
-            robot, motion, quasi_static=quasi_static, adjust=adjust, forces=forces
-        )
-        return demand, joint_series(demand)
-
-    return rule_costs(
-        chains,
-        demanded,
-        friction_coefficient=friction_coefficient,
-        policy=policy.policy,
-        fraction=policy.fraction,
-        adjust=adjust,
-    )
+    for rule in RULES:
+        demand = None
+        for name, chain in chains.items():
+            own = name if rule == LEAST_POWER else None
+            if own or demand is None:  # only the least power differs between alternatives
+                choice = ForceChoice(rule, own, friction_coefficient)
+                demand = demand_along(
+                    robot,
+                    motion,
+                    quasi_static=quasi_static,
+                    adjust=adjust,
+                    forces=choice.ground(chains, regeneration.recovered, adjust),
+                )
+                series = joint_series(demand)
+            result = chain.moving(series)
+            drawn = supply(result, regeneration.policy, regeneration.fraction).supplied_energy
+            torque = np.concatenate([part.torque for part in demand.segments])
+            yield RuleCost(
+                name,
+                rule,
+                float(drawn.sum()),
+                float(np.sqrt(np.mean(torque**2))),
+                max(float(np.nanmax(c.friction_needed)) for c in demand.contacts if c is not None),
+            )

@@ -13,7 +13,7 @@ from actuators.energy.limits import LimitRow
 from actuators.energy.regeneration import BUS, Supply
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.dynamics.joint_demand import MotionDemand
-from pipeline.simulation.ground_forces.force_choice import RuleCost
+from pipeline.simulation.walk_stand import RuleCost
 from reports.table import Table, table_from_rows
 from reports.wide import Quantity, wide_series
 

@@ -20,11 +20,13 @@ from actuators.energy.energy import stage_energy
 from actuators.energy.limits import limit_rows
 from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries
+from pipeline.dynamics.joint_demand import motion_demand
+from pipeline.motion.walking import walking_motion
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.published import Published
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
-from pipeline.simulation.walk_stand import joint_series, stand, walking_demand
+from pipeline.simulation.walk_stand import joint_series, stand
 
 Array = NDArray[np.float64]
 MIDDLE_LEGS = ("lm", "rm")
@@ -180,7 +182,7 @@ def part_of(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:
         PipelineError: Out of reach or tipping.
     """
     robot, reaction, torque = standing_state(spec)
-    _, demand = walking_demand(robot, samples=samples)
+    demand = motion_demand(robot, walking_motion(robot, samples=samples))
     joints = tuple(j for leg in MIDDLE_LEGS for j in leg_joints(spec, leg))
     return RobotPart(robot, reaction, torque, joint_series(demand, joints))
 

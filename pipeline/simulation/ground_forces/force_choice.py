@@ -1,17 +1,12 @@
-"""Which rule chooses the ground's forces, and what each rule costs."""
+"""Which rule chooses the ground's forces, as options say it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from actuators.energy.regeneration import BUS, supply
 from actuators.errors import closest
-from actuators.shaft import ShaftSeries
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, ForceRule, GroundForces, LeastTorque
-from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.errors import GaitError
 from pipeline.machine.drivetrains import Actuators
 from pipeline.simulation.ground_forces.least_power import Adjust, LeastPower
@@ -76,7 +71,7 @@ class ForceChoice:
 
         Args:
             chains: By alternative.
-            recovered: Share of returned power that is used again; see `recovered_share`.
+            recovered: Share of returned power that counts as gained at an instant.
             adjust: Changes the demand on the actuators; see `pipeline.simulation.edited`.
         """
         rule: ForceRule | None = None
@@ -85,64 +80,3 @@ class ForceChoice:
         elif self.power_of is not None:
             rule = LeastPower(chains[self.power_of], recovered, adjust)
         return GroundForces(rule, self.friction_coefficient)
-
-
-def recovered_share(policy: str, fraction: float) -> float:
-    """Share of returned power that counts as gained at an instant, by policy of regeneration."""
-    return 1.0 if policy == BUS else fraction
-
-
-@dataclass(frozen=True)
-class RuleCost:
-    """What one rule costs with one alternative over a cycle.
-
-    Attributes:
-        alternative: Name.
-        rule: One of `RULES`.
-        energy: Out of the supply [J].
-        root_mean_square_torque: Over joints and samples [N*m].
-        friction_needed: Greatest tangential over normal force [1].
-    """
-
-    alternative: str
-    rule: str
-    energy: float
-    root_mean_square_torque: float
-    friction_needed: float
-
-
-def rule_costs(
-    chains: Mapping[str, Actuators],
-    demanded: Callable[[GroundForces], tuple[MotionDemand, ShaftSeries]],
-    *,
-    friction_coefficient: float | None,
-    policy: str,
-    fraction: float,
-    adjust: Adjust | None,
-) -> Iterator[RuleCost]:
-    """Walk under every rule with every alternative; one cost after the other.
-
-    Args:
-        chains: By alternative.
-        demanded: Demand along the gait, and the series at the actuators, for a choice of forces.
-        friction_coefficient: For all rules.
-        policy: Of regeneration.
-        fraction: Its fraction.
-        adjust: Changes the demand on the actuators.
-    """
-    share = recovered_share(policy, fraction)
-    for rule in RULES:
-        same = None
-        for name, chain in chains.items():
-            own = name if rule == LEAST_POWER else None
-            if own or same is None:
-                choice = ForceChoice(rule, own, friction_coefficient)
-                same = demanded(choice.ground(chains, share, adjust))
-            demand, series = same
-            yield RuleCost(
-                name,
-                rule,
-                float(supply(chain.moving(series), policy, fraction).supplied_energy.sum()),
-                float(np.sqrt(np.mean(np.concatenate([p.torque for p in demand.segments]) ** 2))),
-                max(float(np.nanmax(c.friction_needed)) for c in demand.contacts if c is not None),
-            )

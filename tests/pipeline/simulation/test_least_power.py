@@ -17,7 +17,7 @@ from pipeline.motion.motion import Segment
 from pipeline.motion.standing import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES, recovered_share
+from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES
 from pipeline.simulation.ground_forces.least_power import LeastPower, PowerOfJoints
 from pipeline.simulation.walk_stand import Regeneration, compare_rules
 from tests.pipeline.dynamics.test_force_rules import shown, swinging
@@ -120,7 +120,7 @@ def test_on_a_bus_without_friction_least_power_is_least_torque(
 ) -> None:
     """sum(tau q_dot) is the motion's, whatever the forces are: what is left is R I^2."""
     stance = shown(hexapod, step, None)
-    power = LeastPower(CHAINS["ideal"], recovered_share("bus", 0.0)).forces(stance)
+    power = LeastPower(CHAINS["ideal"], Regeneration("bus").recovered).forces(stance)
     torque = LeastTorque().forces(stance)
     np.testing.assert_allclose(power, torque, atol=1e-3 * np.abs(torque).max())
     of = [stance.loaded_torque(force) for force in (power, torque)]
