@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from reports.dust import without_dust
 from reports.errors import ReportError
+from reports.roundoff import without_roundoff
 from reports.table import Table
 from reports.typeset import number_text, prose, unit_text
 
@@ -175,7 +175,7 @@ def table_block(
     Raises:
         ReportError: A column that the table lacks.
     """
-    table = without_dust(table)
+    table = without_roundoff(table)
     shown = list(columns if columns is not None else table.columns)
     for header in shown:
         if header not in table.columns:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,12 +17,14 @@ from reports.typeset import unit_suffix, unit_text
 if TYPE_CHECKING:
     import pandas
 
+Array = NDArray[np.float64]
 #: What a column may hold: a NumPy vector, or a sequence in which None stands for "no value".
 Column = Sequence[Any] | NDArray[Any]
 #: Of a column: (meaning, unit), and where the header's own words would not do, its title.
 Meaning = tuple[str, str] | tuple[str, str, str]
+#: In place of a unit, before the name of the column that holds the unit of each row.
+SEE = "see "
 _NAME = re.compile(r"[A-Za-z0-9_.-]+")
-_SEE = "see "
 #: A quantity in plain words, after its owner, whose name a URDF may write as it likes.
 _HEADER = re.compile(r"""(?:[^/\\,;"\x00-\x1f\x7f]+__)?[A-Za-z0-9_]+""")
 
@@ -33,13 +36,11 @@ class Table:
     Attributes:
         name: File name without ending, e.g. ``"standing"``.
         columns: Header to values, in the order of the file. NaN and None are empty cells.
-        meanings: Header to (meaning, unit) or (meaning, unit, title). The unit is ``""`` for names,
-            ``"1"`` for pure numbers and ``"see unit"`` where another column, here ``unit``, holds
-            it. The title heads the column on a page; without one it is the header's own words.
+        meanings: Header to (meaning, unit) or (meaning, unit, title); see `reports.column`.
         description: One sentence on what the table holds and its sign conventions.
-        exact: Whether the numbers were given and not computed, so that none is rounding's.
+        exact: Whether the numbers were given and not computed, so that none is round-off.
         zero_below: Header to the magnitude up to which numbers were set to zero, by unit where
-            rows have units of their own; filled in by `reports.dust`.
+            rows have units of their own; filled in by `reports.roundoff`.
     """
 
     name: str
@@ -48,48 +49,38 @@ class Table:
     description: str = ""
     exact: bool = False
     zero_below: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
-    rows: int = field(init=False)
 
     def __post_init__(self) -> None:
         """Refuse what a reader could not use.
 
         Raises:
-            TableError: No columns, headers that are not plain words or differ only in case,
-                unequal lengths, columns without a meaning or meanings without a column.
+            TableError: A name that is no file name, headers that are not plain words or
+                differ only in case, columns of unequal length or without a meaning.
         """
+        place = f"table '{self.name}'"
         if not _NAME.fullmatch(self.name):
-            raise TableError(f"table '{self.name}': the name must be a plain file name")
-        if not self.columns:
-            raise TableError(f"table '{self.name}' has no columns; at least 1 is needed")
+            raise TableError(f"{place}: the name must be a plain file name")
         folded: dict[str, str] = {}
         for header in self.columns:
             if not _HEADER.fullmatch(header):
+                raise TableError(f"{place}, column '{header}': use letters, digits and underscores")
+            other = folded.setdefault(header.casefold(), header)
+            if other != header:
                 raise TableError(
-                    f"table '{self.name}', column '{header}': use letters, digits and underscores"
+                    f"{place}: headers '{other}' and '{header}' are the same word; rename one"
                 )
-            if header.casefold() in folded:
-                raise TableError(
-                    f"table '{self.name}': headers '{folded[header.casefold()]}' and '{header}' "
-                    "are the same word; rename one"
-                )
-            folded[header.casefold()] = header
-        missing = [header for header in self.columns if not all(self._meaning(header))]
-        if missing:
-            raise TableError(
-                f"table '{self.name}', column '{missing[0]}' has no meaning; state it and its unit"
-            )
-        extra = [header for header in self.meanings if header not in self.columns]
-        if extra:
-            raise TableError(f"table '{self.name}': meaning of '{extra[0]}', which is no column")
-        lengths = {header: _length(self.name, header, v) for header, v in self.columns.items()}
-        first = next(iter(lengths))
-        for header, length in lengths.items():
-            if length != lengths[first]:
-                raise TableError(
-                    f"table '{self.name}': column '{header}' has {length} rows, "
-                    f"'{first}' has {lengths[first]}"
-                )
-        object.__setattr__(self, "rows", lengths[first])
+        odd = sorted(set(self.columns) ^ set(self.meanings))
+        if odd:
+            raise TableError(f"{place}: '{odd[0]}' lacks values or a meaning; give both")
+        lengths = {len(values): header for header, values in self.columns.items()}
+        if len(lengths) != 1:
+            said = ", ".join(f"'{header}' {length}" for length, header in lengths.items())
+            raise TableError(f"{place}: columns of unequal length: {said or 'there is none'}")
+
+    @property
+    def rows(self) -> int:
+        """How many."""
+        return len(next(iter(self.columns.values())))
 
     def frame(self) -> pandas.DataFrame:
         """The table as a pandas frame: columns are named as in the CSV, units in their names."""
@@ -97,27 +88,26 @@ class Table:
 
         return pandas.DataFrame({h: list(values) for h, values in self.columns.items()})
 
+    def unit_column(self, header: str) -> str:
+        """The column that holds the unit of each row; empty where one unit serves all."""
+        other = self.meanings[header][1].removeprefix(SEE)
+        return other if self.meanings[header][1].startswith(SEE) and other in self.columns else ""
+
     @property
     def unit_columns(self) -> frozenset[str]:
         """Columns that hold the units of others."""
-        units = (meaning[1] for meaning in self.meanings.values())
-        named = {unit.removeprefix(_SEE) for unit in units if unit.startswith(_SEE)}
-        return frozenset({"unit", *named} & set(self.columns))
+        return frozenset({"unit", *map(self.unit_column, self.columns)} & set(self.columns))
 
     def title(self, header: str) -> str:
         """Heading of a column on a page: words, with the unit in brackets."""
         _, unit, *declared = self.meanings[header]
-        words = declared[0] if declared else _words(header, unit)
-        if unit in ("", "1") or unit.startswith(_SEE):
+        words = declared[0] if declared and declared[0] else header_words(header, unit)
+        if unit in ("", "1") or unit.startswith(SEE):
             return words
         return f"{words} [{unit_text(unit)}]"
 
-    def _meaning(self, header: str) -> tuple[bool, bool]:
-        entry = self.meanings.get(header)
-        return (entry is not None and bool(entry[0].strip()), entry is not None)
 
-
-def _words(header: str, unit: str) -> str:
+def header_words(header: str, unit: str) -> str:
     """The words of a header such as ``walking_speed_m_s`` without its unit."""
     suffix = unit_suffix(unit)
     words = header.removesuffix(f"_{suffix}") if suffix else header
@@ -126,36 +116,87 @@ def _words(header: str, unit: str) -> str:
     return f"{owner} {quantity.replace('_', ' ')}" if apart else owner.replace("_", " ")
 
 
-def _length(table: str, header: str, values: Column) -> int:
-    if isinstance(values, np.ndarray) and values.ndim != 1:
-        raise TableError(
-            f"table '{table}', column '{header}' has {values.ndim} dimensions; a column has 1"
-        )
-    if isinstance(values, str):
-        raise TableError(f"table '{table}', column '{header}' is one text; give one per row")
-    return len(values)
-
-
-def table_from_rows(
-    name: str,
-    rows: Sequence[Mapping[str, Any]],
-    meanings: Mapping[str, Meaning],
-    description: str = "",
-    *,
-    exact: bool = False,
+def table_of(
+    kind: Any, rows: Sequence[Any], *, name: str = "", about: str = "", exact: bool = False
 ) -> Table:
-    """A tidy table from one mapping per row; the columns are those of `meanings`, in its order.
+    """A tidy table of rows.
+
+    Args:
+        kind: Dataclass whose fields are columns (`reports.column`), which names the table.
+        rows: Of that kind, or what its columns take their values of.
+        name: Of the table, where it is another.
+        about: One sentence, where it depends on the run.
+        exact: See `Table`.
+    """
+    columns, meanings = {}, {}
+    for declared in fields(kind):
+        value = declared.metadata["of"] or attrgetter(declared.name)
+        columns[declared.name] = [value(row) for row in rows]
+        meanings[declared.name] = declared.metadata["column"]
+    text = about or getattr(kind, "about", "")
+    return Table(name or kind.table, columns, meanings, text, exact)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity at every joint (or foot).
+
+    Attributes:
+        name: As it stands in the header, e.g. ``"torque"``.
+        unit: As people write it, e.g. ``"N*m"``; ``"1"`` leaves the header without a unit. One for
+            each owner, in a tuple, where they differ.
+        meaning: One clause with the sign, e.g. ``"torque the actuator applies to the joint"``.
+        values: Shape (N, J).
+    """
+
+    name: str
+    unit: str | tuple[str, ...]
+    meaning: str
+    values: Array
+
+
+def wide_series(
+    name: str,
+    time: Array,
+    owners: Sequence[str],
+    quantities: Sequence[Quantity],
+    *,
+    labels: Mapping[str, tuple[Column, str]] | None = None,
+    description: str = "",
+) -> Table:
+    """A wide time series: `time_s`, then `<owner>__<quantity>_<unit>` for every joint or foot.
+
+    Args:
+        name: Of the table.
+        time: Shape (N,) [s]. A time that occurs twice marks an instant at which something jumps:
+            the first row is the limit from the left, the second that from the right.
+        owners: Of the columns, J of them.
+        quantities: Each with values of shape (N, J).
+        labels: Columns between time and quantities, header to (values, meaning), e.g. the segment.
+        description: One sentence.
 
     Raises:
-        TableError: A row lacks a column or has one without a meaning.
+        TableError: Shapes that do not fit, or headers that clash.
     """
-    expected = set(meanings)
-    for number, row in enumerate(rows):
-        if set(row) != expected:
-            odd = sorted(set(row) ^ expected)
+    labels = labels or {}
+    columns: dict[str, Column] = {"time_s": time} | {h: v for h, (v, _) in labels.items()}
+    meanings: dict[str, Meaning] = {
+        "time_s": ("time; where it repeats, the left limit then the right limit", "s")
+    }
+    meanings |= {header: (meaning, "") for header, (_, meaning) in labels.items()}
+    for quantity in quantities:
+        if quantity.values.shape != (len(time), len(owners)):
             raise TableError(
-                f"table '{name}', row {number}: columns {', '.join(odd)} are in the row or in the "
-                "meanings, not in both"
+                f"table '{name}', quantity '{quantity.name}' has shape {quantity.values.shape}; "
+                f"{len(time)} times and {len(owners)} columns need ({len(time)}, {len(owners)})"
             )
-    columns = {header: [row[header] for row in rows] for header in meanings}
-    return Table(name, columns, meanings, description, exact)
+    for j, owner in enumerate(owners):
+        for quantity in quantities:
+            unit = quantity.unit if isinstance(quantity.unit, str) else quantity.unit[j]
+            suffix = unit_suffix(unit)
+            header = f"{owner}__{quantity.name}" + (f"_{suffix}" if suffix else "")
+            if header in columns:
+                raise TableError(f"table '{name}': header '{header}' occurs twice; rename one")
+            columns[header] = quantity.values[:, j]
+            meanings[header] = (f"{owner}: {quantity.meaning}", unit)
+    return Table(name, columns, meanings, description)

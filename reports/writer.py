@@ -1,33 +1,39 @@
 """Write tables as CSV with a sidecar, whole or not at all.
 
 Comma, dot decimal, UTF-8, LF, one header row. Floats are written with the shortest digits that
-read back to the same number; what rounding leaves of a zero is zero (`reports/dust.py`); NaN and
-None are empty cells. The file holds no time stamp and no path: the same table gives the same bytes.
+read back to the same number; round-off of a zero is zero (`reports/roundoff.py`); NaN and None are
+empty cells. The file holds no time stamp and no path: the same table gives the same bytes.
 """
 
 from __future__ import annotations
 
 import hashlib
+import json
+import math
+import re
 from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from pathlib import Path, PurePath
+from typing import Any
+
+import numpy as np
 
 from reports.atomic import replacing, write_text
-from reports.dust import without_dust
 from reports.errors import OutputError, TableError
-from reports.meta import sidecar
+from reports.roundoff import RULE, without_roundoff
 from reports.table import Table
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 __all__ = ["csv_bytes", "write_table", "write_text"]
 
-_BOM = b"\xef\xbb\xbf"
 #: A text that is nothing but a number, as a paper's "2.04".
-_NUMBER = r"^[-+]?[0-9]+\.[0-9]*([eE][-+]?[0-9]+)?$"
-#: Rows that are laid out at once.
-_BLOCK = 1 << 16
+_NUMBER = r"^([-+]?[0-9]+)\.([0-9]*(?:[eE][-+]?[0-9]+)?)$"
+#: An absolute path, in Unix or Windows writing, that starts a word.
+_PATH = re.compile(r"(?<![\w./])(?:/|[A-Za-z]:[\\/])(?:[^\s'\"/\\:;,()]+[/\\])+([^\s'\"/\\:;,()]*)")
+#: Types of a column as pandas infers them, to how they are held.
+_TYPES = {
+    **dict.fromkeys(("floating", "mixed-integer-float", "empty"), "float64"),
+    **dict.fromkeys(("string", "boolean"), "object"),
+    "integer": "Int64",
+}
 
 
 def write_table(
@@ -38,7 +44,8 @@ def write_table(
     Args:
         table: What to write.
         out_dir: Folder; made when it is missing.
-        meta: For the sidecar: hashes of inputs, versions, options, seed, warnings.
+        meta: For the sidecar: hashes of inputs, versions, options, seed, warnings. Keys are sorted
+            and folders of absolute paths are left out, so that two machines write the same.
         decimal: ``"."``, or ``","`` for an additional copy with semicolons and decimal commas, as a
             spreadsheet in a comma-decimal country expects it. The plain files stay.
 
@@ -51,13 +58,11 @@ def write_table(
     """
     if decimal not in (".", ","):
         raise OutputError(f"decimal '{decimal}' is unknown; use '.' or ','")
-    table = without_dust(table)
+    table = without_roundoff(table)
     plain = csv_bytes(table)
     contents = {
         out_dir / f"{table.name}.csv": plain,
-        out_dir / f"{table.name}.meta.json": sidecar(
-            table, hashlib.sha256(plain).hexdigest(), meta
-        ).encode("utf-8"),
+        out_dir / f"{table.name}.meta.json": _sidecar(table, plain, meta).encode("utf-8"),
     }
     if decimal == ",":
         contents[out_dir / f"{table.name}.comma.csv"] = csv_bytes(table, decimal=",")
@@ -78,60 +83,79 @@ def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
     Raises:
         TableError: A column whose values are of mixed types.
     """
-    import pyarrow.compute as pc
+    import pandas
 
-    delimiter = ";" if decimal == "," else ","
-    arrays = [_array(table, header) for header in table.columns]
-    lines = [delimiter.join(table.columns)]
-    for start in range(0, table.rows, _BLOCK):
-        cells = [_cells(values.slice(start, _BLOCK), delimiter, decimal) for values in arrays]
-        lines += pc.binary_join_element_wise(*cells, delimiter).to_pylist()
-    text = "\n".join(lines) + "\n"
-    return (_BOM if decimal == "," else b"") + text.encode("utf-8")
+    columns = {}
+    for header, values in table.columns.items():
+        kind = pandas.api.types.infer_dtype(values, skipna=True)
+        if kind not in _TYPES:
+            raise TableError(
+                f"table '{table.name}', column '{header}' holds {kind} values; use numbers or "
+                "texts only"
+            )
+        column = pandas.Series(values, dtype=_TYPES[kind])
+        if kind == "boolean":
+            column = column.map({True: "true", False: "false"})
+        elif kind == "string" and decimal != ".":
+            column = column.str.replace(_NUMBER, rf"\1{decimal}\2", regex=True)
+        columns[header] = column
 
+    def shortest(value: float) -> str:
+        return repr(float(value)).removesuffix(".0").replace(".", decimal)
 
-def _cells(values: pa.Array, delimiter: str, decimal: str) -> pa.Array:
-    """What stands between the delimiters: quotes around those texts only that need them."""
-    import pyarrow as pa
-    import pyarrow.compute as pc
-
-    text = pc.cast(values, pa.string())
-    if pa.types.is_string(values.type):
-        if decimal != ".":
-            number = pc.match_substring_regex(text, _NUMBER)
-            text = pc.if_else(number, pc.replace_substring(text, ".", decimal), text)
-        special = pc.match_substring_regex(text, f'[{delimiter}"\r\n]')
-        if pc.any(special).as_py():
-            inner = pc.replace_substring(text, '"', '""')
-            text = pc.if_else(special, pc.binary_join_element_wise('"', inner, '"', ""), text)
-    elif decimal != "." and pa.types.is_floating(values.type):
-        text = pc.replace_substring(text, ".", decimal)
-    return pc.fill_null(text, "")
+    separator = ";" if decimal == "," else ","
+    text = pandas.DataFrame(columns).to_csv(
+        index=False, lineterminator="\n", sep=separator, float_format=shortest
+    )
+    return text.encode("utf-8-sig" if decimal == "," else "utf-8")
 
 
-def _array(table: Table, header: str) -> pa.Array:
-    import numpy as np
-    import pyarrow as pa
+def _sidecar(table: Table, content: bytes, meta: Mapping[str, Any]) -> str:
+    """JSON text of a table's sidecar; the same input gives the same text."""
+    columns = []
+    for header, (meaning, unit, *_) in table.meanings.items():
+        said = {"name": header, "meaning": meaning, "unit": unit}
+        zero = {"zero_below": table.zero_below[header]} if header in table.zero_below else {}
+        columns.append(said | zero)
+    head = {
+        "table": table.name,
+        "description": table.description,
+        "rows": table.rows,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "columns": columns,
+        **({"zero": RULE} if table.zero_below else {}),
+    }
+    clash = set(meta) & {*head, "zero"}
+    if clash:
+        raise TableError(f"table '{table.name}': meta key '{min(clash)}' is reserved; rename it")
+    rest = {str(key): _plain(meta[key], table.name) for key in sorted(meta, key=str)}
+    return json.dumps(head | rest, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
-    values = table.columns[header]
-    try:
-        if isinstance(values, np.ndarray):
-            array = pa.array(np.ascontiguousarray(values), from_pandas=True)
-        else:
-            array = pa.array(list(values), from_pandas=True)
-    except (pa.ArrowException, TypeError, ValueError):
-        raise TableError(
-            f"table '{table.name}', column '{header}' mixes types; use numbers or texts only"
-        ) from None
-    if pa.types.is_null(array.type):
-        array = array.cast(pa.float64())
-    if not (
-        pa.types.is_floating(array.type)
-        or pa.types.is_integer(array.type)
-        or pa.types.is_boolean(array.type)
-        or pa.types.is_string(array.type)
-    ):
-        raise TableError(
-            f"table '{table.name}', column '{header}' holds {array.type}; use numbers or texts"
-        )
-    return array
+
+def _plain(value: Any, table: str) -> Any:
+    """The value in terms of JSON, mappings sorted by key."""
+    if isinstance(value, Mapping):
+        return {
+            without_folders(str(key)): _plain(value[key], table) for key in sorted(value, key=str)
+        }
+    if isinstance(value, PurePath):
+        return value.name if value.is_absolute() else value.as_posix()
+    if isinstance(value, str):
+        return without_folders(value)
+    if isinstance(value, np.generic | np.ndarray):
+        return _plain(value.tolist(), table)
+    if isinstance(value, float):
+        # JSON has no infinity; NaN is "no value", as in the CSV.
+        return value if math.isfinite(value) else None if math.isnan(value) else str(value)
+    if value is None or isinstance(value, int):
+        return value
+    if isinstance(value, list | tuple):
+        return [_plain(item, table) for item in value]
+    raise TableError(
+        f"table '{table}': meta holds a {type(value).__name__}; use texts, numbers, lists, mappings"
+    )
+
+
+def without_folders(text: str) -> str:
+    """The text with every absolute path cut down to its last part."""
+    return _PATH.sub(lambda match: match.group(1), text)

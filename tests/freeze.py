@@ -161,7 +161,10 @@ def difference(a: Path, b: Path) -> str:
         at = next((k for k, (x, y) in enumerate(zip(*first, strict=False)) if x != y), 0)
         old, new = (line[max(at - 30, 0) : at + 60] for line in first)
         return f"`{old}` became `{new}`"
-    x, y = pd.read_csv(a), pd.read_csv(b)
+    comma = a.name.endswith(".comma.csv")
+    x, y = (
+        pd.read_csv(p, sep=";" if comma else ",", decimal="," if comma else ".") for p in (a, b)
+    )
     if list(x.columns) != list(y.columns) or len(x) != len(y):
         odd = set(x.columns) ^ set(y.columns)
         return f"{len(x)} rows became {len(y)}; columns that differ: {sorted(odd)}"

@@ -31,7 +31,7 @@ ORDER = (
 LEAVES = {
     *("actuators.units", "actuators.parameters", "actuators.errors", "actuators.text_file"),
     "actuators.checked",
-    *("pipeline.errors", "pipeline.progress", "reports.atomic", "reports.errors"),
+    *("pipeline.errors", "pipeline.progress", "reports.atomic", "reports.column", "reports.errors"),
 }
 #: Numbers, and the library by which files are read.
 ACTUATORS_NEED = {"numpy", "pydantic", "pydantic_core"}

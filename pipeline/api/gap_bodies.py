@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipeline.api.gap_tables import bodies_table
 from pipeline.effects.model_file import edits_in
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.errors import GapError
@@ -17,6 +16,7 @@ from pipeline.simulation.found_bodies import (
 )
 from reports.pages.bodies_words import URDF_FILE
 from reports.table import Table
+from reports.tables.gap import bodies
 from reports.writer import write_text
 
 
@@ -38,7 +38,7 @@ def bodies_of(given: Setup, text: str) -> FoundBodies:
 
 def bodies_tables(found: FoundBodies) -> list[Table]:
     """`bodies.csv`, where there are any."""
-    return [bodies_table(found.bodies)] if found.bodies else []
+    return [bodies(found.bodies)] if found.bodies else []
 
 
 def write_model(folder: Path, text: str, found: FoundBodies) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +22,7 @@ from pipeline.identification.workflow.forward import Drive, by_model
 from pipeline.logs.errors import EffectError
 from pipeline.logs.quality.finding import Finding
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.found_bodies import FoundBody
-from reports.table import Table
+from reports.table import Table, table_of
 from reports.tables import forward as forward_tables
 from reports.tables import gap as tables
 
@@ -35,12 +32,12 @@ Array = NDArray[np.float64]
 
 def quality_table(findings: Sequence[Finding]) -> Table:
     """Rows of `quality.csv`."""
-    return tables.quality([asdict(finding) for finding in findings])
+    return table_of(tables.QualityRow, findings)
 
 
 def where_table(rows: Sequence[Where]) -> Table:
     """Rows of `where.csv`."""
-    return tables.where([asdict(row) for row in rows])
+    return table_of(tables.WhereRow, rows)
 
 
 def candidates_table(
@@ -49,20 +46,20 @@ def candidates_table(
     """Rows of `candidates.csv`; what was found and has rivals says so, too."""
     rivals = {(f.effect, f.place): f.rivals for f in found}
     rows = [
-        {
-            "effect": c.effect,
-            "joint": joint_of(model, c.effect, c.place),
-            "place": JOINED.join(c.place),
-            "validation_before": _known(c.before),
-            "validation_after": _known(c.after),
-            "unit": c.unit,
-            "identifiable": c.identifiable,
-            "verdict": _verdict(c, rivals.get((c.effect, c.place), ())),
-            "reason": c.reason,
-        }
+        tables.CandidateRow(
+            effect=c.effect,
+            joint=joint_of(model, c.effect, c.place),
+            place=JOINED.join(c.place),
+            validation_before=_known(c.before),
+            validation_after=_known(c.after),
+            unit=c.unit,
+            identifiable=c.identifiable,
+            verdict=_verdict(c, rivals.get((c.effect, c.place), ())),
+            reason=c.reason,
+        )
         for c in candidates
     ]
-    return tables.candidates(rows)
+    return table_of(tables.CandidateRow, rows)
 
 
 def _verdict(c: Candidate, rivals: Sequence[tuple[str, tuple[str, ...]]]) -> str:
@@ -73,53 +70,40 @@ def _verdict(c: Candidate, rivals: Sequence[tuple[str, tuple[str, ...]]]) -> str
 
 def found_table(found: Sequence[Found], model: MachineModel) -> Table:
     """Rows of `found.csv`, one per parameter."""
-    rows: list[dict[str, Any]] = []
+    rows: list[tables.FoundRow] = []
     for f in found:
         for one in f.each:
             effect = effect_named(f.effect)
             rows += [
-                {
-                    "order": f.order,
-                    "effect": f.effect,
-                    "law": f.law,
-                    "amounts_to": JOINED.join(effect.amounts_to(one.values)),
-                    "joint": joint_of(model, f.effect, one.place),
-                    "place": JOINED.join(one.place),
-                    "parameter": p.name,
-                    "value": p.value,
-                    "ci_low": p.low,
-                    "ci_high": p.high,
-                    "unit": p.unit,
-                    "gap_before": _known(f.gap_before),
-                    "gap_after": _known(f.gap_after),
-                    "gap_unit": f.unit,
-                    "noise_floor": f.noise_floor,
-                    "level": SUSPECTED if f.level == SUSPECTED else p.level or one.level,
-                    "share": _known(p.share if p.level else one.share),
-                    "reason": f.reason,
-                    "written": f.written,
-                }
+                tables.FoundRow(
+                    order=f.order,
+                    effect=f.effect,
+                    law=f.law,
+                    amounts_to=JOINED.join(effect.amounts_to(one.values)),
+                    joint=joint_of(model, f.effect, one.place),
+                    place=JOINED.join(one.place),
+                    parameter=p.name,
+                    value=p.value,
+                    ci_low=p.low,
+                    ci_high=p.high,
+                    unit=p.unit,
+                    gap_before=_known(f.gap_before),
+                    gap_after=_known(f.gap_after),
+                    gap_unit=f.unit,
+                    noise_floor=f.noise_floor,
+                    level=SUSPECTED if f.level == SUSPECTED else p.level or one.level,
+                    share=_known(p.share if p.level else one.share),
+                    reason=f.reason,
+                    written=f.written,
+                )
                 for p in one.parameters
             ]
-    return tables.found(rows)
+    return table_of(tables.FoundRow, rows)
 
 
 def base_table(naming: Naming) -> Table:
     """Rows of `base_parameters.csv`."""
-    return tables.base_parameters([asdict(one) for one in naming.base])
-
-
-def bodies_table(bodies: Sequence[FoundBody]) -> Table:
-    """Rows of `bodies.csv`."""
-    names = [name.removeprefix("urdf_") for name in tables.BODIES if name.startswith("urdf_")]
-    rows: list[dict[str, Any]] = []
-    for body in bodies:
-        row: dict[str, Any] = {"link": body.link}
-        for k, name in enumerate(names):
-            row |= {f"urdf_{name}": body.urdf[k], f"found_{name}": body.found[k]}
-            row |= {f"low_{name}": _known(body.low[k]), f"high_{name}": _known(body.high[k])}
-        rows.append(row | {"differs_in": JOINED.join(body.differs_in)})
-    return tables.bodies(rows)
+    return table_of(tables.BaseRow, naming.base)
 
 
 def _known(value: float) -> float | None:
@@ -156,20 +140,13 @@ def forward_table(drives: Sequence[Drive], joints: Sequence[str]) -> Table:
             misses = [(d.log.name, d.miss[:, j]) for d in own]
             misses.append(("all", np.concatenate([miss for _, miss in misses])))
             rows += [_row(model, log, joint, miss) for log, miss in misses]
-    return forward_tables.forward(rows)
+    return table_of(forward_tables.ForwardRow, rows)
 
 
-def _row(model: str, log: str, joint: str, miss: Array) -> dict[str, object]:
+def _row(model: str, log: str, joint: str, miss: Array) -> forward_tables.ForwardRow:
     size = np.abs(miss[np.isfinite(miss)])
-    return {
-        "model": model,
-        "log": log,
-        "joint": joint,
-        "position_rms_rad": float(np.sqrt(np.mean(size**2))),
-        "position_mean_abs_rad": float(np.mean(size)),
-        "position_largest_rad": float(size.max()),
-        "rows": int(size.size),
-    }
+    errors = (float(np.sqrt(np.mean(size**2))), float(np.mean(size)), float(size.max()))
+    return forward_tables.ForwardRow(model, log, joint, *errors, int(size.size))
 
 
 def rollout_tables(drives: Sequence[Drive], joints: Sequence[str]) -> list[Table]:

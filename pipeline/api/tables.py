@@ -18,17 +18,16 @@ from pipeline.api.result import Computed
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.inverse.foot_tracking import foot_tracking
+from pipeline.simulation import cycle_energy
+from pipeline.simulation.cycle_energy import leg_joints
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.ground_forces.force_choice import RULES
 from pipeline.simulation.settings import PAPER_FORCES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, compare_rules, walk
-from reports.table import Table
-from reports.tables import kinematics as kinematics_tables
+from reports.table import Table, table_of
 from reports.tables import parameters as parameter_tables
 from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
-from reports.tables.gait import walking_base, walking_gait
-from reports.tables.walking import HELD
 
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
@@ -36,22 +35,17 @@ PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 def tables_of_standing(given: Settings, standing: Standing) -> Computed:
     """The tables of standing still, by name."""
     demand, holding = standing.demand, standing.holding
+    legs = leg_joints(given.robot.spec)
     return {
         "standing_limits": lambda: _standing_limits(given, standing),
         "standing": lambda: standing_tables.standing(demand, holding),
-        "standing_energy": lambda: standing_tables.standing_energy(demand, holding, _legs(given)),
+        "standing_energy": lambda: table_of(
+            cycle_energy.StandingEnergy, cycle_energy.standing_energies(demand, holding, legs)
+        ),
         "standing_posture": lambda: standing_tables.standing_posture(demand),
         "standing_contacts": lambda: standing_tables.standing_contacts(standing.contacts),
         "parameters": lambda: _parameters(given),
     }
-
-
-def _legs(given: Settings) -> dict[str, tuple[str, ...]]:
-    """Each leg's joints, and those outside the legs together."""
-    spec = given.robot.spec
-    legs = {leg.name: leg.joints for leg in spec.legs}
-    held = tuple(joint for joint, _ in spec.held)
-    return legs | {HELD: held} if held else legs
 
 
 def _standing_limits(given: Settings, standing: Standing) -> Table:
@@ -88,38 +82,46 @@ def walked(
 def tables_of_walking(given: Settings, walking: Walking) -> Computed:
     """The tables of one walking cycle, by name."""
     demand, supplies, results = walking.demand, walking.supplies, walking.results
-    spec, legs = given.robot.spec, _legs(given)
+    spec, legs = given.robot.spec, leg_joints(given.robot.spec)
     gait = gait_of(spec)
     stages = {name: a.stage_names for name, a in given.catalog.alternatives.items()}
     weight = given.machine.mass * spec.parameters["gravity"]  # that the forces rest on [N]
 
     @cache
-    def static() -> tuple[Table, Table]:
-        other = walked(given, given.chains(*results), quasi_static=True)
-        return walking_tables.quasi_static_difference(
-            demand, other.demand, supplies, other.supplies, legs
-        )
+    def static() -> Walking:
+        return walked(given, given.chains(*results), quasi_static=True)
 
     tables: Computed = {
         "walking_joint_demand": lambda: walking_tables.walking_joint_demand(
             demand, given.robot.sliding_joints
         ),
         "walking_contact_forces": lambda: walking_tables.walking_contact_forces(demand),
-        "walking_gait": lambda: walking_gait(gait),
-        "walking_base": lambda: walking_base(walking.motion),
-        "walking_stability": lambda: walking_tables.walking_stability(demand, walking.margins),
+        "walking_gait": lambda: walking_tables.walking_gait(gait),
+        "walking_base": lambda: walking_tables.walking_base(walking.motion),
+        "walking_stability": lambda: table_of(
+            cycle_energy.Stability, cycle_energy.stability(demand, walking.margins)
+        ),
         "foot_tracking": lambda: _foot_tracking(given, walking),
         "walking_stage_energy": lambda: walking_tables.walking_stage_energy(results, stages),
         "walking_losses": lambda: walking_tables.walking_losses(results, supplies),
-        "walking_energy": lambda: walking_tables.walking_energy(supplies, legs, IDEAL),
-        "robot_energy": lambda: walking_tables.robot_energy(
-            demand, supplies, legs, weight, gait.speed
+        "walking_energy": lambda: table_of(
+            cycle_energy.LegEnergy, cycle_energy.walking_energies(supplies, legs, IDEAL)
+        ),
+        "robot_energy": lambda: table_of(
+            cycle_energy.RobotEnergy,
+            cycle_energy.robot_energies(demand, supplies, legs, weight, gait.speed),
         ),
         "motor_limits": lambda: walking_tables.motor_limits(
             {name: limit_rows(result) for name, result in results.items()}
         ),
-        "quasi_static_torque": lambda: static()[0],
-        "quasi_static_energy": lambda: static()[1],
+        "quasi_static_torque": lambda: table_of(
+            cycle_energy.QuasiStaticTorque,
+            cycle_energy.quasi_static_torques(demand, static().demand),
+        ),
+        "quasi_static_energy": lambda: table_of(
+            cycle_energy.QuasiStaticEnergy,
+            cycle_energy.quasi_static_energies(supplies, static().supplies, legs),
+        ),
         "walking_force_rules": lambda: _force_rules(given, walking),
         "parameters": lambda: _parameters(given),
     }
@@ -139,7 +141,7 @@ def _foot_tracking(given: Settings, walking: Walking) -> Table:
         for segment in walking.motion.segments
         if segment.foot_target is not None
     ]
-    return kinematics_tables.foot_tracking(foot_tracking(given.robot.chains, pieces))
+    return walking_tables.foot_tracking(foot_tracking(given.robot.chains, pieces))
 
 
 def _force_rules(given: Settings, walking: Walking) -> Table:

@@ -185,9 +185,9 @@ def write(trials: Sequence[Scored], out: Path, seed: int, seconds: Sequence[floa
     ]
     meta = {"options": {"seed": seed, "trials": len(trials)}}
     every = (
-        tables.blind_trials(rows),
-        tables.blind_rates(shares),
-        tables.blind_by_effect(by_effect(rows)),
+        tables.blind_table(tables.TrialRow, rows),
+        tables.blind_table(tables.RateRow, shares),
+        tables.blind_table(tables.EffectRow, by_effect(rows)),
         tables.confusion(hidden, named, counts),
     )
     with staged(out, "blind") as folder:

@@ -100,10 +100,10 @@ def _write(rows: Sequence[Row], out: Path, seed: int, seconds: Sequence[float]) 
     reached = rates(rows)
     meta = {"options": {"seed": seed, "trials": len(rows), "matrix": "standard"}}
     every = (
-        tables.standard_trials(rows),
+        tables.blind_table(tables.StandardTrialRow, rows),
         tables.standard_rates([_share(r) for r in reached]),
-        tables.standard_by_effect(by_effect(rows)),
-        tables.standard_reliability(reliability(rows)),
+        tables.blind_table(tables.StandardEffectRow, by_effect(rows)),
+        tables.blind_table(tables.ReliabilityRow, reliability(rows)),
     )
     with staged(out, "blind standard") as folder:
         for table in every:

@@ -14,7 +14,7 @@ from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.demand import JointDemand
-from pipeline.dynamics.force_rules import PAPER, GroundForces
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, PAPER, GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
 from pipeline.dynamics.stability import stability_margins
 from pipeline.machine.drivetrains import Actuators
@@ -102,6 +102,12 @@ class RuleCost:
     energy: float
     root_mean_square_torque: float
     friction_needed: float
+
+    def relative_difference(self, costs: Sequence[RuleCost]) -> float | None:
+        """Energy over that of the paper's rule, less one; None where that is zero."""
+        key = (LEAST_TANGENTIAL, self.alternative)
+        paper = next(cost.energy for cost in costs if (cost.rule, cost.alternative) == key)
+        return self.energy / paper - 1 if paper else None
 
 
 def joint_series(demand: MotionDemand, joints: Sequence[str] | None = None) -> ShaftSeries:

@@ -121,7 +121,7 @@ def _reproduction(judged: Judged, tables: Mapping[str, Table]) -> Section:
         "left_out_high": "left out, high",
     }
     columns = tables["reproduction"].columns
-    known = [low is not None for low in columns["prior_low"]]
+    known = [low == low for low in columns["prior_low"]]  # not NaN
     return Section(
         "Every number the paper prints",
         (

@@ -2,32 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.table import Table, table_from_rows
-from reports.wide import Quantity, wide_series
+from reports.column import column
+from reports.table import Quantity, Table, wide_series
 
 Array = NDArray[np.float64]
 
-FORWARD = {
-    "model": ("what the model has that the one of the rows before has not", ""),
-    "log": ("name of the log; all: of all logs together", ""),
-    "joint": ("name of the joint", ""),
-    "position_rms_rad": ("root mean square of measured less simulated position", "rad"),
-    "position_mean_abs_rad": ("mean of its magnitude", "rad"),
-    "position_largest_rad": ("largest magnitude", "rad"),
-    "rows": ("rows compared", "1"),
-}
 
+@dataclass(frozen=True)
+class ForwardRow:
+    """Position error of a model that drives itself under the servos' law."""
 
-def forward(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Position errors of models that drive themselves under the servos' law."""
-    text = "Measured less simulated position; nothing but the first instant is taken from the log."
-    return table_from_rows("forward", rows, FORWARD, text)
+    table: ClassVar = "forward"
+    about: ClassVar = (
+        "Measured less simulated position; nothing but the first instant is taken from the log."
+    )
+    model: str = column("what the model has that the one of the rows before has not")
+    log: str = column("name of the log; all: of all logs together")
+    joint: str = column("name of the joint")
+    position_rms_rad: float = column("root mean square of measured less simulated position", "rad")
+    position_mean_abs_rad: float = column("mean of its magnitude", "rad")
+    position_largest_rad: float = column("largest magnitude", "rad")
+    rows: int = column("rows compared", "1")
 
 
 def rollout(

@@ -1,8 +1,10 @@
-"""Tables of one walking cycle: demand, ground forces, stage energies, losses, limits."""
+"""Tables of one walking cycle: gait, demand, ground forces, stage energies, losses, limits."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,12 +12,15 @@ from numpy.typing import NDArray
 from actuators.chain import ChainResult
 from actuators.energy.energy import loss_energies, stage_energies
 from actuators.energy.limits import LimitRow
-from actuators.energy.regeneration import BUS, Supply
-from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
+from actuators.energy.regeneration import Supply
 from pipeline.dynamics.joint_demand import MotionDemand
+from pipeline.motion.base_motion import base_in_world
+from pipeline.motion.gait import Gait
+from pipeline.motion.motion import Motion
+from pipeline.robot.inverse.foot_tracking import FootTracking
 from pipeline.simulation.walk_stand import RuleCost
-from reports.table import Table, table_from_rows
-from reports.wide import Quantity, wide_series
+from reports.column import column
+from reports.table import Quantity, Table, table_of, wide_series
 
 Array = NDArray[np.float64]
 #: Rules of the ground's forces in words.
@@ -24,9 +29,171 @@ _FORCES = {
     "least_torque": "Least joint torque squared:",
     "least_power": "Least electrical power:",
 }
-ALTERNATIVE = ("actuator alternative", "")
-#: What tables by leg call the joints outside the legs, which are held.
-HELD = "held joints"
+_STUCK = "of the direction, in the base frame at the motion's start, in which the foot is stuck"
+
+
+@dataclass(frozen=True)
+class LegGait:
+    """When a leg stands, and how far and high its foot steps."""
+
+    table: ClassVar = "walking_gait"
+    leg: str = column("leg")
+    touch_down: float = column("instant of touch-down as a share of the period", "1")
+    duty_factor: float = column("share of the period for which the foot stands", "1")
+    stroke_m: float = column("path of the foot relative to the body while it stands", "m")
+    lift_m: float = column("height of the foot at the middle of its transfer", "m")
+
+
+@dataclass(frozen=True)
+class TrackingRow:
+    """How well a leg follows its foot's path; a row for each direction that it lacks."""
+
+    table: ClassVar = "foot_tracking"
+    about: ClassVar = (
+        "How well the legs follow their feet's paths; a leg that lacks a direction puts its foot "
+        "as near to the path as it gets."
+    )
+    leg: str = column("leg")
+    joints: int = column("joints of the leg", "1")
+    directions: int = column("directions in which they move the foot", "1")
+    cannot_move_x: float | None = column(f"x component {_STUCK}; empty where it moves in all", "1")
+    cannot_move_y: float | None = column(f"y component {_STUCK}", "1")
+    cannot_move_z: float | None = column(f"z component {_STUCK}", "1")
+    deviation_m: float = column("largest distance of the foot from its path", "m")
+    deviation_time_s: float = column("when it is so far off; empty where it follows", "s")
+    least_singular_value_m: float = column(
+        "smallest singular value of the foot's Jacobian along the motion: near zero the leg is "
+        "stretched or folded",
+        "m",
+    )
+    singular_time_s: float = column("when it is that small", "s")
+
+
+@dataclass(frozen=True)
+class StageRow:
+    """Energy through one stage of a joint's actuator."""
+
+    table: ClassVar = "walking_stage_energy"
+    alternative: str = column("actuator alternative")
+    joint: str = column("joint")
+    stage: str = column("shaft, from the joint (out) to the motor (m) and the supply (el)")
+    stage_name: str = column("where that is, in words")
+    forward_J: float = column("E(+): energy per cycle from the supply towards the joint", "J")
+    reverse_J: float = column("E(-): energy per cycle the other way, as a positive number", "J")
+
+
+@dataclass(frozen=True)
+class LossRow:
+    """What an element of a joint's actuator turns into heat."""
+
+    table: ClassVar = "walking_losses"
+    alternative: str = column("actuator alternative")
+    joint: str = column("joint; 'bus' where all joints share the supply")
+    element: str = column(
+        "element of the chain; dumped_return: returned electrical energy that is lost"
+    )
+    loss_J: float = column("energy dissipated per cycle", "J")
+
+
+@dataclass(frozen=True)
+class MotorLimit:
+    """A peak against the motor's data sheet."""
+
+    table: ClassVar = "motor_limits"
+    alternative: str = column("actuator alternative")
+    joint: str = column("joint")
+    quantity: str = column("motor speed, voltage, current, or rms_current over the cycle")
+    unit: str = column("unit of limit and peak")
+    limit: float = column("what the data sheet allows, in the row's unit", "see unit")
+    peak: float = column("largest magnitude over the cycle, in the row's unit", "see unit")
+    at_time_s: float = column("instant of the peak", "s")
+    share_of_time_over: float = column("share of the cycle above the limit", "1")
+    breach: bool = column("whether the peak is above the limit")
+
+
+@dataclass(frozen=True)
+class ForceRuleRow:
+    """What a rule of the ground's forces costs with one alternative."""
+
+    table: ClassVar = "walking_force_rules"
+    alternative: str = column("actuator alternative")
+    rule: str = column(
+        "least_tangential: sum of squared tangential forces (the paper's); least_torque: sum of "
+        "squared joint torques; least_power: power this alternative draws, at every instant"
+    )
+    electrical_J: float = column("electrical energy of the whole robot in one cycle", "J")
+    relative_difference: float | None = column(
+        "energy over that of least_tangential, less one", "1"
+    )
+    rms_joint_torque_Nm: float = column("root mean square over all joints and samples", "N*m")
+    greatest_friction_needed: float = column("largest tangential over normal force", "1")
+
+
+def walking_gait(gait: Gait) -> Table:
+    """The gait as it was walked, leg by leg."""
+    rows = [
+        LegGait(leg, gait.footfall.phase[leg], gait.footfall.duty[leg], float(stroke), float(lift))
+        for leg, stroke, lift in zip(gait.legs, gait.strokes, gait.lift, strict=True)
+    ]
+    text = (
+        f"{gait.title[0].upper()}{gait.title[1:]}: period {gait.period:.6g} s, speed "
+        f"{gait.speed:.6g} m/s, yaw rate {gait.twist[2]:.6g} rad/s."
+    )
+    return table_of(LegGait, rows, about=text)
+
+
+def foot_tracking(legs: Sequence[FootTracking]) -> Table:
+    """One row for each leg, and one more for each further direction that it lacks."""
+    rows = []
+    for leg in legs:
+        for direction in leg.cannot_move or ((None, None, None),):
+            head = (leg.leg, leg.joints, leg.directions, *direction)
+            apart = (leg.deviation, leg.deviation_time)
+            rows.append(TrackingRow(*head, *apart, leg.least_singular_value, leg.singular_time))
+    return table_of(TrackingRow, rows)
+
+
+def walking_base(motion: Motion) -> Table:
+    """Place, attitude and motion of the base link in the world.
+
+    Args:
+        motion: Of a robot with a floating base.
+    """
+    series = [base_in_world(segment) for segment in motion.segments]
+    quantities = []
+    for name, unit, meaning, field in (
+        ("{}", "m", "origin of the base link in the world, {}", "position"),
+        ("{}", "rad", "attitude: yaw after pitch after roll, {}", "angles"),
+        ("velocity_{}", "m/s", "velocity of that origin, world {}", "velocity"),
+        ("acceleration_{}", "m/s^2", "acceleration of that origin, world {}", "acceleration"),
+        (
+            "angular_velocity_{}",
+            "rad/s",
+            "angular velocity, world {}; steady, so that its derivative is zero",
+            "angular_velocity",
+        ),
+    ):
+        values = np.concatenate([getattr(part, field) for part in series])
+        axes = ("roll", "pitch", "yaw") if field == "angles" else "xyz"
+        quantities += [
+            Quantity(name.format(axis), unit, meaning.format(axis), values[:, [k]])
+            for k, axis in enumerate(axes)
+        ]
+    return wide_series(
+        "walking_base",
+        np.concatenate([segment.time for segment in motion.segments]),
+        ["base"],
+        quantities,
+        labels=_support([(segment.name, segment.time) for segment in motion.segments]),
+        description="The base link in the world (x ahead at t = 0, z against gravity) over one "
+        "gait cycle.",
+    )
+
+
+def _support(segments: Sequence[tuple[str, Array]]) -> dict[str, tuple[list[str], str]]:
+    """The column that says which feet support."""
+    names = [name for name, time in segments for _ in time]
+    return {"segment": (names, "which feet support")}
 
 
 def walking_joint_demand(demand: MotionDemand, sliding: Collection[str] = ()) -> Table:
@@ -36,34 +203,26 @@ def walking_joint_demand(demand: MotionDemand, sliding: Collection[str] = ()) ->
         demand: Of all joints.
         sliding: Joints that slide: metres and newtons, not radians and newton metres.
     """
-    parts = demand.segments
-
-    def units(turns: str, slides: str) -> tuple[str, ...]:
-        return tuple(slides if joint in sliding else turns for joint in demand.joints)
-
-    def joined(name: str) -> Array:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    labels = np.concatenate([[part.segment] * part.time.size for part in parts]).tolist()
+    parts, quantities = demand.segments, []
+    for name, turns, slides in (
+        ("position", "rad", "m"),
+        ("velocity", "rad/s", "m/s"),
+        ("acceleration", "rad/s^2", "m/s^2"),
+        ("torque", "N*m", "N"),
+    ):
+        units = tuple(slides if joint in sliding else turns for joint in demand.joints)
+        meaning = name
+        if name == "torque":
+            force = ", a force where it slides" if sliding else ""
+            meaning = f"torque the actuator applies to the joint{force}"
+        values = np.concatenate([getattr(part, name) for part in parts])
+        quantities.append(Quantity(name, units, meaning, values))
     return wide_series(
         "walking_joint_demand",
-        joined("time"),
+        np.concatenate([part.time for part in parts]),
         demand.joints,
-        [
-            Quantity("position", units("rad", "m"), "position", joined("position")),
-            Quantity("velocity", units("rad/s", "m/s"), "velocity", joined("velocity")),
-            Quantity(
-                "acceleration", units("rad/s^2", "m/s^2"), "acceleration", joined("acceleration")
-            ),
-            Quantity(
-                "torque",
-                units("N*m", "N"),
-                "torque the actuator applies to the joint"
-                + (", a force where it slides" if sliding else ""),
-                joined("torque"),
-            ),
-        ],
-        labels={"segment": (labels, "which feet support")},
+        quantities,
+        labels=_support([(part.segment, part.time) for part in parts]),
         description="One gait cycle; torque and velocity positive in the joint's direction.",
     )
 
@@ -73,61 +232,22 @@ def walking_contact_forces(demand: MotionDemand) -> Table:
     parts = [contacts for contacts in demand.contacts if contacts is not None]
     force = np.concatenate([part.force_world for part in parts])
     needed = np.concatenate([part.friction_needed for part in parts])
-    stance = np.concatenate(
-        [
-            np.repeat([[float(leg in part.stance) for leg in part.legs]], part.time.size, axis=0)
-            for part in parts
-        ]
-    )
-    labels = [s.segment for s in demand.segments for _ in range(s.time.size)]
+    stands = [[[float(leg in part.stance) for leg in part.legs]] * part.time.size for part in parts]
     meaning = "force of the ground on the robot, world "
     return wide_series(
         "walking_contact_forces",
         np.concatenate([part.time for part in parts]),
         parts[0].legs,
         [
-            Quantity("force_x", "N", meaning + "x", force[..., 0]),
-            Quantity("force_y", "N", meaning + "y", force[..., 1]),
-            Quantity("force_z", "N", meaning + "z", force[..., 2]),
-            Quantity("contact", "1", "1 on the ground, 0 in the air", stance),
+            *(
+                Quantity(f"force_{axis}", "N", meaning + axis, force[..., k])
+                for k, axis in enumerate("xyz")
+            ),
+            Quantity("contact", "1", "1 on the ground, 0 in the air", np.concatenate(stands)),
             Quantity("friction_needed", "1", "tangential over normal force", needed),
         ],
-        labels={"segment": (labels, "which feet support")},
+        labels=_support([(part.segment, part.time) for part in demand.segments]),
         description=f"{_FORCES[demand.forces.name]} foot forces; world frame, z up.",
-    )
-
-
-def walking_stability(demand: MotionDemand, margins: Sequence[Array]) -> Table:
-    """Static margin, lightest foot and friction needed, per segment."""
-    rows = []
-    for part, contacts, margin in zip(demand.segments, demand.contacts, margins, strict=True):
-        assert contacts is not None
-        normal = contacts.normal_force[:, [leg in contacts.stance for leg in contacts.legs]]
-        at = int(margin.argmin())
-        needed = contacts.friction_needed
-        rows.append(
-            {
-                "segment": part.segment,
-                "least_margin_m": float(margin[at]),
-                "at_time_s": float(part.time[at]),
-                "least_normal_force_N": float(normal.min()),
-                "greatest_friction_needed": float(np.nanmax(needed)),
-                "foot_of_greatest_friction": contacts.legs[
-                    int(np.nanargmax(needed)) % needed.shape[1]
-                ],
-            }
-        )
-    return table_from_rows(
-        "walking_stability",
-        rows,
-        {
-            "segment": ("which feet support", ""),
-            "least_margin_m": ("centre of mass to nearest edge of the support polygon", "m"),
-            "at_time_s": ("instant of the least margin", "s"),
-            "least_normal_force_N": ("lightest load on a supporting foot", "N"),
-            "greatest_friction_needed": ("largest tangential over normal force", "1"),
-            "foot_of_greatest_friction": ("leg that needs it", ""),
-        },
     )
 
 
@@ -141,180 +261,24 @@ def walking_stage_energy(
         stage_names: By alternative, every stage in words.
     """
     rows = [
-        {
-            "alternative": name,
-            "joint": joint,
-            "stage": stage.stage,
-            "stage_name": stage_names[name][stage.stage],
-            "forward_J": stage.forward[j],
-            "reverse_J": stage.reverse[j],
-        }
+        StageRow(name, joint, e.stage, stage_names[name][e.stage], e.forward[j], e.reverse[j])
         for name, result in results.items()
-        for stage in stage_energies(result)
-        for j, joint in enumerate(stage.joints)
+        for e in stage_energies(result)
+        for j, joint in enumerate(e.joints)
     ]
-    return table_from_rows(
-        "walking_stage_energy",
-        rows,
-        {
-            "alternative": ALTERNATIVE,
-            "joint": ("joint", ""),
-            "stage": ("shaft, from the joint (out) to the motor (m) and the supply (el)", ""),
-            "stage_name": ("where that is, in words", ""),
-            "forward_J": ("E(+): energy per cycle from the supply towards the joint", "J"),
-            "reverse_J": ("E(-): energy per cycle the other way, as a positive number", "J"),
-        },
-    )
+    return table_of(StageRow, rows)
 
 
 def walking_losses(results: Mapping[str, ChainResult], supplies: Mapping[str, Supply]) -> Table:
     """What every element turns into heat per cycle, and what is dumped at the supply."""
-    rows: list[dict[str, object]] = []
+    rows = []
     for name, result in results.items():
         for element, loss in loss_energies(result).items():
-            rows.extend(
-                {"alternative": name, "joint": joint, "element": element, "loss_J": loss[j]}
-                for j, joint in enumerate(result.joint.joints)
-            )
-        supply = supplies[name]
-        rows.extend(
-            {"alternative": name, "joint": account, "element": "dumped_return", "loss_J": energy}
-            for account, energy in zip(supply.accounts, supply.dumped_energy, strict=True)
-        )
-    return table_from_rows(
-        "walking_losses",
-        rows,
-        {
-            "alternative": ALTERNATIVE,
-            "joint": ("joint; 'bus' where all joints share the supply", ""),
-            "element": (
-                "element of the chain; dumped_return: returned electrical energy that is lost",
-                "",
-            ),
-            "loss_J": ("energy dissipated per cycle", "J"),
-        },
-    )
-
-
-def leg_energies(supply: Supply, legs: Mapping[str, Sequence[str]]) -> dict[str, float]:
-    """Electrical energy per cycle of each leg and of the robot [J].
-
-    On a shared bus one leg's return feeds another, so only the robot has an energy of its own.
-    """
-    energy = dict(zip(supply.accounts, supply.supplied_energy.tolist(), strict=True))
-    total = {"robot": float(sum(energy.values()))}
-    if BUS in energy:
-        return total
-    return {leg: sum(energy[j] for j in joints) for leg, joints in legs.items()} | total
-
-
-def walking_energy(
-    supplies: Mapping[str, Supply], legs: Mapping[str, Sequence[str]], ideal: str
-) -> Table:
-    """Electrical energy per cycle, and its ratio to the ideal actuator's where there is one."""
-    base = leg_energies(supplies[ideal], legs) if ideal in supplies else {}
-    rows = [
-        {
-            "alternative": name,
-            "leg": leg,
-            "electrical_J": energy,
-            "ratio_to_ideal": energy / base[leg] if base.get(leg, 0.0) > 0 else None,
-        }
-        for name, supply in supplies.items()
-        for leg, energy in leg_energies(supply, legs).items()
-    ]
-    return table_from_rows(
-        "walking_energy",
-        rows,
-        {
-            "alternative": ALTERNATIVE,
-            "leg": ("leg, or the robot as a whole", ""),
-            "electrical_J": ("energy drawn from the supply per cycle", "J", "electrical energy"),
-            "ratio_to_ideal": ("over that of the ideal actuator", "1", "ratio to the ideal"),
-        },
-    )
-
-
-def robot_energy(
-    demand: MotionDemand,
-    supplies: Mapping[str, Supply],
-    legs: Mapping[str, Sequence[str]],
-    weight: float,
-    speed: float,
-) -> Table:
-    """Average power, cost of transport, and how support and transfer share the energy.
-
-    Args:
-        demand: For the segments and their standing feet.
-        supplies: By alternative.
-        legs: Leg to its joints.
-        weight: Of the robot [N].
-        speed: Of walking [m/s].
-    """
-    assert demand.period is not None
-    rows = []
-    for name, supply in supplies.items():
-        energy = float(supply.supplied_energy.sum())
-        support = _support_energy(demand, supply, legs)
-        held = leg_energies(supply, legs).get(HELD, 0.0)
-        power = energy / demand.period
-        rows.append(
-            {
-                "alternative": name,
-                "energy_per_cycle_J": energy,
-                "average_power_W": power,
-                "cost_of_transport": power / (weight * speed) if speed else None,
-                "support_share": None if support is None else support / energy,
-                "transfer_share": None if support is None else 1 - support / energy - held / energy,
-                "dumped_J": float(supply.dumped_energy.sum()),
-            }
-        )
-    return table_from_rows(
-        "robot_energy",
-        rows,
-        {
-            "alternative": ALTERNATIVE,
-            "energy_per_cycle_J": ("energy drawn from the supply per cycle", "J"),
-            "average_power_W": ("over one cycle", "W"),
-            "cost_of_transport": ("average power over weight times speed", "1"),
-            "support_share": (
-                "share of joints while their foot supports; empty on a bus",
-                "1",
-                "share of support",
-            ),
-            "transfer_share": (
-                "share of joints while their foot is in the air",
-                "1",
-                "share of transfer",
-            ),
-            "dumped_J": (
-                "electrical energy per cycle that flows back and is lost",
-                "J",
-                "returned and lost",
-            ),
-        },
-    )
-
-
-def _support_energy(
-    demand: MotionDemand, supply: Supply, legs: Mapping[str, Sequence[str]]
-) -> float | None:
-    if BUS in supply.accounts:
-        return None
-    from actuators.energy.energy import split_integral
-
-    total = 0.0
-    for contacts in demand.contacts:
-        assert contacts is not None
-        start, end = contacts.time[0], contacts.time[-1]
-        # The segment's own rows: of the doubled stamps at its ends, the ones inside it.
-        first = int(np.searchsorted(supply.time, start, side="left"))
-        last = int(np.searchsorted(supply.time, end, side="right"))
-        columns = [supply.accounts.index(j) for leg in contacts.stance for j in legs[leg]]
-        time, power = supply.time[first:last], supply.electrical[first:last][:, columns]
-        forward, reverse = split_integral(time, power)
-        total += float((forward - supply.recovered * reverse).sum())
-    return total
+            own = zip(result.joint.joints, loss, strict=True)
+            rows += [LossRow(name, joint, element, energy) for joint, energy in own]
+        dumped = zip(supplies[name].accounts, supplies[name].dumped_energy, strict=True)
+        rows += [LossRow(name, account, "dumped_return", energy) for account, energy in dumped]
+    return table_of(LossRow, rows)
 
 
 def motor_limits(limits: Mapping[str, Sequence[LimitRow]], name: str = "motor_limits") -> Table:
@@ -324,124 +288,26 @@ def motor_limits(limits: Mapping[str, Sequence[LimitRow]], name: str = "motor_li
         limits: By alternative.
         name: Of the table.
     """
-    rows = [
-        {
-            "alternative": alternative,
-            "joint": row.joint,
-            "quantity": row.quantity,
-            "unit": row.unit,
-            "limit": row.limit,
-            "peak": row.peak,
-            "at_time_s": row.peak_time,
-            "share_of_time_over": row.share_over,
-            "breach": row.breach,
-        }
-        for alternative, own in limits.items()
-        for row in own
-    ]
-    return table_from_rows(
-        name,
-        rows,
-        {
-            "alternative": ALTERNATIVE,
-            "joint": ("joint", ""),
-            "quantity": ("motor speed, voltage, current, or rms_current over the cycle", ""),
-            "unit": ("unit of limit and peak", ""),
-            "limit": ("what the data sheet allows, in the row's unit", "see unit"),
-            "peak": ("largest magnitude over the cycle, in the row's unit", "see unit"),
-            "at_time_s": ("instant of the peak", "s"),
-            "share_of_time_over": ("share of the cycle above the limit", "1"),
-            "breach": ("whether the peak is above the limit", ""),
-        },
-    )
+    rows = [MotorLimit(n, *vars(row).values()) for n, own in limits.items() for row in own]
+    return table_of(MotorLimit, rows, name=name)
 
 
 def force_rules(costs: Sequence[RuleCost], friction_coefficient: float | None) -> Table:
     """What the paper's rule of the ground's forces costs against others."""
-    paper = {cost.alternative: cost.energy for cost in costs if cost.rule == LEAST_TANGENTIAL}
     rows = [
-        {
-            "alternative": cost.alternative,
-            "rule": cost.rule,
-            "electrical_J": cost.energy,
-            "relative_difference": cost.energy / paper[cost.alternative] - 1
-            if paper[cost.alternative]
-            else None,
-            "rms_joint_torque_Nm": cost.root_mean_square_torque,
-            "greatest_friction_needed": cost.friction_needed,
-        }
+        ForceRuleRow(
+            cost.alternative,
+            cost.rule,
+            cost.energy,
+            cost.relative_difference(costs),
+            cost.root_mean_square_torque,
+            cost.friction_needed,
+        )
         for cost in costs
     ]
     limit = "no limit" if friction_coefficient is None else f"{friction_coefficient:g}"
-    return table_from_rows(
-        "walking_force_rules",
-        rows,
-        {
-            "alternative": ALTERNATIVE,
-            "rule": (
-                "least_tangential: sum of squared tangential forces (the paper's); least_torque: "
-                "sum of squared joint torques; least_power: power this alternative draws, at "
-                "every instant",
-                "",
-            ),
-            "electrical_J": ("electrical energy of the whole robot in one cycle", "J"),
-            "relative_difference": ("energy over that of least_tangential, less one", "1"),
-            "rms_joint_torque_Nm": ("root mean square over all joints and samples", "N*m"),
-            "greatest_friction_needed": ("largest tangential over normal force", "1"),
-        },
-        description="The ground's forces chosen by other rules, motion being the same; friction "
-        f"coefficient: {limit}.",
+    text = (
+        "The ground's forces chosen by other rules, motion being the same; friction coefficient: "
+        f"{limit}."
     )
-
-
-def quasi_static_difference(
-    full: MotionDemand,
-    static: MotionDemand,
-    full_supplies: Mapping[str, Supply],
-    static_supplies: Mapping[str, Supply],
-    legs: Mapping[str, Sequence[str]],
-) -> tuple[Table, Table]:
-    """What the links' inertial terms change: in torque by joint, in energy by leg."""
-    torque = [np.concatenate([part.torque for part in d.segments]) for d in (full, static)]
-    joints = Table(
-        "quasi_static_torque",
-        {
-            "joint": list(full.joints),
-            "peak_torque_full_Nm": np.abs(torque[0]).max(axis=0),
-            "peak_torque_quasi_static_Nm": np.abs(torque[1]).max(axis=0),
-            "largest_difference_Nm": np.abs(torque[0] - torque[1]).max(axis=0),
-        },
-        {
-            "joint": ("joint", ""),
-            "peak_torque_full_Nm": ("largest magnitude with all inertial terms", "N*m"),
-            "peak_torque_quasi_static_Nm": ("without the links' inertial terms", "N*m"),
-            "largest_difference_Nm": ("largest difference at one instant", "N*m"),
-        },
-        "Full inverse dynamics against gravity and contact alone.",
-    )
-    rows = []
-    for name, supply in full_supplies.items():
-        other = leg_energies(static_supplies[name], legs)
-        for leg, energy in leg_energies(supply, legs).items():
-            rows.append(
-                {
-                    "alternative": name,
-                    "leg": leg,
-                    "full_J": energy,
-                    "quasi_static_J": other[leg],
-                    "relative_difference": (other[leg] - energy) / energy if energy else None,
-                }
-            )
-    energies = table_from_rows(
-        "quasi_static_energy",
-        rows,
-        {
-            "alternative": ALTERNATIVE,
-            "leg": ("leg, or the robot as a whole", ""),
-            "full_J": ("electrical energy per cycle with all inertial terms", "J"),
-            "quasi_static_J": ("without the links' inertial terms", "J"),
-            "relative_difference": ("quasi-static over full, less one", "1"),
-        },
-        "Reflected rotor inertia stays in the actuator chain in both.",
-    )
-    return joints, energies
+    return table_of(ForceRuleRow, rows, about=text)

@@ -15,7 +15,8 @@ from reports.figures.gap.waterfall import GapStep, gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
 from reports.figures.style import NARROW
-from reports.tables.gap import deciding_motion, found
+from reports.table import table_of
+from reports.tables.gap import FoundRow, deciding_motion
 from tests.reports import geometry
 
 
@@ -145,6 +146,6 @@ def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_tables_have_the_promised_columns() -> None:
     what = "order effect law amounts_to joint place parameter value ci_low ci_high unit"
     how = "gap_before gap_after gap_unit noise_floor level share reason written"
-    assert list(found([]).columns) == [*what.split(), *how.split()]
+    assert list(table_of(FoundRow, []).columns) == [*what.split(), *how.split()]
     table = deciding_motion(np.arange(3.0), ["a", "b"], np.zeros((3, 2)))
     assert list(table.columns) == ["time_s", "a__position_rad", "b__position_rad"]

@@ -1,80 +1,91 @@
-"""Tables refuse what a reader could not use."""
+"""Tables refuse what a reader could not use; a column is declared once, on the rows' dataclass."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
+from reports.column import column
 from reports.errors import TableError
-from reports.table import Table, table_from_rows
-from reports.wide import Quantity, header, wide_series
+from reports.table import Quantity, Table, table_of, wide_series
 
 X = {"x": ("length", "m")}
 
 
+@dataclass(frozen=True)
+class Row:
+    """One thing."""
+
+    table: ClassVar = "things"
+    about: ClassVar = "Some things."
+    name: str = column("of it")
+    peak_torque_Nm: float = column("largest magnitude", "N*m")
+    low: float = column("lower end", "see unit", "95 % from", of=lambda r: r.ends[0])
+    unit: str = column("unit of low")
+
+
 @pytest.mark.parametrize(
-    ("columns", "meanings", "says"),
+    ("name", "columns", "meanings", "says"),
     [
-        ({}, {}, "no columns"),
-        ({"x": [1.0]}, {}, "'x' has no meaning"),
-        ({"x": [1.0]}, {"x": ("  ", "m")}, "'x' has no meaning"),
-        ({"x": [1.0]}, {**X, "y": ("b", "m")}, "'y', which is no column"),
-        ({"x": [1.0], "X": [2.0]}, {**X, "X": ("b", "m")}, "same word"),
-        ({"x": [1.0], "y": [1.0, 2.0]}, {**X, "y": ("b", "m")}, "2 rows"),
-        ({"x,y": [1.0]}, {"x,y": ("a", "m")}, "letters, digits"),
-        ({"x": np.zeros((2, 2))}, X, "2 dimensions"),
-        ({"x": "abc"}, X, "one text"),
+        ("t", {}, {}, "there is none"),
+        ("t", {"x": [1.0]}, {}, "'x' lacks values or a meaning"),
+        ("t", {"x": [1.0]}, {**X, "y": ("b", "m")}, "'y' lacks values or a meaning"),
+        ("t", {"x": [1.0], "X": [2.0]}, {**X, "X": ("b", "m")}, "same word"),
+        ("t", {"x": [1.0], "y": [1.0, 2.0]}, {**X, "y": ("b", "m")}, "unequal length: 'x' 1, 'y'"),
+        ("t", {"x,y": [1.0]}, {"x,y": ("a", "m")}, "letters, digits"),
+        *((name, {"x": [1.0]}, X, "plain file name") for name in ("", "a/b", "../t", "a b")),
     ],
 )
-def test_unusable_table_is_refused_in_one_line(columns, meanings, says) -> None:
+def test_unusable_table_is_refused_in_one_line(name, columns, meanings, says) -> None:
     with pytest.raises(TableError) as caught:
-        Table("t", columns, meanings)
+        Table(name, columns, meanings)
     assert says in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["", "a/b", "../t", "a b"])
-def test_name_is_a_plain_file_name(name: str) -> None:
-    with pytest.raises(TableError, match="plain file name"):
-        Table(name, {"x": [1.0]}, X)
-
-
-def test_rows_take_the_order_of_the_meanings() -> None:
-    meanings = {"b": ("second", "1"), "a": ("first", "1")}
-    table = table_from_rows("t", [{"a": 1, "b": 2}, {"b": 4, "a": 3}], meanings)
-    assert list(table.columns) == ["b", "a"]
-    assert table.columns["a"] == [1, 3]
-    assert table.rows == 2
-
-
-def test_row_with_a_missing_column_is_named() -> None:
-    with pytest.raises(TableError, match="row 1: columns x"):
-        table_from_rows("t", [{"x": 1}, {}], X)
-
-
-def test_wide_headers_follow_the_design() -> None:
-    assert header("rm_joint_2", "torque", "N*m") == "rm_joint_2__torque_Nm"
-    assert header("rm_joint_2", "acceleration", "rad/s^2") == "rm_joint_2__acceleration_rad_s2"
-    assert header("rm", "friction_needed", "1") == "rm__friction_needed"
-
-
-def test_wide_series_keeps_joints_together() -> None:
-    time = np.array([0.0, 1.0, 1.0])
-    velocity = Quantity("velocity", "rad/s", "velocity", np.arange(6.0).reshape(3, 2))
-    torque = Quantity("torque", "N*m", "torque", -np.arange(6.0).reshape(3, 2))
-    table = wide_series(
-        "w", time, ["a", "b"], [velocity, torque], labels={"segment": (["s"] * 3, "segment")}
-    )
-    assert list(table.columns) == [
-        "time_s",
-        "segment",
-        "a__velocity_rad_s",
-        "a__torque_Nm",
-        "b__velocity_rad_s",
-        "b__torque_Nm",
+def test_a_table_of_rows() -> None:
+    rows = [
+        SimpleNamespace(name=n, peak_torque_Nm=1.0, ends=(k, 9), unit="m")
+        for k, n in ((2, "a"), (3, "b"))
     ]
-    np.testing.assert_array_equal(table.columns["b__torque_Nm"], [-1.0, -3.0, -5.0])
-    assert table.meanings["b__torque_Nm"] == ("b: torque", "N*m")
+    table = table_of(Row, rows)
+    assert (table.name, table.description, table.rows) == ("things", "Some things.", 2)
+    assert dict(table.columns) == {
+        "name": ["a", "b"],
+        "peak_torque_Nm": [1.0, 1.0],
+        "low": [2, 3],
+        "unit": ["m", "m"],
+    }
+    assert table.meanings["peak_torque_Nm"][:2] == ("largest magnitude", "N*m")
+    titles = ["name", "peak torque [N·m]", "95 % from", "unit"]
+    assert [table.title(header) for header in table.columns] == titles
+    assert table.unit_columns == {"unit"}
+    assert list(table.frame().columns) == list(table.columns)
+    other = table_of(Row, [], name="none", about="Nothing.", exact=True)
+    assert (other.name, other.description, other.exact, other.rows) == ("none", "Nothing.", True, 0)
+
+
+def test_wide_series_keeps_owners_together_and_names_the_unit() -> None:
+    values = np.arange(6.0).reshape(3, 2)
+    quantities = [
+        Quantity("acceleration", ("rad/s^2", "m/s^2"), "acceleration", values),
+        Quantity("torque_rate", "N*m/s", "torque rate", -values),
+        Quantity("friction_needed", "1", "friction", values),
+    ]
+    labels = {"segment": (["s"] * 3, "segment")}
+    table = wide_series("w", np.arange(3.0), ["a", "é b"], quantities, labels=labels)
+    assert list(table.columns) == [
+        *("time_s", "segment"),
+        *("a__acceleration_rad_s2", "a__torque_rate_Nm_s", "a__friction_needed"),
+        *("é b__acceleration_m_s2", "é b__torque_rate_Nm_s", "é b__friction_needed"),
+    ]
+    np.testing.assert_array_equal(table.columns["é b__torque_rate_Nm_s"], [-1.0, -3.0, -5.0])
+    assert table.meanings["a__torque_rate_Nm_s"] == ("a: torque rate", "N*m/s")
+    assert table.title("a__torque_rate_Nm_s") == "a torque rate [N·m/s]"
 
 
 def test_wide_series_refuses_wrong_shapes_and_doubled_headers() -> None:
@@ -83,28 +94,3 @@ def test_wide_series_refuses_wrong_shapes_and_doubled_headers() -> None:
         wide_series("w", np.zeros(3), ["a"], [good])
     with pytest.raises(TableError, match="occurs twice"):
         wide_series("w", np.zeros(2), ["a"], [good, good])
-
-
-def test_heading_is_the_declared_title_or_the_header_in_words() -> None:
-    table = Table(
-        "t",
-        {
-            h: [1.0]
-            for h in ("peak_torque_Nm", "ci_low", "value", "unit", "rm_joint_2__torque_rate_Nm_s")
-        },
-        {
-            "peak_torque_Nm": ("largest magnitude", "N*m"),
-            "ci_low": ("lower end", "see unit", "95 % from"),
-            "value": ("best estimate", "see unit"),
-            "unit": ("unit of value", ""),
-            "rm_joint_2__torque_rate_Nm_s": ("rate", "N*m/s"),
-        },
-    )
-    assert [table.title(header) for header in table.columns] == [
-        "peak torque [N·m]",
-        "95 % from",
-        "value",
-        "unit",
-        "rm_joint_2 torque rate [N·m/s]",
-    ]
-    assert table.unit_columns == {"unit"}

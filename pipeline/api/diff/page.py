@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.api.diff.compare import PARAMETERS, Comparison, Pair, compare
 from pipeline.api.diff.runs import Run, read_run
+from reports.column import column
 from reports.errors import ReportError
 from reports.folder.staging import staged
 from reports.html import write_html
 from reports.page import Block, FigureBlock, Page, PairBlock, Section, TableBlock, Text
-from reports.table import Table, table_from_rows
+from reports.table import table_of
 from reports.typeset import unit_suffix, unit_text
 from reports.writer import write_table
 
@@ -26,16 +28,21 @@ SHOWN = 12
 TOLD = 4
 #: Change of a number, over the largest of its column, that is rounding's.
 ROUNDING = 1e-9
-_COLUMNS = {
-    "table": ("CSV that both runs have", ""),
-    "row": ("what names the row in it", ""),
-    "quantity": ("its column", ""),
-    "unit": ("of a, b and difference", ""),
-    "a": ("value of run A; empty where it has none", "see unit"),
-    "b": ("value of run B; empty where it has none", "see unit"),
-    "difference": ("b less a", "see unit"),
-    "ratio": ("b over a; empty where a is zero", "1"),
-}
+ABOUT = "Every number of every table that both runs have; B against A."
+
+
+@dataclass(frozen=True)
+class SideBySide:
+    """One number of two runs."""
+
+    table: str = column("CSV that both runs have")
+    row: str = column("what names the row in it")
+    quantity: str = column("its column")
+    unit: str = column("of a, b and difference")
+    a: float = column("value of run A; empty where it has none", "see unit")
+    b: float = column("value of run B; empty where it has none", "see unit")
+    difference: float = column("b less a", "see unit")
+    ratio: float = column("b over a; empty where a is zero", "1")
 
 
 def write_diff(first: Path, second: Path, out: Path, decimal: str = ".") -> list[str]:
@@ -56,7 +63,7 @@ def write_diff(first: Path, second: Path, out: Path, decimal: str = ".") -> list
     both = compare(read_run(first), read_run(second))
     if out.resolve() in {first.resolve(), second.resolve()}:
         raise ReportError(f"{out}: holds a run that is compared; name another folder with --out")
-    table = _table(both)
+    table = table_of(SideBySide, both.pairs, name=NAME, about=ABOUT, exact=True)
     with staged(out, "diff") as folder:
         write_table(table, folder, meta=_meta(both), decimal=decimal)
         for side, run in (("a", both.a), ("b", both.b)):
@@ -68,12 +75,6 @@ def write_diff(first: Path, second: Path, out: Path, decimal: str = ".") -> list
         *(line.replace("**", "").replace("`", "") for line in answer(both)),
         f"written to {out}",
     ]
-
-
-def _table(both: Comparison) -> Table:
-    rows = [{header: getattr(pair, header) for header in _COLUMNS} for pair in both.pairs]
-    description = "Every number of every table that both runs have; B against A."
-    return table_from_rows(NAME, rows, _COLUMNS, description, exact=True)
 
 
 def _meta(both: Comparison) -> dict[str, object]:

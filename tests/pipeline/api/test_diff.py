@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from reports.folder.staging import staged
-from reports.table import table_from_rows
+from reports.table import Table
 from reports.writer import write_table, write_text
 from tests.command_line import Rows, exit_code
 from tests.conftest import SKETCH
@@ -50,7 +50,8 @@ def made(folder: Path, robot: str, scale: float, *legs: str, verb: str = "walk")
     meta = {"inputs_sha256": {f"{robot}.toml": "00"}, "options": {"set": [], "samples": scale}}
     with staged(folder, verb) as out:
         for name, rows, meanings in tables:
-            write_table(table_from_rows(name, rows, meanings), out, meta=meta)
+            columns = {header: [row[header] for row in rows] for header in meanings}
+            write_table(Table(name, columns, meanings), out, meta=meta)
         write_text(out / "gait.svg", SKETCH.replace("1 1", f"1 {scale}"))
         write_text(out / "same.svg", SKETCH)
     return folder

@@ -11,7 +11,7 @@ from pipeline.blind.standard.rows import by_effect, rates, read_rows, reliabilit
 from pipeline.blind.standard.score import StandardScore, score_straight
 from pipeline.blind.twin.fixed.hidden import LAWS_OF_FRICTION
 from pipeline.blind.twin.fixed.matrix import StandardSpec, standard_matrix
-from reports.tables.blind import standard_trials
+from reports.tables.blind import StandardTrialRow, blind_table
 from reports.writer import write_table
 
 NAN = float("nan")
@@ -179,7 +179,7 @@ def test_stated_shares_stand_beside_actual_ones() -> None:
 
 
 def test_a_run_that_is_read_back_gives_the_same_rates(tmp_path: Any) -> None:
-    write_table(standard_trials(rows()), tmp_path, meta={})
+    write_table(blind_table(StandardTrialRow, rows()), tmp_path, meta={})
     again = read_rows(tmp_path / "blind_standard_trials.csv")
     assert [(r.hits, r.trials) for r in rates(again)] == [(r.hits, r.trials) for r in rates(rows())]
 
