@@ -21,7 +21,7 @@ from pipeline.progress import Progress
 from pipeline.simulation.ground_forces.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand
-from reports.folder.staging import staged
+from reports.folder import staged
 from reports.pages.motor_words import limits_text, motors_text
 from reports.pages.names import short_titles
 from reports.table import Table

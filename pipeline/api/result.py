@@ -10,7 +10,7 @@ from typing import Any
 
 from actuators.errors import closest
 from reports.errors import TableError
-from reports.folder.staging import staged
+from reports.folder import staged
 from reports.table import Table
 from reports.writer import write_table
 

@@ -37,7 +37,7 @@ from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.paper.calibration.checkpoint import Checkpoint
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.folder.staging import staged
+from reports.folder import staged
 
 #: What a trial is made of, and what an answer hangs on beside it.
 _OF_TRIALS: Final = (

@@ -93,7 +93,7 @@ def _judged(spec: StandardSpec, sha256: str, run: dict[str, Any], out: Path) -> 
 
 
 def _write(rows: Sequence[Row], out: Path, seed: int, seconds: Sequence[float]) -> int:
-    from reports.folder.staging import staged
+    from reports.folder import staged
     from reports.tables import blind as tables
     from reports.writer import write_table
 

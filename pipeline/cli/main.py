@@ -200,7 +200,7 @@ def _run_urdf(options: argparse.Namespace) -> int:
 @contextmanager
 def _folder_held(options: argparse.Namespace) -> Iterator[None]:
     """Hold the folder of results from the start, and see that the model's folder is settled."""
-    from reports.folder.staging import holding, settled
+    from reports.folder import holding, settled
 
     if getattr(options, "model", None):
         settled(options.model.parent)
@@ -247,9 +247,9 @@ def _run_twin(options: argparse.Namespace) -> int:
 
 
 def _run_blind(options: argparse.Namespace) -> int:
-    from reports.folder.staging import told
+    from reports.folder import output_errors
 
-    with _folder_held(options), told(options.out):
+    with _folder_held(options), output_errors(options.out):
         from pipeline.cli.blind import run_blind
 
         return run_blind(options)
@@ -257,9 +257,9 @@ def _run_blind(options: argparse.Namespace) -> int:
 
 def _run_calibrate(options: argparse.Namespace) -> int:
     from pipeline.cli.calibrate import WORK, run_calibrate
-    from reports.folder.staging import holding, told
+    from reports.folder import holding, output_errors
 
-    with holding(WORK), told(WORK):
+    with holding(WORK), output_errors(WORK):
         return run_calibrate(options)
 
 

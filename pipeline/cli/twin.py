@@ -10,8 +10,7 @@ from pathlib import Path
 from pipeline.blind.twin.errors import TwinError
 from pipeline.blind.twin.files import TrialFiles, check_seal, write_trial
 from pipeline.blind.twin.trial import Trial, make_trial
-from reports.folder.exchange import PREFIX
-from reports.folder.staging import staged
+from reports.folder import PREFIX, staged
 
 
 def run_twin(options: argparse.Namespace) -> int:

@@ -11,7 +11,7 @@ from pipeline.api.diff.compare import PARAMETERS, Comparison, Pair, compare
 from pipeline.api.diff.runs import Run, read_run
 from reports.column import column
 from reports.errors import ReportError
-from reports.folder.staging import staged
+from reports.folder import staged
 from reports.html import write_html
 from reports.page import Block, FigureBlock, Page, PairBlock, Section, TableBlock, Text
 from reports.table import table_of

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 from actuators.errors import one_line
 from reports.errors import ReportError
-from reports.folder.manifest import read_manifest, sha256
-from reports.folder.staging import settled
+from reports.folder import read_manifest, settled, sha256
 
 if TYPE_CHECKING:
     import pandas

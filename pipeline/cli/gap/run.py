@@ -38,7 +38,7 @@ from pipeline.identification.workflow.validate import check
 from pipeline.logs.quality.finding import Finding
 from pipeline.progress import Progress
 from pipeline.simulation.found_bodies import FoundBodies
-from reports.folder.staging import staged
+from reports.folder import staged
 from reports.pages.gap_report import write_report
 from reports.table import Table
 from reports.typeset import plain

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from reports.folder.staging import staged
+from reports.folder import staged
 from reports.table import Table
 from reports.writer import write_table, write_text
 from tests.command_line import Rows, exit_code

@@ -20,9 +20,7 @@ from pipeline.api import figures
 from pipeline.cli.demo import DEMO
 from pipeline.cli.main import main
 from reports.errors import FigureError
-from reports.folder.exchange import EXCHANGE
-from reports.folder.manifest import MANIFEST, read_manifest
-from reports.folder.staging import holding
+from reports.folder import MANIFEST, PENDING, holding, read_manifest
 from tests.command_line import Command, exit_code, in_another_process, results
 
 CODE = """
@@ -33,16 +31,23 @@ sys.exit(main(sys.argv[1:]))
 
 
 def killed(at: int) -> None:
-    """This process kills itself at a call of os.rename, by which a finished set is put in place."""
-    real, calls = os.rename, []
+    """This process kills itself at a step by which a finished set is put in place, from 1."""
+    calls: list[str] = []
 
-    def rename(source: str, target: str) -> None:
-        calls.append(target)
-        if len(calls) == at:
-            os.kill(os.getpid(), signal.SIGKILL)
-        real(source, target)
+    def counted(name: str) -> None:
+        real = getattr(os, name)
 
-    os.rename = rename  # type: ignore[assignment]
+        def step(*arguments: str, **more: object) -> None:
+            if calls or str(arguments[-1]).endswith(PENDING):
+                calls.append(name)
+            if len(calls) == at:
+                os.kill(os.getpid(), signal.SIGKILL)
+            real(*arguments, **more)
+
+        setattr(os, name, step)
+
+    for name in ("rename", "replace", "unlink"):
+        counted(name)
 
 
 def full(most: int) -> None:
@@ -121,7 +126,7 @@ def test_a_process_killed_while_it_puts_files_in_place(
     assert ended.returncode == -signal.SIGKILL
     left = contents(tmp_path / "out").items()
     assert left <= old.items() or left <= new.items()
-    assert (tmp_path / "out" / EXCHANGE).is_dir() == (at > 1)
+    assert (tmp_path / "out" / PENDING).is_dir() == (at > 1)
     assert settled(tmp_path / "out") == (new if at > 1 else old)
 
 
@@ -172,7 +177,7 @@ def test_many_kills_at_random_instants_leave_whole_sets(
 
 def test_two_at_once(root: Path, tmp_path: Path, command: Command) -> None:
     """The second is refused in one line while the first goes on; after it, it is welcome."""
-    code = "import sys\nfrom reports.folder.staging import holding\nfrom pathlib import Path\n"
+    code = "import sys\nfrom reports.folder import holding\nfrom pathlib import Path\n"
     code += "with holding(Path(sys.argv[1])):\n    print(flush=True)\n    sys.stdin.read()\n"
     first = subprocess.Popen(
         [sys.executable, "-c", code, str(tmp_path)],

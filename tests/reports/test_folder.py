@@ -1,8 +1,9 @@
-"""A set of files replaces another as a whole, killed at any step, and no one's file is lost."""
+"""A run's files replace another's as a whole, killed at any step, and no one's file is lost."""
 
 from __future__ import annotations
 
 import os
+import random
 import shutil
 import signal
 from collections.abc import Callable, Iterator
@@ -12,9 +13,7 @@ from pathlib import Path
 import pytest
 
 from reports.errors import OutputError
-from reports.folder.exchange import EXCHANGE
-from reports.folder.manifest import MANIFEST, read_manifest
-from reports.folder.staging import holding, settled, staged
+from reports.folder import MANIFEST, PENDING, holding, read_manifest, settled, staged
 
 OLD = {f"old_{k}.csv": f"old {k}" for k in range(3)} | {"both.csv": "old", "sub/both.txt": "old"}
 NEW = {f"new_{k}.csv": f"new {k}" for k in range(3)} | {"both.csv": "new", "deep/er/a.txt": "new"}
@@ -25,14 +24,15 @@ OWN = {
     "old_1.csv": "old 1, corrected by hand",
     "new_1.csv": "mine before any run",
 }
-#: Where these are after an exchange.
+#: Where these are after a run.
 AFTER = {
     "notes.txt": "mine",
     "gap/report.md": "another run's",
     "old_1.csv.kept": "old 1, corrected by hand",
     "new_1.csv.kept": "mine before any run",
 }
-STEPS = ("rename", "rmdir", "unlink", "mkdir")
+#: Calls that change a folder.
+STEPS = ("rename", "replace", "rmdir", "unlink", "mkdir")
 
 
 def write(folder: Path, files: dict[str, str]) -> None:
@@ -53,6 +53,10 @@ def files(folder: Path, *, hidden: bool = False) -> dict[str, str]:
         for path in folder.rglob("*")
         if path.is_file() and (hidden or not path.relative_to(folder).parts[0].startswith("."))
     }
+
+
+def hidden(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir() if path.name.startswith(".")}
 
 
 @pytest.fixture
@@ -79,13 +83,13 @@ def in_child(action: Callable[[], None]) -> int:
 
 @contextmanager
 def failing_at(number: int, fail: Callable[[], None], *, decided: bool = False) -> Iterator[None]:
-    """Let a step of those that change a folder fail, counted from the first or the decision."""
+    """Let a step that changes a folder fail, counted from the first or from the decision."""
     real = {name: getattr(os, name) for name in STEPS}
     done: list[str] = []
 
     def counted(name: str) -> Callable[..., None]:
         def step(*arguments: object, **more: object) -> None:
-            if done or not decided or str(arguments[-1]).endswith(EXCHANGE):
+            if done or not decided or str(arguments[-1]).endswith(PENDING):
                 done.append(name)
             if len(done) == number:
                 fail()
@@ -106,112 +110,106 @@ def kill() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_a_run_replaces_what_the_last_run_left_and_nothing_else(used: Path) -> None:
+def killed_run(out: Path, number: int, *, decided: bool = False) -> int:
+    def action() -> None:
+        with failing_at(number, kill, decided=decided):
+            run(out, NEW)
+
+    return in_child(action)
+
+
+def check_killed(out: Path, number: int) -> bool:
+    """Kill a run at a step; whether there was such a step."""
+    code = killed_run(out, number)
+    left = files(out)
+    assert set(OWN.values()) <= set(left.values()), f"step {number}: a person's file is lost"
+    of_runs = {(n, t) for n, t in left.items() if t not in OWN.values()}
+    assert of_runs <= set(OLD.items()) or of_runs <= set(NEW.items()), f"step {number}: a mixture"
+    with holding(out):
+        pass
+    assert files(out) in ({**OLD, **OWN}, {**NEW, **AFTER}), number
+    assert hidden(out) == {MANIFEST}, number
+    return code == -signal.SIGKILL
+
+
+def test_a_run_replaces_what_the_last_run_left_and_nothing_else(
+    used: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     run(used, NEW)
     assert files(used) == NEW | AFTER
+    assert "held a run of 'reports'" in capsys.readouterr().out
     assert not (used / "sub").exists()
-    assert {p.name for p in used.iterdir() if p.name.startswith(".")} == {MANIFEST}
+    assert hidden(used) == {MANIFEST}
     assert read_manifest(used).verb == "walk"
     assert set(read_manifest(used).files) == set(NEW)
     run(used, {"last.csv": "last"})
     assert files(used) == {"last.csv": "last"} | AFTER
+    assert capsys.readouterr().out == ""
 
 
-def test_a_run_killed_at_any_step_leaves_files_of_one_run_and_the_next_look_a_whole_one(
-    used: Path, tmp_path: Path
+@pytest.mark.parametrize("kills", [5, pytest.param(40, marks=pytest.mark.slow)])
+def test_a_run_killed_at_random_steps_leaves_files_of_one_run(
+    used: Path, tmp_path: Path, kills: int
 ) -> None:
-    def new_run(number: int) -> Callable[[], None]:
-        def action() -> None:
-            with failing_at(number, kill):
-                run(tmp_path / "trial", NEW)
-
-        return action
-
-    whole = [files(used), NEW | AFTER]
-    names = [set(OLD.items()) - {("old_1.csv", "old 1")}, set(NEW.items())]
-    people = {text for text in OWN.values()}
-    seen: set[int] = set()
-    number, code = 0, -signal.SIGKILL
-    while code == -signal.SIGKILL:
-        number += 1
-        shutil.rmtree(tmp_path / "trial", ignore_errors=True)
-        shutil.copytree(used, tmp_path / "trial")
-        code = in_child(new_run(number))
-        left = files(tmp_path / "trial")
-        assert people <= set(left.values()), number
-        runs = set(left.items()) - {(n, t) for n, t in left.items() if t in people}
-        assert runs <= names[0] or runs <= names[1], f"step {number}: files of two runs"
-        with holding(tmp_path / "trial"):
-            pass
-        assert files(tmp_path / "trial") in whole, number
-        seen.add(whole.index(files(tmp_path / "trial")))
-        hidden = {p.name for p in (tmp_path / "trial").iterdir() if p.name.startswith(".")}
-        assert hidden == {MANIFEST}, number
-    assert code == 0
-    assert number > 25
-    assert seen == {0, 1}
+    steps = 1
+    while killed_run(shutil.copytree(used, tmp_path / f"count_{steps}"), steps) < 0:
+        steps += 1
+    assert steps > 20
+    draw = random.Random(kills)
+    for k in range(kills):
+        out = shutil.copytree(used, tmp_path / f"trial_{k}")
+        assert check_killed(out, draw.randrange(1, steps))
+        run(out, {"next.csv": "1"})
+        assert files(out).items() >= {"next.csv": "1", "notes.txt": "mine"}.items()
 
 
-def test_killed_again_while_it_is_settled(used: Path, tmp_path: Path) -> None:
+def test_killed_again_while_it_is_mended(used: Path) -> None:
     """Any number of kills, each a few steps further, ends in the new set."""
 
-    def action() -> None:
+    def mend() -> None:
         with failing_at(5, kill), holding(used):
             pass
 
-    def first() -> None:
-        with failing_at(3, kill, decided=True):
-            run(used, NEW)
-
-    assert in_child(first) == -signal.SIGKILL
-    assert (used / EXCHANGE).is_dir()
+    assert killed_run(used, 3, decided=True) == -signal.SIGKILL
+    assert (used / PENDING).is_dir()
     kills = 0
-    while in_child(action):
+    while in_child(mend):
         kills += 1
         assert kills < 30
     assert kills > 1
     assert files(used) == NEW | AFTER
 
 
-def test_whoever_reads_a_folder_settles_it_first(used: Path) -> None:
-    def action() -> None:
-        with failing_at(8, kill, decided=True):
-            run(used, NEW)
-
-    assert in_child(action) == -signal.SIGKILL
+def test_whoever_reads_a_folder_mends_it_first(used: Path) -> None:
+    assert killed_run(used, 8, decided=True) == -signal.SIGKILL
     settled(used)
     assert files(used) == NEW | AFTER
 
 
-def test_a_system_that_refuses_any_step_leaves_everything_as_it_was(
+def test_a_system_that_refuses_a_step_leaves_files_of_one_run_and_the_next_start_mends(
     used: Path, tmp_path: Path
 ) -> None:
-    """Where it refuses to remove what is of no more use, the new set is in place already."""
-    before = files(used, hidden=True)
-    trial = tmp_path / "trial" / "out"
-    refused = 0
-
     def refuse() -> None:
         raise OSError(28, "No space left on device")
 
-    for number in range(1, 30):
-        shutil.rmtree(trial, ignore_errors=True)
-        shutil.copytree(used, trial)
-        said = ""
+    refused = 0
+    for number in range(1, 15):
+        trial = shutil.copytree(used, tmp_path / f"trial_{number}")
         with failing_at(number, refuse, decided=True):
+            says = ""
             try:
                 run(trial, NEW)
             except OutputError as error:
-                said = str(error)
-        if said:
-            refused += 1
-            assert said.endswith(
-                "cannot be written (No space left on device); choose another folder"
-            )
-            assert files(trial, hidden=True) == before, number
-        else:
-            assert files(trial) == NEW | AFTER, number
-    assert refused > 12
+                says = str(error)
+        refused += says.endswith(
+            "cannot be written (No space left on device); choose another folder"
+        )
+        assert not says or "No space left" in says
+        left = {(n, t) for n, t in files(trial).items() if t not in OWN.values()}
+        assert left <= set(OLD.items()) or left <= set(NEW.items())
+        settled(trial)
+        assert files(trial) in ({**OLD, **OWN}, {**NEW, **AFTER})
+    assert refused > 8
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, RuntimeError, OutputError("no")])
@@ -230,48 +228,37 @@ def test_a_stop_while_files_are_gathered_leaves_everything_as_it_was(
     assert files(used, hidden=True) == before
 
 
-@pytest.fixture
-def interruptible() -> Iterator[None]:
-    """A process started in the background ignores SIGINT; here it is to be heard."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
+def test_an_interrupt_waits_for_the_end_of_a_replacement(used: Path, tmp_path: Path) -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt
 
-
-@pytest.mark.usefixtures("interruptible")
-def test_an_interrupt_waits_for_the_end_of_an_exchange(used: Path) -> None:
     for number in range(2, 12):
-        interrupt = failing_at(number, lambda: signal.raise_signal(signal.SIGINT), decided=True)
-        with interrupt, pytest.raises(KeyboardInterrupt):
-            run(used, NEW)
-        assert files(used) == NEW | AFTER
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        trial = shutil.copytree(used, tmp_path / f"trial_{number}")
+        with failing_at(number, interrupt, decided=True), pytest.raises(KeyboardInterrupt):
+            run(trial, NEW)
+        assert files(trial) == NEW | AFTER
 
 
 def test_a_file_that_the_run_reads_stays(used: Path) -> None:
     """`gap shrink --model out/model.toml --out out` keeps the model, and a later run knows it."""
+    own = {"notes.txt": "mine", "gap/report.md": "another run's"}
+    own |= {"old_1.csv.kept": OWN["old_1.csv"], "new_1.csv": OWN["new_1.csv"]}
     run(used, {"model.toml": "found", "found.csv": "1"}, "gap add")
     run(used, {"waterfall.png": "*"}, "gap shrink", inputs=[used / "model.toml"])
-    assert files(used) == {"model.toml": "found", "waterfall.png": "*"} | files_of_people(used)
+    assert files(used) == {"model.toml": "found", "waterfall.png": "*"} | own
     run(used, {"standing.csv": "2"}, "stand")
-    assert files(used) == {"standing.csv": "2"} | files_of_people(used)
+    assert files(used) == {"standing.csv": "2"} | own
 
 
-def files_of_people(folder: Path) -> dict[str, str]:
-    return {n: t for n, t in files(folder).items() if t in OWN.values()}
-
-
-def test_a_file_of_the_same_bytes_is_no_ones_loss(tmp_path: Path) -> None:
+def test_what_is_set_aside_gets_a_name_of_its_own_and_the_same_bytes_are_no_loss(
+    tmp_path: Path,
+) -> None:
     write(tmp_path, NEW)
     run(tmp_path, NEW)
     assert files(tmp_path) == NEW
-
-
-def test_a_second_hand_made_change_gets_a_name_of_its_own(tmp_path: Path) -> None:
     for text in ("one", "two"):
-        run(tmp_path, NEW)
         write(tmp_path, {"both.csv": text})
-    run(tmp_path, NEW)
+        run(tmp_path, NEW)
     assert files(tmp_path) == NEW | {"both.csv.kept": "one", "both.csv.kept2": "two"}
 
 
@@ -287,21 +274,15 @@ def test_a_link_is_moved_and_not_written_through(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "both.csv").read_text(encoding="utf-8") == "new"
 
 
-@pytest.mark.parametrize(("name", "words"), [("both.csv", "is a folder"), ("deep", "is a file")])
-def test_what_cannot_make_way_is_named(used: Path, name: str, words: str) -> None:
-    before = files(used)
-    if name == "deep":
-        (used / "deep").write_text("mine", encoding="utf-8")
-        before |= {"deep": "mine"}
-    else:
-        (used / name).unlink()
-        (used / name).mkdir()
-        del before[name]
+@pytest.mark.parametrize(
+    ("name", "words"), [("both.csv/x", "both.csv: is a folder"), ("deep", "deep: is a file")]
+)
+def test_what_cannot_make_way_is_named(tmp_path: Path, name: str, words: str) -> None:
+    write(tmp_path / "out", {name: "mine"})
     with pytest.raises(OutputError, match=words) as caught:
-        run(used, NEW)
-    assert str(used / name) in str(caught.value)
+        run(tmp_path / "out", NEW)
     assert "\n" not in str(caught.value)
-    assert files(used) == before
+    assert files(tmp_path / "out", hidden=True) == {name: "mine"}
 
 
 @pytest.mark.parametrize(
@@ -317,25 +298,20 @@ def test_a_manifest_of_someone_else_is_refused(used: Path, text: str) -> None:
     assert files(used) == before
 
 
-def test_a_damaged_exchange_is_refused(used: Path) -> None:
-    (used / EXCHANGE).mkdir()
-    with pytest.raises(OutputError, match="damaged"):
-        run(used, NEW)
-
-
 def test_left_over_folders_go(used: Path) -> None:
-    write(used, {".legwatt-abc/new/half.csv": "1", ".legwatt-done/old/x": "1"})
+    write(used, {".legwatt-abc/half.csv": "1"})
     run(used, NEW)
     assert files(used) == NEW | AFTER
-    assert {p.name for p in used.iterdir() if p.name.startswith(".")} == {MANIFEST}
+    assert hidden(used) == {MANIFEST}
 
 
-def test_one_run_at_a_time_and_the_lock_ends_with_its_process(used: Path) -> None:
-    ready, told = os.pipe()
+def test_one_run_at_a_time_and_the_lock_ends_with_its_process_not_its_workers(used: Path) -> None:
+    ready, reported = os.pipe()
 
     def hold() -> None:
         with holding(used):
-            os.write(told, b"!")
+            worker = os.fork()
+            os.write(reported, worker.to_bytes(4, "little"))
             signal.pause()
 
     child = os.fork()
@@ -344,7 +320,7 @@ def test_one_run_at_a_time_and_the_lock_ends_with_its_process(used: Path) -> Non
             hold()
         finally:
             os._exit(1)
-    os.read(ready, 1)
+    worker = max(int.from_bytes(os.read(ready, 4), "little") for _ in range(2))
     before = files(used, hidden=True)
     with pytest.raises(OutputError, match="another run is writing here") as caught:
         run(used, NEW)
@@ -352,24 +328,11 @@ def test_one_run_at_a_time_and_the_lock_ends_with_its_process(used: Path) -> Non
     assert files(used, hidden=True) == before
     os.kill(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    run(used, NEW)
-    assert files(used) == NEW | AFTER
-
-
-def test_a_forked_worker_does_not_keep_its_parents_lock(used: Path) -> None:
-    ready, told = os.pipe()
-    with holding(used):
-        child = os.fork()
-        if child == 0:
-            os.write(told, b"!")
-            signal.pause()
-            os._exit(0)
-        os.read(ready, 1)
     try:
-        assert in_child(lambda: run(used, NEW)) == 0
+        run(used, NEW)
     finally:
-        os.kill(child, signal.SIGKILL)
-        os.waitpid(child, 0)
+        os.kill(worker, signal.SIGKILL)
+    assert files(used) == NEW | AFTER
 
 
 def test_a_run_without_result_leaves_no_folder(tmp_path: Path) -> None:

@@ -1,1 +1,0 @@
-"""A folder of results: one run at a time, replaced as a whole."""
