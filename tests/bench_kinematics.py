@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.robot.inverse.damped import approach
 from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.inverse_kinematics import reach, solve_rates
 from pipeline.robot.kinematics import foot_positions
@@ -40,11 +41,11 @@ def inverse_kinematics(root: Path, timed: Callable[..., dict[str, list[float]]])
         velocity = 2 * np.pi * size * speed
         still = np.zeros_like(velocity)
         q, _ = reach(chains, target, start)
-        other, _ = reach(chains, target, start, closed=False)
+        other, _ = approach(chains, target, start)
         np.testing.assert_allclose(other, q, atol=1e-9)
         calls: dict[str, Call] = {
             "closed": lambda c=chains, t=target, s=start: reach(c, t, s),  # type: ignore[misc]
-            "damped": lambda c=chains, t=target, s=start: reach(c, t, s, closed=False),  # type: ignore[misc]
+            "damped": lambda c=chains, t=target, s=start: approach(c, t, s),  # type: ignore[misc]
             "rates": lambda c=chains, p=q, v=velocity, a=still, t=time: solve_rates(c, p, v, a, t),  # type: ignore[misc]
         }
         seconds = timed(calls)

@@ -17,7 +17,13 @@ from pipeline.errors import OutOfReachError
 from pipeline.robot.inverse.closed_form import closed_form, closed_form_legs
 from pipeline.robot.inverse.damped import approach, square_solve
 from pipeline.robot.inverse.least_motion import Freedom, LeastMotion, freedoms
-from pipeline.robot.kinematics import bias_acceleration, foot_positions, swept
+from pipeline.robot.kinematics import (
+    bias_acceleration,
+    foot_jacobians,
+    foot_positions,
+    samples_last,
+    swept,
+)
 from pipeline.robot.leg_chains import LegChains
 
 Array = NDArray[np.float64]
@@ -27,16 +33,13 @@ _JUMP = 0.2  # [rad] between two samples that no velocity explains
 _PATH = 16  # samples from which velocities tell the way from one to the next
 
 
-def reach(
-    chains: LegChains, target: Array, start: Array, *, closed: bool = True
-) -> tuple[Array, Array]:
+def reach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Array]:
     """Joint positions that bring the feet as close to their targets as their legs get.
 
     Args:
         chains: The legs.
         target: Foot positions in the base frame [m], shape (N, L, 3).
         start: Posture that names the branch (knee up or down) [rad, m], shape (L, K).
-        closed: Whether closed forms are used where they exist; the iteration serves all.
 
     Returns:
         Joint positions [rad, m], shape (N, L, K), and by how much a foot misses what its leg
@@ -46,23 +49,23 @@ def reach(
     n_samples, n_legs = target.shape[:2]
     q = np.zeros((n_samples, n_legs, chains.depth))
     miss = np.zeros((n_samples, n_legs))
-    direct = closed_form_legs(chains, start) if closed else np.zeros(0, dtype=np.intp)
+    direct = closed_form_legs(chains, start)
     if direct.size:
         found = closed_form(chains, direct, target[:, direct], start)
         reached = np.isfinite(found).all(axis=(0, 2))
-        direct = direct[reached]  # the iteration says how far the others are off
+        direct = direct[reached]  # the iteration finds how far the others are off
     if direct.size:
         q[:, direct, :3] = found[:, reached]
         feet = foot_positions(chains.of(direct.tolist()), q[:, direct])
         miss[:, direct] = np.linalg.norm(target[:, direct] - feet, axis=-1)
     for freedom, legs in _groups(chains, set(direct.tolist())):
-        own, goal, begin = chains.of(legs), target[:, legs], start[legs]
+        own, n = chains.of(legs).shortened(freedom.joints), freedom.joints
         if freedom.square:
-            q[:, legs], miss[:, legs] = approach(own, goal, begin)
+            q[:, legs, :n], miss[:, legs] = approach(own, target[:, legs], start[legs, :n])
         else:
-            q[:, legs], left = LeastMotion(own, freedom, own.nominal).positions(goal, begin)
-            if not freedom.lacks:
-                miss[:, legs] = left
+            least = LeastMotion(own, freedom)
+            q[:, legs, :n], left = least.positions(target[:, legs], start[legs, :n])
+            miss[:, legs] = 0.0 if freedom.lacks else left
     return q, miss
 
 
@@ -77,7 +80,7 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
 
     Returns:
         Joint positions [rad, m], shape (N, L, K). A leg that lacks a direction puts its foot as
-        near as it gets; `pipeline.robot.inverse.foot_tracking` tells how near.
+        near as it gets; `pipeline.robot.inverse.foot_tracking` says how near.
 
     Raises:
         OutOfReachError: A target is not reached; names leg, instant and how far it is off.
@@ -134,20 +137,17 @@ def solve_rates(
         OutOfReachError: The leg is stretched (singular) at a sample.
     """
     velocity, acceleration = np.zeros(q.shape), np.zeros(q.shape)
+    goal = foot_positions(chains, q) if target is None else target
     for freedom, legs in _groups(chains, set()):
-        own = chains.of(legs)
+        own, n = chains.of(legs).shortened(freedom.joints), freedom.joints
+        posture = q[:, legs, :n]
+        moved = foot_velocity[:, legs], foot_acceleration[:, legs]
         if freedom.square:
-            parts = _square_rates(
-                own, q[:, legs], foot_velocity[:, legs], foot_acceleration[:, legs], time
-            )
+            parts = _square_rates(own, posture, *moved, time)
         else:
-            goal = foot_positions(own, q[:, legs]) if target is None else target[:, legs]
-            _refuse_singular(own, freedom, q[:, legs], time)
-            problem = LeastMotion(own, freedom, own.nominal)
-            parts = problem.rates(
-                q[:, legs], foot_velocity[:, legs], foot_acceleration[:, legs], goal
-            )
-        velocity[:, legs], acceleration[:, legs] = parts
+            _refuse_singular(own, freedom, posture, time)
+            parts = LeastMotion(own, freedom).rates(posture, *moved, goal[:, legs])
+        velocity[:, legs, :n], acceleration[:, legs, :n] = parts
     _refuse_jumps(chains, q, velocity, time)
     return velocity, acceleration
 
@@ -162,9 +162,9 @@ def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> 
     if time.size < _PATH or step.min() <= 0:
         return
     gone = np.diff(q, axis=0)
-    told = 0.5 * step * (velocity[1:] + velocity[:-1])
+    expected = 0.5 * step * (velocity[1:] + velocity[:-1])
     # What the trapezoid leaves out grows with the step, as the change of velocity does.
-    jump = np.abs(gone - told) - 0.5 * step * np.abs(np.diff(velocity, axis=0))
+    jump = np.abs(gone - expected) - 0.5 * step * np.abs(np.diff(velocity, axis=0))
     if jump.max() > _JUMP:
         sample, leg, joint = np.unravel_index(int(jump.argmax()), jump.shape)
         raise OutOfReachError(
@@ -187,22 +187,17 @@ def _groups(chains: LegChains, but: set[int]) -> Iterator[tuple[Freedom, list[in
 def _square_rates(
     chains: LegChains, q: Array, foot_velocity: Array, foot_acceleration: Array, time: Array
 ) -> tuple[Array, Array]:
-    angle = np.array(q.transpose(1, 2, 0))
-    columns = swept(chains, angle.copy()).columns[:, :3]
+    """Of legs with three joints that move their feet in every direction, each (N, M, 3)."""
+    columns = swept(chains, samples_last(q)).columns
     rate, condition = square_solve(columns, foot_velocity.transpose(2, 1, 0))
     _refuse(chains, condition, time)
-    speed = np.zeros(angle.shape)
-    speed[:, :3] = rate.transpose(1, 0, 2)
-    bias = bias_acceleration(chains, angle, speed)
-    bend, _ = square_solve(columns, foot_acceleration.transpose(2, 1, 0) - bias)
-    acceleration = np.zeros(angle.shape)
-    acceleration[:, :3] = bend.transpose(1, 0, 2)
-    return speed.transpose(2, 0, 1), acceleration.transpose(2, 0, 1)
+    bias = bias_acceleration(chains, samples_last(q), rate.transpose(1, 0, 2))
+    faster, _ = square_solve(columns, foot_acceleration.transpose(2, 1, 0) - bias)
+    return rate.transpose(2, 1, 0), faster.transpose(2, 1, 0)
 
 
 def _refuse_singular(chains: LegChains, freedom: Freedom, q: Array, time: Array) -> None:
-    columns = swept(chains, np.array(q.transpose(1, 2, 0))).columns.transpose(3, 2, 0, 1)
-    values = np.linalg.svd(columns, compute_uv=False)
+    values = np.linalg.svd(foot_jacobians(chains, q)[1], compute_uv=False)
     with np.errstate(divide="ignore"):
         _refuse(chains, (values[..., 0] / values[..., freedom.directions - 1]).T, time)
 

@@ -92,8 +92,9 @@ def cross(a: Array, b: Array) -> Array:
     return out
 
 
-def _samples_last(q: Array) -> Array:
-    return np.array(np.moveaxis(q, 0, -1), order="C")  # (N, L, K) -> (L, K, N), always a copy
+def samples_last(q: Array) -> Array:
+    """From (N, L, K) to (L, K, N), always a copy."""
+    return np.array(np.moveaxis(q, 0, -1), order="C")
 
 
 def _parted(chains: LegChains, coordinate: Array) -> tuple[Array, Array | None]:
@@ -156,7 +157,7 @@ class LegPosture:
 
 def leg_posture(chains: LegChains, q: Array) -> LegPosture:
     """Work out the legs at joint positions q [rad, m], shape (N, L, K)."""
-    return posture_at(chains, _samples_last(q))
+    return posture_at(chains, samples_last(q))
 
 
 def posture_at(chains: LegChains, angle: Array) -> LegPosture:
@@ -267,7 +268,7 @@ def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
         Positions [m], shape (N, L, 3), and Jacobians [m/rad, 1],
         shape (N, L, 3 xyz, K joints); a column is zero where a leg has no joint.
     """
-    legs = swept(chains, _samples_last(q))
+    legs = swept(chains, samples_last(q))
     return legs.tip.transpose(2, 1, 0), legs.columns.transpose(3, 2, 0, 1)
 
 
@@ -282,7 +283,7 @@ def foot_jacobian_rates(chains: LegChains, q: Array, q_dot: Array) -> Array:
     Returns:
         The bias acceleration of the feet [m/s^2], shape (N, L, 3).
     """
-    return bias_acceleration(chains, _samples_last(q), _samples_last(q_dot)).transpose(2, 1, 0)
+    return bias_acceleration(chains, samples_last(q), samples_last(q_dot)).transpose(2, 1, 0)
 
 
 def bias_acceleration(chains: LegChains, coordinate: Array, rate: Array) -> Array:

@@ -8,7 +8,7 @@ joints of zero axis, which neither turn nor slide, so that all legs stay one bat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 FEWEST_JOINTS, MOST_JOINTS = 1, 7
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LegChains:
     """Constant geometry of L legs with up to K joints each, read from a Pinocchio model.
 
@@ -116,6 +116,17 @@ class LegChains:
                 self.nominal[own],
             )
         return self._parts[key]
+
+    def shortened(self, depth: int) -> LegChains:
+        """The same with only so many joints: without those that fill up shorter legs."""
+        return replace(
+            self,
+            rotation=self.rotation[:depth],
+            offset=self.offset[:depth],
+            axis=self.axis[:depth],
+            slides=self.slides[:depth],
+            nominal=self.nominal[:, :depth],
+        )
 
 
 def leg_chains(

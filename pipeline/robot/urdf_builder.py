@@ -11,43 +11,60 @@ which the leg plane swings fore and aft.
 from __future__ import annotations
 
 import math
-import xml.etree.ElementTree as ET
-from dataclasses import dataclass
-
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Sequence
+from xml.sax.saxutils import escape
 
 from pipeline.errors import RobotFileError
 from pipeline.robot.robot_file import STATIONS, LegSpec, RobotSpec
 
-Array = NDArray[np.float64]
 FOOT_RADIUS = 0.012  # [m] visual only; the foot point is the sphere's centre
 #: Osmium's: no link is denser [kg/m^3].
 DENSEST = 22600.0
-
-
-@dataclass(frozen=True)
-class Box:
-    """A solid cuboid that carries a link's mass and shows it.
-
-    Attributes:
-        mass: [kg].
-        size: Edge lengths along the link's axes [m].
-        centre: Of the solid in the link's frame [m].
-        com: Centre of mass in the link's frame [m]; the rotational inertia is the solid's.
-    """
-
-    mass: float
-    size: tuple[float, float, float]
-    centre: tuple[float, float, float]
-    com: tuple[float, float, float]
-
-    @property
-    def inertia(self) -> tuple[float, float, float]:
-        """Principal moments of the uniform solid [kg*m^2]."""
-        x, y, z = self.size
-        m = self.mass / 12
-        return m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y)
+_COLOURS = {
+    "trunk": "0.35 0.40 0.45 1",
+    "drive": "0.20 0.20 0.22 1",
+    "femur": "0.80 0.45 0.15 1",
+    "tibia": "0.15 0.45 0.70 1",
+    "foot": "0.10 0.10 0.10 1",
+}
+_ROBOT = """<?xml version="1.0"?>
+<robot name="{name}">
+  <!-- Built from {file} by `make urdf`; change that file, not this one. -->
+{parts}</robot>
+"""
+_VISUAL = """    <visual>
+{origin}      <geometry>
+        {shape}
+      </geometry>
+      <material name="{material}">
+        <color rgba="{colour}" />
+      </material>
+    </visual>
+"""
+_LINK = """  <link name="{name}">
+    <inertial>
+      <origin xyz="{com}" rpy="0 0 0" />
+      <mass value="{mass}" />
+      <inertia ixx="{ixx}" ixy="0" ixz="0" iyy="{iyy}" iyz="0" izz="{izz}" />
+    </inertial>
+{visual}  </link>
+"""
+_JOINT = """  <joint name="{name}" type="revolute">
+    <origin xyz="{origin}" rpy="0 0 0" />
+    <parent link="{parent}" />
+    <child link="{child}" />
+    <axis xyz="{axis}" />
+    <limit lower="{lower}" upper="{upper}" effort="{effort}" velocity="{velocity}" />
+  </joint>
+"""
+_FOOT = """  <joint name="{leg}_foot_joint" type="fixed">
+    <origin xyz="{origin}" rpy="0 0 0" />
+    <parent link="{parent}" />
+    <child link="{foot}" />
+  </joint>
+  <link name="{foot}">
+{visual}  </link>
+"""
 
 
 def build_urdf(spec: RobotSpec) -> str:
@@ -60,15 +77,12 @@ def build_urdf(spec: RobotSpec) -> str:
         RobotFileError: The masses of the legs leave nothing for the trunk, or a link would be
             denser than any metal.
     """
-    root = ET.Element("robot", name=spec.name)
-    root.append(
-        ET.Comment(f" Built from {spec.path.name} by `make urdf`; change that file, not this one. ")
-    )
-    _link(root, spec.base_link, _trunk(spec), "trunk")
-    for leg in spec.legs:
-        _leg(root, spec, leg)
-    ET.indent(root, "  ")
-    return '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
+    p = spec.parameters
+    width = 2 * (p["joint_2_lateral"] - p["coxa_length"]) + p["link_width"]
+    size, com = (p["body_length"], width, p["trunk_height"]), (0, p["trunk_com_left"], 0)
+    trunk = _box(spec.base_link, trunk_mass(spec), size, (0, 0, 0), com, "trunk")
+    parts = [trunk, *(part for leg in spec.legs for part in _leg(spec, leg))]
+    return _ROBOT.format(name=_name(spec.name), file=spec.path.name, parts="".join(parts))
 
 
 def leg_mass(spec: RobotSpec) -> float:
@@ -92,164 +106,106 @@ def trunk_mass(spec: RobotSpec) -> float:
     return mass
 
 
-def _trunk(spec: RobotSpec) -> Box:
-    p = spec.parameters
-    width = 2 * (p["joint_2_lateral"] - p["coxa_length"]) + p["link_width"]
-    size = (p["body_length"], width, p["trunk_height"])
-    return Box(trunk_mass(spec), size, (0, 0, 0), (0, p["trunk_com_left"], 0))
-
-
-def _leg(root: ET.Element, spec: RobotSpec, leg: LegSpec) -> None:
+def _leg(spec: RobotSpec, leg: LegSpec) -> list[str]:
+    """Hip, femur and tibia, each on its joint, and the foot."""
     p = spec.parameters
     out = 1.0 if leg.side == "left" else -1.0  # y of "outward"
-    angle = p["joint_1_axis_angle"]
+    angle, width, coxa = p["joint_1_axis_angle"], p["link_width"], p["coxa_length"]
+    femur, tibia, hip = p["femur_length"], p["tibia_length"], (0, out * p["coxa_length"] / 2, 0)
     # An axis is a pseudo-vector: mirrored in the x-z plane, its x and z components change sign.
-    axis_1 = (0.0, -math.sin(angle), -out * math.cos(angle))
-    axis_raise = (out, 0.0, 0.0)
-    width, coxa = p["link_width"], p["coxa_length"]
-    femur, tibia = p["femur_length"], p["tibia_length"]
-    links = [*(f"{leg.name}_{part}_link" for part in ("hip", "femur", "tibia")), leg.foot]
-    _joint(
-        root,
-        leg.joints[0],
-        (spec.base_link, links[0]),
-        (STATIONS[leg.station] * p["hip_spacing"], out * (p["joint_2_lateral"] - coxa), 0.0),
-        axis_1,
+    axis_1, raising = (0.0, -math.sin(angle), -out * math.cos(angle)), (out, 0.0, 0.0)
+    shoulder = (STATIONS[leg.station] * p["hip_spacing"], out * (p["joint_2_lateral"] - coxa), 0.0)
+    names = [spec.base_link, *(f"{leg.name}_{part}_link" for part in ("hip", "femur", "tibia"))]
+    limits = [
         (-p["joint_1_range"], p["joint_1_range"]),
-        spec,
-    )
-    _link(
-        root,
-        links[0],
-        Box(
-            p["hip_link_mass"],
-            (width, coxa + width, width),
-            (0, out * coxa / 2, 0),
-            (0, out * coxa / 2, 0),
-        ),
-        "drive",
-    )
-    _joint(
-        root,
-        leg.joints[1],
-        (links[0], links[1]),
-        (0, out * coxa, 0),
-        axis_raise,
         (p["joint_2_lower"], p["joint_2_upper"]),
-        spec,
-    )
-    _link(
-        root,
-        links[1],
-        Box(
-            p["femur_mass"],
-            (width, femur, width),
-            (0, out * femur / 2, 0),
-            (0, out * femur * p["femur_com"], 0),
-        ),
-        "femur",
-    )
-    _joint(
-        root,
-        leg.joints[2],
-        (links[1], links[2]),
-        (0, out * femur, 0),
-        axis_raise,
         (p["joint_3_lower"], p["joint_3_upper"]),
-        spec,
-    )
-    _link(
-        root,
-        links[2],
-        Box(
-            p["tibia_mass"],
-            (width / 2, width / 2, tibia),
-            (0, 0, -tibia / 2),
-            (0, 0, -tibia * p["tibia_com"]),
+    ]
+    origins = (shoulder, (0, out * coxa, 0), (0, out * femur, 0))
+    boxes = [
+        _box(names[1], p["hip_link_mass"], (width, coxa + width, width), hip, hip, "drive"),
+        _box(
+            *(names[2], p["femur_mass"], (width, femur, width)),
+            *((0, out * femur / 2, 0), (0, out * femur * p["femur_com"], 0), "femur"),
         ),
-        "tibia",
+        _box(
+            *(names[3], p["tibia_mass"], (width / 2, width / 2, tibia)),
+            *((0, 0, -tibia / 2), (0, 0, -tibia * p["tibia_com"]), "tibia"),
+        ),
+    ]
+    parts = []
+    for k, axis in enumerate((axis_1, raising, raising)):
+        joint = _JOINT.format(
+            name=_name(leg.joints[k]),
+            origin=_numbers(origins[k]),
+            parent=_name(names[k]),
+            child=_name(names[k + 1]),
+            axis=_numbers(axis),
+            lower=_number(limits[k][0]),
+            upper=_number(limits[k][1]),
+            effort=_number(p["joint_effort_limit"]),
+            velocity=_number(p["joint_velocity_limit"]),
+        )
+        parts += [joint, boxes[k]]
+    foot = _FOOT.format(
+        leg=_name(leg.name),
+        origin=_numbers((0, 0, -tibia)),
+        parent=_name(names[3]),
+        foot=_name(leg.foot),
+        visual=_visual(f'<sphere radius="{_number(FOOT_RADIUS)}" />', "foot"),
     )
-    _foot(root, leg, links, tibia)
+    return [*parts, foot]
 
 
-def _foot(root: ET.Element, leg: LegSpec, links: list[str], tibia: float) -> None:
-    fixed = ET.SubElement(root, "joint", name=f"{leg.name}_foot_joint", type="fixed")
-    ET.SubElement(fixed, "origin", xyz=_numbers((0, 0, -tibia)), rpy="0 0 0")
-    ET.SubElement(fixed, "parent", link=links[2])
-    ET.SubElement(fixed, "child", link=links[3])
-    foot = ET.SubElement(root, "link", name=links[3])
-    visual = ET.SubElement(foot, "visual")
-    geometry = ET.SubElement(visual, "geometry")
-    ET.SubElement(geometry, "sphere", radius=_number(FOOT_RADIUS))
-    _material(visual, "foot")
-
-
-def _joint(
-    root: ET.Element,
+def _box(
     name: str,
-    links: tuple[str, str],
-    origin: tuple[float, float, float],
-    axis: tuple[float, float, float],
-    limits: tuple[float, float],
-    spec: RobotSpec,
-) -> None:
-    p = spec.parameters
-    joint = ET.SubElement(root, "joint", name=name, type="revolute")
-    ET.SubElement(joint, "origin", xyz=_numbers(origin), rpy="0 0 0")
-    ET.SubElement(joint, "parent", link=links[0])
-    ET.SubElement(joint, "child", link=links[1])
-    ET.SubElement(joint, "axis", xyz=_numbers(axis))
-    ET.SubElement(
-        joint,
-        "limit",
-        lower=_number(limits[0]),
-        upper=_number(limits[1]),
-        effort=_number(p["joint_effort_limit"]),
-        velocity=_number(p["joint_velocity_limit"]),
-    )
+    mass: float,
+    size: Sequence[float],
+    centre: Sequence[float],
+    com: Sequence[float],
+    material: str,
+) -> str:
+    """A link that is a solid cuboid; its rotational inertia is the solid's about the com.
 
+    Args:
+        name: Of the link.
+        mass: [kg].
+        size: Edge lengths along the link's axes [m].
+        centre: Of the solid in the link's frame [m].
+        com: Centre of mass in the link's frame [m].
+        material: A key of the colours.
 
-_COLOURS = {
-    "trunk": "0.35 0.40 0.45 1",
-    "drive": "0.20 0.20 0.22 1",
-    "femur": "0.80 0.45 0.15 1",
-    "tibia": "0.15 0.45 0.70 1",
-    "foot": "0.10 0.10 0.10 1",
-}
-
-
-def _link(root: ET.Element, name: str, box: Box, material: str) -> None:
-    volume = math.prod(box.size)
-    if box.mass > DENSEST * volume:
+    Raises:
+        RobotFileError: It would be denser than any metal.
+    """
+    volume = math.prod(size)
+    if mass > DENSEST * volume:
         raise RobotFileError(
-            f"link '{name}' has {box.mass:.4g} kg in {1e3 * volume:.3g} litres, denser than any "
+            f"link '{name}' has {mass:.4g} kg in {1e3 * volume:.3g} litres, denser than any "
             "metal; masses in kg, lengths in the unit stated?"
         )
-    link = ET.SubElement(root, "link", name=name)
-    inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "origin", xyz=_numbers(box.com), rpy="0 0 0")
-    ET.SubElement(inertial, "mass", value=_number(box.mass))
-    ixx, iyy, izz = box.inertia
-    ET.SubElement(
-        inertial,
-        "inertia",
-        ixx=_number(ixx),
-        ixy="0",
-        ixz="0",
-        iyy=_number(iyy),
-        iyz="0",
-        izz=_number(izz),
+    (x, y, z), m = size, mass / 12
+    return _LINK.format(
+        name=_name(name),
+        com=_numbers(com),
+        mass=_number(mass),
+        ixx=_number(m * (y * y + z * z)),
+        iyy=_number(m * (x * x + z * z)),
+        izz=_number(m * (x * x + y * y)),
+        visual=_visual(
+            f'<box size="{_numbers(size)}" />',
+            material,
+            f'      <origin xyz="{_numbers(centre)}" rpy="0 0 0" />\n',
+        ),
     )
-    visual = ET.SubElement(link, "visual")
-    ET.SubElement(visual, "origin", xyz=_numbers(box.centre), rpy="0 0 0")
-    geometry = ET.SubElement(visual, "geometry")
-    ET.SubElement(geometry, "box", size=_numbers(box.size))
-    _material(visual, material)
 
 
-def _material(visual: ET.Element, name: str) -> None:
-    material = ET.SubElement(visual, "material", name=name)
-    ET.SubElement(material, "color", rgba=_COLOURS[name])
+def _visual(shape: str, material: str, origin: str = "") -> str:
+    return _VISUAL.format(origin=origin, shape=shape, material=material, colour=_COLOURS[material])
+
+
+def _name(text: str) -> str:
+    return escape(text, {'"': "&quot;"})
 
 
 def _number(value: float) -> str:
@@ -257,5 +213,5 @@ def _number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
-def _numbers(values: tuple[float, float, float]) -> str:
-    return " ".join(_number(value) for value in values)
+def _numbers(values: Sequence[float]) -> str:
+    return " ".join(map(_number, values))

@@ -308,14 +308,6 @@ def _origins(chains: LegChains, q: Array) -> Array:
     origins = np.repeat(chains.offset[0][None, :, None], q.shape[0], axis=0)
     parts = [origins]
     for j in range(1, chains.depth):
-        inner = LegChains(
-            chains.names,
-            chains.rotation[:j],
-            chains.offset[:j],
-            chains.axis[:j],
-            chains.slides[:j],
-            chains.offset[j],
-            chains.nominal[:, :j],
-        )
+        inner = replace(chains.shortened(j), foot=chains.offset[j])
         parts.append(foot_positions(inner, q[..., :j])[:, :, None])
     return np.concatenate(parts, axis=2)

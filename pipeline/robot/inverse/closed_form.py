@@ -10,6 +10,7 @@ angle's solutions the one nearer to a start posture is taken; the knee bends as 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,50 +52,32 @@ class _Planar:
     sign_3: Array
 
 
-def _planar(chains: LegChains) -> _Planar:
-    """Made once for each set of legs."""
-    made: dict[str, _Planar] = chains.__dict__.setdefault("_closed_form", {})
-    if "planar" not in made:
-        made["planar"] = _analysed(chains)
-    return made["planar"]
-
-
-def _analysed(chains: LegChains) -> _Planar:
+@lru_cache
+def _planar(chains: LegChains) -> _Planar | None:
     if chains.depth < 3:
-        legs = np.zeros(0, dtype=np.intp)
-    else:
-        ax3 = np.einsum("lij,lj->li", chains.rotation[2], chains.axis[2])  # in frame 2
-        parallel = np.linalg.norm(np.cross(chains.axis[1], ax3), axis=1) < _PARALLEL
-        u_all = np.einsum("lij,lj->li", chains.rotation[1], chains.axis[1])  # in frame 1
-        across = np.linalg.norm(np.cross(chains.axis[0], u_all), axis=1) > _ACROSS
-        whole = (chains.counts == 3) & ~chains.slides.any(axis=0)
-        legs = np.flatnonzero(parallel & across & whole)
-    if legs.size == 0:
-        none, nothing = np.zeros((0, 3)), np.zeros(0)
-        empty = np.zeros(0, dtype=np.complex128)
-        return _Planar(legs, none, none, nothing, none, none, none, empty, empty, nothing)
-    own = chains.of(legs.tolist())
-    r2, r3 = own.rotation[1], own.rotation[2]
-    u = np.einsum("lij,lj->li", r2, own.axis[1])
-    sign_3 = np.sign(np.einsum("li,lij,lj->l", own.axis[1], r3, own.axis[2]))
+        return None
+    axis_3 = np.einsum("lij,lj->li", chains.rotation[2], chains.axis[2])  # in frame 2
+    parallel = np.linalg.norm(np.cross(chains.axis[1], axis_3), axis=1) < _PARALLEL
+    u = np.einsum("lij,lj->li", chains.rotation[1], chains.axis[1])  # in frame 1
+    across = np.linalg.norm(np.cross(chains.axis[0], u), axis=1) > _ACROSS
+    legs = np.flatnonzero(parallel & across & (chains.counts == 3) & ~chains.slides.any(axis=0))
+    own, u = chains.of(legs.tolist()), u[legs]
     e1 = np.cross(u, np.eye(3)[np.argmin(np.abs(u), axis=1)])
     e1 /= np.linalg.norm(e1, axis=1, keepdims=True)
     e2 = np.cross(u, e1)
-    thigh = np.einsum("lij,lj->li", r2, own.offset[2])
-    shank = np.einsum("lij,ljk,lk->li", r2, r3, own.foot)
-    hip = own.offset[1]
-    level = np.einsum("li,li->l", u, hip + thigh + shank)
+    thigh = np.einsum("lij,lj->li", own.rotation[1], own.offset[2])
+    shank = np.einsum("lij,ljk,lk->li", own.rotation[1], own.rotation[2], own.foot)
     return _Planar(
         legs=legs,
         axis_1=own.axis[0],
         u=u,
-        level=level,
-        hip=hip,
+        level=np.einsum("li,li->l", u, own.offset[1] + thigh + shank),
+        hip=own.offset[1],
         e1=e1,
         e2=e2,
         thigh=_in_plane(thigh, e1, e2),
         shank=_in_plane(shank, e1, e2),
-        sign_3=sign_3,
+        sign_3=np.sign(np.einsum("li,li->l", own.axis[1], axis_3[legs])),
     )
 
 
@@ -111,8 +94,8 @@ def closed_form_legs(chains: LegChains, start: Array) -> NDArray[np.intp]:
         start: Posture, shape (L, K) [rad].
     """
     planar = _planar(chains)
-    if planar.legs.size == 0:
-        return planar.legs
+    if planar is None:
+        return np.zeros(0, dtype=np.intp)
     return planar.legs[_knee(planar, start) != 0]
 
 
@@ -129,7 +112,7 @@ def closed_form(chains: LegChains, legs: NDArray[np.intp], target: Array, start:
 
     Args:
         chains: All legs.
-        legs: Those from `closed_form_legs`, shape (M,).
+        legs: Those from `closed_form_legs`, shape (M,); at least one.
         target: Of their feet in the base frame [m], shape (N, M, 3).
         start: Posture of all legs, shape (L, K) [rad].
 
@@ -137,6 +120,7 @@ def closed_form(chains: LegChains, legs: NDArray[np.intp], target: Array, start:
         Shape (N, M, 3) [rad]; not a number where a foot is out of reach.
     """
     planar = _planar(chains)
+    assert planar is not None
     at = np.searchsorted(planar.legs, legs)
     near = start[legs, :3]
     axis, u = planar.axis_1[at], planar.u[at]

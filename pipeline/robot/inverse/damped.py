@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.robot.kinematics import cross, foot_positions, swept
+from pipeline.robot.kinematics import cross, foot_positions, samples_last, swept
 from pipeline.robot.leg_chains import LegChains
 
 Array = NDArray[np.float64]
@@ -44,37 +44,29 @@ def approach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Arr
         q[knots] = _iterated(chains, target[knots], q[knots])[0]
         guess = CubicSpline(knots, q[knots])(np.arange(n))
         off = np.linalg.norm(foot_positions(chains, guess) - target, axis=-1)
-        trusted = off < _NEAR * chains.reach
-        q = np.where(trusted[..., None], guess, q)
+        q = np.where((off < _NEAR * chains.reach)[..., None], guess, q)
     return _iterated(chains, target, q)
 
 
 def _iterated(chains: LegChains, target: Array, start: Array) -> tuple[Array, Array]:
-    q = np.array(start.transpose(1, 2, 0), order="C")  # (L, K, N)
-    goal = np.array(target.transpose(2, 1, 0), order="C")  # (3, L, N)
+    q, goal = samples_last(start), np.array(target.transpose(2, 1, 0), order="C")
     left = np.empty(goal.shape[1:])
     busy = np.arange(goal.shape[2])  # samples that are not there yet
-    for _ in range(_ITERATIONS):
+    for iteration in range(_ITERATIONS + 1):
         own = q[..., busy]
         legs = swept(chains, own.copy())
         error = goal[..., busy] - legs.tip
-        size = np.sqrt((error**2).sum(axis=0))
-        left[:, busy] = size
-        going = np.flatnonzero((size > _CONVERGED).any(axis=0))
-        if going.size == 0:
+        size = left[:, busy] = np.sqrt((error**2).sum(axis=0))
+        going = (size > _CONVERGED).any(axis=0)
+        if iteration == _ITERATIONS or not going.any():
             break
-        if going.size < busy.size:
+        columns = legs.columns
+        if not going.all():
             busy, own, size = busy[going], own[..., going], size[:, going]
-            error, columns = error[..., going], legs.columns[..., going]
-        else:
-            columns = legs.columns
+            columns, error = columns[..., going], error[..., going]
         step = damped_step(columns, error, np.minimum(_DAMPING, 0.1 * size))
-        largest = np.abs(step).max(axis=0)
-        step *= np.minimum(1.0, _MAX_STEP / np.maximum(largest, 1e-300))
+        step *= np.minimum(1.0, _MAX_STEP / np.maximum(np.abs(step).max(axis=0), 1e-300))
         q[..., busy] = own + step.transpose(1, 0, 2)
-    else:
-        legs = swept(chains, q[..., busy].copy())
-        left[:, busy] = np.sqrt(((goal[..., busy] - legs.tip) ** 2).sum(axis=0))
     return q.transpose(2, 0, 1), left.T
 
 
@@ -89,37 +81,26 @@ def damped_step(columns: Array, error: Array, damping: Array) -> Array:
     Returns:
         Shape (K, L, N).
     """
-    x, y, z = columns
-    m2 = damping**2
-    # The six entries of a symmetric matrix, and its adjugate.
-    a, d, f = (x * x).sum(0) + m2, (y * y).sum(0) + m2, (z * z).sum(0) + m2
-    b, c, e = (x * y).sum(0), (x * z).sum(0), (y * z).sum(0)
-    aa, bb, cc = d * f - e * e, c * e - b * f, b * e - c * d
-    dd, ee, ff = a * f - c * c, b * c - a * e, a * d - b * b
-    determinant = np.maximum(a * aa + b * bb + c * cc, 1e-300)
-    u, v, w = error / determinant
-    return (
-        x * (aa * u + bb * v + cc * w)
-        + y * (bb * u + dd * v + ee * w)
-        + (z * (cc * u + ee * v + ff * w))
-    )
+    normal = np.einsum("ikln,jkln->ijln", columns, columns)
+    normal[range(3), range(3)] += damping**2
+    return np.einsum("ikln,iln->kln", columns, square_solve(normal, error)[0])
 
 
 def square_solve(columns: Array, wanted: Array) -> tuple[Array, Array]:
-    """Rates of three joints that give a foot's rates, by Cramer's rule.
+    """Solve equations of three unknowns for many legs and samples, by Cramer's rule.
 
     Args:
-        columns: Of the Jacobians, shape (3, 3 joints, L, N).
-        wanted: Shape (3, L, N).
+        columns: Of the matrices, shape (3, 3 columns, L, N).
+        wanted: Right-hand sides, shape (3, L, N).
 
     Returns:
-        Shape (3 joints, L, N), and the condition number in the Frobenius norm, (L, N).
+        Shape (3 unknowns, L, N), and the condition number in the Frobenius norm, (L, N).
     """
     one, two, three = columns[:, 0], columns[:, 1], columns[:, 2]
     rows = np.stack([cross(two, three), cross(three, one), cross(one, two)])  # of the adjugate
     determinant = (one * rows[0]).sum(0)
+    determinant[determinant == 0] = 1e-300
     size = np.sqrt((columns**2).sum((0, 1)) * (rows**2).sum((0, 1)))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        condition = size / np.abs(determinant)
+    with np.errstate(over="ignore", invalid="ignore"):
         solved: Array = (rows * wanted).sum(1) / determinant
-    return solved, condition
+        return solved, size / np.abs(determinant)

@@ -12,20 +12,22 @@ direction none the less, as three parallel axes do. With l = (t - x)/s this is
 
     w W (q - q0) - J^T l = 0,    x(q) + s l - t = 0,
 
-solved by Newton's iteration; velocities and accelerations follow from its first and second
-derivative in time, so that they are exactly those of the positions.
+to which damped least squares come near and Newton's iteration leads; velocities and accelerations
+follow from its first and second derivative in time, so that they are exactly those of the
+positions. The second derivative of x by joints j <= k is a_j x column_k where j turns, zero where
+it slides, with the axis a_j and the Jacobian's column of joint k.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.robot.inverse.damped import approach
-from pipeline.robot.kinematics import Swept, bias_acceleration, cross, swept
+from pipeline.robot.kinematics import Swept, cross, foot_positions, samples_last, swept
 from pipeline.robot.leg_chains import LegChains
 
 Array = NDArray[np.float64]
@@ -65,192 +67,127 @@ class Freedom:
         return self.directions < 3
 
 
+@lru_cache
 def freedoms(chains: LegChains) -> tuple[Freedom, ...]:
     """What each leg can do, from its Jacobian at postures spread over all angles."""
-    made: dict[str, tuple[Freedom, ...]] = chains.__dict__.setdefault("_freedoms", {})
-    if "all" not in made:
-        steps = np.sqrt(_PRIMES[: chains.depth])  # irrational to one another
-        q = 2 * np.pi * ((np.arange(1, _POSES + 1)[:, None] * steps) % 1.0) - np.pi
-        pose = np.repeat(q.T[None], len(chains.names), axis=0)
-        columns = swept(chains, pose).columns.transpose(3, 2, 0, 1)
-        values = np.linalg.svd(columns, compute_uv=False)  # (poses, L, min(3, K))
-        ranks = (values > _RANK * values[..., :1]).sum(-1).max(axis=0)
-        made["all"] = tuple(
-            Freedom(int(c), int(r)) for c, r in zip(chains.counts, ranks, strict=True)
-        )
-    return made["all"]
-
-
-@dataclass(frozen=True)
-class _System:
-    """Matrix and ingredients of the problem at some postures, samples and legs first.
-
-    Attributes:
-        matrix: [[w W - H(l), -J^T], [J, s 1]], shape (N, M, n + 3, n + 3).
-        jacobian: Shape (N, M, 3, n).
-        legs: The sweep that made it.
-    """
-
-    matrix: Array
-    jacobian: Array
-    legs: Swept
+    steps = np.sqrt(_PRIMES[: chains.depth])  # irrational to one another
+    q = 2 * np.pi * ((np.arange(1, _POSES + 1)[:, None] * steps) % 1.0) - np.pi
+    columns = swept(chains, np.repeat(q.T[None], len(chains.names), axis=0)).columns
+    values = np.linalg.svd(columns.transpose(3, 2, 0, 1), compute_uv=False)
+    ranks = (values > _RANK * values[..., :1]).sum(-1).max(axis=0)
+    return tuple(Freedom(int(c), int(r)) for c, r in zip(chains.counts, ranks, strict=True))
 
 
 class LeastMotion:
     """The problem for legs of one freedom.
 
     Args:
-        chains: Those legs alone.
+        chains: Those legs alone, each of n joints.
         freedom: Theirs.
-        nominal: Posture about which they move least, shape (M, K) [rad, m].
     """
 
-    def __init__(self, chains: LegChains, freedom: Freedom, nominal: Array) -> None:
-        self.chains, self.n = chains, freedom.joints
-        self.nominal = nominal[:, : self.n]
-        slides = chains.slides.T[:, : self.n]
-        self.metric = np.where(slides, 1 / chains.reach[:, None] ** 2, 1.0)  # W, (M, n)
-        slight = _SLIGHT * chains.reach[:, None] ** 2
-        spare = freedom.joints > freedom.directions
+    def __init__(self, chains: LegChains, freedom: Freedom) -> None:
+        self.chains = chains
+        self.turns = (~chains.slides).astype(np.float64)  # (n, L)
+        metric = np.where(chains.slides.T, 1 / chains.reach[:, None] ** 2, 1.0)
+        slight = _SLIGHT * chains.reach[:, None] ** 2 if freedom.lacks else 1.0
+        self.weight = metric * slight * (freedom.joints > freedom.directions)  # w W, (L, n)
         self.s = 1.0 if freedom.lacks else 0.0
-        self.weight = self.metric * (slight if freedom.lacks else 1.0) * (1.0 if spare else 0.0)
-        self.turns = (~slides).astype(np.float64)
 
     def positions(self, target: Array, start: Array) -> tuple[Array, Array]:
         """Postures, and what is left to the targets.
 
         Args:
-            target: Foot positions in the base frame [m], shape (N, M, 3).
-            start: Shape (M, K) or (N, M, K).
+            target: Foot positions in the base frame [m], shape (N, L, 3).
+            start: Shape (L, n) [rad, m].
 
         Returns:
-            Shape (N, M, K), zero beyond the legs' joints, and (N, M) [m].
+            Shapes (N, L, n) and (N, L) [m].
         """
-        full, _ = approach(self.chains, target, start)
-        q = full[..., : self.n].copy()
-        level = self._multipliers(q, target)
+        q, _ = approach(self.chains, target, start)
+        n, level = q.shape[-1], self._multipliers(q, target)
         for _ in range(_ITERATIONS):
-            system = self._system(q, level)
-            foot = system.legs.tip.transpose(2, 1, 0)
-            first = self.weight * (q - self.nominal) - np.einsum(
-                "nmij,nmi->nmj", system.jacobian, level
-            )
-            second = foot + self.s * level - target
-            both = np.concatenate([first, second], axis=-1)
+            legs, _, matrix = self._system(q, level)
+            motion = self.weight * (q - self.chains.nominal)
+            first = motion - np.einsum("cjln,nlc->nlj", legs.columns, level)
+            second = legs.tip.transpose(2, 1, 0) + self.s * level - target
             try:
-                step = -np.linalg.solve(system.matrix, both[..., None])[..., 0]
-            except np.linalg.LinAlgError:  # a singular posture: what is left tells of it
+                step = -_solve(matrix, first, second)
+            except np.linalg.LinAlgError:  # a singular posture: what is left shows it
                 break
-            largest = np.abs(step[..., : self.n]).max(axis=-1, keepdims=True)
+            largest = np.abs(step[..., :n]).max(axis=-1, keepdims=True)
             step *= np.minimum(1.0, _LARGEST_STEP / np.maximum(largest, 1e-300))
-            q += step[..., : self.n]
-            level += step[..., self.n :]
+            q, level = q + step[..., :n], level + step[..., n:]
             if largest.max() < _CONVERGED:
                 break
-        full[..., : self.n] = q
-        foot = swept(self.chains, np.array(full.transpose(1, 2, 0))).tip.transpose(2, 1, 0)
-        return full, np.linalg.norm(target - foot, axis=-1)
+        return q, np.linalg.norm(target - foot_positions(self.chains, q), axis=-1)
 
     def rates(
         self, q: Array, velocity: Array, acceleration: Array, target: Array
     ) -> tuple[Array, Array]:
-        """Joint velocities and accelerations of the least motion, each (N, M, K).
+        """Joint velocities and accelerations of the least motion, each (N, L, n).
 
         Args:
-            q: Postures from `positions`, shape (N, M, K).
-            velocity: Of the targets [m/s], shape (N, M, 3).
-            acceleration: Of the targets [m/s^2], shape (N, M, 3).
-            target: Where they are [m], shape (N, M, 3).
+            q: Postures from `positions`, shape (N, L, n).
+            velocity: Of the targets [m/s], shape (N, L, 3).
+            acceleration: Of the targets [m/s^2], shape (N, L, 3).
+            target: Where they are [m], shape (N, L, 3).
         """
-        own, n = q[..., : self.n], self.n
-        level = self._multipliers(own, target)
-        system = self._system(own, level)
-        none = np.zeros(own.shape)
-        first = np.linalg.solve(system.matrix, np.concatenate([none, velocity], -1)[..., None])
-        q_dot, level_dot = first[..., :n, 0], first[..., n:, 0]
-        rate = np.zeros(q.shape)
-        rate[..., :n] = q_dot
-        bias = bias_acceleration(
-            self.chains, np.array(q.transpose(1, 2, 0)), np.array(rate.transpose(1, 2, 0))
-        ).transpose(2, 1, 0)
-        turning = 2 * np.einsum("nmjk,nmk->nmj", self._bend(system.legs, level_dot), q_dot)
-        turning += np.einsum("nmjk,nmk->nmj", self._bend_rate(system.legs, level, q_dot), q_dot)
-        right = np.concatenate([turning, acceleration - bias], -1)
-        second = np.linalg.solve(system.matrix, right[..., None])[..., :n, 0]
-        faster = np.zeros(q.shape)
-        faster[..., :n] = second
-        return rate, faster
+        n, level = q.shape[-1], self._multipliers(q, target)
+        legs, second, matrix = self._system(q, level)
+        both = _solve(matrix, np.zeros(q.shape), velocity)
+        q_dot, level_dot = both[..., :n], both[..., n:]
+        rate = samples_last(q_dot).transpose(1, 0, 2)
+        column_rates = np.einsum("cjkln,jln->ckln", second, rate)
+        bias = np.einsum("ckln,kln->nlc", column_rates, rate)
+        turning = 2 * np.einsum("nlc,ckln->nlk", level_dot, column_rates)
+        third = self._derivative_rate(legs, column_rates, rate)
+        turning += np.einsum("nlc,cjkln,kln->nlj", level, third, rate, optimize=True)
+        return q_dot, _solve(matrix, turning, acceleration - bias)[..., :n]
 
     def _multipliers(self, q: Array, target: Array) -> Array:
-        """The l of postures that are solutions, or nearly, shape (N, M, 3)."""
-        full = np.zeros((*q.shape[:2], self.chains.depth))
-        full[..., : self.n] = q
-        legs = swept(self.chains, np.array(full.transpose(1, 2, 0)))
+        """The l of postures that are solutions, or nearly, shape (N, L, 3)."""
+        legs = swept(self.chains, samples_last(q))
         if self.s:
             return np.asarray(target - legs.tip.transpose(2, 1, 0))
-        jacobian = legs.columns.transpose(3, 2, 0, 1)[..., : self.n]
-        normal = jacobian @ jacobian.swapaxes(-1, -2)
-        wanted = np.einsum("nmij,nmj->nmi", jacobian, self.weight * (q - self.nominal))
-        return np.asarray(np.linalg.solve(normal, wanted[..., None])[..., 0])
+        jacobian = legs.columns.transpose(3, 2, 0, 1)
+        wanted = jacobian @ (self.weight * (q - self.chains.nominal))[..., None]
+        return np.asarray(np.linalg.solve(jacobian @ jacobian.swapaxes(-1, -2), wanted)[..., 0])
 
-    def _system(self, q: Array, level: Array) -> _System:
-        n = self.n
-        full = np.zeros((*q.shape[:2], self.chains.depth))
-        full[..., :n] = q
-        legs = swept(self.chains, np.array(full.transpose(1, 2, 0)), axes=True)
-        jacobian = legs.columns.transpose(3, 2, 0, 1)[..., :n]
-        matrix = np.zeros((*q.shape[:2], n + 3, n + 3))
-        matrix[..., :n, :n] = -self._bend(legs, level)
-        matrix[..., range(n), range(n)] += self.weight
-        matrix[..., :n, n:] = -jacobian.swapaxes(-1, -2)
-        matrix[..., n:, :n] = jacobian
-        matrix[..., range(n, n + 3), range(n, n + 3)] = self.s
-        return _System(matrix, jacobian, legs)
+    def _system(self, q: Array, level: Array) -> tuple[Swept, Array, Array]:
+        """The sweep of some postures, second derivatives of the feet and Newton's matrix.
 
-    def _bend(self, legs: Swept, level: Array) -> Array:
-        """H(l), the second derivative of l . x(q), shape (N, M, n, n).
-
-        Its entry of joints j <= k is l . (a_j x column_k) where j turns, zero where it slides.
+        The matrix is [[w W - H(l), -J^T], [J, s 1]] with H(l) the second derivative of l . x(q).
         """
+        n, legs = q.shape[-1], swept(self.chains, samples_last(q), axes=True)
         assert legs.axes is not None
-        axes, columns, force = legs.axes, legs.columns, level.transpose(2, 1, 0)
+        pairs = cross(legs.axes[:, :, None], legs.columns[:, None])
+        second = _symmetric(self.turns[:, None, :, None] * pairs)
+        matrix = np.zeros((*q.shape[:2], n + 3, n + 3))
+        matrix[..., :n, :n] = -np.einsum("nlc,cjkln->nljk", level, second)
+        matrix[..., range(n), range(n)] += self.weight
+        matrix[..., n:, :n] = legs.columns.transpose(3, 2, 0, 1)
+        matrix[..., :n, n:] = -matrix[..., n:, :n].swapaxes(-1, -2)
+        matrix[..., range(n, n + 3), range(n, n + 3)] = self.s
+        return legs, second, matrix
 
-        def entry(j: int, k: int) -> Array:
-            return np.asarray((force * cross(axes[:, j], columns[:, k])).sum(0))
-
-        return self._symmetric(entry, force.shape)
-
-    def _bend_rate(self, legs: Swept, level: Array, q_dot: Array) -> Array:
-        """Time derivative of H(l) at constant l, shape (N, M, n, n)."""
+    def _derivative_rate(self, legs: Swept, column_rates: Array, rate: Array) -> Array:
+        """Time derivative of the feet's second derivatives, shape (3, n, n, L, N)."""
         assert legs.axes is not None
-        axes, columns, n = legs.axes, legs.columns, self.n
-        force, rate = level.transpose(2, 1, 0), q_dot.transpose(2, 1, 0)
-        turns = self.turns.T[:, :, None]
-        spins = np.zeros((3, n, *force.shape[1:]))  # angular velocity of what joint j hangs on
-        for j in range(1, n):
-            spins[:, j] = spins[:, j - 1] + axes[:, j - 1] * (turns[j - 1] * rate[j - 1])
-        axis_rates = [cross(spins[:, j], axes[:, j]) for j in range(n)]
-        # d(column_k)/dt = sum over i of what joint i does to it: a_min x column_max where it turns.
-        column_rates = []
-        for k in range(n):
-            change = np.zeros(force.shape)
-            for i in range(n):
-                low, high = min(i, k), max(i, k)
-                turned = cross(axes[:, low], columns[:, high])
-                change += turned * (turns[low] * rate[i])
-            column_rates.append(change)
+        spin = legs.axes * (self.turns[..., None] * rate)
+        carried = np.cumsum(spin, axis=1) - spin  # angular velocity of what a joint hangs on
+        axis_rates = cross(carried, legs.axes)
+        pairs = cross(axis_rates[:, :, None], legs.columns[:, None])
+        pairs += cross(legs.axes[:, :, None], column_rates[:, None])
+        return _symmetric(self.turns[:, None, :, None] * pairs)
 
-        def entry(j: int, k: int) -> Array:
-            both = cross(axis_rates[j], columns[:, k]) + cross(axes[:, j], column_rates[k])
-            return np.asarray((force * both).sum(0))
 
-        return self._symmetric(entry, force.shape)
+def _symmetric(pairs: Array) -> Array:
+    """Entries of joints j <= k for both orders, shape (3, n, n, L, N)."""
+    upper = np.triu(np.ones(pairs.shape[1:3], dtype=np.bool_))[..., None, None]
+    return np.where(upper, pairs, pairs.swapaxes(1, 2))
 
-    def _symmetric(self, entry: Callable[[int, int], Array], shape: tuple[int, ...]) -> Array:
-        n, (_, legs, samples) = self.n, shape
-        turns = self.turns.T[:, :, None]
-        out = np.empty((n, n, legs, samples))
-        for j in range(n):
-            for k in range(j, n):
-                out[j, k] = out[k, j] = turns[j] * entry(j, k)
-        return out.transpose(3, 2, 0, 1)
+
+def _solve(matrix: Array, first: Array, second: Array) -> Array:
+    right = np.concatenate([first, second], axis=-1)
+    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
