@@ -37,3 +37,9 @@ def require_non_negative(where: str, **values: Scalars) -> None:
         require(
             np.isfinite(array) & (array >= 0.0), where, f"{name} must be finite and not negative"
         )
+
+
+def least_magnitude(low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return the value of least magnitude in each interval [low, high]."""
+    value: FloatArray = np.clip(0.0, low, high)
+    return value

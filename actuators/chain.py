@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars
+from actuators.arrays import FloatArray, Scalars, least_magnitude
 from actuators.elements.element import Element
 from actuators.elements.motor import DCMotor
 from actuators.errors import ChainError, closest
@@ -26,7 +26,7 @@ class HoldingResult:
         motor_torque: The one of least magnitude between them [N*m].
         current: [A].
         voltage: [V].
-        power: Electrical power [W].
+        power: Electrical power, of the motor and of what elements draw themselves [W].
     """
 
     low: FloatArray
@@ -48,7 +48,7 @@ class ChainResult:
         stored: Rate of stored energy by element (N, J) [W].
         current: (N, J) [A].
         voltage: (N, J) [V].
-        electrical_power: From the supply to the motor (N, J) [W].
+        electrical_power: From the supply to motor and elements (N, J) [W].
         motors: One per joint.
     """
 
@@ -152,19 +152,6 @@ class Chain:
         at = self._index(element.name)
         return replace(self, elements=(*self.elements[:at], element, *self.elements[at + 1 :]))
 
-    def inserted(self, element: Element, before: str) -> "Chain":
-        """Return a chain with an element on the joint side of another.
-
-        Args:
-            element: The new element.
-            before: Name of the element whose joint side it takes.
-
-        Raises:
-            ChainError: There is no such element, or the new name is taken.
-        """
-        at = self._index(before)
-        return replace(self, elements=(*self.elements[:at], element, *self.elements[at:]))
-
     def moving(self, joint: ShaftSeries) -> ChainResult:
         """Return everything the chain needs for a motion of its joints.
 
@@ -181,21 +168,22 @@ class Chain:
         shafts = {JOINT_STAGE: joint}
         losses: dict[str, FloatArray] = {}
         stored: dict[str, FloatArray] = {}
-        for element, side, motor_side in steps(self.elements, joint):
-            loss = element.loss(side, motor_side)
-            rate = element.stored(side, motor_side)
-            if loss is not None:
+        drawn = np.zeros_like(joint.torque)
+        side = shown = joint
+        for element in self.elements:
+            if (loss := element.loss(shown)) is not None:
                 losses[element.name] = loss
-            if rate is not None:
+            if (rate := element.stored(shown)) is not None:
                 stored[element.name] = rate
+            drawn += element.drawn(shown.torque, shown.velocity, shown.direction)
+            shown = motor_side = element.moving(side)
             if standing:
-                low, high = element.holding(low, high)
+                low, high = element.holding(low, high, side.position)
+                held = np.where(at_rest, least_magnitude(low, high), motor_side.torque)
+                shown = motor_side.with_torque(held)
             if element.name in stage_after:
-                shown = motor_side
-                if standing:
-                    held = least_magnitude(low, high)
-                    shown = shown.with_torque(np.where(at_rest, held, shown.torque))
                 shafts[stage_after[element.name]] = shown
+            side = motor_side
         last = tuple(shafts.values())[-1]
         current = self.motor.current(last.torque)
         voltage = self.motor.voltage(current, last.velocity)
@@ -207,11 +195,11 @@ class Chain:
             stored=stored,
             current=current,
             voltage=voltage,
-            electrical_power=voltage * current,
+            electrical_power=voltage * current + drawn,
             motors=(self.motor,) * len(joint.joints),
         )
 
-    def holding(self, torque: FloatArray) -> HoldingResult:
+    def holding(self, torque: FloatArray, position: FloatArray | None = None) -> HoldingResult:
         """Return what holds joint torques at standstill.
 
         Each element maps the interval of torques that hold; the motor supplies the one of least
@@ -219,13 +207,20 @@ class Chain:
 
         Args:
             torque: (..., J) [N*m].
+            position: Of the joints (..., J) [rad]; a chain without springs needs none.
+
+        Raises:
+            ChainError: An element's torque depends on the position, and it is not stated.
         """
-        load = np.asarray(torque, dtype=float)
-        low, high = held(self.elements, load, load)
+        low = high = np.asarray(torque, dtype=float)
+        drawn, still = np.zeros_like(low), np.zeros_like(low)
+        for element, angle in _placed(self.elements, position):
+            drawn += element.drawn(least_magnitude(low, high), still, still)
+            low, high = element.holding(low, high, angle)
         motor_torque = least_magnitude(low, high)
         current = self.motor.current(motor_torque)
-        voltage = self.motor.voltage(current, np.zeros_like(current))
-        return HoldingResult(low, high, motor_torque, current, voltage, voltage * current)
+        voltage = self.motor.voltage(current, still)
+        return HoldingResult(low, high, motor_torque, current, voltage, voltage * current + drawn)
 
     def driving(self, motor: ShaftSeries) -> ShaftSeries:
         """Return what reaches the joints from the motor's torque, all motion being known.
@@ -249,32 +244,19 @@ class Chain:
         return names.index(name)
 
 
-def steps(
-    elements: Iterable[Element], joint: ShaftSeries
-) -> Iterator[tuple[Element, ShaftSeries, ShaftSeries]]:
-    """Yield every element of a row with its joint side and what its motor side needs.
-
-    Args:
-        elements: From the joint to the motor.
-        joint: Series at the joints.
-    """
+def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
+    """Return what a row of elements, from the joint to the motor, needs at its motor side."""
     side = joint
     for element in elements:
-        motor_side = element.moving(side)
-        yield element, side, motor_side
-        side = motor_side
-
-
-def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
-    """Return what a row of elements needs at its motor side in motion; see `steps`."""
-    side = joint
-    for _, _, side in steps(elements, joint):  # noqa: B007
-        pass
+        side = element.moving(side)
     return side
 
 
 def held(
-    elements: Iterable[Element], low: FloatArray, high: FloatArray
+    elements: Iterable[Element],
+    low: FloatArray,
+    high: FloatArray,
+    position: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Return which torques at the motor side of a row of elements hold at standstill.
 
@@ -282,13 +264,17 @@ def held(
         elements: From the joint to the motor.
         low: Least torques at the joint side (...) [N*m].
         high: Greatest ones (...) [N*m].
+        position: Of the joint side (...) [rad]; see `Chain.holding`.
     """
-    for element in elements:
-        low, high = element.holding(low, high)
+    for element, angle in _placed(elements, position):
+        low, high = element.holding(low, high, angle)
     return low, high
 
 
-def least_magnitude(low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return the value of least magnitude in each interval [low, high]."""
-    value: FloatArray = np.clip(0.0, low, high)
-    return value
+def _placed(
+    elements: Iterable[Element], position: FloatArray | None
+) -> Iterator[tuple[Element, FloatArray | None]]:
+    """Every element of a row with the position of its joint side."""
+    for element in elements:
+        yield element, position
+        position = None if position is None else position * element.gearing

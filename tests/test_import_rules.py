@@ -34,7 +34,7 @@ LEAVES = {
     *("pipeline.errors", "pipeline.progress", "reports.atomic", "reports.column", "reports.errors"),
 }
 #: Numbers, and the library by which files are read.
-ACTUATORS_NEED = {"numpy", "pydantic", "pydantic_core"}
+ACTUATORS_NEED = {"numpy", "scipy", "pydantic", "pydantic_core"}
 #: No room stands on the actuators' laws before there is a machine.
 WITHOUT_LAWS = {"robot", "motion", "dynamics"}
 #: Where the twin lives, which shares no law with the workflow that it tests.

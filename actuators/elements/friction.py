@@ -1,81 +1,192 @@
-"""Coulomb, load-dependent and viscous friction at one shaft.
+"""Friction at one shaft as one law, of whose terms the named laws of friction are choices.
 
-Eq. 4, 5, 6, 10, 15, 17 and 19 of the paper in one law, with the magnitudes that Eq. 5 and 6 need
-in order to dissipate for every sign:
+With v the velocity, s = sgn(v) the sense of motion and T the torque on the joint side,
 
-    friction = (coulomb + load |torque| + viscous |velocity|) sgn(velocity)
+    friction = (coulomb + excess exp(-(v / stribeck_speed)^2)) s + skew |s|
+             + viscous v + asymmetry |v| + quadratic v |v| + saturating tanh(v / saturation_speed)
+             + (load + when_driving or when_driven) |T| s
+
+Sign: it is what the motor side supplies in addition, T' = T + friction; positive forward.
+
+- Coulomb, load-dependent and viscous (Eq. 4 to 6, 10, 15, 17, 19 of the paper, with the magnitudes
+  that Eq. 5 and 6 need in order to dissipate for every sign): `coulomb`, `load`, `viscous`.
+- Stribeck (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30(7), 1994): `excess`.
+- By direction (Armstrong, "Control of machines with friction", 1991): dry friction is
+  coulomb + skew forward and coulomb - skew backward. In motion `skew` equals a constant torque;
+  only standstill tells the two apart.
+- By quadrant of power (Hamon, Gautier and Garrec, IROS 2010): `when_driving` where s T > 0, the
+  motor driving the load, `when_driven` where s T < 0.
+- The rest: the sum that Bona and Indri, "Friction compensation in robotics", CDC 2005, review.
+
+After a reversal s may rise instead of jumping: over a small displacement (`travel`, Dahl's law, see
+`actuators.presliding`) or over a speed, s = erf(v / (sqrt(2) rise)).
 """
 
-from dataclasses import dataclass
+from abc import abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
+from scipy.special import erf
 
 from actuators.arrays import FloatArray, Scalars, require, require_non_negative
 from actuators.elements.element import Element
+from actuators.presliding import presliding
 from actuators.shaft import ShaftSeries
 
 
 @dataclass(frozen=True, eq=False)
-class Friction(Element):
-    """Friction that the motor side has to overcome; the shaft is the same on both sides.
-
-    The load is the torque on the joint side. At standstill friction holds with up to
-    coulomb + load |torque| in either sense.
+class FrictionLaw(Element):
+    """Friction with a part of its own and a share of the transmitted torque, below 1.
 
     Attributes:
-        coulomb: Load-independent friction [N*m].
-        load: Friction per transmitted torque, below 1, dimensionless. At 1 a load could no longer
-            drive the shaft backwards.
-        viscous: Friction per speed [N*m*s/rad].
+        rise: Transition velocity of dry friction after a reversal; 0 for a jump [rad/s].
+        travel: Presliding displacement, in place of a velocity; 0 for none [rad].
+
+    Note:
+        At standstill dry friction holds with its whole level, whatever `rise` and `travel`.
+    """
+
+    rise: Scalars = field(default=0.0, kw_only=True)
+    travel: float = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        require_non_negative(self.name, rise=self.rise, travel=self.travel)
+
+    @abstractmethod
+    def free(self, velocity: FloatArray, sense: FloatArray) -> FloatArray:
+        """Return the friction torque that no load changes, (N, J) [N*m]."""
+
+    @abstractmethod
+    def share(self, velocity: FloatArray, drives: FloatArray) -> Scalars:
+        """Return friction per transmitted torque, by who drives, (N, J)."""
+
+    @abstractmethod
+    def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
+        """Return levels [N*m] against negative and positive motion, and shares driving, driven."""
+
+    def sense(self, side: ShaftSeries) -> FloatArray:
+        """Return the sense of motion, -1 to 1, (N, J)."""
+        if self.travel > 0.0:
+            columns = zip(side.position.T, side.direction.T, strict=True)
+            return np.stack([presliding(side.time, q, d, self.travel) for q, d in columns], axis=1)
+        if not np.any(self.rise):
+            return side.direction
+        width = np.maximum(np.sqrt(2.0) * np.asarray(self.rise), 1e-300)
+        return np.where(np.asarray(self.rise) > 0.0, erf(side.velocity / width), side.direction)
+
+    def added(self, side: ShaftSeries) -> FloatArray:
+        """Return the friction torque, (N, J) [N*m]."""
+        sense = self.sense(side)
+        share = self.share(side.velocity, side.torque * sense > 0.0)
+        return self.free(side.velocity, sense) + share * np.abs(side.torque) * sense
+
+    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+        """Subtract the friction torque; as shares are below 1, the load has the sign of the rest.
+
+        With x = torque on the motor side less the free part, x = torque + share s |torque|.
+        """
+        sense = self.sense(motor_side)
+        x = motor_side.torque - self.free(motor_side.velocity, sense)
+        along = sense * np.sign(x)
+        share = self.share(motor_side.velocity, along > 0.0)
+        return motor_side.with_torque(x / (1.0 + share * along))
+
+    def holding(
+        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Widen the interval by the whole dry friction at each end; monotone as shares are < 1."""
+        against, along, driving, driven = self.static()
+        return (
+            low - against - np.where(low < 0.0, driving, driven) * np.abs(low),
+            high + along + np.where(high > 0.0, driving, driven) * np.abs(high),
+        )
+
+    def loss(self, joint_side: ShaftSeries) -> FloatArray:
+        """Return friction torque times speed, (N, J) [W]."""
+        return self.added(joint_side) * joint_side.velocity
+
+
+@dataclass(frozen=True, eq=False)
+class Friction(FrictionLaw):
+    """Friction as a sum of terms; those that a shaft does not have are zero.
+
+    Attributes:
+        coulomb: Dry friction at every speed and load [N*m].
+        load: Per transmitted torque, dimensionless; below 1, or no load could drive the shaft.
+        viscous: Per speed [N*m*s/rad].
+        skew: By which dry friction is larger forward and smaller backward [N*m].
+        excess: Break-away less Coulomb friction [N*m].
+        stribeck_speed: At which 1/e of the excess is left [rad/s].
+        asymmetry: By which viscous friction is larger forward and smaller backward [N*m*s/rad].
+        quadratic: Per squared speed [N*m*s^2/rad^2].
+        saturating: Level of friction that grows less and less with speed [N*m].
+        saturation_speed: Over which it grows [rad/s].
+        when_driving: Besides `load` while the motor drives the load, dimensionless.
+        when_driven: Besides `load` while the load drives the motor; together below 1.
 
     Raises:
-        UnphysicalElementError: A coefficient is negative or `load` is not below 1.
+        UnphysicalElementError: A term would give energy, or a speed is not positive.
     """
 
     coulomb: Scalars = 0.0
     load: Scalars = 0.0
     viscous: Scalars = 0.0
+    skew: Scalars = 0.0
+    excess: Scalars = 0.0
+    stribeck_speed: Scalars = 1.0
+    asymmetry: Scalars = 0.0
+    quadratic: Scalars = 0.0
+    saturating: Scalars = 0.0
+    saturation_speed: Scalars = 1.0
+    when_driving: Scalars = 0.0
+    when_driven: Scalars = 0.0
 
     def __post_init__(self) -> None:
-        require_non_negative(self.name, coulomb=self.coulomb, load=self.load, viscous=self.viscous)
-        require(np.less(self.load, 1.0), self.name, "load must be below 1")
-
-    def magnitude(self, joint_side: ShaftSeries) -> FloatArray:
-        """Return the magnitude of the friction torque in motion, (N, J) [N*m]."""
-        friction = np.abs(joint_side.velocity)
-        friction *= self.viscous
-        friction += self.coulomb
-        if np.any(self.load):
-            friction += self.load * np.abs(joint_side.torque)
-        return friction
-
-    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
-        """Add the friction torque."""
-        torque = self.magnitude(joint_side)
-        torque *= joint_side.direction
-        torque += joint_side.torque
-        return joint_side.with_torque(torque)
-
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
-        """Subtract the friction torque; its load term is solved for the joint-side torque.
-
-        With x = torque on the motor side less the load-independent friction, x = torque +
-        direction load |torque|, and torque has the sign of x because load < 1.
-        """
-        d = motor_side.direction
-        x = motor_side.torque - d * (self.coulomb + self.viscous * np.abs(motor_side.velocity))
-        return motor_side.with_torque(x / (1.0 + self.load * d * np.sign(x)))
-
-    def holding(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Widen the interval by the static friction at each end; monotone because load < 1."""
-        return (
-            low - self.coulomb - self.load * np.abs(low),
-            high + self.coulomb + self.load * np.abs(high),
+        super().__post_init__()
+        signless = ("coulomb", "load", "viscous", "excess", "quadratic", "saturating")
+        values = {name: getattr(self, name) for name in signless}
+        require_non_negative(
+            self.name, **values, when_driving=self.when_driving, when_driven=self.when_driven
         )
+        require(np.less(self.load, 1.0), self.name, "load must be below 1")
+        require(
+            np.less(np.add(self.load, self.when_driven), 1.0),
+            self.name,
+            "when_driven and load together must be below 1",
+        )
+        require(np.greater(self.stribeck_speed, 0.0), self.name, "stribeck_speed must be > 0")
+        require(np.greater(self.saturation_speed, 0.0), self.name, "saturation_speed must be > 0")
+        for part, whole in (("skew", "coulomb"), ("asymmetry", "viscous")):
+            within = np.less_equal(np.abs(getattr(self, part)), getattr(self, whole))
+            require(within, self.name, f"{part} must not exceed {whole}: it would give energy")
 
-    def loss(self, joint_side: ShaftSeries, motor_side: ShaftSeries) -> FloatArray:
-        """Return friction torque times speed, (N, J) [W]; zero at rest."""
-        power = self.magnitude(joint_side)
-        power *= joint_side.direction
-        power *= joint_side.velocity
-        return power
+    @cached_property
+    def _terms(self) -> frozenset[str]:
+        """Terms that are there, of those that not every friction has."""
+        rare = ("skew", "excess", "asymmetry", "quadratic", "saturating")
+        return frozenset(name for name in rare if np.any(getattr(self, name)))
+
+    def free(self, velocity: FloatArray, sense: FloatArray) -> FloatArray:
+        """Return all terms but those of the load, (N, J) [N*m]."""
+        v, terms = velocity, self._terms
+        torque = self.coulomb * sense + self.viscous * v
+        if "skew" in terms:
+            torque = torque + self.skew * np.abs(sense)
+        if "excess" in terms:
+            torque = torque + self.excess * np.exp(-((v / self.stribeck_speed) ** 2)) * sense
+        if "asymmetry" in terms or "quadratic" in terms:
+            torque = torque + (self.asymmetry + self.quadratic * v) * np.abs(v)
+        if "saturating" in terms:
+            torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
+        return torque
+
+    def share(self, velocity: FloatArray, drives: FloatArray) -> Scalars:
+        """Return the coefficient of the quadrant of power, (N, J)."""
+        return self.load + np.where(drives, self.when_driving, self.when_driven)
+
+    def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
+        """Return dry friction either way and the shares of load."""
+        level = self.coulomb + self.excess
+        driving, driven = self.load + self.when_driving, self.load + self.when_driven
+        return level - self.skew, level + self.skew, driving, driven

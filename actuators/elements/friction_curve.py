@@ -9,14 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import FloatArray, Scalars, require, require_non_negative
-from actuators.elements.loaded_friction import LoadedFriction
-from actuators.shaft import ShaftSeries
+from actuators.elements.friction import FrictionLaw
 
 _MOST_SHARE = 0.99  # of the load: at 1 no load could drive the shaft
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionCurve(LoadedFriction):
+class FrictionCurve(FrictionLaw):
     """Friction over speed and load, for one joint.
 
     Attributes:
@@ -24,7 +23,7 @@ class FrictionCurve(LoadedFriction):
         levels: Mean of both directions at the knots, (K,) [N*m].
         asymmetries: By which it is larger forward and smaller backward, (K,) [N*m].
         shares: Friction per transmitted torque at the knots, (K,), dimensionless.
-        viscous: Per speed, beside the curves [N*m*s/rad].
+        viscous: Per speed, in addition to the curves [N*m*s/rad].
 
     Raises:
         UnphysicalElementError: Knots do not ascend, or the curves would give energy at a knot.
@@ -44,8 +43,7 @@ class FrictionCurve(LoadedFriction):
         require(ascending, self.name, "speeds must ascend from 0")
         require_non_negative(self.name, viscous=self.viscous)
         passive = np.array(self.levels) + self.viscous * np.array(self.speeds)
-        # Sums of a few terms that cancel leave rounding.
-        slack = 1e-9 * (1.0 + np.abs(passive).max())
+        slack = 1e-9 * (1.0 + np.abs(passive).max())  # sums of terms that cancel leave rounding
         out = passive - np.abs(self.asymmetries) >= -slack
         require(out, self.name, "friction must not be negative in either direction")
         shares = np.array(self.shares)
@@ -57,19 +55,18 @@ class FrictionCurve(LoadedFriction):
         beyond = np.maximum(speed - x[-1], 0.0) * (y[-1] - y[-2]) / (x[-1] - x[-2])
         return np.asarray(np.interp(speed, x, y) + beyond)
 
-    def free(self, side: ShaftSeries) -> FloatArray:
+    def free(self, velocity: FloatArray, sense: FloatArray) -> FloatArray:
         """Return levels and asymmetry, (N, J) [N*m]; they take energy out at every speed."""
-        v, s = side.velocity, self.sense(side)
-        speed = np.abs(v)
+        speed = np.abs(velocity)
         level = np.maximum(self.at(self.levels, speed), -self.viscous * speed)
         most = level + self.viscous * speed
         skew = np.clip(self.at(self.asymmetries, speed), -most, most)
         # Towards standstill the asymmetry goes with the sense of motion, as dry friction does.
-        return np.asarray(level * s + skew * np.abs(s) + self.viscous * v)
+        return np.asarray(level * sense + skew * np.abs(sense) + self.viscous * velocity)
 
-    def share(self, side: ShaftSeries, sign: FloatArray) -> FloatArray:
+    def share(self, velocity: FloatArray, drives: FloatArray) -> FloatArray:
         """Return friction per transmitted torque, (N, J)."""
-        return np.clip(self.at(self.shares, np.abs(side.velocity)), 0.0, _MOST_SHARE)
+        return np.clip(self.at(self.shares, np.abs(velocity)), 0.0, _MOST_SHARE)
 
     def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
         """Return the curves at standstill."""

@@ -69,16 +69,16 @@ class Hypoid(Element):
     @property
     def driving_factor(self) -> Scalars:
         """T1 n / T2 where the pinion drives: above 1."""
-        factor: Scalars = (1.0 + self.friction * np.tan(self.pinion_angle)) / (
-            1.0 + self.friction * np.tan(self.wheel_angle)
-        )
-        return factor
+        return self._factor(self.friction)
 
     @property
     def driven_factor(self) -> Scalars:
         """T1 n / T2 where the wheel drives: below 1, zero or less when self-locking."""
-        factor: Scalars = (1.0 - self.friction * np.tan(self.pinion_angle)) / (
-            1.0 - self.friction * np.tan(self.wheel_angle)
+        return self._factor(-np.asarray(self.friction))
+
+    def _factor(self, friction: Scalars) -> Scalars:
+        factor: Scalars = (1.0 + friction * np.tan(self.pinion_angle)) / (
+            1.0 + friction * np.tan(self.wheel_angle)
         )
         return factor
 
@@ -103,23 +103,16 @@ class Hypoid(Element):
 
     def normal_force(self, joint_side: ShaftSeries) -> FloatArray:
         """Return the signed normal force at the teeth, (N, J) [N] (Eq. 12)."""
-        sense = np.sign(joint_side.torque)
-        sense *= joint_side.direction
-        sense *= self.friction * np.sin(self.wheel_angle)
-        sense += np.cos(self.wheel_angle)
-        sense *= self.wheel_radius
-        force: FloatArray = joint_side.torque / sense
+        along = np.sign(joint_side.torque) * joint_side.direction
+        across = np.cos(self.wheel_angle) + self.friction * np.sin(self.wheel_angle) * along
+        force: FloatArray = joint_side.torque / (self.wheel_radius * across)
         return force
 
     def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return the pinion's torque and motion (Eq. 13)."""
         force = self.normal_force(joint_side)
-        torque = np.abs(force)
-        torque *= joint_side.direction
-        torque *= self.friction * np.sin(self.pinion_angle)
-        force *= np.cos(self.pinion_angle)
-        torque += force
-        torque *= self.pinion_radius
+        rubbing = self.friction * np.sin(self.pinion_angle) * joint_side.direction * np.abs(force)
+        torque = (force * np.cos(self.pinion_angle) + rubbing) * self.pinion_radius
         return joint_side.geared(self.ratio, torque)
 
     def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
@@ -147,7 +140,9 @@ class Hypoid(Element):
         torque = motor_side.torque * self.ratio / factor
         return motor_side.geared(1.0 / np.asarray(self.ratio), torque)
 
-    def holding(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def holding(
+        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the span of Eq. 13 over both senses of an impending motion.
 
         Each end of the motor-side interval is a concave (lower) or convex (upper) function of the
@@ -158,15 +153,12 @@ class Hypoid(Element):
         ends = [low * a, low * b, high * a, high * b]
         return np.minimum.reduce(ends), np.maximum.reduce(ends)
 
-    def loss(self, joint_side: ShaftSeries, motor_side: ShaftSeries) -> FloatArray:
+    def loss(self, joint_side: ShaftSeries) -> FloatArray:
         """Return mu |F| |v|, (N, J) [W], with the sliding speed v along the teeth.
 
         v = r2 w2 cos b2 (tan b1 - tan b2): both gears share the speed normal to the teeth and
         differ along them. This is a law of its own, not a difference of powers.
         """
         slip = np.cos(self.wheel_angle) * (np.tan(self.pinion_angle) - np.tan(self.wheel_angle))
-        power = np.abs(self.normal_force(joint_side))
-        power *= self.friction * slip * self.wheel_radius
-        power *= joint_side.direction
-        power *= joint_side.velocity
-        return power
+        speed = self.wheel_radius * slip * joint_side.direction * joint_side.velocity
+        return self.friction * np.abs(self.normal_force(joint_side)) * speed

@@ -26,22 +26,10 @@ class Inertia(Element):
     def __post_init__(self) -> None:
         require_non_negative(self.name, inertia=self.inertia)
 
-    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
-        """Add inertia times acceleration."""
-        torque = joint_side.acceleration * self.inertia
-        torque += joint_side.torque
-        return joint_side.with_torque(torque)
+    def added(self, side: ShaftSeries) -> FloatArray:
+        """Return inertia times acceleration; nothing at standstill."""
+        return self.inertia * side.acceleration
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
-        """Subtract inertia times acceleration."""
-        return motor_side.with_torque(motor_side.torque - self.inertia * motor_side.acceleration)
-
-    def holding(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the interval as it is: at standstill nothing accelerates."""
-        return low, high
-
-    def stored(self, joint_side: ShaftSeries, motor_side: ShaftSeries) -> FloatArray:
+    def stored(self, joint_side: ShaftSeries) -> FloatArray:
         """Return the rate of kinetic energy, (N, J) [W]."""
-        rate = joint_side.acceleration * self.inertia
-        rate *= joint_side.velocity
-        return rate
+        return self.added(joint_side) * joint_side.velocity

@@ -1,49 +1,73 @@
-"""Torques that depend on a joint's position alone: parallel spring and ripple.
+"""Torques that depend on a shaft's position alone: parallel spring and ripple.
 
-They stand on the joint side of the chain and add to what the joint demands; unlike the elements
-of a chain they need the position at standstill, too.
+They are conservative: what they take on one half of a closed path they give back on the other.
 """
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, require
+from actuators.arrays import FloatArray, Scalars, require
+from actuators.elements.element import Element
+from actuators.errors import ChainError
+from actuators.shaft import ShaftSeries
 
 
-@dataclass(frozen=True)
-class PositionTorque(ABC):
-    """What the actuator has to supply on top because of where the joint stands."""
-
-    name: str
+@dataclass(frozen=True, eq=False)
+class PositionTorque(Element):
+    """What the motor side has to supply in addition because of where the shaft stands."""
 
     @abstractmethod
     def torque(self, position: FloatArray) -> FloatArray:
-        """Return the additional demand (N,) [N*m] at positions (N,) [rad]."""
+        """Return the additional demand (...) [N*m] at positions (...) [rad]."""
+
+    def added(self, side: ShaftSeries) -> FloatArray:
+        """Return the torque at the series' positions, (N, J) [N*m]."""
+        return self.torque(side.position)
+
+    def holding(
+        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Shift the interval.
+
+        Raises:
+            ChainError: The position is not known.
+        """
+        if position is None:
+            raise ChainError(f"element '{self.name}': what holds depends on the position: state it")
+        torque = self.torque(position)
+        return low + torque, high + torque
+
+    def stored(self, joint_side: ShaftSeries) -> FloatArray:
+        """Return the rate of potential energy, (N, J) [W]."""
+        return self.torque(joint_side.position) * joint_side.velocity
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ParallelSpring(PositionTorque):
-    """A spring between the joint's two links: stiffness (position - rest).
+    """A spring beside the drive, between the two links: stiffness (position - rest).
+
+    Its torque acts on the joint against the displacement, so that the drive supplies it on top.
 
     Attributes:
         stiffness: [N*m/rad].
         rest: Position without torque [rad].
     """
 
-    stiffness: float = 0.0
-    rest: float = 0.0
+    stiffness: Scalars = 0.0
+    rest: Scalars = 0.0
 
     def __post_init__(self) -> None:
-        require(np.isfinite([self.stiffness, self.rest]), self.name, "values must be finite")
+        for values in (self.stiffness, self.rest):
+            require(np.isfinite(values), self.name, "values must be finite")
 
     def torque(self, position: FloatArray) -> FloatArray:
         """Return stiffness (position - rest) [N*m]."""
         return self.stiffness * (position - self.rest)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ripple(PositionTorque):
     """Torque periodic in the angle: amplitude sin(order position + phase).
 
@@ -52,7 +76,7 @@ class Ripple(PositionTorque):
 
     Attributes:
         amplitude: [N*m].
-        order: Periods per turn of the joint; a motor's order times the ratio.
+        order: Periods per turn of the shaft.
         phase: [rad].
     """
 

@@ -34,7 +34,9 @@ class Ratio(Element):
         """Return the slower shaft with the larger torque."""
         return motor_side.geared(1.0 / np.asarray(self.ratio), motor_side.torque * self.ratio)
 
-    def holding(self, low: FloatArray, high: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def holding(
+        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
         """Scale the interval."""
         return low / self.ratio, high / self.ratio
 

@@ -3,19 +3,22 @@
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import Annotated, Final
+from typing import Annotated, Final, Self
 
-from pydantic import AfterValidator, ConfigDict, Field, Strict
+from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
 from actuators.checked import Table, Text, checked
 from actuators.elements.element import Element
 from actuators.elements.friction import Friction
+from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.inertia import Inertia
+from actuators.elements.position_torque import ParallelSpring
 from actuators.elements.ratio import Ratio
+from actuators.elements.second_motor import SecondMotor
 from actuators.errors import CatalogError, closest, one_line
+from actuators.loading.components import FRICTION
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
 #: Files and columns are called after alternatives.
@@ -45,10 +48,7 @@ class Law:
 LAWS: Final[Mapping[str, Law]] = {
     "ratio": Law(Ratio, {"ratio": "ratio"}),
     "inertia": Law(Inertia, {"inertia": "inertia"}),
-    "friction": Law(
-        Friction,
-        possible={"coulomb": "torque", "load": "ratio", "viscous": "viscous friction"},
-    ),
+    "friction": Law(Friction, possible=FRICTION),
     "hypoid": Law(
         Hypoid,
         {
@@ -59,26 +59,61 @@ LAWS: Final[Mapping[str, Law]] = {
             "friction": "ratio",
         },
     ),
+    "parallel_spring": Law(ParallelSpring, {"stiffness": "rotational stiffness", "rest": "angle"}),
+    "holding_brake": Law(
+        HoldingBrake,
+        {"static_torque": "torque"},
+        {"released_power": "power", "engaged_power": "power"},
+    ),
+    "second_motor": Law(
+        SecondMotor,
+        {"torque_constant": "torque constant", "resistance": "resistance", "share": "ratio"},
+    ),
 }
 
 
-@dataclass(frozen=True)
-class ElementEntry:
-    """One element of an alternative as written: a law and where its arguments come from.
+class ElementEntry(Table):
+    """One element of an alternative as written: what is none of its keys is a law's argument.
 
     Attributes:
         name: The element's name.
         law: Key of the table of laws.
-        arguments: Argument to `component.parameter`.
         stage: Name of the shaft on its motor side, or empty.
         shaft: Where that shaft is, in words, or empty.
     """
 
-    name: str
+    model_config = ConfigDict(extra="allow")
+    expected = "name, law, arguments, and for the last element stage"
+    __pydantic_extra__: dict[str, str] = Field(init=False)
+    name: Text
     law: str
-    arguments: Mapping[str, str]
-    stage: str
+    stage: str = ""
     shaft: str = ""
+
+    @property
+    def arguments(self) -> Mapping[str, str]:
+        """Argument to `component.parameter`."""
+        return self.__pydantic_extra__
+
+    @model_validator(mode="after")
+    def _of_the_law(self) -> Self:
+        """Arguments are those of the law, and a place in words is that of a stage."""
+        if self.law not in LAWS:
+            raise ValueError(f"unknown law '{one_line(self.law)}': {closest(self.law, list(LAWS))}")
+        law = LAWS[self.law]
+        for argument in self.arguments:
+            if argument not in law.arguments:
+                raise ValueError(
+                    f"law '{self.law}' has no argument '{one_line(argument)}': "
+                    f"{closest(argument, sorted(law.arguments))}"
+                )
+        lacking = sorted(set(law.needed) - set(self.arguments))
+        if lacking:
+            names = ", ".join(f"'{name}'" for name in lacking)
+            raise ValueError(f"law '{self.law}' lacks its argument {names}")
+        if self.shaft and not self.stage:
+            raise ValueError("'shaft' says where a stage is; name the stage, too")
+        return self
 
 
 @dataclass(frozen=True)
@@ -117,48 +152,7 @@ class Alternative:
         return (self.ratio, *(r for e in self.elements for r in e.arguments.values()))
 
 
-class _Element(Table):
-    """An element as it stands in a file: what is none of its keys is an argument of its law."""
-
-    model_config = ConfigDict(extra="allow")
-    expected = "name, law, arguments, and for the last element stage"
-    __pydantic_extra__: dict[str, str] = Field(init=False)
-    name: Text
-    law: str
-    stage: str = ""
-    shaft: str = ""
-
-    @property
-    def arguments(self) -> dict[str, str]:
-        """Argument to `component.parameter`."""
-        return self.__pydantic_extra__
-
-
-def _argument_names(entry: _Element) -> _Element:
-    """Arguments are those of the law.
-
-    Raises:
-        ValueError: The law is unknown, or an argument is unknown or missing.
-    """
-    if entry.law not in LAWS:
-        raise ValueError(f"unknown law '{one_line(entry.law)}': {closest(entry.law, list(LAWS))}")
-    law = LAWS[entry.law]
-    for argument in entry.arguments:
-        if argument not in law.arguments:
-            raise ValueError(
-                f"law '{entry.law}' has no argument '{one_line(argument)}': "
-                f"{closest(argument, sorted(law.arguments))}"
-            )
-    lacking = sorted(set(law.needed) - set(entry.arguments))
-    if lacking:
-        names = ", ".join(f"'{name}'" for name in lacking)
-        raise ValueError(f"law '{entry.law}' lacks its argument {names}")
-    if entry.shaft and not entry.stage:
-        raise ValueError("'shaft' says where a stage is; name the stage, too")
-    return entry
-
-
-def _stages_differ(elements: tuple[_Element, ...]) -> tuple[_Element, ...]:
+def _stages_differ(elements: tuple[ElementEntry, ...]) -> tuple[ElementEntry, ...]:
     stages = [element.stage for element in elements if element.stage]
     if not elements:
         raise ValueError("is empty, expected at least one [[NAME.element]]")
@@ -178,11 +172,7 @@ class _Written(Table):
     title: Text
     motor: str
     ratio: str
-    element: Annotated[
-        tuple[Annotated[_Element, AfterValidator(_argument_names)], ...],
-        Strict(False),
-        AfterValidator(_stages_differ),
-    ]
+    element: Annotated[tuple[ElementEntry, ...], Strict(False), AfterValidator(_stages_differ)]
 
 
 def read_alternative(name: str, entry: object) -> Alternative:
@@ -202,8 +192,4 @@ def read_alternative(name: str, entry: object) -> Alternative:
             "'_' and '-'; tables and files are called after it"
         )
     written = checked(_Written, entry, f"{ALTERNATIVES_FILE} [{one_line(name)}]", CatalogError)
-    elements = tuple(
-        ElementEntry(e.name, e.law, MappingProxyType(dict(e.arguments)), e.stage, e.shaft)
-        for e in written.element
-    )
-    return Alternative(name, written.title, written.motor, written.ratio, elements)
+    return Alternative(name, written.title, written.motor, written.ratio, written.element)

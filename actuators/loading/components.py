@@ -13,8 +13,18 @@ from actuators.parameters import ParameterSet, parameters_from_table, read_toml
 
 MOTOR_KIND: Final = "dc_motor"
 
-_FRICTION: Final = {"coulomb": "torque", "load": "ratio", "viscous": "viscous friction"}
-_GEAR: Final = {"ratio": "ratio", **_FRICTION, "inertia": "inertia"}
+#: Terms of the law of friction, with the dimension of each.
+FRICTION: Final[Mapping[str, str]] = {
+    "coulomb": "torque",
+    "load": "ratio",
+    "viscous": "viscous friction",
+    "skew": "torque",
+    "excess": "torque",
+    "stribeck_speed": "angular velocity",
+    "when_driving": "ratio",
+    "when_driven": "ratio",
+}
+_GEAR: Final = {"ratio": "ratio", **FRICTION, "inertia": "inertia"}
 
 KINDS: Final[Mapping[str, Mapping[str, str]]] = {
     "requirement": {"ratio": "ratio"},
@@ -27,7 +37,7 @@ KINDS: Final[Mapping[str, Mapping[str, str]]] = {
         "peak_current": "current",
         "mass": "mass",
     },
-    "rotating_friction": {**_FRICTION, "inertia": "inertia"},
+    "rotating_friction": {**FRICTION, "inertia": "inertia"},
     "gear": _GEAR,
     "harmonic_drive": _GEAR,
     "timing_belt": _GEAR,
@@ -39,7 +49,14 @@ KINDS: Final[Mapping[str, Mapping[str, str]]] = {
         "wheel_radius": "length",
         "friction": "ratio",
     },
-    "bearing": _FRICTION,
+    "bearing": FRICTION,
+    "spring": {"stiffness": "rotational stiffness", "rest": "angle"},
+    "brake": {"static_torque": "torque", "released_power": "power", "engaged_power": "power"},
+    "second_motor": {
+        "torque_constant": "torque constant",
+        "resistance": "resistance",
+        "share": "ratio",
+    },
 }
 
 

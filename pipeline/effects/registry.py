@@ -21,14 +21,16 @@ from pipeline.effects.drive.torque_constant_error import TorqueConstantError
 from pipeline.effects.drive.torque_ripple import TorqueRipple
 from pipeline.effects.drive.transmission_coupling import BareCoupling, TransmissionCoupling
 from pipeline.effects.drive.winding_heating import SensedHeating, WindingHeating
-from pipeline.effects.friction.backdrive_loss import BackdriveLoss
-from pipeline.effects.friction.coulomb_friction import CoulombFriction
-from pipeline.effects.friction.direction_dependent_friction import DirectionDependentFriction
 from pipeline.effects.friction.friction_curve import FrictionCurveEffect
 from pipeline.effects.friction.joint_friction import JointFrictionLaw
-from pipeline.effects.friction.load_dependent_friction import LoadDependentFriction
-from pipeline.effects.friction.stribeck_friction import StribeckFriction
-from pipeline.effects.friction.viscous_friction import ViscousFriction
+from pipeline.effects.friction.presets import (
+    BackdriveLoss,
+    CoulombFriction,
+    DirectionDependentFriction,
+    LoadDependentFriction,
+    StribeckFriction,
+    ViscousFriction,
+)
 from pipeline.effects.sensing.effort_gain import EffortGain
 from pipeline.effects.sensing.effort_offset import EffortOffset
 from pipeline.effects.sensing.position_offset import PositionOffset

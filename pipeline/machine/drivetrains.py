@@ -15,7 +15,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.chain import Chain, ChainResult, HoldingResult, held, least_magnitude
+from actuators.arrays import least_magnitude
+from actuators.chain import Chain, ChainResult, HoldingResult, held
 from actuators.shaft import ShaftSeries
 from pipeline.machine.joint import JointModel, joints_of
 
@@ -117,7 +118,7 @@ class Drivetrains:
             side = joint.at(k)
             for element in own.apart:
                 behind = element.moving(side)
-                loss = element.loss(side, behind)
+                loss = element.loss(side)
                 if loss is not None:
                     total = lost.setdefault(element.name, np.zeros_like(torque))
                     total[:, k] += loss[:, 0]
@@ -140,20 +141,25 @@ class Drivetrains:
             )
         return ShaftSeries.at_joint(names, joint.time, position, velocity, acceleration, torque)
 
-    def holding(self, torque: Array) -> HoldingResult:
+    def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
         """Return what holds joint torques at standstill; see `Chain.holding`.
 
         Args:
             torque: (..., J) [N*m].
+            position: (..., J) [rad].
         """
         asked = np.array(torque, dtype=float)
         for k, own in enumerate(self.joints):
             if own.apart:  # its friction carries what it can
-                asked[..., k] = least_magnitude(*held(own.apart, asked[..., k], asked[..., k]))
+                at = None if position is None else position[..., k]
+                asked[..., k] = least_magnitude(*held(own.apart, asked[..., k], asked[..., k], at))
         out: dict[str, Array] = {}
         for chain, columns in self._groups:
             load = [self.load(k, lambda i: asked[..., i]) for k in columns]
-            result = chain.holding(np.stack(load, axis=-1))
+            at = None
+            if position is not None:
+                at = np.stack([self.turned(k, position) for k in columns], axis=-1)
+            result = chain.holding(np.stack(load, axis=-1), at)
             for name in ("low", "high", "motor_torque", "current", "voltage", "power"):
                 out.setdefault(name, np.empty_like(asked))[..., columns] = getattr(result, name)
         return HoldingResult(**out)

@@ -136,9 +136,15 @@ class JointModel:
         """What the motor's shaft needs for a motion and load at the joint side (inverse)."""
         return moved(self.path, side)
 
-    def holding(self, low: Array, high: Array) -> tuple[Array, Array]:
-        """Motor torques that hold a load between `low` and `high` (...) [N*m] at standstill."""
-        return held(self.path, low, high)
+    def holding(self, low: Array, high: Array, position: Array) -> tuple[Array, Array]:
+        """Motor torques that hold a load between `low` and `high` (...) [N*m] at standstill.
+
+        Args:
+            low: Least load (...) [N*m].
+            high: Greatest load (...) [N*m].
+            position: Of the joint (...) [rad].
+        """
+        return held(self.path, low, high, position)
 
     def warm(self, rise: Array) -> DCMotor:
         """The motor with its winding warmer than the data sheet's by `rise` (...) [K].

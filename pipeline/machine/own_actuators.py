@@ -89,7 +89,9 @@ class OwnActuators:
         *_, motor = parts[0].elements
         shared = [set(a.stage_names) for a in parts]
         elements = tuple(
-            e if e is motor or all(e.stage in stages for stages in shared) else replace(e, stage="")
+            e
+            if e is motor or all(e.stage in stages for stages in shared)
+            else e.model_copy(update={"stage": ""})
             for e in parts[0].elements
         )
         title = "As built: " + ", ".join(f"{name} at {count[name]} joints" for name in names)

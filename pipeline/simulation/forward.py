@@ -284,7 +284,7 @@ class ForwardSimulator:
             needed = mass @ a + load
             held = np.flatnonzero(direction == 0.0)
             for k in held.tolist():  # a motor's torque outside the interval starts the joint
-                low, high = self._actuators[k].holding(needed[[k]], needed[[k]])
+                low, high = self._actuators[k].holding(needed[[k]], needed[[k]], q[[k]])
                 direction[k] = float(torque[k] > high[0]) - float(torque[k] < low[0])
             if not direction[held].any():
                 break

@@ -151,10 +151,9 @@ def stand(
     assert contacts is not None
     if adjust is not None:
         demand = adjust(segment, demand)
-    torque = demand.torque[0]
-    return Standing(
-        segment, demand, contacts, {name: chain.holding(torque) for name, chain in chains.items()}
-    )
+    torque, position = demand.torque[0], demand.position[0]
+    holding = {name: chain.holding(torque, position) for name, chain in chains.items()}
+    return Standing(segment, demand, contacts, holding)
 
 
 def demand_along(

@@ -102,16 +102,10 @@ def test_holding_contains_the_limits_of_moving(alternative, torque):
 
 
 def test_edits_return_new_chains():
-    chain = CHAINS["rotor"]
-    extra = Friction("seal", coulomb=1.0)
-    more = chain.inserted(extra, before="transmission")
-    assert [e.name for e in more.elements][:2] == ["seal", "transmission"]
-    assert len(chain.elements) == 3
-    s = constant(1.0, 0.0)
-    rise = more.moving(s).motor.torque - chain.moving(s).motor.torque
-    np.testing.assert_allclose(rise, 1.0 / 400.0)
-    weaker = more.replaced(Friction("seal", coulomb=0.0))
-    np.testing.assert_allclose(weaker.moving(s).motor.torque, chain.moving(s).motor.torque)
+    chain, s = CHAINS["rotor"], constant(1.0, 0.0)
+    rubbing = chain.replaced(Friction("rotor_friction", coulomb=1.0))
+    np.testing.assert_allclose(rubbing.moving(s).motor.torque[0], 1.0, rtol=1e-3)
+    assert chain.element("rotor_friction").coulomb < 0.1
     assert chain.element("transmission").gearing == 400.0
 
 

@@ -14,7 +14,7 @@ def test_eq_3_lacks_the_dot_on_the_second_omega():
     inertia = Inertia("rotor", 2.0)
     assert (inertia.moving(steady).torque == steady.torque).all()  # J w w would load it
     speeding = constant(5.0, 1.0, acceleration=3.0)
-    assert (inertia.stored(speeding, speeding) == 2.0 * 5.0 * 3.0).all()
+    assert (inertia.stored(speeding) == 2.0 * 5.0 * 3.0).all()
 
 
 def test_eq_5_and_6_lack_the_magnitudes():
@@ -22,7 +22,7 @@ def test_eq_5_and_6_lack_the_magnitudes():
     for speed in (2.0, -2.0):
         for torque in (100.0, -100.0):
             s = constant(speed, torque)
-            assert (friction.loss(s, friction.moving(s)) > 0.0).all()
+            assert (friction.loss(s) > 0.0).all()
             printed = (1.0 + 0.5 * torque + 0.1 * speed) * np.sign(speed) * speed
             assert (printed < 0.0) == (torque < 0.0)  # as printed it gives power
 

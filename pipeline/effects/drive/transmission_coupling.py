@@ -7,7 +7,6 @@ from typing import ClassVar
 
 from actuators.elements.friction import Friction
 from actuators.elements.inertia import Inertia
-from actuators.elements.joint_friction import JointFriction
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
@@ -108,13 +107,8 @@ def _refuse_circle(model: MachineModel, place: Place) -> None:
 def with_shaft(actuator: JointModel, values: Values) -> JointModel:
     """An actuator with inertia and friction at its shaft."""
     name = TransmissionCoupling.name
-    rise, travel = values.get("rise", 0.0), values.get("travel", 0.0)
-    coulomb, viscous = values["coulomb"], values["viscous"]
-    actuator = actuator.with_element(
-        JointFriction(name=name, rise=rise, travel=travel, coulomb=coulomb, viscous=viscous)
-        if rise or travel
-        else Friction(name=name, coulomb=coulomb, viscous=viscous)
-    )
+    dry = {key: values.get(key, 0.0) for key in ("coulomb", "viscous", "rise", "travel")}
+    actuator = actuator.with_element(Friction(name=name, **dry))
     return actuator.with_element(Inertia(name=f"{name}_inertia", inertia=values["inertia"]))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Final
 
-from actuators.elements.joint_friction import JointFriction
+from actuators.elements.friction import Friction
 from pipeline.effects.base import Effect, Parameter, Place, Values
 from pipeline.machine.machine import MachineModel
 
@@ -62,10 +62,8 @@ class JointFrictionLaw(Effect):
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert the law at the joint's side."""
-        terms = {**x, **shape}
-        load = terms.pop("load", 0.0)
-        driving, driven = (terms.pop(name, 0.0) + load for name in ("driving", "driven"))
-        element = JointFriction(name=self.name, when_driving=driving, when_driven=driven, **terms)
+        terms = {f"when_{n}" if n in ("driving", "driven") else n: v for n, v in shape.items()}
+        element = Friction(name=self.name, **terms)
         return model.with_actuator(model.actuator(place[0]).with_output(element))
 
 

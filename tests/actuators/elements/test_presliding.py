@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from actuators.elements.joint_friction import JointFriction
+from actuators.elements.friction import Friction
 from actuators.errors import UnphysicalElementError
 from actuators.presliding import presliding
 from tests.actuators.motions import series, split
@@ -86,7 +86,7 @@ def test_no_sense_leaves_its_bounds_and_none_depends_on_where_zero_is():
 
 
 def friction(travel, **sizes):
-    return JointFriction(name="dry", travel=travel, **sizes)
+    return Friction(name="dry", travel=travel, **sizes)
 
 
 def test_dry_friction_over_a_travel_has_that_sense_and_what_is_viscous_has_not():
@@ -94,7 +94,7 @@ def test_dry_friction_over_a_travel_has_that_sense_and_what_is_viscous_has_not()
     side = series(t, q, v, 0 * v, 0 * v)
     law = friction(0.003, coulomb=2.0, viscous=0.7)
     expected = 2.0 * presliding(t, q, side.direction[:, 0], 0.003) + 0.7 * v
-    np.testing.assert_allclose(law.friction(side)[:, 0], expected, atol=1e-12)
+    np.testing.assert_allclose(law.added(side)[:, 0], expected, atol=1e-12)
 
 
 def test_friction_per_load_over_a_travel_is_undone_from_the_motors_side():
@@ -108,7 +108,7 @@ def test_a_vanishing_travel_is_the_same_law_as_a_jump():
     t, q, v = swing()
     side = split(series(t, q, v, np.gradient(v, t), np.cos(t)))
     steady = np.abs(side.velocity[:, 0]) > 1e-3
-    jump, slid = (friction(d, coulomb=2.0, when_driving=0.1).friction(side) for d in (0.0, 1e-12))
+    jump, slid = (friction(d, coulomb=2.0, when_driving=0.1).added(side) for d in (0.0, 1e-12))
     np.testing.assert_allclose(slid[steady], jump[steady], atol=1e-3)
 
 
@@ -119,17 +119,17 @@ def test_where_a_series_is_split_at_a_reversal_the_sense_goes_on():
     side = split(whole)
     assert side.time.size > t.size
     law = friction(0.01, coulomb=1.0)
-    there = np.interp(t, side.time, law.friction(side)[:, 0])
-    np.testing.assert_allclose(there, law.friction(whole)[:, 0], atol=0.01)
+    there = np.interp(t, side.time, law.added(side)[:, 0])
+    np.testing.assert_allclose(there, law.added(whole)[:, 0], atol=0.01)
 
 
 def test_columns_of_several_joints_are_each_their_own():
     t, q, v = swing()
     side = series(t, *(np.column_stack([x, -2 * x]) for x in (q, v, 0 * v, 0 * v)))
     law = friction(0.003, coulomb=1.0)
-    both = law.friction(side)
+    both = law.added(side)
     for k in (0, 1):
-        np.testing.assert_array_equal(both[:, [k]], law.friction(side.at(k)))
+        np.testing.assert_array_equal(both[:, [k]], law.added(side.at(k)))
 
 
 def test_a_negative_travel_is_refused():

@@ -15,7 +15,6 @@ import pytest
 from actuators.chain import Chain
 from actuators.elements.friction import Friction
 from actuators.elements.inertia import Inertia
-from actuators.elements.joint_friction import JointFriction
 from actuators.elements.motor import DCMotor
 from actuators.elements.ratio import Ratio
 from actuators.shaft import ShaftSeries
@@ -157,7 +156,7 @@ def test_friction_at_the_joints_own_side_does_not_turn_with_the_coupled_motor(
     motion: Measurement, machine: MachineModel
 ) -> None:
     """Its loss is its own law on the joint's own speed, and the balance of power says so."""
-    seal = JointFriction("seal", coulomb=0.2, viscous=0.3, when_driving=0.1, when_driven=0.1)
+    seal = Friction("seal", coulomb=0.2, viscous=0.3, when_driving=0.1, when_driven=0.1)
     rubbing = machine.with_actuator(machine.actuators[2].with_output(seal))
     plain, dry = (Simulator(motion).predict(m) for m in (machine, rubbing))
     more = dry.motor_torque - plain.motor_torque
@@ -177,7 +176,7 @@ def test_walking_tells_what_friction_at_a_coupled_joints_own_side_loses(
     names = machine.joints
     motion = [rng.normal(size=(40, 3)) for _ in range(3)]
     side = ShaftSeries.at_joint(names, np.arange(40.0), *motion, rng.normal(size=(40, 3)))
-    seal = JointFriction("seal", coulomb=0.2, viscous=0.3)
+    seal = Friction("seal", coulomb=0.2, viscous=0.3)
     rubbing = machine.with_actuator(machine.actuators[2].with_output(seal))
     plain, dry = (Drivetrains("d", m.actuators) for m in (machine, rubbing))
     lost = dry.moving(side).losses["seal"]
@@ -189,7 +188,7 @@ def test_walking_tells_what_friction_at_a_coupled_joints_own_side_loses(
 
 
 def test_at_standstill_it_carries_what_it_can(machine: MachineModel) -> None:
-    seal = JointFriction("seal", coulomb=0.5)
+    seal = Friction("seal", coulomb=0.5)
     rubbing = Drivetrains(
         "d", machine.with_actuator(machine.actuators[2].with_output(seal)).actuators
     )

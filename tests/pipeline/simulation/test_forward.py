@@ -15,9 +15,7 @@ from actuators.elements.friction import Friction
 from actuators.elements.heating import COPPER, Heating
 from actuators.elements.inertia import Inertia
 from actuators.elements.motor import DCMotor
-from actuators.elements.quadrant import QuadrantFriction
 from actuators.elements.ratio import Ratio
-from actuators.elements.stribeck import Stribeck
 from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
 from pipeline.machine.joint import JointModel
@@ -35,7 +33,7 @@ CONSTANT, RESISTANCE = 0.013, 4.0
 SUPPLY, GAIN = 7.0, 0.6
 
 
-def machine(*friction: Friction | Stribeck | QuadrantFriction, **changes: object) -> MachineModel:
+def machine(*friction: Friction, **changes: object) -> MachineModel:
     """The pendulum behind a gear of 30, friction at the joint."""
     elements = (
         *friction,
@@ -94,7 +92,7 @@ def test_load_friction_forward_is_its_inverse() -> None:
     """Along a driven motion the chain, asked backward, needs the motor's torque."""
     model = machine(
         Friction("load", load=0.35, coulomb=0.01),
-        Stribeck("s", excess=0.02, speed=0.3),
+        Friction("s", excess=0.02, stribeck_speed=0.3),
     )
     servo = driven(lambda t: np.asarray(1.2 * np.sin(3.0 * t)))
     run = ForwardSimulator(model).run(servo)
@@ -143,7 +141,7 @@ def test_a_held_joint_breaks_away_at_its_friction(torque: float, moves: bool) ->
 
 
 def test_a_self_locking_gear_is_not_driven_back() -> None:
-    lock = QuadrantFriction("q", when_driving=0.4, when_driven=0.99)
+    lock = Friction("q", when_driving=0.4, when_driven=0.99)
     held = ForwardSimulator(machine(lock, Friction("c", coulomb=0.01))).run(free(1.0, 1.0))
     assert np.ptp(held.position) == 0.0
 

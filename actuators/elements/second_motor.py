@@ -1,0 +1,61 @@
+"""A second motor at a shaft, which takes a fixed share of the shaft's torque."""
+
+from dataclasses import dataclass
+
+from actuators.arrays import FloatArray, Scalars, least_magnitude, require, require_non_negative
+from actuators.elements.element import Element
+from actuators.shaft import ShaftSeries
+
+
+@dataclass(frozen=True, eq=False)
+class SecondMotor(Element):
+    """A motor beside the chain's own, on the same shaft: I = share torque / k, P = k I w + R I^2.
+
+    At standstill it gives its share of the least torque that holds. Two motors lose least copper
+    where each takes a share in proportion to its k^2 / R.
+
+    Attributes:
+        torque_constant: k [N*m/A].
+        resistance: R of its winding [ohm].
+        share: Of the shaft's torque, from 0 to below 1, dimensionless.
+
+    Raises:
+        UnphysicalElementError: A constant is not positive, or the share is not below 1.
+
+    Note:
+        Its rotor's friction and inertia are elements of their own, at the same shaft. Its current
+        and voltage are held against no limits.
+    """
+
+    torque_constant: Scalars = 1.0
+    resistance: Scalars = 0.0
+    share: Scalars = 0.0
+
+    def __post_init__(self) -> None:
+        require_non_negative(self.name, resistance=self.resistance, share=self.share)
+        require(self.torque_constant > 0.0, self.name, "torque_constant must be > 0")
+        require(self.share < 1.0, self.name, "share must be below 1")
+
+    def added(self, side: ShaftSeries) -> FloatArray:
+        """Return what the chain's own motor need not supply, negative for a load that resists."""
+        return -self.share * side.torque
+
+    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+        """Return both motors' torque."""
+        return motor_side.with_torque(motor_side.torque / (1.0 - self.share))
+
+    def holding(
+        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Shift the interval by the share of the least torque that holds."""
+        own = self.share * least_magnitude(low, high)
+        return low - own, high - own
+
+    def drawn(self, torque: FloatArray, velocity: FloatArray, direction: FloatArray) -> FloatArray:
+        """Return its electrical power [W]."""
+        own = self.share * torque
+        return own * velocity + self.resistance * (own / self.torque_constant) ** 2
+
+    def loss(self, joint_side: ShaftSeries) -> FloatArray:
+        """Return R I^2, (N, J) [W]."""
+        return self.resistance * (self.share * joint_side.torque / self.torque_constant) ** 2

@@ -1,0 +1,159 @@
+"""What every element promises: driving inverts moving, energy balances, holding is a limit."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from actuators.elements.friction import Friction
+from actuators.elements.friction_curve import FrictionCurve
+from actuators.elements.holding_brake import HoldingBrake
+from actuators.elements.hypoid import Hypoid
+from actuators.elements.inertia import Inertia
+from actuators.elements.position_torque import ParallelSpring, Ripple
+from actuators.elements.ratio import Ratio
+from actuators.elements.second_motor import SecondMotor
+from actuators.errors import UnphysicalElementError
+from tests.actuators.motions import constant, harmonic, series, split
+
+torques = st.floats(-1e3, 1e3)
+speeds = st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-6)
+positive, fraction = st.floats(0.0, 10.0), st.floats(0.0, 0.47)
+FRICTION = {name: positive for name in ("coulomb", "excess", "quadratic", "saturating", "viscous")}
+FRICTION |= dict.fromkeys(("load", "when_driving", "when_driven"), fraction)
+
+
+@st.composite
+def hypoids(draw):
+    b2 = draw(st.floats(0.0, 0.8))
+    b1 = draw(st.floats(b2 + 0.05, 1.5))
+    most = min(0.95 / max(np.tan(b2), 1e-9), 0.95 / np.tan(b1))
+    return Hypoid("h", draw(st.floats(1, 100)), b1, b2, 0.03, draw(st.floats(0, most)))
+
+
+CURVE = FrictionCurve(
+    "c", (0.0, 0.5, 2.0), (0.5, 0.8, -0.2), (0.0, 0.3, -0.2), (0.1, 0.3, 0.2), viscous=0.4
+)
+SIDED = Friction("f", coulomb=2.0, skew=-1.5, viscous=0.3, asymmetry=0.2, stribeck_speed=0.2)
+FRICTIONS = st.builds(Friction, st.just("f"), **FRICTION) | st.sampled_from([CURVE, SIDED])
+ELEMENTS = (
+    FRICTIONS
+    | hypoids()
+    | st.builds(Ratio, st.just("r"), st.floats(0.1, 500.0))
+    | st.builds(Inertia, st.just("i"), positive)
+    | st.builds(ParallelSpring, st.just("s"), st.floats(-9, 9), st.floats(-3, 3))
+    | st.builds(Ripple, st.just("w"), positive, positive, st.floats(-3, 3))
+    | st.builds(HoldingBrake, st.just("b"), positive, positive)
+    | st.builds(SecondMotor, st.just("m"), st.just(0.1), positive, st.floats(0.0, 0.9))
+)
+
+
+@given(ELEMENTS, torques, speeds, st.floats(-100, 100))
+def test_driving_inverts_moving(element, torque, speed, acceleration):
+    s = constant(speed, torque, acceleration)
+    back = element.driving(element.moving(s))
+    for name in ("torque", "velocity", "acceleration", "position", "direction"):
+        slack = 1e-7 * (1 + abs(torque) + speed**2)
+        np.testing.assert_allclose(getattr(back, name), getattr(s, name), rtol=1e-7, atol=slack)
+
+
+@given(ELEMENTS, torques, speeds, st.floats(-100, 100))
+def test_what_goes_in_is_passed_on_lost_or_stored(element, torque, speed, acceleration):
+    s = constant(speed, torque, acceleration)
+    m, loss, stored = element.moving(s), element.loss(s), element.stored(s)
+    drawn = element.drawn(s.torque, s.velocity, s.direction)
+    taken = (0.0 if loss is None else loss) + (0.0 if stored is None else stored)
+    assert loss is None or (loss >= 0.0).all()
+    scale = np.abs(s.power).max() + np.abs(m.power).max() + np.abs(drawn).max()
+    np.testing.assert_allclose(m.power + drawn - s.power, taken, rtol=1e-9, atol=1e-9 * (1 + scale))
+
+
+@given(FRICTIONS | hypoids(), torques)
+def test_holding_ends_where_motion_sets_in(element, torque):
+    low, high = element.holding(np.array([torque]), np.array([torque]))
+    ends = sorted(element.moving(constant([2e-9, -2e-9], torque)).torque[0])
+    np.testing.assert_allclose([low[0], high[0]], ends, rtol=1e-6, atol=1e-6 * (1 + abs(torque)))
+
+
+@given(FRICTIONS | hypoids(), torques, st.floats(0, 1e3), st.floats(0, 1))
+def test_holding_an_interval_contains_holding_each_of_its_points(element, low, width, share):
+    a, b = element.holding(np.array([low]), np.array([low + width]))
+    p, q = element.holding(*(np.array([low + share * width]),) * 2)
+    slack = 1e-9 * (1 + abs(low) + width)
+    assert a[0] <= p[0] + slack
+    assert q[0] <= b[0] + slack
+
+
+NOTHING = (
+    *(Friction("f"), FrictionCurve("c"), Inertia("i"), Ratio("r"), HoldingBrake("b")),
+    *(ParallelSpring("s"), Ripple("w"), SecondMotor("m")),
+)
+
+
+@pytest.mark.parametrize("law", NOTHING, ids=lambda e: type(e).__name__)
+def test_a_law_without_parameters_is_absent(law):
+    s = constant([1.0, -1.0, 2.0, 0.0], [3.0, 5.0, -7.0, 2.0], acceleration=4.0)
+    for side in (law.moving(s), law.driving(s)):
+        assert np.array_equal(side.torque, s.torque)
+    for end in law.holding(s.torque, s.torque, s.position):
+        assert np.array_equal(end, s.torque)
+    assert not np.any(law.drawn(s.torque, s.velocity, s.direction))
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        *(lambda n=n: Friction("f", **{n: -1.0}) for n in FRICTION),
+        lambda: Friction("f", load=1.0),
+        lambda: Friction("f", load=0.5, when_driven=0.5),
+        lambda: Friction("f", viscous=np.nan),
+        lambda: Friction("f", coulomb=0.1, skew=0.2),
+        lambda: Friction("f", viscous=0.1, asymmetry=-0.2),
+        lambda: Friction("f", excess=1.0, stribeck_speed=0.0),
+        lambda: Friction("f", saturation_speed=-1.0),
+        lambda: Friction("f", travel=-1.0),
+        lambda: FrictionCurve("f", speeds=(0.1, 1.0)),
+        lambda: FrictionCurve("f", speeds=(0.0, 0.0)),
+        lambda: FrictionCurve("f", levels=(0.1, -0.1)),
+        lambda: FrictionCurve("f", asymmetries=(0.0, 0.3)),
+        lambda: FrictionCurve("f", shares=(0.0, 1.0)),
+        lambda: FrictionCurve("f", levels=(0.1,)),
+        lambda: Inertia("i", -1.0),
+        lambda: Ratio("r", 0.0),
+        lambda: Ratio("r", np.inf),
+        lambda: Hypoid("h", 10.0, 0.5, 0.6, 0.03, 0.1),
+        lambda: Hypoid("h", 10.0, 1.5, 1.4, 0.03, 0.5),
+        lambda: Hypoid("h", 10.0, 1.6, 0.4, 0.03, 0.1),
+        lambda: Hypoid("h", ratio=2.0),
+        lambda: Hypoid("h", 0.0, 1.4, 0.4, 0.03, 0.1),
+        lambda: Hypoid("h", 10.0, 1.4, 0.4, 0.0, 0.1),
+        lambda: Hypoid("h", 10.0, 1.4, -0.1, 0.03, 0.1),
+        lambda: ParallelSpring("s", stiffness=np.inf),
+        lambda: Ripple("w", phase=np.nan),
+        lambda: HoldingBrake("b", static_torque=-1.0),
+        lambda: HoldingBrake("b", released_power=np.nan),
+        lambda: SecondMotor("m", share=1.0),
+        lambda: SecondMotor("m", torque_constant=0.0),
+    ],
+)
+def test_unphysical_parameters_are_refused(build):
+    with pytest.raises(UnphysicalElementError, match=r"^element '[a-z]':"):
+        build()
+
+
+def test_parameters_may_differ_by_joint():
+    f = Friction("f", coulomb=np.array([1.0, 2.0]))
+    assert f.moving(constant([1.0, -1.0], 0.0)).torque[0].tolist() == [1.0, -2.0]
+
+
+def test_inertia_stores_the_change_of_kinetic_energy():
+    s = split(harmonic(4001, joints=2, seed=1))
+    rate = Inertia("i", 0.3).stored(s)
+    kinetic = 0.5 * 0.3 * s.velocity**2
+    integral = np.diff(s.time)[:, None] * 0.5 * (rate[1:] + rate[:-1])
+    np.testing.assert_allclose(np.cumsum(integral, axis=0), kinetic[1:] - kinetic[0], atol=1e-5)
+
+
+def test_a_series_keeps_its_motion_through_an_element_without_ratio():
+    s = series([0.0, 1.0], [0, 1], [1, 1], [0, 0], [2, 2])
+    assert Friction("f", coulomb=1.0).moving(s).position is s.position

@@ -1,0 +1,100 @@
+"""The motor's conversion and its warming, against closed forms and a general integrator."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+
+from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
+from actuators.elements.motor import DCMotor
+from actuators.errors import UnphysicalElementError
+
+LIMITS = ("max_speed", "supply_voltage", "continuous_current", "peak_current")
+
+
+@given(st.floats(-1e3, 1e3), st.floats(-1e3, 1e3))
+def test_motor_power_is_mechanical_power_and_copper_loss(torque, speed):
+    m = DCMotor("m", 0.03, 0.3)
+    i = m.current(np.array(torque))
+    u = m.voltage(i, np.array(speed))
+    assert u * i == pytest.approx(torque * speed + m.copper_loss(i), rel=1e-9, abs=1e-6)
+    assert m.torque(u, np.array(speed)) == pytest.approx(torque, rel=1e-9, abs=1e-6)
+
+
+def test_a_motor_may_be_small_and_has_no_limits_unless_given():
+    small = DCMotor("m", 0.003, 0.3, **dict.fromkeys(LIMITS, 0.5))
+    assert [getattr(small, name) for name in LIMITS] == [0.5] * 4
+    m = DCMotor("m", 0.03, 0.3)
+    assert {getattr(m, name) for name in LIMITS} == {math.inf}
+    assert m.torque_constant_spread == m.resistance_spread == 0.0
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda: DCMotor("m", 0.0, 0.3),
+        lambda: DCMotor("m", np.array([0.03, 0.0]), 0.3),
+        lambda: DCMotor("m", 0.03, -0.3),
+        lambda: DCMotor("m", 0.03, 0.3, max_speed=0.0),
+        lambda: DCMotor("m", 0.03, 0.3, continuous_current=2.0, peak_current=1.0),
+        lambda: Heating(time_constant=0.0),
+        lambda: Heating(thermal_resistance=-1.0),
+    ],
+)
+def test_unphysical_motors_are_refused(build):
+    with pytest.raises(UnphysicalElementError):
+        build()
+
+
+def test_heating_solves_its_equation_for_a_current_that_changes():
+    """Against a general integrator, the current held over each interval."""
+    rng = np.random.default_rng(6)
+    time = np.cumsum(rng.uniform(0.05, 1.5, 30))
+    loss = rng.uniform(0.0, 40.0, 30)
+    node = Heating(thermal_resistance=3.0, time_constant=7.0, rise=5.0, initial=12.0)
+    level, expected = 12.0, [12.0]
+    for k in range(29):
+        solved = solve_ivp(
+            lambda t, x, p=loss[k]: (5.0 + 3.0 * p * (1.0 + 0.00393 * x) - x) / 7.0,
+            (time[k], time[k + 1]),
+            [level],
+            rtol=1e-10,
+            atol=1e-10,
+        )
+        level = float(solved.y[0, -1])
+        expected.append(level)
+    np.testing.assert_allclose(node.temperature_rise(time, loss), expected, rtol=1e-7)
+
+
+def test_heating_in_closed_form():
+    time = np.linspace(0.0, 20.0, 400)
+    even = np.ones(400)
+    # The winding's own resistance grows with it: a shorter way to a higher end.
+    share = 1.0 - 0.00393 * 2.0 * 3.0
+    rise = Heating(2.0, 5.0, rise=10.0).temperature_rise(time, 3.0 * even)
+    np.testing.assert_allclose(rise, 16.0 / share * (1 - np.exp(-time * share / 5.0)))
+    assert not Heating().temperature_rise(time, 9.0 * even).any()
+    # Warm at the start it cools with its time constant, 10 s where none is given.
+    cooling = Heating(initial=30.0).temperature_rise(time, 0.0 * even)
+    np.testing.assert_allclose(cooling, 30.0 * np.exp(-time / 10.0))
+    # Where the warm winding's own loss just balances cooling, the warming is a straight line.
+    line = Heating(1.0, 5.0).temperature_rise(time, even / 0.00393)
+    np.testing.assert_allclose(line, np.minimum(time / 5.0 / 0.00393, 500.0), atol=1e-9)
+
+
+def test_copper_magnets_and_sensor_follow_their_coefficients():
+    warm = np.array([0.0, 100.0])
+    np.testing.assert_allclose(warm_resistance(0.5, warm), [0.5, 0.5 * 1.393])
+    np.testing.assert_allclose(warm_torque_constant(0.03, warm), [0.03, 0.03 * 0.89])
+    sensed = Heating(sensor_gain=4.0).sensed(np.array([25.0, 30.0, 20.0]))
+    np.testing.assert_allclose(sensed, [0.0, 20.0, -20.0])
+
+
+def test_a_motor_that_would_melt_is_warmed_to_an_end():
+    time, none = np.arange(100.0), np.zeros(100)
+    rise = Heating(thermal_resistance=10.0).temperature_rise(time, none + 400.0)
+    assert (rise.max(), Heating(rise=-9000.0).temperature_rise(time, none).min()) == (500.0, -500.0)
+    assert warm_torque_constant(0.03, rise).min() > 0.0
