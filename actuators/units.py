@@ -3,7 +3,6 @@
 import math
 import re
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import Final
 
 from actuators.errors import UnitError, closest
@@ -11,8 +10,8 @@ from actuators.errors import UnitError, closest
 _RPM: Final = math.pi / 30.0  # [rad/s]
 _DEG: Final = math.pi / 180.0  # [rad]
 
-# dimension -> {unit: factor to SI}. The first unit of each dimension is the SI unit.
-_TABLE: Final[Mapping[str, Mapping[str, float]]] = {
+#: Dimension to its units and their factors to SI; the first unit of each is the SI unit.
+UNITS: Final[Mapping[str, Mapping[str, float]]] = {
     "ratio": {"1": 1.0, "%": 1e-2},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
     "mass": {"kg": 1.0, "g": 1e-3},
@@ -60,22 +59,13 @@ _TABLE: Final[Mapping[str, Mapping[str, float]]] = {
 _QUANTITY: Final = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S.*)?")
 _OFFSET: Final[Mapping[str, float]] = {"degC": 273.15}  # added after scaling [K]
 
-_DIMENSION: Final = MappingProxyType(
-    {unit: name for name, units in _TABLE.items() for unit in units}
-)
-_FACTOR: Final = MappingProxyType(
-    {unit: f for units in _TABLE.values() for unit, f in units.items()}
-)
+_DIMENSION: Final = {unit: name for name, units in UNITS.items() for unit in units}
+_FACTOR: Final = {unit: f for units in UNITS.values() for unit, f in units.items()}
 
 
 def known_units() -> tuple[str, ...]:
     """Return every unit of the table, in its order."""
     return tuple(_DIMENSION)
-
-
-def known_dimensions() -> tuple[str, ...]:
-    """Return every dimension of the table, in its order."""
-    return tuple(_TABLE)
 
 
 def dimension(unit: str) -> str:
@@ -95,12 +85,10 @@ def si_unit(dimension_name: str) -> str:
     Raises:
         UnitError: The dimension is not in the table.
     """
-    if dimension_name not in _TABLE:
-        raise UnitError(
-            f"unknown dimension {dimension_name!r:.40}: "
-            f"{closest(str(dimension_name), known_dimensions())}"
-        )
-    return next(iter(_TABLE[dimension_name]))
+    if dimension_name not in UNITS:
+        hint = closest(str(dimension_name), [*UNITS])
+        raise UnitError(f"unknown dimension {dimension_name!r:.40}: {hint}")
+    return next(iter(UNITS[dimension_name]))
 
 
 def to_si(value: float, unit: str) -> float:
@@ -150,7 +138,7 @@ def number_and_unit(written: object, dimension_name: str) -> tuple[float, str]:
     if not unit:
         raise UnitError(f"{written!r:.40} has no unit; expected such as {example}")
     if dimension(unit) != dimension_name:
-        known = ", ".join(_TABLE[dimension_name])
+        known = ", ".join(UNITS[dimension_name])
         raise UnitError(f"{written!r:.40}: expected a {dimension_name} in one of {known}")
     if not math.isfinite(value):
         raise UnitError(f"{written!r:.40} is not finite")

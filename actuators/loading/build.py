@@ -86,44 +86,33 @@ class Catalog:
             raise CatalogError(
                 f"no alternative '{one_line(name)}': {closest(name, list(self.alternatives))}"
             )
-        own = values or {}
-        alternative = self.alternatives[name]
+        alternative, own = self.alternatives[name], values or {}
+
+        def value(reference: str) -> Scalars:
+            return own[reference] if reference in own else self.parameter(reference).value
+
         try:
-            chain = self._built(alternative, own)
+            elements = tuple(
+                LAWS[e.law].element(name=e.name, **{a: value(r) for a, r in e.arguments.items()})
+                for e in alternative.elements
+            )
+            constants = self.components[alternative.motor].parameters
+            numbers: dict[str, Any] = {n: value(f"{alternative.motor}.{n}") for n in constants}
+            for n in ("torque_constant", "resistance"):
+                numbers[f"{n}_spread"] = constants.parameter(n).spread
+            motor = DCMotor(name=WINDING, **numbers)
+            stages = {e.stage: e.name for e in alternative.elements if e.stage}
+            chain = Chain(name, elements, motor, MappingProxyType(stages))
         except ActuatorError as error:
             raise CatalogError(f"alternative '{name}': {error}") from None
         total = np.asarray(chain.ratio, dtype=float)
-        promised = own.get(alternative.ratio, self.parameter(alternative.ratio).value)
+        promised = value(alternative.ratio)
         if np.any(np.abs(total / promised - 1.0) > _RATIO_TOLERANCE):
             raise CatalogError(
                 f"alternative '{name}': its ratios multiply to {total.flat[0]:.10g}, "
                 f"'{alternative.ratio}' asks for {promised:.10g}: change them together"
             )
         return chain
-
-    def _built(self, alternative: Alternative, own: Mapping[str, Scalars]) -> Chain:
-        """The chain of an alternative, whatever its ratios multiply to."""
-
-        def value(reference: str) -> Scalars:
-            return own[reference] if reference in own else self.parameter(reference).value
-
-        elements = tuple(
-            LAWS[e.law].element(name=e.name, **{a: value(r) for a, r in e.arguments.items()})
-            for e in alternative.elements
-        )
-        constants = self.components[alternative.motor].parameters
-        spread = {
-            f"{name}_spread": constants.parameter(name).spread
-            for name in ("torque_constant", "resistance")
-        }
-        numbers: dict[str, Any] = {
-            n: own.get(f"{alternative.motor}.{n}", v) for n, v in constants.items()
-        }
-        motor = DCMotor(name=WINDING, **numbers, **spread)
-        stages = {e.stage: e.name for e in alternative.elements if e.stage}
-        return Chain(
-            name=alternative.name, elements=elements, motor=motor, stages=MappingProxyType(stages)
-        )
 
     def chains(self) -> dict[str, Chain]:
         """Return the chain of every alternative, in order."""
@@ -176,7 +165,6 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     alternatives = {name: read_alternative(name, entry) for name, entry in contents.items()}
     catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
     for alternative in alternatives.values():
-        _check_motor(alternative, catalog)
         _check_references(alternative, catalog)
         catalog.chain(alternative.name)
     catalog = catalog.only(alternatives)
@@ -209,24 +197,18 @@ def _refuse_unused(catalog: Catalog) -> None:
             _logger.warning("%s", said)
 
 
-def _check_motor(alternative: Alternative, catalog: Catalog) -> None:
-    """Raise unless an alternative's motor is a motor of the catalogue."""
+def _check_references(alternative: Alternative, catalog: Catalog) -> None:
+    """Raise unless the motor is one and every argument names a parameter of its own dimension."""
     motors = [c.name for c in catalog.components.values() if c.kind == MOTOR_KIND]
     if alternative.motor not in motors:
         raise CatalogError(
             f"alternative '{alternative.name}': no motor '{one_line(alternative.motor)}': "
             f"{closest(alternative.motor, motors)}"
         )
-
-
-def _check_references(alternative: Alternative, catalog: Catalog) -> None:
-    """Raise unless every argument names a parameter of the catalogue, of its own dimension."""
     wanted = [("ratio", alternative.ratio, "ratio")]
     for e in alternative.elements:
-        kinds = LAWS[e.law].arguments
-        wanted += [
-            (f"element '{one_line(e.name)}': {a}", r, kinds[a]) for a, r in e.arguments.items()
-        ]
+        kinds, where = LAWS[e.law].arguments, f"element '{one_line(e.name)}'"
+        wanted += [(f"{where}: {a}", r, kinds[a]) for a, r in e.arguments.items()]
     for key, reference, expected in wanted:
         try:
             unit = catalog.parameter(reference).unit

@@ -27,11 +27,13 @@ from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
+from pydantic import Field, Strict
 
 from actuators.chain import Chain
+from actuators.checked import Names, Table, Text, checked
 from actuators.errors import ActuatorError, closest, one_line
 from actuators.loading.alternatives import Alternative
 from actuators.loading.build import Catalog
@@ -45,8 +47,24 @@ from pipeline.robot.robot_file import RobotSpec
 #: The alternative of a machine whose joints are built as different ones.
 AS_BUILT: Final = "as_built"
 RATIO: Final = "ratio"
-_KEYS: Final = ("folder", "alternative", "source", "joint")
-_JOINT_KEYS: Final = ("joints", "alternative", "parameters")
+
+
+class _Joint(Table):
+    """An entry of `[[actuators.joint]]`."""
+
+    expected = "joints, alternative and parameters"
+    joints: Annotated[Names, Field(min_length=1)]
+    alternative: str = ""
+    parameters: dict[str, Any] = Field(default_factory=dict)
+
+
+class _Written(Table):
+    """The table `[actuators]`."""
+
+    folder: Text | None = None
+    alternative: str = ""
+    source: str = ""
+    joint: Annotated[tuple[_Joint, ...], Strict(False)] = ()
 
 
 @dataclass(frozen=True)
@@ -141,21 +159,22 @@ class OwnActuators:
             raise RobotFileError(f"{self.where}: joint '{joint}': {error}") from None
 
 
+def _written(spec: RobotSpec) -> _Written:
+    return checked(_Written, spec.actuator_table, f"{spec.path}: actuators", RobotFileError)
+
+
 def actuator_folder(spec: RobotSpec) -> Path | None:
     """Folder of actuator files that a robot file names; None where it names none.
 
     Raises:
         RobotFileError: It is no text, or no such folder.
     """
-    folder = spec.actuator_table.get("folder")
+    folder = _written(spec).folder
     if folder is None:
         return None
-    where = f"{spec.path}: actuators.folder"
-    if not isinstance(folder, str) or not folder or "\x00" in folder:
-        raise RobotFileError(f"{where}: expected the name of a folder of actuator files")
     path = spec.path.parent / folder
     if not path.is_dir():
-        raise RobotFileError(f"{where}: no folder '{one_line(path)}'")
+        raise RobotFileError(f"{spec.path}: actuators.folder: no folder '{one_line(path)}'")
     return path
 
 
@@ -170,29 +189,26 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
         RobotFileError: A key, joint, alternative or number is unknown, or a number cannot be; names
             it and offers the closest match.
     """
-    table, where = spec.actuator_table, f"{spec.path}: actuators"
-    _known(table, _KEYS, where)
-    alternative, source = _alternative(table, catalog, where), table.get("source", "")
-    if not isinstance(source, str):
-        raise RobotFileError(f"{where}.source: expected a text")
-    entries = table.get("joint", [])
-    if not isinstance(entries, list) or not all(isinstance(e, Mapping) for e in entries):
-        raise RobotFileError(f"{where}: joints are written [[actuators.joint]]")
+    table, where = _written(spec), f"{spec.path}: actuators"
+    alternative = table.alternative
+    _known("alternative", alternative, [*catalog.alternatives, ""], where)
     built: dict[str, str] = {}
     numbers: dict[str, dict[str, Parameter]] = {}
     groups = []
-    for count, entry in enumerate(entries, start=1):
+    for count, entry in enumerate(table.joint, start=1):
         place = f"{where}.joint {count}"
-        _known(entry, _JOINT_KEYS, place)
-        patterns, names = _joints(entry, spec.joints, place)
-        own = _alternative(entry, catalog, place)
-        given = _numbers(entry, catalog, place)
-        for joint in names:
-            if own:
-                built[joint] = own
-            if given:
-                numbers[joint] = numbers.get(joint, {}) | given
-        groups.append((f"joints {' '.join(patterns)}", tuple(given.values())))
+        for pattern in entry.joints:
+            if not any(fnmatchcase(joint, pattern) for joint in spec.joints):
+                _known("joint", pattern, spec.joints, place)
+        _known("alternative", entry.alternative, [*catalog.alternatives, ""], place)
+        given = _numbers(entry.parameters, catalog, place)
+        for joint in spec.joints:
+            if any(fnmatchcase(joint, pattern) for pattern in entry.joints):
+                if entry.alternative:
+                    built[joint] = entry.alternative
+                if given:
+                    numbers[joint] = numbers.get(joint, {}) | given
+        groups.append((f"joints {' '.join(entry.joints)}", tuple(given.values())))
     missing = [joint for joint in spec.joints if built and not alternative and joint not in built]
     if missing:
         raise RobotFileError(
@@ -206,7 +222,7 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
             f"{where}: an alternative of the actuator files is called '{AS_BUILT}', as the machine "
             "whose joints differ; rename it"
         )
-    out = OwnActuators(where, spec.joints, alternative, built, numbers, tuple(groups), source)
+    out = OwnActuators(where, spec.joints, alternative, built, numbers, tuple(groups), table.source)
     out.every(out.catalog(catalog))  # what loads works
     return out
 
@@ -243,49 +259,22 @@ def _with_numbers(catalog: Catalog, name: str, numbers: Mapping[str, Parameter])
     return catalog
 
 
-def _alternative(table: Mapping[str, Any], catalog: Catalog, where: str) -> str:
-    name = table.get("alternative", "")
-    if not isinstance(name, str) or (name and name not in catalog.alternatives):
-        hint = closest(str(name), list(catalog.alternatives))
-        raise RobotFileError(f"{where}: no alternative '{one_line(name)}'; {hint}")
-    return name
+def _known(what: str, name: str, known: Sequence[str], where: str) -> None:
+    if name not in known:
+        hint = closest(name, [k for k in known if k])
+        raise RobotFileError(f"{where}: no {what} '{one_line(name)}'; {hint}")
 
 
-def _joints(
-    entry: Mapping[str, Any], known: Sequence[str], where: str
-) -> tuple[list[str], list[str]]:
-    """Patterns of an entry and the joints they name."""
-    patterns = entry.get("joints")
-    texts = isinstance(patterns, list) and all(isinstance(p, str) for p in patterns)
-    if not isinstance(patterns, list) or not patterns or not texts:
-        raise RobotFileError(f'{where}: joints must be a list of names or patterns as "*_joint_1"')
-    for pattern in patterns:
-        if not any(fnmatchcase(joint, pattern) for joint in known):
-            hint = closest(pattern, list(known))
-            raise RobotFileError(f"{where}: no joint '{one_line(pattern)}'; {hint}")
-    return patterns, [j for j in known if any(fnmatchcase(j, p) for p in patterns)]
-
-
-def _numbers(entry: Mapping[str, Any], catalog: Catalog, where: str) -> dict[str, Parameter]:
+def _numbers(table: Mapping[str, Any], catalog: Catalog, where: str) -> dict[str, Parameter]:
     """The numbers of an entry by their names."""
-    table = entry.get("parameters", {})
-    if not isinstance(table, Mapping):
-        raise RobotFileError(f"{where}: parameters must be a table, [actuators.joint.parameters]")
     schema = {}
-    motors = [catalog.components[a.motor] for a in catalog.alternatives.values()]
     for alternative in catalog.alternatives.values():
         schema[RATIO] = dimension(catalog.parameter(alternative.ratio).unit)
-    for component in motors:
-        schema |= {p.name: dimension(p.unit) for p in component.parameters.rows()}
+        motor = catalog.components[alternative.motor].parameters
+        schema |= {p.name: dimension(p.unit) for p in motor.rows()}
     schema |= {f"{c}.{p.name}": dimension(p.unit) for c, p in catalog.rows()}
     try:
         found = parameters_from_table(table, schema, f"{where}.parameters", frozenset(schema))
     except ActuatorError as error:
         raise RobotFileError(str(error)) from None
     return {p.name: p for p in found.rows()}
-
-
-def _known(table: Mapping[str, Any], known: Sequence[str], where: str) -> None:
-    for key in table:
-        if key not in known:
-            raise RobotFileError(f"{where}: unknown key '{one_line(key)}'; {closest(key, known)}")

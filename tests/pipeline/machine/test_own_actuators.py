@@ -127,12 +127,12 @@ NUMBER = '{value = 160, unit = "1", basis = "datasheet", source = "x"}'
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ('[actuators]\nalternativ = "rotor"\n', "unknown key 'alternativ'; did you mean 'alter"),
+        ('[actuators]\nalternativ = "rotor"\n', "unknown key 'alternativ': did you mean 'alter"),
         ('[actuators]\nalternative = "rotr"\n', "no alternative 'rotr'; did you mean 'rotor'"),
-        ("actuators = 3\n", "actuators must be a table"),
-        ("[actuators]\njoint = 3\n", r"written \[\[actuators.joint\]\]"),
+        ("actuators = 3\n", "must be a table"),
+        ("[actuators]\njoint = 3\n", "'joint' must be a list"),
         ('[[actuators.joint]]\njoints = ["rm_joint_9"]\n', "joint 1: no joint 'rm_joint_9'; did"),
-        ('[[actuators.joint]]\njoints = "rm_joint_2"\n', "joint 1: joints must be a list"),
+        ('[[actuators.joint]]\njoints = "rm_joint_2"\n', "'joint 1.joints' must be a list"),
         (JOINT + 'alternative = "rotor"\n', "as what is joint 'lf_joint_1' built"),
         (JOINT + f"parameters.ratioo = {NUMBER}\n", "unknown parameter 'ratioo': did you mean"),
         (JOINT + "parameters.ratio = 160\n", "expected {value, unit, basis, source}"),
