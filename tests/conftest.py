@@ -15,7 +15,7 @@ from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.figures import several
+from reports.figures import save as saving
 from tests.command_line import Command, exit_code, stand_and_walk
 
 # No clock in a test: a loaded machine is no failure.
@@ -82,7 +82,7 @@ def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
         (folder / f"{name}.svg").write_text(SKETCH, encoding="utf-8")
         (folder / f"{name}.png").write_bytes(b"")
 
-    monkeypatch.setattr(several, "save_figure", save)
+    monkeypatch.setattr(saving, "save_figure", save)
 
 
 @pytest.fixture(scope="session")

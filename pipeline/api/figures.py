@@ -5,32 +5,47 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from actuators.energy.energy import stage_energies
-from pipeline.api.pictures.actuators import actuator_drawings
-from pipeline.api.pictures.gait import legs_stretches
-from pipeline.api.pictures.robot import robot_drawings, write_gait_steps
-from pipeline.api.pictures.scene import Scenery
+from pipeline.api.pictures.scene import Scene, mass_centre
+from pipeline.api.pictures.walk import steps_of, stretches, thinned
+from pipeline.machine.own_actuators import AS_BUILT
+from pipeline.motion.gait import gait_of, gait_table
+from pipeline.motion.ground import Ground
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
+from reports.atomic import write_text
+from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_parts
 from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
-from reports.figures.energy.joint_demand import joint_demand_figure, stretches
+from reports.figures.energy.joint_demand import joint_demand_figure
 from reports.figures.energy.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
-from reports.figures.several import Drawing, save_figures
+from reports.figures.robot.gait_steps import gait_steps
+from reports.figures.robot.gait_view import gait_figure
+from reports.figures.robot.joint_directions import joint_directions_figure
+from reports.figures.robot.robot_view import robot_figure
+from reports.figures.save import save_figures
+from reports.figures.stretch import Stretch
 from reports.figures.style import NARROW
-from reports.pages.gait_words import gait_and_conditions
+from reports.pages.gait_words import conditions, gait_and_conditions
 from reports.pages.names import leg_words, short_titles, shown_leg
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Array = NDArray[np.float64]
+#: File name without ending to what makes the figure; nothing is drawn before it is called.
+Drawings = dict[str, Callable[[], "Figure"]]
 #: File name of each subject's Fig. 21.
 SUBJECT_TITLES = {
     "middle_legs": "both middle legs, as in Fig. 21",
@@ -48,7 +63,7 @@ def write_figures(
     paper: bool = False,
     done: Callable[[float], None] | None = None,
 ) -> int:
-    """Draw and save every figure of a run.
+    """Draw and save every figure of a run, and its gait as a moving picture, ``gait_steps.svg``.
 
     Args:
         given: The run.
@@ -56,27 +71,78 @@ def write_figures(
         walking: Its result.
         out: Folder.
         paper: Whether the run is held against the paper, whose figures are then named.
-        done: Told the share that is drawn.
+        done: Called with the share that is drawn.
 
     Returns:
         How many.
     """
-    write_gait_steps(Scenery(given.robot), walking, out)
+    spec = given.robot.spec
+    title, subtitle = f"{spec.name}: {gait_of(spec).title}", ", ".join(conditions(spec))
+    moving = gait_steps(steps_of(Scene(given.robot), walking), title=title, subtitle=subtitle)
+    write_text(out / "gait_steps.svg", moving)
     every = drawings(given, standing, walking, paper=paper)
     return 1 + save_figures(every, out, done=done)
 
 
 def drawings(
     given: Settings, standing: Standing, walking: Walking, *, paper: bool = False
-) -> list[Drawing]:
+) -> Drawings:
     """Every figure of a run, the longest first, so that two processes end together."""
-    return [
-        *robot_drawings(Scenery(given.robot), standing, walking),
-        *_energy(given, walking),
-        *_all_legs(given, walking),
-        *_demand(given, walking, paper),
-        *actuator_drawings(given),
-    ]
+    parts = stretches(given.robot, walking)
+    return {
+        **robot_drawings(Scene(given.robot), standing, parts),
+        **_energy(given, walking),
+        **_all_legs(given, parts),
+        **_demand(given, parts, paper),
+        **_actuators(given),
+    }
+
+
+def robot_drawings(scene: Scene, standing: Standing, parts: list[Stretch]) -> Drawings:
+    """The gait, the robot standing, its zero pose."""
+    robot, spec, leg = scene.robot, scene.robot.spec, shown_leg(scene.robot)
+    table = gait_table(spec)
+    ground = Ground(table.slope_forward, table.slope_left)
+    posture = standing.segment.configuration[0].copy()
+    words = []
+    if len(standing.segment.stance) < len(robot.leg_names):
+        words.append("the other feet are lifted to mid-transfer")
+    if not ground.level:  # dimensions are true along the ground's axes
+        back = Rotation.from_matrix(ground.rotation.T)
+        posture[:3] = back.apply(posture[:3])
+        posture[3:7] = (back * Rotation.from_quat(posture[3:7])).as_quat()
+        words.append("drawn along the ground, which is inclined")
+    if scene.load is not None:
+        words.append("ball: payload")
+    if count := len(scene.visuals.missing):
+        words.append(f"{count} {'mesh is' if count == 1 else 'meshes are'} missing")
+    if scene.remark:
+        words.append(scene.remark)
+    walked = (f"transfer path '{gait_of(spec).path}'", *conditions(spec))
+    return {
+        "gait": lambda: gait_figure(
+            robot.leg_names,
+            thinned(parts),
+            shown=leg,
+            body=scene.trunk_outline(),
+            title=f"{spec.name}: {gait_of(spec).title}",
+            subtitle="; ".join(
+                [*walked, *(["arrow: the robot's front"] if conditions(spec) else [])]
+            ),
+        ),
+        "robot": lambda: robot_figure(
+            *scene.at(posture),
+            title=f"{spec.name}, {standing.segment.name}",
+            subtitle="; ".join(words),
+            mass_centre=mass_centre(robot, posture[None])[0],
+        ),
+        "zero_pose": lambda: joint_directions_figure(
+            *scene.at(scene.zero),
+            leg,
+            title=f"{spec.name}: zero pose and positive directions",
+            zero_pose=spec.zero_pose,
+        ),
+    }
 
 
 def _name(given: Settings) -> str:
@@ -91,59 +157,47 @@ def _joints(given: Settings) -> tuple[str, dict[str, str]]:
     return leg, {joint: f"joint {number}" for number, joint in enumerate(joints, start=1)}
 
 
-def _demand(given: Settings, walking: Walking, paper: bool) -> list[Drawing]:
-    leg, joints = _joints(given)
-    sliding = dict(zip(given.robot.joints, given.robot.sliding, strict=True))
-    return [
-        Drawing(
-            f"joint_demand_{joint}",
-            partial(
-                joint_demand_figure,
-                joint,
-                stretches(walking.demand, joint, leg),
-                title=f"{label.capitalize()} of the {leg_words(leg)}: velocity and torque",
-                subtitle=f"{_name(given)}: demand over one cycle"
-                + (f", as in Fig. {number} of the paper" if paper else ""),
-                slides=bool(sliding[joint]),
-            ),
+def _demand(given: Settings, parts: list[Stretch], paper: bool) -> Drawings:
+    robot, (leg, labels) = given.robot, _joints(given)
+    out: Drawings = {}
+    for number, (joint, label) in enumerate(labels.items(), start=2):
+        column = robot.joints.index(joint)
+        as_in = f", as in Fig. {number} of the paper" if paper else ""
+        out[f"joint_demand_{joint}"] = partial(
+            joint_demand_figure,
+            parts,
+            column,
+            leg,
+            title=f"{label.capitalize()} of the {leg_words(leg)}: velocity and torque",
+            subtitle=f"{_name(given)}: demand over one cycle{as_in}",
+            slides=bool(robot.sliding[column]),
         )
-        for number, (joint, label) in enumerate(joints.items(), start=2)
-    ]
+    return out
 
 
-def _all_legs(given: Settings, walking: Walking) -> list[Drawing]:
-    robot = given.robot
-    parts = legs_stretches(robot, walking)
-    slide = [name for name, one in zip(robot.joints, robot.sliding, strict=True) if one]
-    legs = {leg.name: leg.joints for leg in robot.spec.legs}
-    words = "a line is thin while its leg is in the air"
-    return [
-        Drawing(
-            "joint_torques",
-            partial(
-                joint_torques_figure,
-                parts,
-                walking.demand.joints,
-                legs,
-                sliding=slide,
-                title="Torque of every joint over one cycle",
-                subtitle=f"{_name(given)}; {words}",
-            ),
+def _all_legs(given: Settings, parts: list[Stretch]) -> Drawings:
+    robot, shown = given.robot, thinned(parts)
+    return {
+        "joint_torques": partial(
+            joint_torques_figure,
+            shown,
+            robot.joints,
+            {leg.name: leg.joints for leg in robot.spec.legs},
+            sliding=[name for name, one in zip(robot.joints, robot.sliding, strict=True) if one],
+            title="Torque of every joint over one cycle",
+            subtitle=f"{_name(given)}; a line is thin while its leg is in the air",
         ),
-        Drawing(
-            "ground_forces",
-            partial(
-                ground_forces_figure,
-                parts,
-                robot.leg_names,
-                title="Ground forces and static stability over one cycle",
-                subtitle=_name(given),
-            ),
+        "ground_forces": partial(
+            ground_forces_figure,
+            shown,
+            robot.leg_names,
+            title="Ground forces and static stability over one cycle",
+            subtitle=_name(given),
         ),
-    ]
+    }
 
 
-def _energy(given: Settings, walking: Walking) -> list[Drawing]:
+def _energy(given: Settings, walking: Walking) -> Drawings:
     leg, labels = _joints(given)
     support = [
         (float(part.time[0]), float(part.time[-1]))
@@ -153,47 +207,38 @@ def _energy(given: Settings, walking: Walking) -> list[Drawing]:
     scale = common_scale([(r.motor, r.motors) for r in walking.results.values()], labels)
     stages = {name: stage_energies(result) for name, result in walking.results.items()}
     limits = energy_limits(stages.values(), labels)
-    titles = short_titles(given.catalog)
-    out, electrical = [], {}
+    out, electrical = {}, {}
     for name, result in walking.results.items():
-        title = given.catalog.alternatives[name].title
+        alternative = given.catalog.alternatives[name]
         columns = [result.joint.joints.index(joint) for joint in labels]
-        electrical[titles[name]] = stages[name][-1].forward[columns]
-        out += [
-            Drawing(
-                f"motor_limits_{name}",
-                partial(
-                    motor_limits_figure,
-                    result.motor,
-                    result.motors,
-                    labels,
-                    support,
-                    title=f"{title}: its motors, {leg_words(leg)}",
-                    subtitle=f"{_name(given)}: {SUBTITLE}",
-                    scale=scale,
-                ),
-            ),
-            Drawing(
-                f"stage_energy_{name}",
-                partial(
-                    stage_energy_figure,
-                    stages[name],
-                    labels,
-                    places=given.catalog.alternatives[name].stage_names,
-                    title=title,
-                    subtitle=f"{_name(given)}: energy per cycle through each stage, "
-                    f"{leg_words(leg)}; one scale for all alternatives",
-                    limits=limits,
-                ),
-            ),
-        ]
-    return [*out, *_electrical(given, leg, list(labels.values()), electrical)]
+        electrical[name] = stages[name][-1].forward[columns]
+        out[f"motor_limits_{name}"] = partial(
+            motor_limits_figure,
+            result.motor,
+            result.motors,
+            labels,
+            support,
+            title=f"{alternative.title}: its motors, {leg_words(leg)}",
+            subtitle=f"{_name(given)}: {SUBTITLE}",
+            scale=scale,
+        )
+        out[f"stage_energy_{name}"] = partial(
+            stage_energy_figure,
+            stages[name],
+            labels,
+            places=alternative.stage_names,
+            title=alternative.title,
+            subtitle=f"{_name(given)}: energy per cycle through each stage, {leg_words(leg)}; "
+            "one scale for all alternatives",
+            limits=limits,
+        )
+    return out | _electrical(given, leg, list(labels.values()), electrical)
 
 
 def _electrical(
-    given: Settings, leg: str, labels: list[str], electrical: dict[str, Array]
-) -> list[Drawing]:
-    """What every alternative draws, wide and narrow."""
+    given: Settings, leg: str, labels: list[str], energies: dict[str, Array]
+) -> Drawings:
+    """Energy of every alternative, wide and narrow."""
     subtitle = (
         "returned energy is lost"
         if given.regeneration.policy == "none"
@@ -201,20 +246,44 @@ def _electrical(
     )
     if IDEAL not in given.catalog.alternatives:
         subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
-    ideal = short_titles(given.catalog).get(IDEAL)
-    figure = partial(electrical_energy_figure, labels, electrical, reference=ideal)
-    wide = partial(
-        figure,
-        title=f"Electrical energy per cycle, {leg_words(leg)}",
-        subtitle=f"{_name(given)}; {subtitle}",
+    titles = short_titles(given.catalog)
+    ideal = titles.get(IDEAL)
+    figure = partial(
+        electrical_energy_figure,
+        labels,
+        {titles[name]: energy for name, energy in energies.items()},
+        reference=ideal,
     )
-    narrow = partial(
-        figure,
-        title=f"Energy per cycle, {leg_words(leg)}",
-        subtitle=f"\N{MULTIPLICATION SIGN}: times that of the {ideal}" if ideal else "",
-        width=NARROW,
-    )
-    return [Drawing("electrical_energy", wide), Drawing("electrical_energy_narrow", narrow)]
+    return {
+        "electrical_energy": partial(
+            figure,
+            title=f"Electrical energy per cycle, {leg_words(leg)}",
+            subtitle=f"{_name(given)}; {subtitle}",
+        ),
+        "electrical_energy_narrow": partial(
+            figure,
+            title=f"Energy per cycle, {leg_words(leg)}",
+            subtitle=f"\N{MULTIPLICATION SIGN}: times that of the {ideal}" if ideal else "",
+            width=NARROW,
+        ),
+    }
+
+
+def _actuators(given: Settings) -> Drawings:
+    """One for each alternative that is built of one row of elements at all joints."""
+    subtitle = "from the motor's terminals to the joint, as in the actuator files"
+    if given.own.numbers:
+        subtitle = "as in the actuator files; some joints have numbers of their own"
+    return {
+        f"actuator_chain_{name}": partial(
+            actuator_chain_figure,
+            chain_parts(given.catalog, name),
+            title=alternative.title,
+            subtitle=subtitle,
+        )
+        for name, alternative in given.catalog.alternatives.items()
+        if name != AS_BUILT
+    }
 
 
 def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int:
@@ -228,9 +297,9 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
     Returns:
         How many figures.
     """
-    every = []
+    every: Drawings = {}
     crossings = {row.subject: row for row in judgement.break_even}
-    for subject in SUBJECT_TITLES:
+    for subject, words in SUBJECT_TITLES.items():
         curves = [c for c in judgement.per_minute if c.subject == subject]
         share, row = curves[0].fraction, crossings.get(subject)
         mark, note = None, ""
@@ -241,25 +310,16 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
         else:
             reference = next(c for c in curves if c.alternative == "reversible")
             energy = float(np.interp(row.fraction, share, reference.energy))
-            known = (v if np.isfinite(v) else None for v in row.prior)
-            mark = BreakEven(row.fraction, energy, *known)
-        figure = partial(
+            known = row.prior if np.isfinite(row.prior).all() else None
+            mark = BreakEven(row.fraction, energy, known)
+        every[f"energy_per_minute_{subject}"] = partial(
             energy_per_minute_figure,
             share,
-            [
-                EnergyLine(
-                    titles[c.alternative],
-                    c.energy,
-                    *(c.prior if c.prior is not None else (None, None)),
-                    *(c.left_out if c.left_out is not None else (None, None)),
-                )
-                for c in curves
-            ],
-            title=f"Energy in one minute: {SUBJECT_TITLES[subject]}",
+            [EnergyLine(titles[c.alternative], c.energy, c.prior, c.left_out) for c in curves],
+            title=f"Energy in one minute: {words}",
             subtitle=note or _bands(curves),
             break_even=mark,
         )
-        every.append(Drawing(f"energy_per_minute_{subject}", figure))
     return save_figures(every, out)
 
 

@@ -123,9 +123,9 @@ def _walked(guess: Guess, path: Path, temporary: Path) -> tuple[Guess, Robot, li
 
 def _draw(robot: Robot, path: Path) -> Path:
     """The stance in four views, beside the robot file."""
-    from pipeline.api.pictures.scene import Scenery
+    from pipeline.api.pictures.scene import Scene
     from reports.figures.robot.robot_view import robot_figure
-    from reports.figures.several import Drawing, save_figures
+    from reports.figures.save import save_figures
 
     stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
     data = robot.model.createData()
@@ -133,11 +133,11 @@ def _draw(robot: Robot, path: Path) -> Path:
 
     def draw() -> Figure:
         return robot_figure(
-            *Scenery(robot).at(stance[0]),
+            *Scene(robot).at(stance[0]),
             title=f"{robot.spec.name}: the stance guessed",
             subtitle="left and right, front and rear, feet and knees as they should be?",
             mass_centre=centre,
         )
 
-    save_figures([Drawing(path.stem, draw)], path.absolute().parent)
+    save_figures({path.stem: draw}, path.absolute().parent)
     return path.with_suffix(".png")

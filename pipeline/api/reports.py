@@ -154,7 +154,7 @@ def _first_lines(
 def _held_against_the_paper(given: Settings, said: list[str]) -> tuple[Judged | None, list[Table]]:
     """The judgement of the paper's robot, of no other; what there is to say is added to `said`."""
     from pipeline.api.judgement import judged
-    from pipeline.api.pictures.scene import Scenery
+    from pipeline.api.pictures.scene import Scene
     from pipeline.paper.judgement.basis import basis
 
     result: Judged | None = None
@@ -166,7 +166,7 @@ def _held_against_the_paper(given: Settings, said: list[str]) -> tuple[Judged | 
         logger.info("holding the run against the paper")
         result, tables = judged(given, by)
         said += [by.word] if by.word else []
-    remark = Scenery(given.robot).shapes.remark
+    remark = Scene(given.robot).visuals.remark
     said += [remark] if remark else []
     return result, tables
 

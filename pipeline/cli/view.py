@@ -34,12 +34,10 @@ def run_view(options: argparse.Namespace) -> int:
         PipelineError: Unusable input.
         ReportError: The package viser is not installed.
     """
-    from pipeline.api.pictures.player import viser_module
-
-    viser_module()  # before anything is computed
-    from pipeline.api.pictures.view import player
+    from pipeline.api.pictures.view import player, viser_module
     from pipeline.cli.run import settings_of
 
+    viser_module()  # refused before anything is computed
     given = settings_of(options)
     shown = player(given, host=options.host, port=options.port)
     print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)

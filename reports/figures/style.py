@@ -6,21 +6,19 @@ imported when the first figure is drawn, not with this module.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import cache, wraps
+from functools import cache
 from pathlib import Path
 from textwrap import shorten
-from typing import TYPE_CHECKING, Any, ParamSpec
+from typing import TYPE_CHECKING, Any
 
 from reports.typeset import number_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-P = ParamSpec("P")
 
 # Okabe and Ito (2008), Color Universal Design.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -75,12 +73,13 @@ RC: dict[Any, Any] = {
 }
 
 
+#: Whether the style is worn already: entering it costs as much as a small drawing.
 _worn: ContextVar[bool] = ContextVar("house style", default=False)
 
 
 @cache
 def own_fonts() -> None:
-    """See that the letters are those that Matplotlib brings, before any other of the same name.
+    """Put the fonts that Matplotlib brings before all others of the same name.
 
     Matplotlib keeps a list of fonts in the user's cache, which every version and environment
     shares. One that was made where its own files could not be read lacks them for good: figures
@@ -93,15 +92,14 @@ def own_fonts() -> None:
     folder = Path(matplotlib.get_data_path(), "fonts", "ttf")
     brought = {str(path) for path in sorted(folder.glob("*.ttf"))}
     manager = font_manager.fontManager
-    listed = {font.fname for font in manager.ttflist}
-    for path in sorted(brought - listed):
+    for path in sorted(brought - {font.fname for font in manager.ttflist}):
         manager.addfont(path)
     manager.ttflist.sort(key=lambda font: font.fname not in brought)
 
 
 @contextmanager
 def house_style() -> Iterator[None]:
-    """Matplotlib's defaults with our changes, for the length of a block; blocks may be nested."""
+    """Matplotlib's defaults with our changes, for a block or, as a decorator, for a function."""
     import matplotlib
 
     if _worn.get():
@@ -118,22 +116,20 @@ def house_style() -> Iterator[None]:
         _worn.reset(token)
 
 
-def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
-    """Draw under the common style, whatever the caller's Matplotlib settings are."""
-
-    @wraps(draw)
-    def wrapper(*args: P.args, **kwargs: P.kwargs) -> Figure:
-        with house_style():
-            return draw(*args, **kwargs)
-
-    return wrapper
-
-
-def new_figure(height: float, width: float = WIDTH, *, arranged: bool = True) -> Figure:
-    """An empty figure with an Agg canvas.
+def new_figure(
+    height: float,
+    title: str = "",
+    subtitle: str = "",
+    *,
+    width: float = WIDTH,
+    arranged: bool = True,
+) -> Figure:
+    """An empty figure with an Agg canvas, a title flush left and a quiet second line.
 
     Args:
         height: [in].
+        title: First line.
+        subtitle: Second line.
         width: [in].
         arranged: Whether a layout places the axes; otherwise the caller does.
     """
@@ -142,20 +138,15 @@ def new_figure(height: float, width: float = WIDTH, *, arranged: bool = True) ->
 
     figure = Figure(figsize=(width, height), layout="constrained" if arranged else None)
     FigureCanvasAgg(figure)
-    return figure
-
-
-def headline(figure: Figure, title: str, subtitle: str = "") -> None:
-    """A title flush left, with a quiet second line."""
-    text = f"{title}\n" if subtitle else title
-    height = figure.get_size_inches()[1]
-    look: dict[str, Any] = {"x": 0.012, "ha": "left", "fontsize": 11.5, "fontweight": "bold"}
-    if figure.get_layout_engine() is None:
-        look |= {"y": 1 - 0.06 / height, "va": "top"}  # where a layout would put it
-    figure.suptitle(text, **look)
+    if title:
+        look: dict[str, Any] = {"x": 0.012, "ha": "left", "fontsize": 11.5, "fontweight": "bold"}
+        if not arranged:
+            look |= {"y": 1 - 0.06 / height, "va": "top"}  # where a layout would put it
+        figure.suptitle(f"{title}\n" if subtitle else title, **look)
     if subtitle:
         # In the second, empty line of the title, for which the layout keeps room.
         figure.text(0.012, 1 - 0.33 / height, subtitle, ha="left", va="center", color=QUIET)
+    return figure
 
 
 def horizontal_grid(axes: Axes) -> None:
@@ -185,6 +176,36 @@ def name_rows(axes: Axes, names: Sequence[str], thick: float, *, above: bool) ->
 def zero_line(axes: Axes) -> None:
     """A line at zero where signs matter."""
     axes.axhline(0.0, color=QUIET, linewidth=0.8, zorder=1)
+
+
+def arrow(
+    axes: Axes,
+    tip: Any,
+    tail: Any,
+    color: str,
+    *,
+    style: str = "-|>",
+    head: tuple[float, float] = (0.22, 0.5),
+    width: float = 1.5,
+    zorder: float = 7,
+    linestyle: Any = "-",
+) -> None:
+    """An arrow from tail to tip in data coordinates, each of shape (2,).
+
+    Args:
+        axes: To draw in.
+        tip: Where it points.
+        tail: Where it begins.
+        color: Of line and head.
+        style: Matplotlib's name of the arrow.
+        head: Half its width, and its length, in tens of points.
+        width: Of the line [points].
+        zorder: Of the arrow.
+        linestyle: Matplotlib's.
+    """
+    shape = f"{style},head_width={head[0]:g},head_length={head[1]:g}"
+    look = {"arrowstyle": shape, "linewidth": width, "linestyle": linestyle, "color": color}
+    axes.annotate("", tip, tail, arrowprops=look | {"shrinkA": 0, "shrinkB": 0}, zorder=zorder)
 
 
 #: A value for a label, written as in the tables of a page.

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 
-from pipeline.api.figures import drawings
+from pipeline.api.figures import Drawings, drawings
 from pipeline.cli.main import parser
 from pipeline.cli.run import settings_of
 from pipeline.simulation.walk_stand import stand, walk
-from reports.figures.several import Drawing
 from reports.pages.names import leg_words, names_text
 from tests.reports import geometry
 
@@ -26,20 +27,20 @@ NAMES = (
 )
 
 
-def run(robot: Path) -> dict[str, Drawing]:
+def run(robot: Path) -> Drawings:
     given = settings_of(parser().parse_args(["reports", "--robot", str(robot), "--samples", "151"]))
     standing = stand(given.machine, given.chains())
     walking = walk(given.machine, given.chains(), samples=given.samples)
-    return {drawing.name: drawing for drawing in drawings(given, standing, walking)}
+    return drawings(given, standing, walking)
 
 
 @pytest.fixture(scope="module")
-def figures(root: Path) -> dict[str, Drawing]:
+def figures(root: Path) -> Drawings:
     return run(root / "urdf" / "hexapod.toml")
 
 
-def objections(drawing: Drawing) -> list[object]:
-    figure = drawing.draw()
+def objections(draw: Callable[[], Figure]) -> list[object]:
+    figure = draw()
     small = geometry.smallest_letters(figure)
     return [
         *geometry.outside(figure),
@@ -50,29 +51,29 @@ def objections(drawing: Drawing) -> list[object]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_to_object_to(figures: dict[str, Drawing], name: str) -> None:
+def test_nothing_to_object_to(figures: Drawings, name: str) -> None:
     assert objections(figures[name]) == []
 
 
-def test_every_figure_is_measured(figures: dict[str, Drawing]) -> None:
+def test_every_figure_is_measured(figures: Drawings) -> None:
     assert set(figures) == set(NAMES)
 
 
 @pytest.mark.slow
 def test_nothing_to_object_to_with_the_other_axis(root: Path) -> None:
-    for drawing in run(root / "urdf" / "hexapod_axis90.toml").values():
-        assert objections(drawing) == [], drawing.name
+    for name, draw in run(root / "urdf" / "hexapod_axis90.toml").items():
+        assert objections(draw) == [], name
 
 
 def test_motor_and_stage_panels_have_one_scale_in_all_alternatives(
-    figures: dict[str, Drawing],
+    figures: Drawings,
 ) -> None:
     for kind in ("motor_limits", "stage_energy"):
         limits = {
-            tuple((axes.get_xlim(), axes.get_ylim()) for axes in drawing.draw().axes)
+            tuple((axes.get_xlim(), axes.get_ylim()) for axes in draw().axes)
             if kind == "motor_limits"
-            else drawing.draw().axes[0].get_ylim()
-            for name, drawing in figures.items()
+            else draw().axes[0].get_ylim()
+            for name, draw in figures.items()
             if name.startswith(kind)
         }
         assert len(limits) == 1

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,10 +11,9 @@ from numpy.typing import NDArray
 
 from pipeline.motion.gait import gait_table
 from pipeline.robot.robot import Robot
-from reports.figures.robot.outline import outline
-from reports.figures.robot.solids import Leg, Solid, legs_of
-from reports.figures.robot.sticks import leg_sticks, trunk_centre
-from reports.figures.robot.visuals import Shape, Shapes, joint_marks, read_shapes
+from reports.figures.robot.solids import JointMark, Leg, Solid, outline, sphere, sticks
+from reports.figures.robot.steps import Body
+from reports.figures.robot.visuals import Visuals, read_visuals
 
 Array = NDArray[np.float64]
 _STEEL = 7850.0  # [kg/m^3]
@@ -23,7 +21,7 @@ _LOAD = (0.94, 0.89, 0.26)  # yellow, as no link of ours
 
 
 @dataclass(frozen=True, eq=False)
-class Scenery:
+class Scene:
     """What there is to see of a robot.
 
     Attributes:
@@ -33,36 +31,19 @@ class Scenery:
     robot: Robot
 
     @cached_property
-    def shapes(self) -> Shapes:
+    def visuals(self) -> Visuals:
         """Surfaces of its links, read once."""
-        return read_shapes(self.robot.urdf, self.robot.spec.urdf.parent)
+        return read_visuals(self.robot.urdf, self.robot.spec.urdf.parent)
 
     @cached_property
-    def load(self) -> Shape | None:
-        """The payload as a ball of steel of its mass about its place; None without one."""
+    def load(self) -> Solid | None:
+        """The payload as a ball of steel of its mass in the base's frame; None without one."""
         table = gait_table(self.robot.spec)
         if not table.payload_mass:
             return None
-        origin = np.eye(4)
-        origin[:3, 3] = table.payload_x, table.payload_y, table.payload_z
-        size = np.full(3, np.cbrt(6 * table.payload_mass / (np.pi * _STEEL)))
-        return Shape(self.robot.spec.base_link, origin, _LOAD, size, sphere=True)
-
-    @cached_property
-    def carrier(self) -> dict[str, int]:
-        """Link to the moving body (Pinocchio's joint) that carries it."""
-        frames = self.robot.model.frames
-        return {f.name: f.parentJoint for f in frames if f.type == pin.FrameType.BODY}
-
-    @cached_property
-    def leg_of_body(self) -> dict[int, str]:
-        """Moving body to the leg that it is part of; the trunk and what it carries are in none."""
-        model = self.robot.model
-        return {
-            int(model.getJointId(joint)): leg.name
-            for leg in self.robot.spec.legs
-            for joint in leg.joints
-        }
+        ball = sphere(float(np.cbrt(6 * table.payload_mass / (np.pi * _STEEL))) / 2, _LOAD)
+        place = np.array([table.payload_x, table.payload_y, table.payload_z])
+        return ball.moved(pin.SE3(np.eye(3), place).homogeneous)
 
     @cached_property
     def zero(self) -> Array:
@@ -70,45 +51,127 @@ class Scenery:
         joints = np.zeros((1, len(self.robot.joints)))
         return self.robot.configuration(joints, np.zeros((1, 3)))[0]
 
-    def placements(self, configuration: Array) -> dict[str, Array]:
-        """Every frame in the world, links before others of the same name, (4, 4) each [m]."""
+    @cached_property
+    def legs_of_bodies(self) -> dict[int, str]:
+        """Number of a moving body to its leg; the trunk and what it carries are in none."""
+        return {body: leg for leg, bodies in self._bodies_of_legs.items() for body in bodies[1:]}
+
+    @cached_property
+    def _bodies_of_legs(self) -> dict[str, list[int]]:
+        """The trunk and the moving bodies of each leg, from the base outward."""
+        number, trunk = self.robot.model.getJointId, int(self.robot.floating)
+        return {
+            leg.name: [trunk, *(int(number(joint)) for joint in leg.joints)]
+            for leg in self.robot.spec.legs
+        }
+
+    @cached_property
+    def bare(self) -> tuple[str, ...]:
+        """Legs of which the URDF shows nothing but spheres; they are drawn as sticks."""
+        shown = {s.body for s in self._solids(self.zero) if s.kind != "sphere"}
+        return tuple(leg for leg, own in self._bodies_of_legs.items() if not shown & {*own[1:]})
+
+    @property
+    def remark(self) -> str:
+        """What is to be said of legs drawn as sticks; empty where none is."""
+        if not self.bare:
+            return ""
+        every = len(self.bare) == len(self.robot.spec.legs)
+        which = "legs" if every else f"legs {', '.join(self.bare)}"
+        return f"{which} without shapes in the URDF: sticks between their joints"
+
+    def _solids(self, configuration: Array) -> list[Solid]:
+        """Surfaces in the world: what the URDF shows, then the payload."""
         model, data = self.robot.model, self.robot.model.createData()
         pin.framesForwardKinematics(model, data, configuration)
-        bodies: dict[str, Array] = {}
-        others: dict[str, Array] = {}
-        for i, frame in enumerate(model.frames):
-            kind = bodies if frame.type == pin.FrameType.BODY else others
-            kind[frame.name] = data.oMf[i].homogeneous.copy()
-        return others | bodies
+        every = [*self.visuals.solids]
+        if self.load is not None:
+            every.append((self.robot.spec.base_link, self.load))
+        out = []
+        for link, solid in every:
+            frame = model.getFrameId(link, pin.FrameType.BODY)
+            placed = solid.moved(data.oMf[frame].homogeneous)
+            out.append(replace(placed, body=int(model.frames[frame].parentJoint)))
+        return out
 
-    def legs_at(self, placed: Mapping[str, Array]) -> list[Leg]:
-        """Legs for the placements of one configuration."""
-        marks = joint_marks(self.robot.urdf, placed)
-        legs = {leg.name: (leg.joints, leg.foot) for leg in self.robot.spec.legs}
-        return legs_of(legs, marks, placed)
+    def legs(self, configuration: Array) -> list[Leg]:
+        """Legs in one configuration, shape (nq,)."""
+        robot, model = self.robot, self.robot.model
+        data = model.createData()
+        pin.computeJointJacobians(model, data, configuration)
+        pin.updateFramePlacements(model, data)
+        slides = dict(zip(robot.joints, robot.sliding, strict=True))
+
+        def mark(joint: str) -> JointMark:
+            k = model.getJointId(joint)
+            column = pin.getJointJacobian(model, data, k, pin.LOCAL_WORLD_ALIGNED)[
+                :, model.joints[k].idx_v
+            ]
+            axis = column[:3] if slides[joint] else column[3:]
+            return JointMark(joint, data.oMi[k].translation.copy(), axis, bool(slides[joint]))
+
+        return [
+            Leg(
+                leg.name,
+                tuple(mark(joint) for joint in leg.joints),
+                data.oMf[model.getFrameId(leg.foot, pin.FrameType.BODY)].translation.copy(),
+            )
+            for leg in robot.spec.legs
+        ]
 
     def at(self, configuration: Array) -> tuple[list[Solid], list[Leg]]:
-        """Surfaces and legs in one configuration, shape (nq,)."""
-        placed = self.placements(configuration)
-        solids = self.shapes.at(placed)
-        if self.load is not None:
-            solids.append(self.load.at(placed[self.load.link]))
-        return solids, self.legs_at(placed)
+        """Surfaces, with sticks for bare legs, and legs in one configuration, shape (nq,)."""
+        solids, legs = self._solids(configuration), self.legs(configuration)
+        for leg in legs:
+            if leg.name in self.bare:
+                solids += sticks(leg, legs, self._bodies_of_legs[leg.name])
+        return solids, legs
 
-    def sticks(self, leg: Leg, legs: Sequence[Leg]) -> list[tuple[int, Solid]]:
-        """Sticks of a leg of which the URDF shows nothing, each with the body that carries it."""
-        carriers = [1, *(int(self.robot.model.getJointId(joint.name)) for joint in leg.joints)]
-        return [(carriers[k], stick) for k, stick in leg_sticks(leg, trunk_centre(legs))]
+    def bodies(self, configurations: Array, origin: Array) -> list[Body]:
+        """Every moving body and its way through configurations of shape (S, nq).
+
+        Args:
+            configurations: One for each step.
+            origin: What the picture follows, shape (S, 3) [m].
+        """
+        model, data = self.robot.model, self.robot.model.createData()
+        legs = self.legs(configurations[0])
+        parts: dict[tuple[int, str, bool], list[Solid]] = {}
+        solids = self._solids(configurations[0])
+        for i, solid in enumerate(solids):
+            load = self.load is not None and i == len(solids) - 1
+            key = (solid.body, self.legs_of_bodies.get(solid.body, ""), load)
+            parts.setdefault(key, []).append(solid)
+        for leg in legs:
+            if leg.name in self.bare:
+                for stick in sticks(leg, legs, self._bodies_of_legs[leg.name]):
+                    parts.setdefault((stick.body, leg.name, False), []).append(stick)
+        placed = []
+        for configuration in configurations:
+            pin.forwardKinematics(model, data, configuration)
+            placed.append([data.oMi[body].homogeneous for body, _, _ in parts])
+        placements = np.array(placed)  # (S, bodies, 4, 4)
+        moved = placements @ np.linalg.inv(placements[0])
+        return [
+            Body(
+                "_".join(word for word in (str(model.names[body]), leg, "load" * load) if word),
+                leg,
+                tuple(own),
+                moved[:, i, :3, 3] - origin,
+                moved[:, i, :3, :3],
+                load,
+            )
+            for i, ((body, leg, load), own) in enumerate(parts.items())
+        ]
 
     def trunk_outline(self) -> Array:
         """The trunk from above in its own frame, counter-clockwise, shape (P, 2) [m].
 
         Where the URDF shows nothing of it, the outline of the legs' first joints.
         """
-        placed = self.placements(self.zero)
-        solids, legs = self.shapes.at(placed), self.legs_at(placed)
-        points = [s.points[:, :2] for s in solids if self.carrier[s.link] <= 1]
-        points = points or [np.array([leg.joints[0].position[:2] for leg in legs])]
+        trunk = [s for s in self._solids(self.zero) if s.body <= 1]
+        points = [s.corners[:, :2] for s in (trunk[:-1] if self.load is not None else trunk)]
+        points = points or [np.array([leg.joints[0].position[:2] for leg in self.legs(self.zero)])]
         return outline(np.concatenate(points))
 
 

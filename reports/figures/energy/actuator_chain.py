@@ -25,8 +25,8 @@ from reports.figures.style import (
     REVERSE,
     SHADE,
     VERMILION,
+    house_style,
     new_figure,
-    styled,
 )
 from reports.typeset import number_text, unit_text
 
@@ -135,7 +135,7 @@ def _numbers(catalog: Catalog, references: Mapping[str, str]) -> tuple[str, ...]
     return tuple(out)
 
 
-@styled
+@house_style()
 def actuator_chain_figure(
     parts: Sequence[Shaft | tuple[Part, ...]], *, title: str, subtitle: str = ""
 ) -> Figure:
@@ -160,7 +160,7 @@ def actuator_chain_figure(
     top = _MARGIN + 0.2 * len(heading) + (0.22 if subtitle else 0.05)  # [in]
     body = sum(_GAP if isinstance(part, Shaft) else _height(part) for part in parts)
     height = top + body + _LINE * len(legend) + 0.22
-    figure = new_figure(height, _WIDTH, arranged=False)
+    figure = new_figure(height, width=_WIDTH, arranged=False)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_xlim(0.0, _WIDTH)
     axes.set_ylim(height, 0.0)  # downwards, in inches

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.errors import FigureError
 from reports.figures.style import (
     CYCLE,
     QUIET,
     WIDTH,
-    headline,
+    house_style,
     name_rows,
     new_figure,
     number,
-    styled,
 )
 
 if TYPE_CHECKING:
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@styled
+@house_style()
 def electrical_energy_figure(
     joints: Sequence[str],
     alternatives: Mapping[str, Array],
@@ -47,21 +45,13 @@ def electrical_energy_figure(
         title: First line.
         subtitle: Second line.
         width: [in]; names stand above their bars where it is less than usual.
-
-    Raises:
-        FigureError: Shapes that do not fit, nothing to draw, or no such reference.
     """
-    if not alternatives or any(a.shape != (len(joints),) for a in alternatives.values()):
-        raise FigureError(f"'{title}': every alternative needs {len(joints)} values")
-    if reference is not None and reference not in alternatives:
-        raise FigureError(f"'{title}': no alternative '{reference}' to compare with")
     totals = {name: float(a.sum()) for name, a in alternatives.items()}
     base = totals[reference] if reference is not None else 0.0
     widest = max(*totals.values(), 1e-9)
     narrow = width < WIDTH
     row_height, rest = (0.5, 1.35) if narrow else (0.62, 1.55)  # [in]
-    figure = new_figure(row_height * len(alternatives) + rest, width)
-    headline(figure, title, subtitle)
+    figure = new_figure(row_height * len(alternatives) + rest, title, subtitle, width=width)
     axes = figure.subplots()
     thick, names = 0.45 if narrow else 0.62, []
     for row, (name, parts) in enumerate(alternatives.items()):

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.errors import FigureError
 from reports.figures.style import (
     CYCLE,
     INK,
     QUIET,
-    headline,
     horizontal_grid,
+    house_style,
     new_figure,
     number,
-    styled,
 )
 
 if TYPE_CHECKING:
@@ -28,6 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 #: The prior's bands are wide and overlap, so they are fainter than those of figures left out.
 PRIOR_ALPHA, LEFT_OUT_ALPHA = 0.10, 0.28
+Band = tuple[Array, Array]
 _REACH = 4.0  # to either side of the crossing [%]
 
 
@@ -38,19 +37,14 @@ class EnergyLine:
     Attributes:
         name: Shown at the line.
         energy: At each share of standing, shape (N,) [J].
-        low: Lower end of what is known without any fit, shape (N,) [J], or None.
-        high: Upper end, shape (N,) [J], or None.
-        left_out_low: Lower end of what is known without this line's own figure, shape (N,) [J],
-            or None.
-        left_out_high: Upper end, shape (N,) [J], or None.
+        prior: Ends of what is known without any fit, shape (N,) each [J], or None.
+        left_out: Ends of what is known without this line's own figure, or None.
     """
 
     name: str
     energy: Array
-    low: Array | None = None
-    high: Array | None = None
-    left_out_low: Array | None = None
-    left_out_high: Array | None = None
+    prior: Band | None = None
+    left_out: Band | None = None
 
 
 @dataclass(frozen=True)
@@ -60,17 +54,15 @@ class BreakEven:
     Attributes:
         share: From 0 to 1.
         energy: There [J].
-        low: Lower end of what is known without any fit, or None.
-        high: Upper end, or None.
+        prior: Ends of what is known without any fit, or None.
     """
 
     share: float
     energy: float
-    low: float | None = None
-    high: float | None = None
+    prior: tuple[float, float] | None = None
 
 
-@styled
+@house_style()
 def energy_per_minute_figure(
     share: Array,
     lines: Sequence[EnergyLine],
@@ -87,62 +79,43 @@ def energy_per_minute_figure(
         title: First line.
         subtitle: Second line.
         break_even: Marked and enlarged; None where there is none.
-
-    Raises:
-        FigureError: Shapes that do not fit, or nothing to draw.
     """
-    if not lines or share.ndim != 1 or share.size < 2:
-        raise FigureError(f"'{title}': at least one line over two shares is needed")
-    for line in lines:
-        bands = (line.low, line.high, line.left_out_low, line.left_out_high)
-        for values in (line.energy, *bands):
-            if values is not None and values.shape != share.shape:
-                raise FigureError(f"'{title}': '{line.name}' needs {share.size} values")
-    figure = new_figure(4.8)
-    headline(figure, title, subtitle)
-    if break_even is None:
-        whole, near = figure.subplots(1, 1), None
-    else:
-        whole, near = figure.subplots(1, 2, width_ratios=[2.0, 1.0])
-    panels = [whole] if near is None else [whole, near]
+    from matplotlib.lines import Line2D
+
+    figure = new_figure(4.8, title, subtitle)
+    ratios = [2.0] if break_even is None else [2.0, 1.0]
+    panels = figure.subplots(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
     for axes in panels:
         _lines(axes, share, lines)
         horizontal_grid(axes)
         axes.set_xlabel("share of the time standing [%]")
-    whole.set_xlim(float(share[0]) * 100, float(share[-1]) * 100)
-    whole.set_ylim(bottom=0)
-    whole.set_ylabel("energy per minute [J]")
-    _key(figure, lines)
-    if break_even is not None and near is not None:
-        _enlarge(near, share, lines, break_even)
-    return figure
-
-
-def _lines(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
-    for k, line in enumerate(lines):
-        color = CYCLE[k % len(CYCLE)]
-        bands = ((line.low, line.high), (line.left_out_low, line.left_out_high))
-        for (low, high), alpha in zip(bands, (PRIOR_ALPHA, LEFT_OUT_ALPHA), strict=True):
-            if low is not None and high is not None:
-                axes.fill_between(share * 100, low, high, color=color, alpha=alpha, lw=0)
-        axes.plot(share * 100, line.energy, color=color)
-
-
-def _key(figure: Figure, lines: Sequence[EnergyLine]) -> None:
-    """Names below the panels, where no line crosses them, ordered as the lines at the left."""
-    from matplotlib.lines import Line2D
-
+    panels[0].set_xlim(float(share[0]) * 100, float(share[-1]) * 100)
+    panels[0].set_ylim(bottom=0)
+    panels[0].set_ylabel("energy per minute [J]")
+    # Names below the panels, where no line crosses them, ordered as the lines at the left.
     handles = [
         Line2D([], [], color=CYCLE[k % len(CYCLE)], label=lines[k].name)
         for k in sorted(range(len(lines)), key=lambda k: -float(lines[k].energy[0]))
     ]
     columns = min(len(handles), 4)
     figure.legend(handles=handles, loc="outside lower center", ncols=columns, columnspacing=1.6)
+    if break_even is not None:
+        _enlarge(panels[1], share, lines, break_even)
+    return figure
+
+
+def _lines(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
+    for k, line in enumerate(lines):
+        color = CYCLE[k % len(CYCLE)]
+        for band, alpha in ((line.prior, PRIOR_ALPHA), (line.left_out, LEFT_OUT_ALPHA)):
+            if band is not None:
+                axes.fill_between(share * 100, *band, color=color, alpha=alpha, lw=0)
+        axes.plot(share * 100, line.energy, color=color)
 
 
 def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: BreakEven) -> None:
     at = 100 * break_even.share
-    spread = [100 * v for v in (break_even.low, break_even.high) if v is not None]
+    spread = [100 * end for end in break_even.prior or ()]
     low, high = max(at - _REACH, 100 * float(share[0])), min(at + _REACH, 100 * float(share[-1]))
     axes.set_xlim(low, high)
     window = np.linspace(low, high, 50) / 100
@@ -154,7 +127,7 @@ def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: 
     ]
     values = np.array([np.interp(window, share, line.energy) for line in crossing or lines])
     axes.set_ylim(min(0.0, float(values.min())), 1.12 * float(values.max()))
-    if len(spread) == 2:
+    if spread:
         shown = (max(spread[0], low), min(spread[1], high))
         axes.axvspan(*shown, color=QUIET, alpha=0.12, linewidth=0)
     axes.plot(
@@ -162,6 +135,6 @@ def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: 
     )
     axes.axvline(at, color=INK, linewidth=0.8, linestyle=(0, (3, 3)))
     text = f"break-even {number(at)} %"
-    if len(spread) == 2:
+    if spread:
         text += f" (fitted),\nbefore the fit {number(spread[0])} to {number(spread[1])} %"
     axes.set_title(text, fontweight="bold", loc="center")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from actuators.energy.envelope import operating_region
 from actuators.energy.limits import rms_over_time
-from reports.errors import FigureError
 from reports.figures.style import (
     BLUE,
     GREEN,
@@ -19,10 +18,10 @@ from reports.figures.style import (
     QUIET,
     SHADE_DARK,
     VERMILION,
-    headline,
+    arrow,
+    house_style,
     new_figure,
     number,
-    styled,
 )
 
 if TYPE_CHECKING:
@@ -48,49 +47,34 @@ _POINTS, _LEAST = 201, 31
 _ARROW = 0.06
 
 
-@dataclass(frozen=True)
-class MotorScale:
-    """Half the ranges of a panel.
-
-    Attributes:
-        speed: [rad/s].
-        torque: [N*m].
-    """
-
-    speed: float
-    torque: float
-
-
 def common_scale(
     every: Iterable[tuple[ShaftSeries, Sequence[DCMotor]]], joints: Iterable[str]
-) -> MotorScale:
-    """The scale on which the paths of several alternatives can be compared.
+) -> tuple[float, float]:
+    """Half the ranges of panels in which the paths of several alternatives can be compared.
 
-    It holds every path, the edge of the region at no torque, and the continuous torque.
+    They hold every path, the edge of the region at no torque, and the continuous torque.
 
     Args:
         every: Series at the motors' shafts and the motor of each of its joints.
         joints: Those to draw.
 
-    Raises:
-        FigureError: A joint that a series lacks.
+    Returns:
+        Speed [rad/s] and torque [N*m].
     """
     shown = list(joints)
-    speed, torque = [1e-9], [1e-9]
+    speeds, torques = [1e-9], [1e-9]
     for series, motors in every:
-        columns = _columns(series, shown)
-        speed.append(1.12 * float(np.abs(series.velocity[:, columns]).max()))
-        torque.append(1.12 * float(np.abs(series.torque[:, columns]).max()))
+        columns = [series.joints.index(joint) for joint in shown]
+        speeds.append(1.12 * float(np.abs(series.velocity[:, columns]).max()))
+        torques.append(1.12 * float(np.abs(series.torque[:, columns]).max()))
         for column in columns:
             motor, constant = motors[column], _constants(motors[column], column)[0]
-            edges = [motor.max_speed, motor.supply_voltage / constant]
-            speed += [1.12 * edge for edge in edges if np.isfinite(edge)]
-            continuous = motor.continuous_current * constant
-            torque += [1.25 * continuous] if np.isfinite(continuous) else []
-    return MotorScale(max(speed), max(torque))
+            speeds += [1.12 * motor.max_speed, 1.12 * motor.supply_voltage / constant]
+            torques.append(1.25 * motor.continuous_current * constant)
+    return max(filter(np.isfinite, speeds)), max(filter(np.isfinite, torques))
 
 
-@styled
+@house_style()
 def motor_limits_figure(
     series: ShaftSeries,
     motors: Sequence[DCMotor],
@@ -98,8 +82,8 @@ def motor_limits_figure(
     support: Sequence[tuple[float, float]],
     *,
     title: str,
-    subtitle: str = SUBTITLE,
-    scale: MotorScale | None = None,
+    subtitle: str = "",
+    scale: tuple[float, float] | None = None,
 ) -> Figure:
     """The closed path of each joint's motor within what voltage, current and speed allow.
 
@@ -113,68 +97,42 @@ def motor_limits_figure(
         support: Start and end of every stretch of time in which the joints' leg stands [s].
         title: First line.
         subtitle: Second line.
-        scale: Of the panels, to give several figures the same.
-
-    Raises:
-        FigureError: No joint to draw, or one that the series lacks.
+        scale: Of the panels, to give several figures the same: half the ranges of speed [rad/s]
+            and torque [N*m].
     """
-    if not joints:
-        raise FigureError(f"'{title}': no joint to draw")
-    columns = _columns(series, list(joints))
-    scale = scale or common_scale([(series, motors)], joints)
-    rms = rms_over_time(series.time, series.torque[:, columns])
-    unit, factor = ("N·m", 1.0) if scale.torque >= _STRONG else ("mN·m", 1e3)
-    figure, whole, rows = _panels(len(joints))
-    headline(figure, title, subtitle)
-    panels = [axes for row in rows for axes in row]
-    _whole(whole, motors[columns[0]], columns[0], scale, factor)
+    columns = [series.joints.index(joint) for joint in joints]
+    speed, strongest = scale or common_scale([(series, motors)], joints)
+    unit, factor = ("N·m", 1.0) if strongest >= _STRONG else ("mN·m", 1e3)
+    limits = (speed * _RPM, strongest * factor)
+    rows = math.ceil(len(joints) / _IN_ROW)
+    across = math.ceil(len(joints) / rows)
+    figure = new_figure(1.2 + 3.4 * rows, title, subtitle)
+    grid = figure.subplots(rows, 1 + across, width_ratios=[0.8] + [1.0] * across, squeeze=False)
+    whole, panels = grid[0, 0], grid[:, 1:].ravel()
+    for axes in (*grid[1:, 0], *panels[len(joints) :]):
+        axes.set_visible(False)
+    _whole(whole, motors[columns[0]], columns[0], limits, factor)
     whole.set_ylabel(f"motor torque [{unit}]")
     whole.set_title("whole region\n", loc="center", fontweight="bold")
-    for column, value, axes, label in zip(columns, rms, panels, joints.values(), strict=True):
-        motor, limits = motors[column], (scale.speed * _RPM, scale.torque * factor)
+    whole.set_xlabel("motor speed [1000 rpm]")
+    rms = rms_over_time(series.time, series.torque[:, columns])
+    for k, (column, label) in enumerate(zip(columns, joints.values(), strict=True)):
+        motor, axes = motors[column], panels[k]
         key = _region(axes, motor, column, limits, factor)
         key = _path(axes, series, column, support, limits, factor) + key
         allowed = motor.continuous_current * _constants(motor, column)[0]
         share = f" of {number(allowed * factor)}" if np.isfinite(allowed) else ""
         axes.set_title(f"{label}\n", loc="center", fontweight="bold")
-        words = f"rms {number(float(value) * factor)}{share} {unit}"
+        words = f"rms {number(float(rms[k]) * factor)}{share} {unit}"
         look: dict[str, Any] = {"ha": "center", "va": "bottom", "color": QUIET, "fontsize": 8}
         axes.text(0.5, 1.015, words, transform=axes.transAxes, **look)
-        if all(axes is not row[0] for row in rows):
-            axes.tick_params(labelleft=False)
-    for axes in (whole, *panels):
+        axes.tick_params(labelleft=k % across == 0)
         axes.set_xlabel("motor speed [1000 rpm]")
-    key = _common(key, [motors[column] for column in columns])
+    if any(motors[column] is not motors[columns[0]] for column in columns):
+        for handle in key:  # the key of all panels says only what is the same in each
+            handle.set_label(str(handle.get_label()).partition(":")[0])
     figure.legend(handles=key, loc="outside lower center", ncols=4, fontsize=8, handlelength=2.2)
     return figure
-
-
-def _panels(joints: int) -> tuple[Figure, Axes, list[list[Axes]]]:
-    """A figure, its panel of the whole region, and rows of panels, one for each joint."""
-    rows = -(-joints // _IN_ROW)
-    across = -(-joints // rows)
-    figure = new_figure(1.2 + 3.4 * rows)
-    grid = figure.subplots(rows, 1 + across, width_ratios=[0.8] + [1.0] * across, squeeze=False)
-    for axes in (*grid[1:, 0], *grid[:, 1:].ravel()[joints:]):
-        axes.set_visible(False)
-    shown = [list(row[1:]) for row in grid]
-    shown[-1] = shown[-1][: joints - across * (rows - 1)]
-    return figure, grid[0, 0], shown
-
-
-def _common(key: list[Artist], motors: Sequence[DCMotor]) -> list[Artist]:
-    """The key of all panels: how large a limit is only where it is the same in each."""
-    if any(motor is not motors[0] for motor in motors):
-        for handle in key:
-            handle.set_label(str(handle.get_label()).partition(":")[0])
-    return key
-
-
-def _columns(series: ShaftSeries, joints: Sequence[str]) -> list[int]:
-    unknown = [joint for joint in joints if joint not in series.joints]
-    if unknown:
-        raise FigureError(f"no joint '{', '.join(unknown)}' in the motor's series")
-    return [series.joints.index(joint) for joint in joints]
 
 
 def _constants(motor: DCMotor, column: int) -> tuple[float, float]:
@@ -184,18 +142,20 @@ def _constants(motor: DCMotor, column: int) -> tuple[float, float]:
     return constant, resistance
 
 
-def _whole(axes: Axes, motor: DCMotor, column: int, scale: MotorScale, factor: float) -> None:
+def _whole(
+    axes: Axes, motor: DCMotor, column: int, frame: tuple[float, float], factor: float
+) -> None:
     """The whole region, and a frame around what the other panels show."""
     from matplotlib.patches import Rectangle
 
     constant, resistance = _constants(motor, column)
     strongest = [motor.peak_current * constant, motor.supply_voltage / resistance * constant]
     finite = [torque for torque in strongest if np.isfinite(torque)]
-    limits = (1.05 * scale.speed * _RPM, 1.15 * max([*finite, scale.torque]) * factor)
+    limits = (1.05 * frame[0], 1.15 * max([*finite, frame[1] / factor]) * factor)
     _region(axes, motor, column, limits, factor)
-    width, height = 2 * scale.speed * _RPM, 2 * scale.torque * factor
+    corner = (-frame[0], -frame[1])
     axes.add_patch(
-        Rectangle((-width / 2, -height / 2), width, height, fill=False, edgecolor=INK, zorder=4)
+        Rectangle(corner, 2 * frame[0], 2 * frame[1], fill=False, edgecolor=INK, zorder=4)
     )
 
 
@@ -291,16 +251,4 @@ def _arrow(axes: Axes, points: Array, limits: Array, color: str) -> None:
         return
     at = 0.5 * length[-1] + np.array([-0.01, 0.01])
     tail, tip = zip(*(np.interp(at, length, points[:, k]).tolist() for k in (0, 1)), strict=True)
-    axes.annotate(
-        "",
-        tip,
-        tail,
-        arrowprops={
-            "arrowstyle": "-|>,head_width=0.28,head_length=0.55",
-            "color": color,
-            "linewidth": 1.2,
-            "shrinkA": 0,
-            "shrinkB": 0,
-        },
-        zorder=3,
-    )
+    arrow(axes, tip, tail, color, head=(0.28, 0.55), width=1.2, zorder=3)

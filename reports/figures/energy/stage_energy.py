@@ -10,17 +10,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.errors import FigureError
 from reports.figures.style import (
     FORWARD,
     INK,
     QUIET,
     REVERSE,
-    headline,
     horizontal_grid,
+    house_style,
     new_figure,
     number,
-    styled,
     zero_line,
 )
 
@@ -35,7 +33,7 @@ Array = NDArray[np.float64]
 _IN_ROW = 4
 
 
-@styled
+@house_style()
 def stage_energy_figure(
     stages: Sequence[StageEnergy],
     joints: Mapping[str, str],
@@ -54,24 +52,16 @@ def stage_energy_figure(
         title: Names the alternative.
         subtitle: Second line.
         limits: Largest E(+) and E(-) to scale for [J], to give several figures the same scale.
-
-    Raises:
-        FigureError: Nothing to draw, a joint that is not among the stages' joints, or a stage
-            without words.
     """
-    if not stages or not joints:
-        raise FigureError(f"'{title}': no stage or no joint to draw")
-    for stage in stages:
-        if stage.stage not in places:
-            raise FigureError(f"'{title}': no words say where stage '{stage.stage}' is")
+    from matplotlib.patches import Patch
+
     forward, reverse = _energies(stages, joints)
     top, bottom = limits or energy_limits([stages], joints)
     names = {s.stage: (stage_symbol(s.stage), places[s.stage]) for s in stages}
     long = [f"{symbol}  {words}" for symbol, words in names.values() if " " in words]
     rows = math.ceil(len(joints) / _IN_ROW)
     across = math.ceil(len(joints) / rows)
-    figure = new_figure(1.3 + 3.2 * rows + 0.2 * math.ceil(len(long) / 2))
-    headline(figure, title, subtitle)
+    figure = new_figure(1.3 + 3.2 * rows + 0.2 * math.ceil(len(long) / 2), title, subtitle)
     grid = figure.subplots(rows, across, sharey=True, squeeze=False)
     panels = grid.ravel()[: len(joints)]
     for axes in grid.ravel()[len(joints) :]:
@@ -85,7 +75,14 @@ def stage_energy_figure(
     for axes in grid[:, 0]:
         axes.set_ylabel("energy per cycle [J]")
     panels[0].yaxis.set_major_formatter(lambda value, _: f"{abs(value):g}")
-    _key(figure, long)
+    words = [Patch(alpha=0.0, label=text) for text in long]
+    handles = [  # by column, of which the first has the odd one
+        Patch(color=FORWARD, label="E(+): from supply to joint"),
+        *words[::2],
+        Patch(color=REVERSE, label="E(\N{MINUS SIGN}): from joint to supply"),
+        *words[1::2],
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
 
@@ -109,11 +106,7 @@ def _name_stages(axes: Axes, names: Sequence[tuple[str, str]]) -> None:
 def energy_limits(
     every: Iterable[Sequence[StageEnergy]], joints: Iterable[str]
 ) -> tuple[float, float]:
-    """Largest E(+) and largest E(-) of several alternatives at the joints shown [J].
-
-    Raises:
-        FigureError: A joint that is not among the stages' joints.
-    """
+    """Largest E(+) and largest E(-) of several alternatives at the joints shown [J]."""
     pairs = [_energies(stages, list(joints)) for stages in every]
     forward = max((float(f.max()) for f, _ in pairs), default=0.0)
     return max(forward, 1e-9), max((float(r.max()) for _, r in pairs), default=0.0)
@@ -122,11 +115,7 @@ def energy_limits(
 def _energies(stages: Sequence[StageEnergy], joints: Iterable[str]) -> tuple[Array, Array]:
     """E(+) and E(-), each of shape (stages, joints) [J]."""
     shown = list(joints)
-    for stage in stages:
-        for joint in shown:
-            if joint not in stage.joints:
-                raise FigureError(f"stage '{stage.stage}' has no joint '{joint}'")
-    columns = [[s.joints.index(joint) for joint in shown] for s in stages]
+    columns = [[stage.joints.index(joint) for joint in shown] for stage in stages]
     return (
         np.array([s.forward[c] for s, c in zip(stages, columns, strict=True)]),
         np.array([s.reverse[c] for s, c in zip(stages, columns, strict=True)]),
@@ -170,22 +159,3 @@ def stage_symbol(stage: str, letter: str = "E") -> str:
     """
     plain = re.sub(r"([_#%&${}])", r"\\\1", stage)
     return rf"${letter}_{{\mathrm{{{plain}}}}}$"
-
-
-def _key(figure: Figure, long: Sequence[str]) -> None:
-    """What colours and symbols mean, below the panels, where no line crosses it.
-
-    Args:
-        figure: To draw in.
-        long: Symbols with the words that are too long to stand under a bar.
-    """
-    from matplotlib.patches import Patch
-
-    words = [Patch(alpha=0.0, label=text) for text in long]
-    handles = [  # by column, of which the first has the odd one
-        Patch(color=FORWARD, label="E(+): from supply to joint"),
-        *words[::2],
-        Patch(color=REVERSE, label="E(\N{MINUS SIGN}): from joint to supply"),
-        *words[1::2],
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2)

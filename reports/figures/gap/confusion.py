@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.style import BLUE, INK, QUIET, SHADE, VERMILION, headline, new_figure, styled
+from reports.figures.style import BLUE, INK, QUIET, SHADE, VERMILION, house_style, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import Rectangle
 
 
-@styled
+@house_style()
 def confusion(
     hidden: Sequence[str], named: Sequence[str], counts: NDArray[np.int_], subtitle: str
 ) -> Figure:
@@ -29,8 +29,9 @@ def confusion(
     """
     kept = [int(i) for i in np.flatnonzero(counts.sum(axis=1))]
     used = [k for k in range(len(named)) if counts[:, k].any()]
-    figure = new_figure(2.2 + 0.25 * max(len(kept), 6), 2.6 + 0.3 * max(len(used), 14))
-    headline(figure, "What was hidden, and what was named first", subtitle)
+    height, width = 2.2 + 0.25 * max(len(kept), 6), 2.6 + 0.3 * max(len(used), 14)
+    title = "What was hidden, and what was named first"
+    figure = new_figure(height, title, subtitle, width=width)
     axes = figure.add_subplot()
     for row, i in enumerate(kept):
         total = int(counts[i].sum())

@@ -16,10 +16,9 @@ from reports.figures.style import (
     QUIET,
     SHADE,
     YELLOW,
-    headline,
+    house_style,
     new_figure,
     number,
-    styled,
     zero_line,
 )
 from reports.typeset import unit_text
@@ -61,7 +60,7 @@ class GapTrace:
     proves: NDArray[np.bool_] | None = None
 
 
-@styled
+@house_style()
 def gap_time_figure(
     traces: Sequence[GapTrace], *, title: str, subtitle: str = "", channel: str = "effort"
 ) -> Figure:
@@ -78,13 +77,12 @@ def gap_time_figure(
     """
     if not 1 <= len(traces) <= 3:
         raise FigureError(f"gap in time: {len(traces)} joints; give 1 to 3")
-    figure = new_figure(5.2)
+    figure = new_figure(5.2, title, subtitle)
     axes = figure.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.0))
     for k, trace in enumerate(traces):
         _trace(axes[0, k], axes[1, k], _thinned(trace), channel, first=k == 0)
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=4)
-    headline(figure, title, subtitle)
     return figure
 
 

@@ -15,9 +15,8 @@ from reports.figures.style import (
     ORANGE,
     QUIET,
     SHADE,
-    headline,
+    house_style,
     new_figure,
-    styled,
     zero_line,
 )
 from reports.typeset import unit_text
@@ -53,7 +52,7 @@ class Signature:
     unit: str
 
 
-@styled
+@house_style()
 def gap_signature_figure(signature: Signature, *, title: str, subtitle: str = "") -> Figure:
     """Draw it without (left) and with the effect (right), on one scale.
 
@@ -65,14 +64,13 @@ def gap_signature_figure(signature: Signature, *, title: str, subtitle: str = ""
     if not keep.any():
         raise FigureError(f"signature against {s.variable}: no rows; give at least 1")
     x, before, after = s.x[keep], s.before[keep], s.after[keep]
-    figure = new_figure(4.2)
+    figure = new_figure(4.2, title, subtitle)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     _half(left, x, before, s, "without the effect", ORANGE)
     _half(right, x, after, s, "with the effect", BLUE)
     limit = 1.1 * float(np.quantile(np.abs(np.concatenate([before, after])), 0.998))
     left.set_ylim(-limit, limit)
     left.set_ylabel(f"measured minus predicted [{unit_text(s.unit)}]")
-    headline(figure, title, subtitle)
     return figure
 
 

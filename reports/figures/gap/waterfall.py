@@ -15,11 +15,10 @@ from reports.figures.style import (
     ORANGE,
     QUIET,
     WIDTH,
-    headline,
+    house_style,
     name_rows,
     new_figure,
     number,
-    styled,
 )
 from reports.typeset import unit_text
 
@@ -44,7 +43,7 @@ class GapStep:
     gap: float
 
 
-@styled
+@house_style()
 def gap_waterfall_figure(
     before: float,
     steps: Sequence[GapStep],
@@ -73,7 +72,8 @@ def gap_waterfall_figure(
         raise FigureError("waterfall: a gap is negative; give root mean squares")
     labels = ["model as it was", *(s.label for s in steps), "what is left"]
     narrow = width < WIDTH
-    figure = new_figure((0.54 if narrow else 0.42) * len(labels) + 1.5, width)
+    height = (0.54 if narrow else 0.42) * len(labels) + 1.5
+    figure = new_figure(height, title, subtitle, width=width)
     ax = figure.subplots()
     thick = 0.42 if narrow else 0.62
     gaps = [before, *(s.gap for s in steps)]
@@ -94,7 +94,6 @@ def gap_waterfall_figure(
     ax.set_xlim(0, (1.2 if narrow else 1.14) * max([*gaps, noise_floor]))
     ax.set_ylim(last + 0.55, -1.05)
     ax.set_xlabel(f"gap on held-out data, root mean square [{unit_text(unit)}]")
-    headline(figure, title, subtitle)
     return figure
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from reports.errors import FigureError
-from reports.figures.style import INK, QUIET, WIDTH, headline, new_figure, styled
+from reports.figures.style import INK, QUIET, WIDTH, house_style, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +45,7 @@ class WhereGroup:
     ratio: Array
 
 
-@styled
+@house_style()
 def where_map_figure(
     joints: Sequence[str], groups: Sequence[WhereGroup], *, title: str, subtitle: str = ""
 ) -> Figure:
@@ -77,8 +77,7 @@ def where_map_figure(
     cell = min(room / widest, _WIDEST)
     tall = _ROW * len(joints)
     height = _HEAD + len(lines) * (_TITLE + tall + _BANDS)
-    figure = new_figure(height, arranged=False)  # cells of one size, on which no layout insists
-    headline(figure, title, subtitle)
+    figure = new_figure(height, title, subtitle, arranged=False)  # for cells of one size
     finite = np.concatenate([g.ratio[np.isfinite(g.ratio)] for g in groups])
     top = max(float(finite.max(initial=1.0)), 3.0)
     norm = LogNorm(1.0, top)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.marks import dimension
 from reports.figures.robot.projection import FRONT, SIDE, TOP, View, extent
-from reports.figures.robot.solids import Leg, Primitive, Solid
+from reports.figures.robot.solids import Leg, Solid
+from reports.figures.style import INK, arrow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,17 +25,48 @@ _FLAT = 0.95
 
 def links_of(leg: Leg) -> list[tuple[Array, Array]]:
     """The links of a leg that are long enough to be seen: both ends in the world [m]."""
-    points = [*(joint.position for joint in leg.joints), leg.foot]
-    whole = sum(float(np.linalg.norm(b - a)) for a, b in pairwise(points))
-    return [
-        (a, b) for a, b in pairwise(points) if float(np.linalg.norm(b - a)) > _SHORT * whole > 0
-    ]
+    least = _SHORT * leg.length
+    return [(a, b) for a, b in leg.links if float(np.linalg.norm(b - a)) > least > 0]
 
 
 def hip_of(leg: Leg) -> Array:
     """Where the first long link of a leg begins, shape (3,) [m]."""
     links = links_of(leg)
     return links[0][0] if links else leg.joints[0].position
+
+
+def dimension(axes: Axes, start: Array, end: Array, offset: tuple[float, float], text: str) -> None:
+    """A dimension line parallel to start-end, with extension lines and its text on it.
+
+    Args:
+        axes: In metres.
+        start: Shape (2,) [m].
+        end: Shape (2,) [m].
+        offset: From the measured points to the dimension line [m].
+        text: Value with unit.
+    """
+    shift = np.asarray(offset)
+    a, b = start + shift, end + shift
+    beyond = shift / max(float(np.hypot(*shift)), 1e-9) * 0.012
+    for point, tip in ((start, a), (end, b)):
+        ends = np.column_stack([point + 0.25 * beyond, tip + beyond])
+        axes.plot(*ends, color=INK, linewidth=0.5, zorder=5)
+    look: dict[str, Any] = {"style": "<|-|>", "head": (0.12, 0.3), "width": 0.7}
+    arrow(axes, b, a, INK, zorder=5, **look)
+    angle = float(np.degrees(np.arctan2(b[1] - a[1], b[0] - a[0])))
+    angle = (angle + 60) % 180 - 60  # readable from below or from the right
+    middle = (a + b) / 2
+    axes.text(
+        *middle,
+        text,
+        ha="center",
+        va="center",
+        rotation=angle,
+        rotation_mode="anchor",
+        fontsize=7.5,
+        zorder=6,
+        bbox={"boxstyle": "square,pad=0.12", "facecolor": "white", "edgecolor": "none"},
+    )
 
 
 def _millimetres(a: Array, b: Array) -> str:
@@ -84,14 +115,15 @@ def side_dimensions(axes: Axes, scene: Sequence[Solid], legs: Sequence[Leg], uni
     """Distances of the hips, and the length of the trunk where it is a box that carries them."""
     hips = _apart([float(hip_of(leg)[0]) for leg in legs], 0.05 * unit)
     top = max(float(hip_of(leg)[2]) for leg in legs)
-    boxes = [p for p in scene if isinstance(p, Primitive) and not p.sphere]
-    trunks = [p for p in boxes if p.size[0] >= hips[-1] - hips[0] > 0]
+    trunks = []
+    for box in (solid.corners for solid in scene if solid.kind == "box"):
+        edges = np.linalg.norm(box[[4, 2, 1]] - box[0], axis=1)  # along its x, y and z
+        if edges[0] >= hips[-1] - hips[0] > 0:
+            trunks.append((float(edges.prod()), float(edges[0]), box[[5, 7]].mean(axis=0)))
     if trunks:
-        trunk = max(trunks, key=lambda p: float(np.prod(p.size)))
-        half = trunk.placement[:3, :3] @ np.array([trunk.size[0] / 2, 0, trunk.size[2] / 2])
-        front = SIDE.project(trunk.placement[:3, 3] + half)[:2]
-        length = np.array([trunk.size[0], 0.0])
-        dimension(axes, front - length, front, (0, 0.25 * unit), f"{1e3 * trunk.size[0]:.0f} mm")
+        _, size, end = max(trunks, key=lambda trunk: trunk[0])
+        front, length = SIDE.project(end)[:2], np.array([size, 0.0])
+        dimension(axes, front - length, front, (0, 0.25 * unit), f"{1e3 * size:.0f} mm")
         top = float(front[1])
     else:
         top = max(top, float(extent(SIDE, scene)[1][1]) - 0.04 * unit)

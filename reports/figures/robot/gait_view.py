@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reports.errors import FigureError
-from reports.figures.marks import dimension
+from reports.figures.robot.dimensions import dimension
+from reports.figures.stretch import Stretch
 from reports.figures.style import (
     BLUE,
     FAINT,
@@ -18,10 +18,9 @@ from reports.figures.style import (
     QUIET,
     SHADE,
     VERMILION,
-    headline,
+    house_style,
     new_figure,
     number,
-    styled,
 )
 
 if TYPE_CHECKING:
@@ -36,30 +35,10 @@ _THREE = ((0.0, "start"), (0.5, "middle"), (1.0, "end"))
 _MOST = 6
 
 
-@dataclass(frozen=True)
-class GaitStretch:
-    """Part of the gait during which the same feet stand.
-
-    Attributes:
-        time: Shape (N,) [s].
-        feet: In the base frame, shape (N, L, 3) [m].
-        stance: Legs that stand.
-        mass_centre: In the base frame, shape (N, 3) [m].
-        margin: Distance of the centre of mass from the nearest edge of the support polygon, seen
-            from above, shape (N,) [m].
-    """
-
-    time: Array
-    feet: Array
-    stance: tuple[str, ...]
-    mass_centre: Array
-    margin: Array
-
-
-@styled
+@house_style()
 def gait_figure(
     legs: Sequence[str],
-    stretches: Sequence[GaitStretch],
+    stretches: Sequence[Stretch],
     *,
     shown: str,
     body: Array,
@@ -89,8 +68,7 @@ def gait_figure(
         raise FigureError(f"leg '{shown}' must both stand and swing in the gait drawn")
     instants = _instants(stretches, standing[0])
     rows = -(-len(instants) // 3)
-    figure = new_figure(5.7 + 2.65 * rows + 0.12 * max(0, len(legs) - 6))
-    headline(figure, title, subtitle)
+    figure = new_figure(5.7 + 2.65 * rows + 0.12 * max(0, len(legs) - 6), title, subtitle)
     ratios = [1.25, *[1.15] * rows, 0.95 + 0.05 * max(0, len(legs) - 6)]
     grid = figure.add_gridspec(2 + rows, 6, height_ratios=ratios)
     unit = _size(stretches)
@@ -106,16 +84,14 @@ def gait_figure(
     return figure
 
 
-def _instants(
-    stretches: Sequence[GaitStretch], first: GaitStretch
-) -> list[tuple[GaitStretch, int, str]]:
+def _instants(stretches: Sequence[Stretch], first: Stretch) -> list[tuple[Stretch, int, str]]:
     """Stretch, sample and words of every support polygon to draw."""
     stances = {frozenset(stretch.stance) for stretch in stretches}
     if len(stances) <= 2:
         n = first.time.size - 1
         return [(first, round(share * n), f"{word} of support") for share, word in _THREE]
     # The least stable instant of every stance; a gait with many shows the most critical ones.
-    least: dict[frozenset[str], tuple[GaitStretch, int, str]] = {}
+    least: dict[frozenset[str], tuple[Stretch, int, str]] = {}
     for stretch in stretches:
         key, sample = frozenset(stretch.stance), int(stretch.margin.argmin())
         if key not in least or stretch.margin[sample] < _margin(least[key]):
@@ -124,12 +100,12 @@ def _instants(
     return sorted(chosen, key=lambda one: float(one[0].time[one[1]]))
 
 
-def _margin(instant: tuple[GaitStretch, int, str]) -> float:
+def _margin(instant: tuple[Stretch, int, str]) -> float:
     stretch, sample, _ = instant
     return float(stretch.margin[sample])
 
 
-def _size(stretches: Sequence[GaitStretch]) -> float:
+def _size(stretches: Sequence[Stretch]) -> float:
     """Longer side of the field of feet [m]."""
     feet = np.concatenate([s.feet[..., :2].reshape(-1, 2) for s in stretches])
     return max(float(np.ptp(feet, axis=0).max()), 1e-6)
@@ -154,7 +130,7 @@ def _body(axes: Axes, body: Array, unit: float) -> None:
 def _paths_from_above(
     axes: Axes,
     legs: Sequence[str],
-    stretches: Sequence[GaitStretch],
+    stretches: Sequence[Stretch],
     body: Array,
     unit: float,
 ) -> None:
@@ -183,7 +159,7 @@ def _paths_from_above(
     axes.margins(0.04, 0.12)
 
 
-def _path_from_the_side(axes: Axes, index: int, leg: str, stretches: Sequence[GaitStretch]) -> None:
+def _path_from_the_side(axes: Axes, index: int, leg: str, stretches: Sequence[Stretch]) -> None:
     """One foot's path in the vertical plane in which it moves on the ground."""
     every = np.concatenate([s.feet[:, index] for s in stretches])
     on_ground = np.concatenate([s.feet[:, index] for s in stretches if leg in s.stance])
@@ -252,7 +228,7 @@ def _phase_words(axes: Axes, at: Array, tail: Array, stands: bool, size: float) 
 def _support(
     axes: Axes,
     legs: Sequence[str],
-    stretch: GaitStretch,
+    stretch: Stretch,
     sample: int,
     words: str,
     body: Array,
@@ -312,7 +288,7 @@ def _beside(feet: Array, i: int, unit: float) -> tuple[Literal["left", "center",
     return ("right", 1.0) if near[np.argmin(np.abs(near))] >= 0 else ("left", -1.0)
 
 
-def _footfall(axes: Axes, legs: Sequence[str], stretches: Sequence[GaitStretch]) -> None:
+def _footfall(axes: Axes, legs: Sequence[str], stretches: Sequence[Stretch]) -> None:
     for row, leg in enumerate(legs):
         for stretch in stretches:
             first, last = float(stretch.time[0]), float(stretch.time[-1])

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from reports.errors import FigureError
-from reports.figures.marks import axis_line, rotation_arrow, sliding_arrow
 from reports.figures.robot.projection import (
     FRONT,
     OBLIQUE,
@@ -22,7 +21,6 @@ from reports.figures.robot.projection import (
 )
 from reports.figures.robot.robot_view import frame_arrows
 from reports.figures.robot.solids import JointMark, Leg, Solid, reach
-from reports.figures.robot.sticks import with_sticks
 from reports.figures.style import (
     BLUE,
     GREEN,
@@ -32,21 +30,22 @@ from reports.figures.style import (
     QUIET,
     SKY,
     VERMILION,
-    headline,
+    arrow,
+    house_style,
     new_figure,
-    styled,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Array = NDArray[np.float64]
 #: As many as a leg may have joints.
 JOINT_COLORS = (GREEN, BLUE, VERMILION, PURPLE, ORANGE, SKY, INK)
 _FLAT_VIEWS = (FRONT, TOP, SIDE)
 
 
-@styled
+@house_style()
 def joint_directions_figure(
     scene: Sequence[Solid],
     legs: Sequence[Leg],
@@ -66,45 +65,29 @@ def joint_directions_figure(
         shown: Name of the leg that is shown obliquely, with its joints' names.
         title: First line.
         zero_pose: The robot file's words, written below the picture.
-
-    Raises:
-        FigureError: There is no such leg.
     """
-    by_name = {leg.name: leg for leg in legs}
-    if shown not in by_name:
-        raise FigureError(f"leg '{shown}' is not among {', '.join(by_name)}")
-    leg = by_name[shown]
-    scene, _ = with_sticks(scene, legs)
+    leg = next(leg for leg in legs if leg.name == shown)
     unit = reach(scene)
-    figure = new_figure(4.6)
     slides = any(joint.slides for one in legs for joint in one.joints)
     straight = "; straight arrows: positive sliding" if slides else ""
     words = "circular arrows: positive rotation, right-handed about the drawn axis"
-    headline(figure, title, f"{words}{straight}")
+    figure = new_figure(4.6, title, f"{words}{straight}")
     close, *panels = figure.subplots(1, 3, width_ratios=[1.0, 1.25, 1.15])
     oblique = OBLIQUE if leg.foot[1] <= 0 else OBLIQUE_LEFT
     _panel(close, oblique, scene, f"oblique, leg {shown.upper()}", unit, pixels=700)
     _close_up(close, oblique, leg, unit)
-    best = {view.name: _seen_from(leg, view) for view in _FLAT_VIEWS}
-    most = sorted(_FLAT_VIEWS, key=lambda view: -len(best[view.name]))[:2]
-    for axes, view in zip(panels, [v for v in _FLAT_VIEWS if v in most], strict=True):
+    best = [int(np.argmax([_faces(joint, view) for view in _FLAT_VIEWS])) for joint in leg.joints]
+    most = sorted(range(len(_FLAT_VIEWS)), key=lambda k: -best.count(k))[:2]
+    for axes, k in zip(panels, sorted(most), strict=True):
+        view = _FLAT_VIEWS[k]
         _panel(axes, view, scene, view.name, unit, pixels=450)
-        _flat_arrows(axes, view, _facing(view, legs, leg), best[view.name], unit)
+        numbers = [number for number, seen_best in enumerate(best) if seen_best == k]
+        _flat_arrows(axes, view, _facing(view, legs, leg), numbers, unit)
     if zero_pose:
         figure.supxlabel(
             textwrap.fill(f"Zero pose: {zero_pose}", 140), x=0.012, ha="left", fontsize=8.5
         )
     return figure
-
-
-def _seen_from(leg: Leg, view: View) -> list[int]:
-    """Joints of a leg, of all the flat views, best shown by this one."""
-    seen = []
-    for number, joint in enumerate(leg.joints):
-        along = [_faces(joint, one) for one in _FLAT_VIEWS]
-        if _FLAT_VIEWS[int(np.argmax(along))] is view:
-            seen.append(number)
-    return seen
 
 
 def _faces(joint: JointMark, view: View) -> float:
@@ -121,14 +104,8 @@ def _facing(view: View, legs: Sequence[Leg], leg: Leg) -> list[Leg]:
         near = [one for one in legs if one.joints[0].position[1] < 0]
         return near or list(legs)
     mirror = leg.joints[0].position * np.array([1.0, -1.0, 1.0])
-    return [
-        leg,
-        *(
-            one
-            for one in legs
-            if one is not leg and np.allclose(one.joints[0].position, mirror, atol=1e-3)
-        ),
-    ]
+    others = [one for one in legs if one is not leg]
+    return [leg, *(o for o in others if np.allclose(o.joints[0].position, mirror, atol=1e-3))]
 
 
 def _panel(
@@ -155,8 +132,12 @@ def _close_up(axes: Axes, view: View, leg: Leg, unit: float) -> None:
     order = sorted(range(len(leg.joints)), key=lambda k: -points[k, 1])
     for number, joint in enumerate(leg.joints):
         color = JOINT_COLORS[number % len(JOINT_COLORS)]
-        axis_line(axes, view, joint, color, 0.18 * unit)
-        _arrow(axes, view, joint, color, unit)
+        tail, tip = _along(view, joint, -0.6 * 0.18 * unit, 0.18 * unit)
+        if np.hypot(*(tip - tail)) >= 0.2 * 0.18 * unit:
+            dashes = (0, (6, 2, 1, 2))
+            look: dict[str, Any] = {"head": (0.15, 0.35), "width": 0.9, "linestyle": dashes}
+            arrow(axes, tip, tail, color, zorder=6, **look)
+        _joint_arrow(axes, view, joint, color, 0.083 * unit)
         at = (left + 0.02 * unit, top + step * (len(order) - order.index(number)))
         side = 1.0 if points[number, 0] > middle[0] - 0.5 * half else 0.1
         axes.annotate(
@@ -176,11 +157,31 @@ def _close_up(axes: Axes, view: View, leg: Leg, unit: float) -> None:
     axes.set_ylim(low[1] - 0.13 * unit, top + step * (len(order) + 0.7))
 
 
-def _arrow(
-    axes: Axes, view: View, joint: JointMark, color: str, unit: float
-) -> tuple[float, float]:
-    draw = sliding_arrow if joint.slides else rotation_arrow
-    return draw(axes, view, joint, color, 0.083 * unit)
+def _along(view: View, joint: JointMark, start: float, end: float) -> Array:
+    """Two points on a joint's axis, so far from the joint [m], in the image, shape (2, 2)."""
+    return view.project(joint.position + np.array([[start], [end]]) * joint.axis)[:, :2]
+
+
+def _joint_arrow(axes: Axes, view: View, joint: JointMark, color: str, size: float) -> None:
+    """A circular arrow around a joint's axis in its positive sense; of a sliding one a straight."""
+    if joint.slides:
+        tail, tip = _along(view, joint, -size, size)
+        arrow(axes, tip, tail, color, width=2.2)
+        return
+    # Start the arc where it is lowest in the image, so that all arcs of a view open alike.
+    up = view.axes[1]
+    first = up - (up @ joint.axis) * joint.axis
+    if np.linalg.norm(first) < 1e-6:
+        first = view.axes[0] - (view.axes[0] @ joint.axis) * joint.axis
+    first /= np.linalg.norm(first)
+    second = np.cross(joint.axis, first)
+    angle = np.radians(np.linspace(-215, 55, 60))[:, None]
+    circle = joint.position + size * (np.cos(angle) * first + np.sin(angle) * second)
+    seen = view.project(circle)[:, :2]
+    axes.plot(*seen[:-4].T, color=color, linewidth=1.5, zorder=7, solid_capstyle="butt")
+    arrow(axes, seen[-1], seen[-6], color)
+    centre = view.project(joint.position)[:2]
+    axes.plot(*centre, marker="o", markersize=3.2, color=color, zorder=7)
 
 
 def _flat_arrows(
@@ -192,10 +193,10 @@ def _flat_arrows(
             if number >= len(leg.joints) or _faces(leg.joints[number], view) < 0.5:
                 continue
             color = JOINT_COLORS[number % len(JOINT_COLORS)]
-            x, y = _arrow(axes, view, leg.joints[number], color, unit)
+            _joint_arrow(axes, view, leg.joints[number], color, 0.083 * unit)
             axes.annotate(
                 f"{number + 1}",
-                (x, y),
+                view.project(leg.joints[number].position)[:2],
                 xytext=(0, 5),
                 textcoords="offset points",
                 ha="center",

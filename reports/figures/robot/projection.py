@@ -1,4 +1,4 @@
-"""Orthographic views of boxes, spheres and meshes, hidden surfaces removed, one lamp, edges drawn.
+"""Orthographic views of triangles, hidden surfaces removed, one lamp, edges drawn.
 
 A depth buffer decides pixel by pixel what is in front; it is exact where bodies touch or enter one
 another, which sorting polygons is not.
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.figures.robot.solids import Mesh, Primitive, Solid
+from reports.figures.robot.solids import Solid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +61,7 @@ OBLIQUE_LEFT = camera("oblique, from the left", (1.0, 1.35, 0.85))
 
 def extent(view: View, scene: Sequence[Solid]) -> tuple[Array, Array]:
     """Lower left and upper right corner of a scene in the image, each of shape (2,) [m]."""
-    seen = view.project(np.concatenate([solid.points for solid in scene]))[:, :2]
+    seen = view.project(np.concatenate([solid.corners for solid in scene]))[:, :2]
     return seen.min(axis=0), seen.max(axis=0)
 
 
@@ -81,12 +81,7 @@ def draw_scene(
     step = float((high - low).max()) / (pixels * _OVERSAMPLED)
     canvas = _Canvas(low - 4 * step, high + 4 * step, step)
     for solid in scene:
-        if isinstance(solid, Mesh):
-            canvas.mesh(view, solid)
-        elif solid.sphere:
-            canvas.sphere(view, solid)
-        else:
-            canvas.box(view, solid)
+        canvas.draw(view, solid)
     image = canvas.picture()
     image[..., :3] += fade * (1 - image[..., :3])
     axes.imshow(image, extent=canvas.extent, origin="lower", zorder=2, interpolation="antialiased")
@@ -114,56 +109,22 @@ class _Canvas:
         right = left + self.x.size * self.step
         return float(left), float(right), float(bottom), float(bottom + self.y.size * self.step)
 
-    def box(self, view: View, box: Primitive) -> None:
-        """The three faces at most that look at the viewer."""
-        rotation, centre = view.axes @ box.placement[:3, :3], view.project(box.placement[:3, 3])
-        for k in range(3):
-            facing = rotation[2, k]
-            if abs(facing) < 1e-6:
-                continue
-            normal = np.sign(facing) * rotation[:, k]
-            sides = [rotation[:, i] * box.size[i] / 2 for i in range(3) if i != k]
-            middle = centre + normal * box.size[k] / 2
-            reach = np.abs(sides).sum(axis=0)
-            rows, columns = self._window(middle - reach, middle + reach)
-            u, v = (side.tolist() for side in sides)
-            dx = self.x[columns][None, :] - float(middle[0])
-            dy = self.y[rows][:, None] - float(middle[1])
-            det = u[0] * v[1] - u[1] * v[0]
-            a = (dx * v[1] - dy * v[0]) / det
-            b = (dy * u[0] - dx * u[1]) / det
-            inside = (np.abs(a) <= 1) & (np.abs(b) <= 1)
-            depth = float(middle[2]) + a * u[2] + b * v[2]
-            color = np.broadcast_to(_shaded(box.color, normal), (*depth.shape, 3))
-            self._cover(rows, columns, inside, depth, color)
-
-    def sphere(self, view: View, ball: Primitive) -> None:
-        """A ball, shaded round."""
-        centre, radius = view.project(ball.placement[:3, 3]), float(ball.size[0]) / 2
-        rows, columns = self._window(centre - radius, centre + radius)
-        dx = (self.x[columns][None, :] - float(centre[0])) / radius
-        dy = (self.y[rows][:, None] - float(centre[1])) / radius
-        rest = 1 - dx * dx - dy * dy
-        dz = np.sqrt(np.maximum(rest, 0))
-        normal = np.stack(np.broadcast_arrays(dx, dy, dz), axis=-1)
-        self._cover(
-            rows, columns, rest >= 0, float(centre[2]) + radius * dz, _shaded(ball.color, normal)
-        )
-
-    def mesh(self, view: View, mesh: Mesh) -> None:
-        """Triangles, both of their sides, shaded flat; one line around them all."""
-        corners = view.project(mesh.points)[mesh.faces]  # (F, 3 corners, 3)
+    def draw(self, view: View, solid: Solid) -> None:
+        """Triangles, seen from both sides, shaded flat; a line around each side of the solid."""
+        corners = view.project(solid.points)[solid.faces]  # (F, 3 corners, 3)
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         facing = normal[:, 2]  # twice the area that is seen, signed
-        shown = np.abs(facing) > 1e-4 * self.step**2
+        area = np.abs(facing) if solid.kind == "mesh" else facing  # others hide their own backs
+        shown = area > 1e-4 * self.step**2
         corners, normal, facing = corners[shown], normal[shown], facing[shown]
         color = normal * (np.sign(facing) / np.linalg.norm(normal, axis=1))[:, None]
-        color = _shaded(mesh.colors[shown], color).astype(np.float32)
+        color = _shaded(solid.colors[shown], color).astype(np.float32)
         slope = -normal[:, :2] / facing[:, None] * self.step  # of the depth, per sample
         flat = (corners[..., :2] - self.low) / self.step - 0.5  # in samples
         first = np.maximum(np.ceil(flat[..., 1].min(axis=1)), 0).astype(int)
         last = np.minimum(np.floor(flat[..., 1].max(axis=1)), self.y.size - 1).astype(int)
-        self.surfaces += 1
+        side = self.surfaces + 1 + solid.sides[shown]
+        self.surfaces += 1 + int(solid.sides.max())
         rows = np.maximum(last - first + 1, 0)
         which = np.repeat(np.arange(rows.size), rows)
         y = first[which] + _counted_up(rows)
@@ -172,28 +133,18 @@ class _Canvas:
         at = flat[which, 0]
         depth = corners[which, 0, 2] + slope[which, 0] * (begin - at[:, 0])
         depth += slope[which, 1] * (y - at[:, 1])
-        self._runs(y, begin, np.maximum(end - begin + 1, 0), depth, slope[which, 0], color[which])
-
-    def _runs(
-        self,
-        y: NDArray[np.intp],
-        begin: NDArray[np.intp],
-        length: NDArray[np.intp],
-        depth: Array,
-        slope: Array,
-        color: NDArray[np.float32],
-    ) -> None:
-        """Runs of samples along rows, each of one colour and of a depth that grows by a slope."""
-        which = np.repeat(np.arange(length.size), length)
-        along = _counted_up(length)
-        at = (y * self.x.size + begin)[which] + along
-        near = (depth[which] + slope[which] * along).astype(np.float32)
-        seen = np.flatnonzero(near > self.depth.ravel()[at] + _TOUCHING)
-        seen = seen[np.argsort(near[seen], kind="stable")]  # the nearest last: it stays
-        at = at[seen]
-        self.depth.reshape(-1)[at] = near[seen]
-        self.color.reshape(-1, 3)[at] = color[which[seen]]
-        self.surface.reshape(-1)[at] = self.surfaces
+        # Runs of samples along rows, each of one face and of a depth that grows by a slope.
+        run = np.repeat(np.arange(y.size), np.maximum(end - begin + 1, 0))
+        along = _counted_up(np.maximum(end - begin + 1, 0))
+        sample = (y * self.x.size + begin)[run] + along
+        near = (depth[run] + slope[which, 0][run] * along).astype(np.float32)
+        seen = np.flatnonzero(near > self.depth.ravel()[sample] + _TOUCHING)
+        if solid.kind == "mesh":
+            seen = seen[np.argsort(near[seen], kind="stable")]  # the nearest last: it stays
+        sample, face = sample[seen], which[run[seen]]
+        self.depth.reshape(-1)[sample] = near[seen]
+        self.color.reshape(-1, 3)[sample] = color[face]
+        self.surface.reshape(-1)[sample] = side[face]
 
     def picture(self) -> Array:
         """Red, green, blue and opacity, with a dark line where one surface ends."""
@@ -216,21 +167,6 @@ class _Canvas:
         cover = averaged(opaque)
         mixed = averaged(color * opaque) / np.maximum(cover, 1e-9)
         return np.concatenate([mixed, cover], axis=-1)
-
-    def _window(self, low: Array, high: Array) -> tuple[slice, slice]:
-        first = np.floor((low[:2] - self.low) / self.step).astype(int)
-        last = np.ceil((high[:2] - self.low) / self.step).astype(int) + 1
-        first = np.maximum(first, 0)
-        return slice(first[1], max(last[1], 0)), slice(first[0], max(last[0], 0))
-
-    def _cover(
-        self, rows: slice, columns: slice, inside: NDArray[np.bool_], depth: Array, color: Array
-    ) -> None:
-        self.surfaces += 1
-        nearer = inside & (depth > self.depth[rows, columns] + _TOUCHING)
-        self.depth[rows, columns][nearer] = depth[nearer]
-        self.color[rows, columns][nearer] = color[nearer]
-        self.surface[rows, columns][nearer] = self.surfaces
 
 
 def _counted_up(counts: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -263,11 +199,12 @@ def _spans(
         )
     crossed = low <= high
     low, high = np.where(crossed, low, 0.0), np.where(crossed, high, -1.0)
-    return np.ceil(low).astype(np.intp), np.floor(high).astype(np.intp)
+    # Samples on an edge, which may be that of two faces, belong to both.
+    return np.ceil(low - 1e-6).astype(np.intp), np.floor(high + 1e-6).astype(np.intp)
 
 
-def _shaded(color: tuple[float, float, float] | Array, normal: Array) -> Array:
+def _shaded(color: Array, normal: Array) -> Array:
     """Lambert's law with some ambient light; lightened, so that labels stay legible on top."""
     light = 0.66 + 0.34 * np.maximum(0.0, normal @ _LAMP)
-    shaded: Array = (0.22 + 0.78 * np.asarray(color)) * light[..., None]
+    shaded: Array = (0.22 + 0.78 * color) * light[..., None]
     return np.clip(shaded, 0, 1)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.errors import FigureError
 from reports.figures.robot.dimensions import (
     flat_links,
     front_dimensions,
@@ -18,8 +17,7 @@ from reports.figures.robot.dimensions import (
 )
 from reports.figures.robot.projection import FRONT, OBLIQUE, SIDE, TOP, View, draw_scene, extent
 from reports.figures.robot.solids import Leg, Solid, reach
-from reports.figures.robot.sticks import with_sticks
-from reports.figures.style import BLUE, GREEN, INK, QUIET, VERMILION, headline, new_figure, styled
+from reports.figures.style import BLUE, GREEN, INK, QUIET, VERMILION, house_style, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +26,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@styled
+@house_style()
 def robot_figure(
     scene: Sequence[Solid],
     legs: Sequence[Leg],
@@ -45,16 +43,9 @@ def robot_figure(
         title: First line.
         subtitle: Second line.
         mass_centre: Centre of mass in the world, shape (3,) [m].
-
-    Raises:
-        FigureError: Nothing to draw.
     """
-    if not legs:
-        raise FigureError(f"'{title}': no leg to draw")
-    scene, remark = with_sticks(scene, legs)
     unit = reach(scene)
-    figure = new_figure(8.4)
-    headline(figure, title, "; ".join(words for words in (subtitle, remark) if words))
+    figure = new_figure(8.4, title, subtitle)
     ((oblique, above), (ahead, beside)) = figure.subplots(
         2, 2, height_ratios=[1.25, 1.0], width_ratios=[1.0, 1.15]
     )
@@ -99,7 +90,7 @@ def _name_legs(
     oblique: Axes, above: Axes, scene: Sequence[Solid], legs: Sequence[Leg], unit: float
 ) -> None:
     """Names at the feet; of far legs above all that may hide them."""
-    outlines = OBLIQUE.project(np.concatenate([solid.points for solid in scene]))[:, :2]
+    outlines = OBLIQUE.project(np.concatenate([solid.corners for solid in scene]))[:, :2]
     for leg in legs:
         at = OBLIQUE.project(leg.foot)[:2] - [0, 0.06 * unit]
         if leg.foot[1] > 0:  # the trunk may hide a far foot, but not what lies above it

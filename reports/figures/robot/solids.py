@@ -1,62 +1,100 @@
-"""What a picture of a robot is made of: boxes, spheres and meshes in the world, and joints."""
+"""What a picture of a robot is made of: coloured triangles in the world, joints and legs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.errors import FigureError
-
 Array = NDArray[np.float64]
+Color = tuple[float, float, float]
+#: Of what has no colour of its own.
+GREY: Color = (0.6, 0.6, 0.6)
 _CORNERS = np.array([[i, j, k] for i in (-0.5, 0.5) for j in (-0.5, 0.5) for k in (-0.5, 0.5)])
+_SIDES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+_SLENDER = 0.03  # thickness of a stick over the leg's length
 
 
 @dataclass(frozen=True)
-class Primitive:
-    """A box or a sphere somewhere in the world.
+class Solid:
+    """A surface of triangles.
 
     Attributes:
-        link: The link it belongs to.
-        color: Red, green, blue from 0 to 1.
-        placement: Of its centre in the world, homogeneous, shape (4, 4) [m].
-        size: Edge lengths of a box, shape (3,) [m]; for a sphere its diameter three times.
-        sphere: Whether it is a sphere.
-    """
-
-    link: str
-    color: tuple[float, float, float]
-    placement: Array
-    size: Array
-    sphere: bool
-
-    @property
-    def points(self) -> Array:
-        """Corners of the box around it in the world, shape (8, 3) [m]."""
-        return (self.size * _CORNERS) @ self.placement[:3, :3].T + self.placement[:3, 3]
-
-
-@dataclass(frozen=True)
-class Mesh:
-    """Triangles somewhere in the world.
-
-    Attributes:
-        link: The link it belongs to.
-        points: Its vertices in the world, shape (V, 3) [m].
+        kind: ``"box"``, ``"sphere"`` or ``"mesh"``.
+        points: Vertices, shape (V, 3) [m].
         faces: Rows of `points`, shape (F, 3).
         colors: Of each face, red, green, blue from 0 to 1, shape (F, 3).
+        sides: Number of the side to which each face belongs; a line is drawn around each, shape
+            (F,).
+        corners: Points within which it lies: of a box or sphere those of the box around it (x
+            counts slowest), of a mesh its vertices, shape (P, 3) [m].
+        body: Number of the rigid body that carries it.
     """
 
-    link: str
+    kind: str
     points: Array
     faces: NDArray[np.intp]
     colors: Array
+    sides: NDArray[np.intp]
+    corners: Array
+    body: int = 0
+
+    def moved(self, placement: Array) -> Solid:
+        """The same elsewhere.
+
+        Args:
+            placement: Homogeneous, shape (4, 4) [m].
+        """
+        turn, shift = placement[:3, :3].T, placement[:3, 3]
+        points = self.points @ turn + shift
+        corners = points if self.kind == "mesh" else self.corners @ turn + shift
+        return replace(self, points=points, corners=corners)
 
 
-#: Anything with a surface.
-Solid = Primitive | Mesh
+def box(size: Array, color: Color = GREY) -> Solid:
+    """A box about the origin, of edge lengths of shape (3,) [m]."""
+    corners = _CORNERS * size
+    faces = np.array([half for a, b, c, d in _SIDES for half in ((a, b, c), (a, c, d))])
+    sides = np.repeat(np.arange(6), 2)
+    return Solid("box", corners, faces, np.tile(color, (12, 1)), sides, corners)
+
+
+def mesh(points: Array, faces: NDArray[np.intp], colors: Array | Color = GREY) -> Solid:
+    """Triangles with a colour of each, or one of all."""
+    colors = np.broadcast_to(np.asarray(colors, float), (len(faces), 3))
+    return Solid("mesh", points, faces, colors, np.zeros(len(faces), dtype=np.intp), points)
+
+
+def cylinder(radius: float, length: float, color: Color = GREY) -> Solid:
+    """A cylinder about the z axis, centred at the origin [m]."""
+    half = length / 2
+    return mesh(*_turned([0, radius, radius, 0], [-half, -half, half, half], 32), color)
+
+
+def sphere(radius: float, color: Color = GREY) -> Solid:
+    """A ball about the origin, of a radius [m]."""
+    angle = np.linspace(0, np.pi, 37)
+    ball = mesh(*_turned(radius * np.sin(angle), -radius * np.cos(angle), 72), color)
+    return replace(ball, kind="sphere", corners=2 * radius * _CORNERS)
+
+
+def _turned(
+    radius: Sequence[float] | Array, z: Sequence[float] | Array, count: int
+) -> tuple[Array, NDArray[np.intp]]:
+    """Vertices and faces of the surface that a line from the lower to the upper end sweeps."""
+    angle = 2 * np.pi * np.arange(count) / count
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.ones(count)])
+    points = np.concatenate([ring * [r, r, height] for r, height in zip(radius, z, strict=True)])
+    i = np.arange(count)
+    j = (i + 1) % count
+    strip = np.concatenate(
+        [np.column_stack([i, j, j + count]), np.column_stack([i, j + count, i + count])]
+    )
+    return points, np.concatenate([strip + count * k for k in range(len(points) // count - 1)])
 
 
 @dataclass(frozen=True)
@@ -68,14 +106,12 @@ class JointMark:
         position: Origin in the world, shape (3,) [m].
         axis: Unit vector in the world, shape (3,); positive rotation is right-handed about it,
             positive sliding along it.
-        links: Those that it carries, its own child and what is fixed to that.
         slides: Whether it is prismatic.
     """
 
     name: str
     position: Array
     axis: Array
-    links: frozenset[str] = frozenset()
     slides: bool = False
 
 
@@ -93,33 +129,77 @@ class Leg:
     joints: tuple[JointMark, ...]
     foot: Array
 
+    @property
+    def links(self) -> list[tuple[Array, Array]]:
+        """Both ends of each link in the world, shape (3,) each [m]."""
+        return list(pairwise([*(joint.position for joint in self.joints), self.foot]))
 
-def legs_of(
-    names: Mapping[str, tuple[Sequence[str], str]],
-    marks: Sequence[JointMark],
-    links: Mapping[str, Array],
-) -> list[Leg]:
-    """Gather legs from joint marks and link placements.
+    @property
+    def length(self) -> float:
+        """Of all links together [m]."""
+        return sum(float(np.linalg.norm(b - a)) for a, b in self.links)
+
+
+def sticks(leg: Leg, legs: Sequence[Leg], bodies: Sequence[int]) -> list[Solid]:
+    """Sticks from the middle of the trunk through a leg's joints to its foot.
 
     Args:
-        names: Leg to (its joints' names from the base outward, its foot link).
-        marks: From `visuals.joint_marks`.
-        links: Link name to placement, shape (4, 4) [m].
-
-    Raises:
-        FigureError: A joint or foot that is not there.
+        leg: The leg, of which the URDF shows nothing.
+        legs: All legs, whose first joints are around the middle of the trunk.
+        bodies: Numbers of the bodies that carry each stick, from the trunk outward.
     """
-    by_name = {mark.name: mark for mark in marks}
-    legs = []
-    for leg, (joints, foot) in names.items():
-        lacking = [joint for joint in joints if joint not in by_name]
-        if lacking or foot not in links:
-            raise FigureError(f"leg '{leg}': '{(lacking or [foot])[0]}' is not placed")
-        legs.append(Leg(leg, tuple(by_name[j] for j in joints), links[foot][:3, 3]))
-    return legs
+    centre = np.mean([one.joints[0].position for one in legs], axis=0)
+    ends = [(centre, leg.joints[0].position), *leg.links]
+    thick = _SLENDER * sum(float(np.linalg.norm(b - a)) for a, b in ends)
+    return [
+        replace(_stick(a, b, thick), body=body)
+        for body, (a, b) in zip(bodies, ends, strict=True)
+        if np.linalg.norm(b - a) > 1e-9
+    ]
+
+
+def _stick(a: Array, b: Array, thick: float) -> Solid:
+    length = float(np.linalg.norm(b - a))
+    along = (b - a) / length
+    side = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])  # any that is not along it
+    side /= np.linalg.norm(side)
+    placement = np.eye(4)
+    placement[:3, :3] = np.column_stack([side, np.cross(along, side), along])
+    placement[:3, 3] = (a + b) / 2
+    return box(np.array([thick, thick, length + thick])).moved(placement)
 
 
 def reach(scene: Sequence[Solid]) -> float:
     """Size of a robot: the longest edge of the box around it [m]."""
-    points = np.concatenate([solid.points for solid in scene])
-    return float(np.ptp(points, axis=0).max())
+    return float(np.ptp(np.concatenate([solid.corners for solid in scene]), axis=0).max())
+
+
+def outline(points: Array) -> Array:
+    """Corners of the convex hull of points in a plane, counter-clockwise, shape (P, 2)."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    points = np.unique(np.round(points, 6), axis=0)
+    try:
+        corners: Array = points[ConvexHull(points).vertices]
+    except (QhullError, ValueError):
+        return points[[0, -1]] if len(points) > 1 else points
+    first = int(np.lexsort(corners.T[::-1])[0])
+    return np.roll(corners, -first, axis=0)
+
+
+def hull_points(points: Array, cell: float) -> Array:
+    """Corners of the convex hull of points in space, those within one cell drawn into one.
+
+    Args:
+        points: Shape (P, 3) [m].
+        cell: [m].
+
+    Returns:
+        Shape (Q, 3) [m]; all points where they have no hull.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    with suppress(QhullError, ValueError):
+        points = points[ConvexHull(points).vertices]
+    _, first = np.unique(np.round(points / cell).astype(np.int64), axis=0, return_index=True)
+    return points[np.sort(first)]

@@ -13,13 +13,20 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.api.pictures.cycle import Cycle, arrow, quaternions, towards, triangles
-from pipeline.api.pictures.player import Player, viser_module
-from pipeline.api.pictures.scene import Scenery
-from pipeline.api.pictures.view import cycle
+from pipeline.api.pictures.scene import Scene
+from pipeline.api.pictures.view import (
+    Player,
+    arrow,
+    quaternions,
+    towards,
+    triangles,
+    viser_module,
+)
+from pipeline.api.pictures.walk import rows_of_steps, steps_of
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking, walk
 from reports.errors import ReportError
+from reports.figures.robot.steps import Steps
 from tests.command_line import exit_code
 from tests.reports import browser
 
@@ -32,8 +39,8 @@ def walking(hexapod: Robot) -> Walking:
 
 
 @pytest.fixture(scope="module")
-def played(hexapod: Robot, walking: Walking) -> Cycle:
-    return cycle(Scenery(hexapod), walking, COUNT)
+def played(hexapod: Robot, walking: Walking) -> Steps:
+    return steps_of(Scene(hexapod), walking, COUNT)
 
 
 def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
@@ -42,31 +49,28 @@ def rotated(quaternion: np.ndarray, vector: np.ndarray) -> np.ndarray:
 
 
 def test_bodies_are_carried_to_where_pinocchio_has_them(
-    hexapod: Robot, walking: Walking, played: Cycle
+    hexapod: Robot, walking: Walking, played: Steps
 ) -> None:
-    from pipeline.api.pictures.gait import rows_of_steps
-
-    scenery = Scenery(hexapod)
-    _, q = rows_of_steps(walking, COUNT)
-    k = 5
-    solids = {id(s): s for s in scenery.at(q[k])[0]}
-    expected = sorted(tuple(np.round(s.points.mean(axis=0), 6)) for s in solids.values())
+    scene, k = Scene(hexapod), 5
+    segment, sample = rows_of_steps(walking, COUNT)[k]
+    solids = scene.at(walking.motion.segments[segment].configuration[sample])[0]
+    expected = sorted(tuple(np.round(s.points.mean(axis=0), 6)) for s in solids)
     found = []
     for body in played.bodies:
         for solid in body.solids:
             centre = solid.points.mean(axis=0)
-            moved = body.rotation[k] @ centre + body.position[k] + played.steps.origin[k]
+            moved = body.rotation[k] @ centre + body.position[k] + played.origin[k]
             found.append(tuple(np.round(moved, 6)))
     np.testing.assert_allclose(sorted(found), expected, atol=1e-6)
 
 
 def test_surfaces_become_triangles_with_their_colours(hexapod: Robot) -> None:
-    scenery = Scenery(hexapod)
-    (trunk,) = (s for s in scenery.at(scenery.zero)[0] if s.link == "base_link")
+    scene = Scene(hexapod)
+    trunk = next(s for s in scene.at(scene.zero)[0] if s.body == 1)
     mesh = triangles([trunk])
     assert len(mesh.faces) == 12
     np.testing.assert_allclose(mesh.bounds, [trunk.points.min(axis=0), trunk.points.max(axis=0)])
-    np.testing.assert_allclose(mesh.visual.face_colors[0, :3] / 255, trunk.color, atol=0.01)
+    np.testing.assert_allclose(mesh.visual.face_colors[0, :3] / 255, trunk.colors[0], atol=0.01)
 
 
 def test_arrows_point_along_the_force() -> None:
@@ -96,13 +100,13 @@ def stub() -> tuple[ModuleType, MagicMock]:
 
 
 def test_each_step_shows_bodies_forces_and_torques(
-    played: Cycle, monkeypatch: pytest.MonkeyPatch
+    played: Steps, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     module, server = stub()
     monkeypatch.setitem(sys.modules, "viser", module)
-    player = Player(played, "127.0.0.1", 8080)
+    player = Player("title", played, "127.0.0.1", 8080)
     assert player.address == "http://127.0.0.1:8080"
-    steps = played.steps
+    steps = played
     lengths = {}
     for k in (0, 3):
         player.show(k)
@@ -125,11 +129,11 @@ def test_each_step_shows_bodies_forces_and_torques(
 @pytest.mark.slow
 @browser.needs_chromium
 def test_a_browser_shows_the_robot(
-    played: Cycle, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    played: Steps, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The picture of a page with the robot differs from that of the same page without it."""
     pytest.importorskip("viser", reason="the package viser is missing; `make view` installs it")
-    player = Player(played, "127.0.0.1", 8080)
+    player = Player("title", played, "127.0.0.1", 8080)
     pictures = []
     try:
         for shown in (True, False):
@@ -179,12 +183,12 @@ def test_view_walks_what_walk_walks(
     """Gait file, changed numbers, rule and friction of the ground's forces reach the picture."""
     monkeypatch.setitem(sys.modules, "viser", stub()[0])
     monkeypatch.setattr(Player, "play", lambda _: None)
-    seen: list[Cycle] = []
+    seen: list[tuple[str, Steps]] = []
     begin = Player.__init__
 
-    def kept(player: Player, cycle: Cycle, host: str, port: int) -> None:
-        seen.append(cycle)
-        begin(player, cycle, host, port)
+    def kept(player: Player, title: str, steps: Steps, host: str, port: int) -> None:
+        seen.append((title, steps))
+        begin(player, title, steps, host, port)
 
     monkeypatch.setattr(Player, "__init__", kept)
     gait = tmp_path / "wave.toml"
@@ -192,13 +196,13 @@ def test_view_walks_what_walk_walks(
     options = ["view", "--gait", str(gait), "--set", "gait.slope_forward=5 deg", "--samples", "51"]
     assert exit_code(options) == 0
     assert exit_code([*options, "--forces", "least_torque"]) == 0
-    paper, other = seen
-    assert "wave" in paper.title
+    (title, paper), (_, other) = seen
+    assert "wave" in title
     assert paper.ground[0] == pytest.approx(-np.sin(np.radians(5)))
-    along = paper.steps.origin[-1] - paper.steps.origin[0]
+    along = paper.origin[-1] - paper.origin[0]
     assert along[1] > 10 * abs(along[0])
-    change = np.abs(other.steps.force - paper.steps.force).max()
-    assert change > 0.1 * np.abs(paper.steps.force).max()
+    change = np.abs(other.force - paper.force).max()
+    assert change > 0.1 * np.abs(paper.force).max()
     capsys.readouterr()
     assert exit_code([*options, "--friction-coefficient", "0.01"]) == 1
     assert "slides" in capsys.readouterr().err

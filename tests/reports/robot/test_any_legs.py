@@ -12,25 +12,21 @@ import pytest
 from actuators.elements.motor import DCMotor
 from actuators.energy.energy import StageEnergy
 from actuators.shaft import ShaftSeries
-from pipeline.api.pictures.scene import Scenery
+from pipeline.api.pictures.scene import Scene
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.errors import FigureError
-from reports.figures.energy.all_legs import (
-    LegsStretch,
-    ground_forces_figure,
-    joint_torques_figure,
-)
+from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
 from reports.figures.energy.electrical_energy import electrical_energy_figure
-from reports.figures.energy.joint_demand import Stretch, joint_demand_figure
 from reports.figures.energy.motor_limits import motor_limits_figure
 from reports.figures.energy.stage_energy import stage_energy_figure
-from reports.figures.robot.gait_view import GaitStretch, gait_figure
+from reports.figures.robot.gait_view import gait_figure
 from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.robot_view import robot_figure
-from reports.figures.robot.solids import JointMark, Leg
+from reports.figures.robot.solids import JointMark, Leg, sticks
+from reports.figures.stretch import Stretch
 from reports.figures.style import number
 from tests.reports import geometry
+from tests.reports.walks import crawl, stretch
 
 X, Y, Z = np.eye(3)
 
@@ -54,12 +50,17 @@ def leg(name: str, x: float, y: float, axes: list[np.ndarray], slides: int | Non
     return Leg(name, marks, np.array([x, y + np.sign(y) * 0.03 * count, 0.0]))
 
 
-def stretch(first: float, joints: int, legs: tuple[str, ...], stance: tuple[str, ...]):
+def drawn(legs: list[Leg]) -> list:
+    return [s for one in legs for s in sticks(one, legs, range(len(one.joints) + 1))]
+
+
+def part(first: float, joints: int, legs: tuple[str, ...], stance: tuple[str, ...]) -> Stretch:
     time = np.linspace(first, first + 1, 11)
     torque = np.sin(time[:, None] + np.arange(joints))
     normal = np.tile([float(one in stance) for one in legs], (11, 1))
     friction = np.where(normal > 0, 0.1, np.nan)
-    return LegsStretch(time, stance, torque, normal, friction, np.full(11, 0.03))
+    given = {"torque": torque, "normal": normal, "friction": friction}
+    return stretch(time, legs, stance, **given, margin=np.full(11, 0.03))
 
 
 @pytest.mark.parametrize(("count", "depth"), [(2, 7), (4, 2), (8, 7)])
@@ -67,7 +68,7 @@ def test_every_joint_has_a_line_in_the_panel_of_its_place(count: int, depth: int
     legs = {f"l{i}": [f"l{i}_{k}" for k in range(depth)] for i in range(count)}
     joints = [joint for own in legs.values() for joint in own]
     names = tuple(legs)
-    parts = [stretch(0, len(joints), names, names), stretch(1, len(joints), names, names[1:])]
+    parts = [part(0, len(joints), names, names), part(1, len(joints), names, names[1:])]
     figure = joint_torques_figure(parts, joints, legs, title="t")
     assert len(figure.axes) == depth
     for k, axes in enumerate(figure.axes):
@@ -82,24 +83,22 @@ def test_every_joint_has_a_line_in_the_panel_of_its_place(count: int, depth: int
 def test_legs_of_unequal_length_and_joints_outside_legs_have_their_place() -> None:
     legs = {"a": ["a1", "a2", "a3"], "b": ["b1", "b2"]}
     joints = ["a1", "a2", "a3", "b1", "b2", "arm"]
-    part = stretch(0, 6, ("a", "b"), ("a",))
-    figure = joint_torques_figure([part], joints, legs, sliding=["a3"], title="t")
+    only = part(0, 6, ("a", "b"), ("a",))
+    figure = joint_torques_figure([only], joints, legs, sliding=["a3"], title="t")
     assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == [
         *("joint 1", "joint 2", "joint 3"),
         "outside legs",
     ]
     curves = [[x for x in axes.lines if len(x.get_xdata()) == 11] for axes in figure.axes]
     assert [len(found) for found in curves] == [2, 2, 1, 1]
-    np.testing.assert_array_equal(curves[3][0].get_ydata(), part.torque[:, 5])
+    np.testing.assert_array_equal(curves[3][0].get_ydata(), only.torque[:, 5])
     assert "force [N]" in figure.axes[2].get_ylabel()
     assert "arm" in texts(figure.legends[0])
-    with pytest.raises(FigureError, match="'b2'"):
-        joint_torques_figure([part], joints[:4], legs, title="t")
 
 
 def test_ground_forces_state_the_least_margin() -> None:
     legs = ("a", "b", "c", "d")
-    parts = [stretch(0, 1, legs, legs), stretch(1, 1, legs, legs[1:])]
+    parts = [part(0, 1, legs, legs), part(1, 1, legs, legs[1:])]
     figure = ground_forces_figure(parts, legs, title="t")
     assert len(figure.axes) == 3
     assert any("least margin 30 mm" in word for word in texts(figure))
@@ -130,24 +129,6 @@ def test_energy_figures_hold_up_to_seven_joints(joints: int) -> None:
         assert geometry.overlapping(figure) == []
 
 
-def test_a_sliding_joint_has_metres_and_newtons() -> None:
-    part = Stretch(np.linspace(0, 1, 5), np.full(5, 0.1), np.full(5, 30.0), True)
-    words = texts(joint_demand_figure("j", [part], slides=True))
-    assert "velocity [m/s]" in words
-    assert "force [N]" in words
-
-
-def test_phases_in_a_row_are_named_once() -> None:
-    t = np.linspace(0, 1, 5)
-    kinds = (True, True, True, False, True)
-    parts = [Stretch(t + k, np.full(5, 0.1), np.full(5, 3.0), s) for k, s in enumerate(kinds)]
-    figure = joint_demand_figure("j", parts)
-    assert [w for w in texts(figure) if w in ("support", "transfer")] == [
-        *("support", "transfer", "support")
-    ]
-    assert len(figure.axes[0].patches) == 2
-
-
 @pytest.mark.parametrize(
     ("axes", "views"),
     [
@@ -161,7 +142,7 @@ def test_directions_are_shown_from_the_ends_of_the_axes(
     axes: list[np.ndarray], views: list[str]
 ) -> None:
     legs = [leg(n, x, y, axes) for n, x, y in (("fr", 0.3, -0.2), ("fl", 0.3, 0.2))]
-    figure = joint_directions_figure([], legs, "fl", title="t")
+    figure = joint_directions_figure(drawn(legs), legs, "fl", title="t")
     shown = [panel.get_title(loc="left") for panel in figure.axes[1:]]
     assert set(shown) <= {"from ahead", "from above", "from the right"}
     best = {int(np.argmax(np.abs(axis))) for axis in axes}
@@ -179,7 +160,7 @@ def test_directions_are_shown_from_the_ends_of_the_axes(
 
 def test_a_sliding_joint_gets_a_straight_arrow_and_a_word() -> None:
     legs = [leg(n, 0.3, y, [X, Z], slides=1) for n, y in (("r", -0.2), ("l", 0.2))]
-    words = texts(joint_directions_figure([], legs, "r", title="t"))
+    words = texts(joint_directions_figure(drawn(legs), legs, "r", title="t"))
     assert any("straight arrows: positive sliding" in word for word in words)
 
 
@@ -198,28 +179,10 @@ def test_a_robot_of_any_size_is_dimensioned_alike(scale: float, root: Path) -> N
         )
         for one in legs
     ]
-    figure = robot_figure([], scaled, title="t")
+    figure = robot_figure(drawn(scaled), scaled, title="t")
     assert f"{800 * scale:.0f} mm" in texts(figure)
     assert geometry.outside(figure) == []
     assert geometry.overlapping(figure) == []
-
-
-def crawl() -> list[GaitStretch]:
-    """Four feet, one of which swings in each stretch."""
-    legs = ("lf", "rf", "lh", "rh")
-    corners = np.array([[0.3, 0.2], [0.3, -0.2], [-0.3, 0.2], [-0.3, -0.2]])
-    out = []
-    for k in range(4):
-        t = np.linspace(k, k + 1, 21)
-        feet = np.zeros((21, 4, 3))
-        feet[..., :2] = corners
-        phase = (t[:, None] - np.arange(4)) % 4
-        feet[..., 0] += np.where(phase < 1, -0.06 + 0.12 * phase, 0.06 - 0.04 * (phase - 1))
-        feet[:, k, 2] = 0.05 * np.sin(np.pi * (t - k))
-        stance = tuple(name for i, name in enumerate(legs) if i != k)
-        margin = 0.02 + 0.01 * k + 0.01 * np.cos(t)
-        out.append(GaitStretch(t, feet, stance, np.zeros((21, 3)), margin))
-    return out
 
 
 def test_a_gait_of_many_stances_shows_the_least_stable_instant_of_each() -> None:
@@ -228,10 +191,12 @@ def test_a_gait_of_many_stances_shows_the_least_stable_instant_of_each() -> None
     figure = gait_figure(("lf", "rf", "lh", "rh"), parts, shown="rh", body=body, title="t")
     said = [w for w in texts(figure) if w.startswith("least stable")]
     assert len(said) == 4
-    for part in parts:
-        least = f"stability margin {number(1e3 * float(part.margin.min()))} mm"
+    for one in parts:
+        least = f"stability margin {number(1e3 * float(one.margin.min()))} mm"
         assert any(least in word for word in said)
     assert geometry.outside(figure) == []
+    words = texts(figure)
+    assert {"120 mm", "50 mm"} <= set(words)  # stroke and height
 
 
 @pytest.mark.slow
@@ -239,17 +204,17 @@ def test_a_gait_of_many_stances_shows_the_least_stable_instant_of_each() -> None
 def test_nothing_to_object_to_in_any_figure_of_published_robots(root: Path, name: str) -> None:
     from tests.reports.test_geometry_of_run import objections, run
 
-    drawn = run(root / "urdf" / f"{name}.toml")
-    for drawing in drawn.values():
-        assert objections(drawing) == [], drawing.name
-        if not re.match("robot|zero_pose|gait", drawing.name):
-            words = " ".join(texts(drawing.draw()))
+    every = run(root / "urdf" / f"{name}.toml")
+    for figure, draw in every.items():
+        assert objections(draw) == [], figure
+        if not re.match("robot|zero_pose|gait", figure):
+            words = " ".join(texts(draw()))
             assert f"{name}, crawl gait" in words
             assert "paper" not in words
 
 
 def test_the_trunk_seen_from_above_is_an_outline_in_its_own_frame(root: Path) -> None:
-    scenery = Scenery(load_robot(load_robot_file(root / "urdf" / "hexapod.toml")))
-    outline = scenery.trunk_outline()
+    scene = Scene(load_robot(load_robot_file(root / "urdf" / "hexapod.toml")))
+    outline = scene.trunk_outline()
     np.testing.assert_allclose(np.abs(outline).max(axis=0)[0], 0.3, atol=1e-6)
     assert len(outline) == 4

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.api.pictures.gait import gait_steps_of
-from pipeline.api.pictures.robot import robot_drawings
-from pipeline.api.pictures.scene import Scenery
+from pipeline.api.figures import robot_drawings
+from pipeline.api.pictures.scene import Scene
+from pipeline.api.pictures.walk import steps_of, stretches
 from pipeline.motion.gait import gait_of
 from pipeline.motion.payload import with_payload
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.simulation.walk_stand import Walking, stand, walk
-from reports.figures.robot.solids import Primitive
 from reports.pages.gait_words import conditions, gait_and_conditions, pace
 
 LOADED = {
@@ -66,28 +65,25 @@ def walking(loaded: Robot) -> Walking:
 def test_a_payload_is_drawn_where_it_is_and_is_no_part_of_the_trunk(
     hexapod: Robot, loaded: Robot, walking: Walking
 ) -> None:
-    scenery = Scenery(loaded)
-    solids, _ = scenery.at(scenery.zero)
+    scene = Scene(loaded)
+    solids, _ = scene.at(scene.zero)
     ball = solids[-1]
-    assert isinstance(ball, Primitive)
-    assert ball.sphere
-    np.testing.assert_allclose(ball.placement[:3, 3], [0.1, 0.0, 0.15])
-    volume = np.pi / 6 * ball.size[0] ** 3
+    assert ball.kind == "sphere"
+    np.testing.assert_allclose(ball.corners.mean(axis=0), [0.1, 0.0, 0.15])
+    volume = np.pi / 6 * float(np.ptp(ball.corners[:, 0])) ** 3
     assert volume * 7850 == pytest.approx(4.0)
-    np.testing.assert_array_equal(scenery.trunk_outline(), Scenery(hexapod).trunk_outline())
-    steps = gait_steps_of(scenery, walking, 4)
+    np.testing.assert_array_equal(scene.trunk_outline(), Scene(hexapod).trunk_outline())
+    steps = steps_of(scene, walking, 4)
     (load,) = (body for body in steps.bodies if body.load)
     assert not load.leg
-    assert Scenery(hexapod).load is None
+    assert Scene(hexapod).load is None
 
 
 def test_dimensions_are_measured_along_the_ground_on_a_slope_too(
     loaded: Robot, walking: Walking
 ) -> None:
-    (drawing,) = (
-        d for d in robot_drawings(Scenery(loaded), stand(loaded, {}), walking) if d.name == "robot"
-    )
-    figure = drawing.draw()
+    parts = stretches(loaded, walking)
+    figure = robot_drawings(Scene(loaded), stand(loaded, {}), parts)["robot"]()
     said = [t.get_text() for axes in figure.axes for t in axes.texts]
     assert "520 mm" in said  # of the paper's Table I
     assert "296 mm" in said
