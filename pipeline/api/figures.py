@@ -298,20 +298,20 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
         How many figures.
     """
     every: Drawings = {}
-    crossings = {row.subject: row for row in judgement.break_even}
+    crossings = {row.id: row for row in judgement.break_even}
     for subject, words in SUBJECT_TITLES.items():
         curves = [c for c in judgement.per_minute if c.subject == subject]
         share, row = curves[0].fraction, crossings.get(subject)
         mark, note = None, ""
         if row is None:
             note = "no break-even: that is between the reversible and the irreversible actuator"
-        elif np.isnan(row.fraction):
-            note = row.note.split(";")[0]
+        elif np.isnan(row.computed):
+            note = row.remark.split(";")[0]
         else:
             reference = next(c for c in curves if c.alternative == "reversible")
-            energy = float(np.interp(row.fraction, share, reference.energy))
+            energy = float(np.interp(row.computed, share, reference.energy))
             known = row.prior if np.isfinite(row.prior).all() else None
-            mark = BreakEven(row.fraction, energy, known)
+            mark = BreakEven(row.computed, energy, known)
         every[f"energy_per_minute_{subject}"] = partial(
             energy_per_minute_figure,
             share,

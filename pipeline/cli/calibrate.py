@@ -8,10 +8,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.paper.calibration.calibrate import Effort, calibrate
-from pipeline.paper.calibration.machine import MIDDLE_LEGS, POSTURE, ROBOT
 from pipeline.paper.calibration.prior import load_prior
 from pipeline.paper.calibration.store import AT_LEAST, calibrated_numbers, save
 from pipeline.paper.errors import CalibrationError
+from pipeline.paper.hexapod import MIDDLE_LEGS, POSTURE, ROBOT
 from pipeline.robot.robot_file import load_robot_file, read_toml
 
 WORK = Path(".calibration")

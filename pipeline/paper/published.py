@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import csv
-import math
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, Literal, Self
 
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from actuators.checked import Table, checked, finite
 from actuators.errors import UnitError, closest
-from actuators.units import dimension
+from actuators.text_file import UnreadableTextError, read_file, utf8
+from actuators.units import dimension, to_si
 from pipeline.paper.errors import TargetError
 
 PUBLISHED_FILE = Path(__file__).parent / "published_values.csv"
+_LARGEST = 2**20  # [bytes]
 #: What part a printed number plays, and what is said of it.
 ROLES = {
     "input": "put in",
@@ -21,15 +25,64 @@ ROLES = {
     "prediction": "neither put in nor fitted nor a consequence of what was",
     "contradicted": "another printed number contradicts it",
 }
-_COLUMNS = ("id", "where", "quantity", "joint", "unit", "value", "half_width", "role", "note")
+#: Duration of a walking cycle, over which section IV.B adds up [s].
+CYCLE = 3.0
+EVEN = "break_even_standing_fraction"
+#: What walking takes more with the irreversible than with the reversible actuator, which the
+#: printed break-even asks for in other words [J].
+EXTRA = "walking_extra_J"
+#: What the reversible actuator's motor holds at joint 2.
+HELD = "reversible_motor_torque_2"
+#: Alternatives between which the break-even is.
+PAIR = ("reversible", "irreversible")
+ALTERNATIVES = ("ideal", "rotor", *PAIR)
+_KINDS = {"motor_torque": "torque", "current": "current", "voltage": "voltage", "power": "power"}
+_LENGTHS = (
+    *("body_length", "robot_width", "femur_length", "tibia_length"),
+    *("foot_stroke_longitudinal", "foot_stroke_vertical"),
+)
+#: Every id, with the dimension of its unit.
+DIMENSIONS = {
+    **dict.fromkeys(_LENGTHS, "length"),
+    **{"robot_mass": "mass", "walking_speed": "velocity", "gait_period": "time"},
+    **{"transmission_ratio": "ratio", "standing_reaction_rm": "force"},
+    **{f"standing_torque_{j}": "torque" for j in (1, 2, 3)},
+    **{
+        f"{a}_{kind}_{j}": _KINDS[kind] for a in ALTERNATIVES[:3] for kind in _KINDS for j in (2, 3)
+    },
+    **{f"{a}_leg_energy_3s": "energy" for a in ALTERNATIVES},
+    **{f"walking_ratio_{a}": "ratio" for a in ALTERNATIVES[1:]},
+    EVEN: "ratio",
+}
 
 
-@dataclass(frozen=True)
-class Published:
+def _number(text: object) -> float:
+    try:
+        return finite(float(str(text)))
+    except ValueError:
+        raise ValueError(f"'{text}' is not a finite number") from None
+
+
+def _computed(name: str) -> str:
+    if name not in DIMENSIONS:
+        raise ValueError(f"'{name}' is not computed; {closest(name, list(DIMENSIONS))}")
+    return name
+
+
+def _not_negative(number: float) -> float:
+    if number < 0:
+        raise ValueError("must not be negative")
+    return number
+
+
+_Number = Annotated[float, BeforeValidator(_number)]
+
+
+class Published(Table):
     """One printed number.
 
     Attributes:
-        id: Short name.
+        id: Short name, one of `DIMENSIONS`.
         where: Table or section.
         quantity: In words.
         joint: Number of the joint, or empty.
@@ -40,97 +93,70 @@ class Published:
         note: Remark.
     """
 
-    id: str
+    noun = "column"
+    id: Annotated[str, AfterValidator(_computed)]
     where: str
     quantity: str
     joint: str
     unit: str
-    value: float
-    half_width: float
-    role: str
-    note: str
+    value: _Number
+    half_width: Annotated[_Number, AfterValidator(_not_negative)]
+    role: Literal["input", "target", "consequence", "symmetry", "prediction", "contradicted"]
+    note: str = Field(repr=False)
+
+    @model_validator(mode="after")
+    def _unit_fits(self) -> Self:
+        try:
+            found = dimension(self.unit)
+        except UnitError as error:
+            raise ValueError(str(error)) from None
+        if found != DIMENSIONS[self.id]:
+            raise ValueError(
+                f"'{self.unit}' is a unit of {found}, '{self.id}' is one of {DIMENSIONS[self.id]}"
+            )
+        return self
+
+    @property
+    def si(self) -> float:
+        """The printed value in SI units."""
+        return to_si(self.value, self.unit)
+
+    @property
+    def half_width_si(self) -> float:
+        """Its half width in SI units."""
+        return to_si(self.half_width, self.unit)
 
     def reproduced(self, computed: float) -> bool:
-        """Whether a computed value lies within the half width of the printed one."""
+        """Whether a computed value, in `unit`, lies within the half width of the printed one."""
         slack = 1e-9 * max(1.0, abs(self.value))
         return abs(computed - self.value) <= self.half_width + slack
 
 
-def load_published(
-    known: tuple[str, ...], dimensions: dict[str, str], path: Path = PUBLISHED_FILE
-) -> dict[str, Published]:
-    """Read the file of published values.
+def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
+    """Read the printed values, by id.
 
     Args:
-        known: Every id that the model computes; each must be there exactly once.
-        dimensions: Dimension each id must have.
-        path: The file.
+        path: The file; every id of `DIMENSIONS` must be there exactly once.
 
     Raises:
         TargetError: Missing or doubled id, unknown column or role, a unit that does not fit, or a
             number that is none.
     """
     try:
-        with path.open(encoding="utf-8", newline="") as file:
-            reader = csv.DictReader(file)
-            header = tuple(reader.fieldnames or ())
-            rows = list(reader)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise TargetError(f"{path.name}: cannot be read ({reason})") from None
-    for column in _COLUMNS:
-        if column not in header:
-            raise TargetError(f"{path.name}: column '{column}' is missing")
+        lines = utf8(read_file(path, _LARGEST)).splitlines()
+    except UnreadableTextError as error:
+        raise TargetError(f"{path.name}: cannot be read ({error})") from None
     found: dict[str, Published] = {}
+    columns, *rows = list(csv.reader(lines)) or [[]]
     for number, row in enumerate(rows, start=2):
-        entry = _entry(row, f"{path.name}, line {number}", known, dimensions)
+        where = f"{path.name}, line {number}"
+        if len(row) != len(columns):
+            raise TargetError(f"{where}: the number of columns differs from the header's")
+        entry = checked(Published, dict(zip(columns, row, strict=True)), where, TargetError)
         if entry.id in found:
-            raise TargetError(f"{path.name}, line {number}: id '{entry.id}' is there twice")
+            raise TargetError(f"{where}: id '{entry.id}' is there twice")
         found[entry.id] = entry
-    for name in known:
+    for name in DIMENSIONS:
         if name not in found:
             raise TargetError(f"{path.name}: id '{name}' is missing")
     return found
-
-
-def _entry(
-    row: dict[str, str | None], where: str, known: tuple[str, ...], dimensions: dict[str, str]
-) -> Published:
-    if None in row or any(row[column] is None for column in _COLUMNS):
-        raise TargetError(f"{where}: the number of columns differs from the header's")
-    text = {column: str(row[column]) for column in _COLUMNS}
-    name = text["id"]
-    if name not in known:
-        raise TargetError(f"{where}: id '{name}' is not computed; {closest(name, list(known))}")
-    if text["role"] not in ROLES:
-        raise TargetError(f"{where}: role '{text['role']}'; {closest(text['role'], list(ROLES))}")
-    try:
-        found = dimension(text["unit"])
-    except UnitError as error:
-        raise TargetError(f"{where}: {error}") from None
-    if found != dimensions[name]:
-        raise TargetError(
-            f"{where}: '{text['unit']}' is a unit of {found}, '{name}' is one of {dimensions[name]}"
-        )
-    numbers = []
-    for column in ("value", "half_width"):
-        try:
-            number = float(text[column])
-        except ValueError:
-            number = math.nan
-        if not math.isfinite(number):
-            raise TargetError(f"{where}: {column} '{text[column]}' is not a finite number")
-        numbers.append(number)
-    if numbers[1] < 0:
-        raise TargetError(f"{where}: half_width must not be negative")
-    return Published(
-        name,
-        text["where"],
-        text["quantity"],
-        text["joint"],
-        text["unit"],
-        numbers[0],
-        numbers[1],
-        text["role"],
-        text["note"],
-    )

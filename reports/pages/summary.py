@@ -260,7 +260,7 @@ def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Sect
             "left_out_holds_share": "holds left out",
         }
     of_v = [where == "Section V" for where in tables["conclusions"].columns["where"]]
-    notes = [f"{row.subject.replace('_', ' ')}: {row.note}" for row in judgement.break_even]
+    notes = [f"{row.id.replace('_', ' ')}: {row.remark}" for row in judgement.break_even]
     return Section(
         "What the conclusions hang on",
         (

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.paper.calibration.problem import EVEN
 from pipeline.paper.judgement.basis import Judged
-from pipeline.paper.judgement.conclusions import Conclusion
-from pipeline.paper.judgement.reproduction import REPRODUCED, headline
+from pipeline.paper.judgement.rows import REPRODUCED, Row, headline
+from pipeline.paper.published import EVEN
 from reports.page import Number
 from reports.pages.summary_words import changed, percent, span
 from reports.typeset import number_text
@@ -16,7 +15,7 @@ _FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
 
 def numbers_first(judged: Judged) -> tuple[Number, ...]:
     """What the paper's main sentences come to here, and how many of its numbers are predicted."""
-    said = {c.sentence.name: c for c in judged.judgement.conclusions}
+    said = {c.id: c for c in judged.judgement.conclusions}
     out = [_number(said[name], judged) for name in _FIRST if name in said]
     met, of = headline(judged.judgement.reproduction)["prediction"]
     if of and judged.by.results is not None:
@@ -27,21 +26,21 @@ def numbers_first(judged: Judged) -> tuple[Number, ...]:
     return tuple(out)
 
 
-def _number(row: Conclusion, judged: Judged) -> Number:
-    share = row.sentence.name == EVEN
+def _number(row: Row, judged: Judged) -> Number:
+    share = row.id == EVEN
     value = (
         percent(row.computed, 1)
         if share
         else f"{number_text(row.computed)} \N{MULTIPLICATION SIGN}"
     )
-    part = "computed anew" if judged.by.results is None else row.sentence.part
-    return Number(value, f"*{part}:* {row.sentence.text}", "quiet" if row.holds else "bad")
+    part = "computed anew" if judged.by.results is None else row.role
+    return Number(value, f"*{part}:* {row.sentence}", "quiet" if row.holds else "bad")
 
 
 def first_sentences(judged: Judged) -> tuple[str, ...]:
     """What it is about, what was fitted, what is predicted, and what is known without the fit."""
-    rows = {row.published.id: row for row in judged.judgement.reproduction}
-    mass = f" of {rows['robot_mass'].published.value:g} kg" if "robot_mass" in rows else ""
+    rows = {row.id: row for row in judged.judgement.reproduction}
+    mass = f" of {rows['robot_mass'].published:g} kg" if "robot_mass" in rows else ""
     about = (
         f"A paper compares drives for the joints of a six-legged robot{mass}: an *ideal* one, one "
         "with a real motor's *rotor*, *reversible* gears, and *irreversible* gears, which lock "
@@ -55,10 +54,10 @@ def first_sentences(judged: Judged) -> tuple[str, ...]:
         f"**Fitted:** the friction of motors and gears, to {count['target'][1]} of the {total} "
         "numbers that the paper prints: that the model agrees with these proves nothing."
     )
-    predicted = [r for r in rows.values() if r.published.role == "prediction"]
+    predicted = [r for r in rows.values() if r.role == "prediction"]
     each = "; ".join(
-        f"{_named(r.published.where, r.published.quantity, r.published.joint)}: "
-        f"{number_text(r.computed)} where {number_text(r.published.value)} is printed"
+        f"{_named(r.where, r.quantity, r.joint)}: "
+        f"{number_text(r.computed)} where {number_text(r.published)} is printed"
         for r in predicted
     )
     met = sum(r.verdict == REPRODUCED for r in predicted)
@@ -76,10 +75,10 @@ def _named(where: str, quantity: str, joint: str) -> str:
 def _known(judged: Judged) -> tuple[str, ...]:
     """What data sheets and literature say of the paper's ratios before anything is fitted."""
     parts = [
-        f"{span(c.prior)} (paper: {c.sentence.printed}; so in {percent(c.prior_share)} of all "
-        f"draws) with {c.sentence.name.rpartition('_')[2]}"
+        f"{span(c.prior)} (paper: {c.words}; so in {percent(c.prior_share)} of all "
+        f"draws) with {c.id.rpartition('_')[2]}"
         for c in judged.judgement.conclusions
-        if c.sentence.name in _FIRST and c.sentence.name != EVEN
+        if c.id in _FIRST and c.id != EVEN
     ]
     if not parts:
         return ()

@@ -8,14 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 
-from pipeline.paper.calibration.machine import PUBLISHED_LEG
-from pipeline.paper.calibration.problem import EVEN, EXTRA
-from pipeline.paper.calibration.quantities import STANDING_SECONDS
+from pipeline.paper.constants.motor_constants import asked_frictions
+from pipeline.paper.hexapod import PUBLISHED_LEG
 from pipeline.paper.judgement.basis import Judged
 from pipeline.paper.judgement.evidence import Interval
-from pipeline.paper.judgement.price import NOTABLE
-from pipeline.paper.judgement.reproduction import REPRODUCED, ReproducedRow, headline
-from pipeline.paper.published import ROLES
+from pipeline.paper.judgement.judge import NOTABLE
+from pipeline.paper.judgement.rows import REPRODUCED, Row, headline
+from pipeline.paper.published import CYCLE, EVEN, EXTRA, ROLES
 from reports.table import Table
 
 _REAL = ("rotor", "reversible", "irreversible")
@@ -37,7 +36,7 @@ def first_paragraph(judged: Judged) -> str:
         judged: With the calibration's sets.
     """
     rows = _rows(judged)
-    mass, even = rows["robot_mass"].published.value, rows[EVEN].computed
+    mass, even = rows["robot_mass"].published, rows[EVEN].computed
     ratios = [rows[f"walking_ratio_{name}"].computed for name in _REAL]
     return " ".join(
         (
@@ -54,8 +53,8 @@ def first_paragraph(judged: Judged) -> str:
     )
 
 
-def _rows(judged: Judged) -> dict[str, ReproducedRow]:
-    return {row.published.id: row for row in judged.judgement.reproduction}
+def _rows(judged: Judged) -> dict[str, Row]:
+    return {row.id: row for row in judged.judgement.reproduction}
 
 
 def _listed(words: Iterable[str]) -> str:
@@ -78,7 +77,7 @@ def _counted(judged: Judged) -> tuple[str, ...]:
             f"**Reproduced:** {met} of the {total} printed numbers that can be computed with these "
             f"actuators; {len(judged.judgement.missing)} cannot and are left out.",
         )
-    predicted = [r for r in judged.judgement.reproduction if r.published.role == "prediction"]
+    predicted = [r for r in judged.judgement.reproduction if r.role == "prediction"]
     named = _listed(_prediction(row, judged.by.results is not None) for row in predicted)
     text = (
         f"**Predicted:** {_word(len(predicted))} of the {total} printed numbers: {named}. "
@@ -90,14 +89,14 @@ def _counted(judged: Judged) -> tuple[str, ...]:
     return tuple(part for part in (text, _against(judged), _missed(judged)) if part)
 
 
-def _prediction(row: ReproducedRow, known: bool) -> str:
+def _prediction(row: Row, known: bool) -> str:
     """A prediction, whether it comes out, and in which share of the posterior."""
-    unit = "" if row.published.value == 0 else f" {row.published.unit}"
+    unit = "" if row.published == 0 else f" {row.unit}"
     text = (
-        f"{_named(row)} is {row.published.value:g}{unit}, which "
+        f"{_named(row)} is {row.published:g}{unit}, which "
         f"{'comes' if row.verdict == REPRODUCED else 'does not come'} out"
     )
-    return text + (f" (in {percent(row.met)} of the posterior)" if known else "")
+    return text + (f" (in {percent(row.posterior_share)} of the posterior)" if known else "")
 
 
 def _against(judged: Judged) -> str:
@@ -106,11 +105,13 @@ def _against(judged: Judged) -> str:
     met, of = headline(judgement.reproduction)["contradicted"]
     if of == 0:
         return ""
-    first, second = judgement.contradiction.asked
+    first, second = (
+        1e3 * friction for friction, _ in asked_frictions(judged.by.published).values()
+    )
     unmet = [
         _beside(row)
         for row in judgement.reproduction
-        if row.published.role == "contradicted" and row.verdict != REPRODUCED
+        if row.role == "contradicted" and row.verdict != REPRODUCED
     ]
     text = (
         f"**Contradicted by the paper itself:** the other {_word(of)}. Two motor torques of "
@@ -125,31 +126,30 @@ def _against(judged: Judged) -> str:
     return text + "."
 
 
-def _beside(row: ReproducedRow) -> str:
+def _beside(row: Row) -> str:
     """Ours instead of the paper's, with the printed digits."""
-    published, ours, unit = row.published.value, row.computed, row.published.unit
-    half = row.published.half_width
+    published, ours, unit = row.published, row.computed, row.unit
+    half = row.half_width
     if unit == "N*m":
         published, ours, half, unit = 1e3 * published, 1e3 * ours, 1e3 * half, "mN·m"
     digits = max(0, -math.floor(math.log10(half))) - 1 if half > 0 else 3
-    joint = f" of joint {row.published.joint}" if row.published.joint else ""
+    joint = f" of joint {row.joint}" if row.joint else ""
     return (
-        f"{row.published.quantity}{joint}, {ours:.{digits}f} where {published:.{digits}f} {unit} "
-        "is printed"
+        f"{row.quantity}{joint}, {ours:.{digits}f} where {published:.{digits}f} {unit} is printed"
     )
 
 
-def _named(row: ReproducedRow) -> str:
-    joint = f" of joint {row.published.joint}" if row.published.joint else ""
-    return f"the {row.published.quantity}{joint} ({row.published.where})"
+def _named(row: Row) -> str:
+    joint = f" of joint {row.joint}" if row.joint else ""
+    return f"the {row.quantity}{joint} ({row.where})"
 
 
 def _missed(judged: Judged) -> str:
     """Rows not reproduced that nothing contradicts."""
     missed = [
-        row.published.id
+        row.id
         for row in judged.judgement.reproduction
-        if row.verdict != REPRODUCED and row.published.role != "contradicted"
+        if row.verdict != REPRODUCED and row.role != "contradicted"
     ]
     return f"**Not reproduced:** {', '.join(missed)}." if missed else ""
 
@@ -187,7 +187,7 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
             "**What it costs:** walking one 3 s cycle, the middle right leg draws " + listed + "."
         )
     power = {
-        name: rows[f"{name}_leg_energy_3s"].computed / STANDING_SECONDS
+        name: rows[f"{name}_leg_energy_3s"].computed / CYCLE
         for name in ("reversible", "irreversible")
     }
     text = (
@@ -208,8 +208,8 @@ def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
     )
     if judged.by.results is None:
         return text
-    row = next(c for c in judged.judgement.conclusions if c.sentence.name == EVEN)
-    more = next(c for c in judged.judgement.conclusions if c.sentence.name == EXTRA)
+    row = next(c for c in judged.judgement.conclusions if c.id == EVEN)
+    more = next(c for c in judged.judgement.conclusions if c.id == EXTRA)
     return text + (
         " Data sheets and literature alone, before any fit, put the irreversible gears at "
         f"{span(rows['walking_ratio_irreversible'].prior)} times the ideal drive's energy; in "
@@ -240,7 +240,7 @@ def _posterior(judged: Judged) -> str:
     results = judged.by.results
     assert results is not None
     count = headline(judged.judgement.reproduction)
-    unmet = judged.judgement.contradiction.best.unmet
+    unmet = judged.judgement.best.unmet
     known = results["posterior"]
     numbers = known["numbers"].values()
     paths = [

@@ -35,26 +35,29 @@ class ReproductionRow:
     """Every printed value beside ours."""
 
     table: ClassVar = "reproduction"
-    id: str = column("short name", of=lambda r: r.published.id)
-    where: str = column("table or section of the paper", of=lambda r: r.published.where)
-    quantity: str = column("what is printed", of=lambda r: r.published.quantity)
-    joint: str = column("joint of the middle right leg, or empty", of=lambda r: r.published.joint)
-    unit: str = column("unit of the numbers in the row", of=lambda r: r.published.unit)
-    published: float = column("as printed", "see unit", of=lambda r: r.published.value)
+    id: str = column("short name")
+    where: str = column("table or section of the paper")
+    quantity: str = column("what is printed")
+    joint: str = column("joint of the middle right leg, or empty")
+    unit: str = column("unit of the numbers in the row")
+    published: float = column("as printed", "see unit")
     half_width: float = column(
         "half of the last printed digit, or of the words' range",
         "see unit",
-        of=lambda r: r.published.half_width,
     )
     computed: float = column("ours, with the calibrated files", "see unit")
-    error: float = column("computed less published", "see unit")
-    role: str = column(_ROLE, of=lambda r: r.published.role)
+    error: float = column(
+        "computed less published", "see unit", of=lambda r: r.computed - r.published
+    )
+    role: str = column(_ROLE)
     verdict: str = column(
         "reproduced: the error is within the half width; contradicted: it is not, and other "
         "printed numbers leave no way to it"
     )
     met_share: float = column(
-        "share of the posterior in which it comes out at printed precision", "1", of=lambda r: r.met
+        "share of the posterior in which it comes out at printed precision",
+        "1",
+        of=lambda r: r.posterior_share,
     )
     prior_low: float = column(
         PRIOR_LOW + "; empty where it was put in or follows from that",
@@ -118,18 +121,18 @@ class ConclusionRow:
     """Sections V and IV.A, sentence by sentence."""
 
     table: ClassVar = "conclusions"
-    where: str = column("section of the paper", of=lambda r: r.sentence.where)
-    sentence: str = column("what the paper says", of=lambda r: r.sentence.text)
-    joint: str = column("joint of the middle right leg, or empty", of=lambda r: r.sentence.joint)
-    quantity: str = column("what is computed for it", of=lambda r: r.sentence.quantity)
-    unit: str = column("unit of the numbers", of=lambda r: r.sentence.unit)
-    printed: str = column("the paper's number or word", of=lambda r: r.sentence.printed)
+    where: str = column("section of the paper")
+    sentence: str = column("what the paper says")
+    joint: str = column("joint of the middle right leg, or empty")
+    quantity: str = column("what is computed for it")
+    unit: str = column("unit of the numbers")
+    printed: str = column("the paper's number or word", of=lambda r: r.words)
     computed: float = column("ours", "see unit")
     holds: bool = column("whether the sentence holds for ours")
     part: str = column(
         "in the calibration; put in, or fitted: asked for, so that it holds says nothing; "
         "follows: from fitted and put-in numbers",
-        of=lambda r: r.sentence.part,
+        of=lambda r: r.role,
     )
     prior_low: float = column(PRIOR_LOW, "see unit", of=lambda r: r.prior[0])
     prior_high: float = column(PRIOR_HIGH, "see unit", of=lambda r: r.prior[1])
@@ -282,9 +285,11 @@ class BreakEvenRow:
     """Where the irreversible actuator begins to pay."""
 
     table: ClassVar = "break_even"
-    subject: str = column("the paper's pair of middle legs, or the robot on three or six feet")
+    subject: str = column(
+        "the paper's pair of middle legs, or the robot on three or six feet", of=lambda r: r.id
+    )
     standing_fraction: float = column(
-        "fraction of time standing; empty where there is none", "1", of=lambda r: r.fraction
+        "fraction of time standing; empty where there is none", "1", of=lambda r: r.computed
     )
     prior_low: float = column(
         PRIOR_LOW + "; of the draws that have one", "1", of=lambda r: r.prior[0]
@@ -296,7 +301,7 @@ class BreakEvenRow:
         of=lambda r: r.left_out[0],
     )
     left_out_high: float = column(LEFT_HIGH, "1", of=lambda r: r.left_out[1])
-    note: str = column("in words")
+    note: str = column("in words", of=lambda r: r.remark)
 
 
 @dataclass(frozen=True)

@@ -14,37 +14,26 @@ from typing import Any
 import numpy as np
 
 from actuators.loading.build import CATALOG
-from pipeline.paper.calibration import search
+from pipeline.paper.calibration import tasks
 from pipeline.paper.calibration.checkpoint import Checkpoint
-from pipeline.paper.calibration.machine import MIDDLE_LEGS, ROBOT
 from pipeline.paper.calibration.prior import PRIOR_FILE, Prior
-from pipeline.paper.calibration.problem import EXTRA, Problem, fixed_before
-from pipeline.paper.calibration.search import Reading
-from pipeline.paper.constants.motor_constants import KEYS
-from pipeline.paper.constants.rotor_friction import HELD, friction_ranges
+from pipeline.paper.calibration.problem import Problem, fixed_before
+from pipeline.paper.calibration.tasks import OUTPUTS, Point, Reading
+from pipeline.paper.constants.motor_constants import KEYS, friction_ranges
 from pipeline.paper.errors import CalibrationError
-from pipeline.paper.published import PUBLISHED_FILE, Published
+from pipeline.paper.hexapod import MIDDLE_LEGS, ROBOT
+from pipeline.paper.published import EXTRA, HELD, PUBLISHED_FILE, Published
 
-#: Plain results of one task.
-Point = dict[str, Any]
 #: Given a title and a total, returns what is called per finished task.
 Progress = Callable[[str, int], Callable[[int], None]]
 logger = logging.getLogger("legwatt")
-AXES_DEG = (0.0, 15.0, 30.0, 45.0, 90.0)
 _GROUPS = 8  # of walkers, which have to agree
 AT_BOUND = 0.02  # coordinates this close to a bound count as lying at it
 COUNTS = (1, 2)  # middle legs that Fig. 21 counts as loaded
 #: Every axis with either count, and at the vertical axis consumption net of what returns.
 READINGS = (
-    *(Reading(axis, count) for axis in AXES_DEG for count in COUNTS),
+    *(Reading(axis, count) for axis in (0.0, 15.0, 30.0, 45.0, 90.0) for count in COUNTS),
     *(Reading(0.0, count, net=True) for count in COUNTS),
-)
-OUTPUTS = (
-    "walking_ratio_rotor",
-    "walking_ratio_reversible",
-    "walking_ratio_irreversible",
-    "walking_extra_J",
-    "break_even_standing_fraction",
 )
 #: Targets left out together. What the irreversible actuator costs stands in two of them.
 LEAVE_OUT = (
@@ -55,6 +44,7 @@ LEAVE_OUT = (
     (EXTRA,),
     ("walking_ratio_irreversible", EXTRA),
 )
+_EVALUATIONS = 30  # of the full problem, per search
 
 
 @dataclass(frozen=True)
@@ -89,30 +79,37 @@ class Effort:
 
 
 def input_hash(robot: Path, effort: Effort) -> str:
-    """Hash of what the tasks depend on: prior, printed values, robot structure, effort, code.
+    """Hash of what the tasks depend on: prior, printed values, robot structure, seed, code.
 
     The calibrated values inside the robot and actuator files are overruled by the prior, but
     everything else in them counts, so their text is part of the hash.
     """
     digest = hashlib.sha256(f"{effort.seed}".encode())
     paper = Path(__file__).parents[1]
-    names = (
-        *(f"calibration/{n}" for n in ("search", "problem", "machine", "quantities", "prior")),
-        *(f"calibration/{n}" for n in ("batch", "posterior", "whole_robot")),
-        *(f"constants/{n}" for n in ("motor_constants", "rotor_friction", "table_entries")),
-    )
-    code = [paper / f"{name}.py" for name in names]
-    for path in [PRIOR_FILE, PUBLISHED_FILE, robot, *sorted(CATALOG.glob("*.toml")), *code]:
+    code = [*paper.glob("*.py"), *paper.glob("calibration/*.py"), *paper.glob("constants/*.py")]
+    files = [PRIOR_FILE, PUBLISHED_FILE, robot, *sorted(CATALOG.glob("*.toml")), *sorted(code)]
+    for path in files:
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-def calibrate(
-    robot: Path,
-    effort: Effort,
-    work: Path,
-    progress: Progress,
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class _Run:
+    """Where the tasks of one calibration run, each named for its result to be found again."""
+
+    robot: str
+    effort: Effort
+    store: Checkpoint
+    pool: ProcessPoolExecutor
+    progress: Progress
+
+    def all(self, title: str, function: Callable[..., Any], named: Mapping[str, Any]) -> list[Any]:
+        """Results of a function of the robot and further arguments, in the order of the names."""
+        every = [(name, (self.robot, *arguments)) for name, arguments in named.items()]
+        return self.store.run(self.pool, function, every, self.progress(title, len(every)))
+
+
+def calibrate(robot: Path, effort: Effort, work: Path, progress: Progress) -> dict[str, Any]:
     """Run everything, going on where an earlier run stopped.
 
     Args:
@@ -128,35 +125,35 @@ def calibrate(
     Raises:
         CalibrationError: No admissible point at all.
     """
-    task = _task(robot)
+    task = _checked_problem(robot)
     store = Checkpoint(work / "tasks.jsonl", input_hash(robot, effort))
     with ProcessPoolExecutor(effort.workers) as pool:
         run = _Run(str(robot), effort, store, pool, progress)
-        walkers = run.posterior((), effort.ensembles, effort.steps, "posterior")
-        starts = run.starts(walkers)
+        walkers = _posterior(run, (), effort.ensembles, effort.steps, "posterior")
+        starts = _starts(run, walkers)
         good = [s for s in starts if s.get("admissible")]
         if not good:
             raise CalibrationError("no start reaches a point that meets every target and limit")
         best = min(good, key=lambda s: s["prior_distance"])
-        paths = tuple(p for p in search.PATHS if any(s["path"] == p for s in good))
-        members = run.points("posterior", _spread(walkers, effort.sets))
+        members = _points(run, "posterior", _spread(walkers, effort.sets))
         left_out = {}
         for targets in LEAVE_OUT:
             key = "+".join(targets)
-            found = run.posterior(targets, 1, effort.left_out_steps, f"without {key}")
-            left_out[key] = run.points(key, _spread(found, effort.left_out_sets))
-        # The motor's limits are the data sheet's, so a draw beyond them is not what it says.
-        before = [p for p in run.prior(search.PATHS) if p.get("inside")]
-        readings = run.readings(best["path"], best["z"])
-        sensitivity = _sensitivity(pool, store, str(robot), best, effort, progress)
+            found = _posterior(run, targets, 1, effort.left_out_steps, f"without {key}")
+            left_out[key] = _points(run, key, _spread(found, effort.left_out_sets))
+        draws = {f"prior/{i}": (effort.seed, i) for i in range(effort.prior_draws)}
+        before = run.all("prior", tasks.prior_point, draws)
+        readings = _readings(run, best)
+        sensitivity = _sensitivity(run, best, task.prior)
     published = task.published
     return {
         "nearest": best,
         "starts": starts,
-        "paths": paths,
+        "paths": [p for p in tasks.PATHS if any(s["path"] == p for s in good)],
         "sets": members,
         "posterior": posterior_summary(walkers, task.prior),
-        "prior": [_kept(p, published) for p in before],
+        # The motor's limits are the data sheet's, so a draw beyond them is not what it says.
+        "prior": [_kept(p, published) for p in before if p.get("inside")],
         "left_out": {
             key: [_kept(p, published) for p in points] for key, points in left_out.items()
         },
@@ -166,10 +163,109 @@ def calibrate(
     }
 
 
+def _checked_problem(robot: Path) -> Problem:
+    """The problem of a robot file; bad input is an error here, before any process starts.
+
+    Raises:
+        CalibrationError: The robot is none that the paper's numbers can be of.
+    """
+    task = tasks.base_problem(str(robot))
+    missing = [leg for leg in MIDDLE_LEGS if leg not in {own.name for own in task.spec.legs}]
+    if missing or not task.spec.floating:
+        raise CalibrationError(
+            f"{robot.name}: the paper's numbers are those of a walking hexapod with the middle "
+            f"legs {' and '.join(MIDDLE_LEGS)}; this robot "
+            + (f"has no leg '{missing[0]}'" if missing else "is on a stand")
+        )
+    logger.info("rotor friction leaves unmet: %s", ", ".join(task.sliver.frictions.unmet) or "none")
+    return task
+
+
+def _posterior(
+    run: _Run, without: tuple[str, ...], ensembles: int, steps: int, title: str
+) -> list[list[Point]]:
+    """Sets of the walkers of independent ensembles in the posterior, by walker."""
+    first = 100 * (1 + LEAVE_OUT.index(without)) if without else 0
+    named = {
+        f"posterior/{'+'.join(without)}/{i}": (
+            *(run.effort.seed, first + i, without),
+            *(steps, run.effort.robots),
+        )
+        for i in range(ensembles)
+    }
+    found = run.all(title, tasks.posterior, named)
+    return [walker for ensemble in found for walker in ensemble]
+
+
 def _spread(walkers: list[list[Point]], count: int) -> list[Point]:
     """So many sets of all walkers' sets, evenly spread over walkers and steps."""
     every = [one for at_step in zip(*walkers, strict=True) for one in at_step]
     return [every[i] for i in np.linspace(0, len(every) - 1, min(count, len(every))).astype(int)]
+
+
+def _starts(run: _Run, walkers: list[list[Point]]) -> list[Point]:
+    """Nearest points to the prior's centre, from the posterior's nearest draws of each path."""
+    every = sorted((p for own in walkers for p in own), key=lambda p: float(np.dot(p["z"], p["z"])))
+    named: dict[str, tuple[Any, ...]] = {}
+    for path in tasks.PATHS:
+        own = [p["z"] for p in every if p["path"] == path][: run.effort.starts]
+        named |= {
+            f"start/{path}/{i}": (path, tasks.READ, z, _EVALUATIONS) for i, z in enumerate(own)
+        }
+    return run.all("nearest point", tasks.nearest, named)
+
+
+def _points(run: _Run, kind: str, sets: list[Point]) -> list[Point]:
+    """Sets with all that the paper prints and the energy of the whole robot."""
+    named = {f"set/{kind}/{i}": (s["path"], s["z"], s["constants"]) for i, s in enumerate(sets)}
+    return run.all(f"whole robot, {kind}", tasks.point_of, named)
+
+
+def _readings(run: _Run, best: Point) -> list[Point]:
+    """Every reading of the paper, with its point closest to the rows where there is one."""
+    named = {
+        f"reading/{reading}": (best["path"], reading, best["z"], _EVALUATIONS)
+        for reading in READINGS
+    }
+    found = run.all("readings", tasks.closest, named)
+    return [
+        asdict(reading) | {"point": None if "failed" in point else point}
+        for reading, point in zip(READINGS, found, strict=True)
+    ]
+
+
+def _sensitivity(run: _Run, best: Point, prior: Prior) -> dict[str, Any]:
+    """Sobol indices with every free number uniform within one prior sigma of the nearest point."""
+    from SALib.analyze import sobol as analyze
+    from SALib.sample import sobol as sample
+
+    z, seed = np.array(best["z"]), run.effort.seed
+    ends = np.maximum(z - 1.0, prior.lower), np.minimum(z + 1.0, prior.upper)
+    names = list(prior.keys)
+    setup = {"num_vars": z.size, "names": names, "bounds": np.stack(ends, axis=1).tolist()}
+    rows = sample.sample(setup, run.effort.sobol, calc_second_order=False, seed=seed)
+    block = z.size + 2  # rows of one base point share most of the robot's coordinates
+    named = {
+        f"sobol/{best['path']}/{i}": (best["path"], rows[i : i + block].tolist())
+        for i in range(0, len(rows), block)
+    }
+    blocks = run.all("sensitivities", tasks.sensitivity_rows, named)
+    y = np.array([row for part in blocks for row in part], dtype=float)
+    missing = np.isnan(y).any(axis=1)
+    y[missing] = np.nanmean(y, axis=0)  # a robot that tips says nothing; its count is reported
+    result: dict[str, Any] = {
+        "names": names,
+        "base": run.effort.sobol,
+        "missing": int(missing.sum()),
+    }
+    for output, column in zip(OUTPUTS, y.T, strict=True):
+        indices = analyze.analyze(
+            setup, column, calc_second_order=False, print_to_console=False, seed=seed
+        )
+        result[output] = {
+            k: np.asarray(indices[k]).tolist() for k in ("S1", "S1_conf", "ST", "ST_conf")
+        }
+    return result
 
 
 def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any]:
@@ -193,18 +289,20 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
     constants = np.array([[[p["constants"][k] for k in KEYS] for p in own] for own in walkers])
     every = np.moveaxis(np.concatenate([z, constants], axis=-1), -1, 0)
     no_bound = np.full(len(KEYS), np.inf)
-    lower, upper = (np.append(b, e) for b, e in ((prior.lower, -no_bound), (prior.upper, no_bound)))
+    lower, upper = np.append(prior.lower, -no_bound), np.append(prior.upper, no_bound)
     axes = {"chain_axis": 0, "draw_axis": 1}
     groups = np.arange(len(walkers)) * _GROUPS // len(walkers)
     own = [key.startswith(f"{ROBOT}.") for key in prior.keys]
     _, counts = np.unique(z[..., own].reshape(-1, sum(own)), axis=0, return_counts=True)
     robots = float(counts.sum() ** 2 / (counts.astype(float) ** 2).sum())
+
+    def effective(values: Any, *, of_robots: bool) -> float:
+        draws = float(array_stats.ess(values, **axes))
+        return 1 / (1 / draws + 1 / robots) if of_robots else draws
+
     numbers = {}
     for key, values, least, most in zip((*prior.keys, *KEYS), every, lower, upper, strict=True):
         low, high = np.quantile(values, [0.025, 0.975])
-        effective = float(array_stats.ess(values, **axes))
-        if key.startswith(f"{ROBOT}."):
-            effective = _both(effective, robots)
         numbers[key] = {
             "low": float(low),
             "high": float(high),
@@ -213,152 +311,26 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
             "at_lower": float(np.mean(values - least < AT_BOUND)),
             "at_upper": float(np.mean(most - values < AT_BOUND)),
             "r_hat": float(array_stats.rhat_nested(values, superchain_ids=groups, **axes)),
-            "effective": effective,
+            "effective": effective(values, of_robots=key.startswith(f"{ROBOT}.")),
         }
     paths = {}
-    for path in search.PATHS:
+    for path in tasks.PATHS:
         taken = np.array([[float(p["path"] == path) for p in own] for own in walkers])
-        share = float(taken.mean())
-        error = 0.0
+        share, error = float(taken.mean()), 0.0
         if 0 < share < 1:
-            effective = _both(float(array_stats.ess(taken, **axes)), robots)
-            error = math.sqrt(share * (1 - share) / effective)
+            error = math.sqrt(share * (1 - share) / effective(taken, of_robots=True))
         paths[path] = {"share": share, "standard_error": error}
+    sets = int(z.shape[0] * z.shape[1])
     return {
         "numbers": numbers,
         "paths": paths,
         "walkers": len(walkers),
-        "sets": int(z.shape[0] * z.shape[1]),
+        "sets": sets,
         "robots": robots,
     }
 
 
-def _both(draws: float, robots: float) -> float:
-    """Effective sample size of draws that take their robots from a bank of so many."""
-    return 1 / (1 / draws + 1 / robots)
-
-
-def _task(robot: Path) -> Problem:
-    """The problem of a robot file; bad input is an error here, before any process starts.
-
-    Raises:
-        CalibrationError: The robot is none that the paper's numbers can be of.
-    """
-    task = search.base_problem(str(robot))
-    missing = [leg for leg in MIDDLE_LEGS if leg not in {own.name for own in task.spec.legs}]
-    if missing or not task.spec.floating:
-        raise CalibrationError(
-            f"{robot.name}: the paper's numbers are those of a walking hexapod with the middle "
-            f"legs {' and '.join(MIDDLE_LEGS)}; this robot "
-            + (f"has no leg '{missing[0]}'" if missing else "is on a stand")
-        )
-    logger.info("rotor friction leaves unmet: %s", ", ".join(task.sliver.frictions.unmet) or "none")
-    return task
-
-
-@dataclass(frozen=True)
-class _Run:
-    """The tasks of one calibration, each with the name under which its result is kept.
-
-    Attributes:
-        robot: Robot file.
-        effort: How much.
-        store: Of finished tasks.
-        pool: Of processes.
-        progress: As for `calibrate`.
-    """
-
-    robot: str
-    effort: Effort
-    store: Checkpoint
-    pool: ProcessPoolExecutor
-    progress: Progress
-
-    def starts(self, walkers: list[list[Point]]) -> list[Point]:
-        """Nearest points to the prior's centre, from the posterior's nearest draws of each path.
-
-        Args:
-            walkers: Of the posterior.
-        """
-        every = sorted(
-            (p for own in walkers for p in own), key=lambda p: float(np.dot(p["z"], p["z"]))
-        )
-        tasks = []
-        for path in search.PATHS:
-            own = [p["z"] for p in every if p["path"] == path][: self.effort.starts]
-            tasks += [
-                (f"start/{path}/{i}", (self.robot, path, search.READ, z, 30))
-                for i, z in enumerate(own)
-            ]
-        done = self.progress("nearest point", len(tasks))
-        return self.store.run(self.pool, search.nearest, tasks, done)
-
-    def posterior(
-        self, without: tuple[str, ...], ensembles: int, steps: int, title: str
-    ) -> list[list[Point]]:
-        """Sets of the walkers of independent ensembles in the posterior, by walker.
-
-        Args:
-            without: Targets left out.
-            ensembles: How many.
-            steps: Of every walker.
-            title: Of the progress.
-        """
-        first = 100 * (1 + LEAVE_OUT.index(without)) if without else 0
-        tasks = [
-            (
-                f"posterior/{'+'.join(without)}/{i}",
-                (self.robot, self.effort.seed, first + i, without, steps, self.effort.robots),
-            )
-            for i in range(ensembles)
-        ]
-        found = self.store.run(self.pool, search.posterior, tasks, self.progress(title, ensembles))
-        return [walker for ensemble in found for walker in ensemble]
-
-    def points(self, kind: str, sets: list[Point]) -> list[Point]:
-        """Sets with all that the paper prints and the energy of the whole robot."""
-        tasks = [
-            (f"set/{kind}/{i}", (self.robot, s["path"], s["z"], s["constants"]))
-            for i, s in enumerate(sets)
-        ]
-        done = self.progress(f"whole robot, {kind}", len(sets))
-        return self.store.run(self.pool, search.point_of, tasks, done)
-
-    def prior(self, paths: tuple[str, ...]) -> list[Point]:
-        """Draws of the prior, each a set as `points` makes it."""
-        tasks = [
-            (f"prior/{'+'.join(paths)}/{i}", (self.robot, paths, self.effort.seed, i))
-            for i in range(self.effort.prior_draws)
-        ]
-        done = self.progress("prior", self.effort.prior_draws)
-        return self.store.run(self.pool, search.prior_member, tasks, done)
-
-    def readings(self, path: str, start: list[float]) -> list[Point]:
-        """Every other reading of the paper, with its nearest point where there is one.
-
-        Args:
-            path: Of the foot.
-            start: Coordinates at which every search begins.
-        """
-        tasks = [
-            (f"reading/{_task_name(reading)}", (self.robot, path, reading, start, 30))
-            for reading in READINGS
-        ]
-        found = self.store.run(
-            self.pool, search.read, tasks, self.progress("readings", len(READINGS))
-        )
-        return [
-            asdict(reading) | {"point": None if "failed" in point else point}
-            for reading, point in zip(READINGS, found, strict=True)
-        ]
-
-
-def _task_name(reading: Reading) -> str:
-    """A name for the reading's tasks."""
-    return f"{reading.axis_deg:g}/{reading.legs}/{'net' if reading.net else 'drawn'}"
-
-
-def _kept(point: dict[str, Any], published: Mapping[str, Published]) -> dict[str, Any]:
+def _kept(point: Point, published: Mapping[str, Published]) -> Point:
     """What the judgement needs of a set of which only quantiles are shown, to six digits."""
     fixed = fixed_before(published)
 
@@ -369,51 +341,3 @@ def _kept(point: dict[str, Any], published: Mapping[str, Published]) -> dict[str
         "values": {k: short(v) for k, v in point["values"].items() if k not in fixed},
         "totals": {a: {k: short(v) for k, v in t.items()} for a, t in point["totals"].items()},
     }
-
-
-def _sensitivity(
-    pool: ProcessPoolExecutor,
-    store: Checkpoint,
-    robot: str,
-    best: dict[str, Any],
-    effort: Effort,
-    progress: Progress,
-) -> dict[str, Any]:
-    """Sobol indices with every free number uniform within one prior sigma of the nearest point."""
-    from SALib.analyze import sobol as analyze
-    from SALib.sample import sobol as sample
-
-    prior = search.base_problem(robot).prior
-    z = np.array(best["z"])
-    low = np.maximum(z - 1.0, prior.lower)
-    high = np.minimum(z + 1.0, prior.upper)
-    setup = {
-        "num_vars": z.size,
-        "names": list(prior.keys),
-        "bounds": np.stack([low, high], axis=1).tolist(),
-    }
-    rows = sample.sample(setup, effort.sobol, calc_second_order=False, seed=effort.seed)
-    block = z.size + 2  # rows of one base point share most of the robot's coordinates
-    blocks = [rows[i : i + block].tolist() for i in range(0, len(rows), block)]
-    outputs = store.run(
-        pool,
-        search.sensitivity_row,
-        [(f"sobol/{best['path']}/{i}", (robot, best["path"], b)) for i, b in enumerate(blocks)],
-        progress("sensitivities", len(blocks)),
-    )
-    y = np.array([row for part in outputs for row in part], dtype=float)
-    missing = np.isnan(y).any(axis=1)
-    y[missing] = np.nanmean(y, axis=0)  # a robot that tips says nothing; its count is reported
-    result: dict[str, Any] = {
-        "names": list(prior.keys),
-        "base": effort.sobol,
-        "missing": int(missing.sum()),
-    }
-    for i, output in enumerate(OUTPUTS):
-        indices = analyze.analyze(
-            setup, y[:, i], calc_second_order=False, print_to_console=False, seed=effort.seed
-        )
-        result[output] = {
-            k: np.asarray(indices[k]).tolist() for k in ("S1", "S1_conf", "ST", "ST_conf")
-        }
-    return result

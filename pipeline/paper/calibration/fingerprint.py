@@ -28,7 +28,7 @@ def fingerprint(
         prior: What was known before.
     """
     out: Fingerprint = {f"robot.{name}": value for name, value in spec.parameters.items()}
-    out |= _gait(spec)
+    out |= {f"gait.{key}": _text(value) for key, value in sorted(spec.gait.items())}
     out["standing.feet"] = repr(spec.standing_feet)
     out["legs"] = repr([(leg.name, leg.joints, leg.foot, leg.side) for leg in spec.legs])
     # No law takes a part's mass.
@@ -37,18 +37,11 @@ def fingerprint(
     for name, a in catalog.alternatives.items():
         elements = [(e.name, e.law, e.stage, sorted(e.arguments.items())) for e in a.elements]
         out[f"alternatives.{name}"] = repr((a.motor, a.ratio, elements))
-    for row in published.values():
-        out[f"published.{row.id}"] = repr((row.unit, row.value, row.half_width, row.role))
-    for free in prior.free:
-        out[f"prior.{free.key}"] = repr(
-            (free.centre, free.deviation, free.bounds, free.logarithmic)
-        )
+    for p in published.values():
+        out[f"published.{p.id}"] = repr((p.unit, p.value, p.half_width, p.role))
+    for f in prior.free:
+        out[f"prior.{f.key}"] = repr((f.centre, f.deviation, f.bounds, f.logarithmic))
     return out
-
-
-def _gait(spec: RobotSpec) -> Fingerprint:
-    """The table ``[gait]``, each key by name; lists as tuples."""
-    return {f"gait.{key}": _text(value) for key, value in sorted(spec.gait.items())}
 
 
 def _text(value: object) -> str:

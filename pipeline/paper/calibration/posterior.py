@@ -21,7 +21,7 @@ likelihood with edges does not have, and it asks for many walkers at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import emcee
@@ -30,15 +30,22 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize.elementwise import find_root
 
-from actuators.chain import Chain
-from pipeline.paper.calibration.batch import Bank, BatchOutcome, drawn, outcome
-from pipeline.paper.calibration.machine import PUBLISHED_LEG, with_splits
 from pipeline.paper.calibration.prior import Free
-from pipeline.paper.calibration.problem import EXTRA, Problem, Target
-from pipeline.paper.calibration.quantities import PAIR
+from pipeline.paper.calibration.problem import Problem, Target
 from pipeline.paper.constants.motor_constants import KEYS
-from pipeline.paper.constants.rotor_friction import HELD
 from pipeline.paper.errors import CalibrationError
+from pipeline.paper.hexapod import (
+    MIDDLE_LEGS,
+    PUBLISHED_LEG,
+    Demand,
+    Outcome,
+    chain_at,
+    drawn,
+    outcome,
+    printed_leg,
+    with_splits,
+)
+from pipeline.paper.published import EXTRA, HELD, PAIR
 
 Array = NDArray[np.float64]
 #: Targets that take the place of a coordinate, in the order in which they are solved for: each
@@ -60,23 +67,21 @@ _SETTLING = 0.15  # of the steps, twice, before any is kept
 
 @dataclass(frozen=True)
 class _Sets:
-    """Walkers as sets of numbers; a set is a column.
+    """Walkers as sets of numbers: the demand of their robots, and numbers in SI by reference (W,).
 
-    Attributes:
-        demand: Of their robots.
-        values: Of their numbers in SI, by reference, (W,).
+    The printed leg's demand is kept by itself: most targets need no other.
     """
 
-    demand: Bank
+    demand: Demand
+    leg: Demand
     values: dict[str, Array]
 
     def taken(self, which: NDArray[np.intp]) -> _Sets:
-        """Some of the sets."""
-        return _Sets(self.demand.taken(which), {k: v[which] for k, v in self.values.items()})
+        values = {k: v[which] for k, v in self.values.items()}
+        return _Sets(self.demand.taken(which), self.leg.taken(which), values)
 
     def with_number(self, key: str, value: Array) -> _Sets:
-        """The sets with one number replaced."""
-        return _Sets(self.demand, {**self.values, key: value})
+        return _Sets(self.demand, self.leg, {**self.values, key: value})
 
 
 class Posterior:
@@ -87,12 +92,13 @@ class Posterior:
 
     Args:
         task: Prior, catalogue, targets; its `without` names the targets left out.
-        robots: The bank.
+        robots: The bank; each is a set of the demand.
         targets: What has to come out; the task's by default.
     """
 
-    def __init__(self, task: Problem, robots: Bank, targets: Sequence[Target] = ()) -> None:
+    def __init__(self, task: Problem, robots: Demand, targets: Sequence[Target] = ()) -> None:
         self.task, self.robots = task, robots
+        self.robots_leg = robots.of_leg(PUBLISHED_LEG)
         self.targets = {t.name: t for t in (targets or task.targets)}
         own = {f.key: f for f in (task.prior.free[i] for i in task.actuator_columns)}
         self.solved: dict[str, Free] = {}
@@ -105,9 +111,7 @@ class Posterior:
         self.constants = slice(self.numbers.stop, self.numbers.stop + len(KEYS) + 1)
         self.aims = slice(self.constants.stop, self.constants.stop + len(self.aimed))
         self.size = self.aims.stop
-        every = np.arange(self.size)
-        self.continuous = np.concatenate([every[self.numbers], every[self.aims]])
-        self.ratio = task.catalog.parameter("requirement.ratio").value
+        self.continuous = np.r_[self.numbers, self.aims]
 
     def start(self, rng: np.random.Generator, count: int) -> Array:
         """Walkers drawn from the prior, aims uniform, (W, D); some may have no density."""
@@ -115,23 +119,13 @@ class Posterior:
         out[:, 0] = rng.integers(self.robots.count, size=count)
         columns = [self.task.prior.free.index(f) for f in self.free]
         out[:, self.numbers] = [self.task.prior.draw(rng)[columns] for _ in range(count)]
-        out[:, self.constants] = self.drawn_constants(rng, count)
+        out[:, self.constants] = self.task.sliver.draws(rng, count)
         out[:, self.aims] = rng.uniform(-1, 1, (count, len(self.aimed)))
         return out
 
-    def drawn_constants(self, rng: np.random.Generator, count: int) -> Array:
-        """Draws of the motor's constants and the torque that they hold, (W, 4)."""
-        sets, held = self.task.sliver.draws(rng, count)
-        return np.column_stack([sets, held])
-
     def __call__(self, x: Array) -> Array:
-        """Log density up to a constant, (W,); minus infinity where there is none.
-
-        Args:
-            x: Walkers (W, D).
-        """
-        log, _ = self.evaluate(x)
-        return log
+        """Log density of walkers (W, D) up to a constant, (W,); minus infinity where none."""
+        return self.evaluate(x)[0]
 
     def evaluate(self, x: Array) -> tuple[Array, dict[str, Array]]:
         """Log density of walkers (W,), and their numbers in SI by reference, (W,).
@@ -140,22 +134,23 @@ class Posterior:
             x: Walkers (W, D).
         """
         z = x[:, self.numbers]
-        lower, upper = (np.array([f.coordinate(f.bounds[k]) for f in self.free]) for k in (0, 1))
-        good = ((z >= lower) & (z <= upper)).all(axis=1) & (np.abs(x[:, self.aims]) <= 1).all(
-            axis=1
-        )
+        lower, upper = np.array([f.ends for f in self.free]).T
+        good = ((z >= lower) & (z <= upper)).all(axis=1)
+        good &= (np.abs(x[:, self.aims]) <= 1).all(axis=1)
         good &= (x[:, 0] >= 0) & (x[:, 0] < self.robots.count)
         log = np.where(good, -0.5 * (z**2).sum(axis=1), -np.inf)
         sets = self.as_sets(x)
         for name, free in self.solved.items():
             kept = np.flatnonzero(np.isfinite(log))
-            own = sets.taken(kept)
-            goal, unit = self._goal(name, x[kept]), self._unit(name, own)
-            found, density = self._solved(name, free, own, goal * unit)
-            log[kept] += density + np.log(unit)
-            sets.values[free.key][kept] = found
+            if kept.size:
+                own = sets.taken(kept)
+                goal, unit = self._goal(name, x[kept]), self._unit(name, own)
+                found, density = self._solved(name, free, own, goal * unit)
+                log[kept] += density + np.log(unit)
+                sets.values[free.key][kept] = found
         kept = np.flatnonzero(np.isfinite(log))
-        log[kept] += self._likelihood(sets.taken(kept))
+        if kept.size:
+            log[kept[~self._met(sets.taken(kept))]] = -np.inf
         return log, sets.values
 
     def as_sets(self, x: Array) -> _Sets:
@@ -165,7 +160,7 @@ class Posterior:
         values |= dict(zip(KEYS, x[:, self.constants].T, strict=False))
         values |= {f.key: np.full(len(x), f.centre) for f in self.solved.values()}
         robots = np.clip(x[:, 0], 0, self.robots.count - 1).astype(np.intp)
-        return _Sets(self.robots.taken(robots), values)
+        return _Sets(self.robots.taken(robots), self.robots_leg.taken(robots), values)
 
     def _goal(self, name: str, x: Array) -> Array:
         """The value of a solved target that walkers ask for, (W,)."""
@@ -176,83 +171,76 @@ class Posterior:
         aim = x[:, self.aims.start + self.aimed.index(name)]
         return target.centre + target.half_width * aim
 
-    def _chain(self, sets: _Sets, name: str) -> Chain:
-        return self.task.catalog.chain(name, with_splits(sets.values, self.ratio))
+    def _outcome(self, sets: _Sets, name: str) -> Outcome:
+        values = with_splits(sets.values, self.task.ratio)
+        return outcome(sets.demand, chain_at(sets.demand, self.task.catalog, name, values))
+
+    def _drawn(self, sets: _Sets, name: str) -> Array:
+        """E_el(+) per cycle of the printed leg, (W,) [J]."""
+        values = with_splits(sets.values, self.task.ratio)
+        return drawn(sets.leg, chain_at(sets.leg, self.task.catalog, name, values))
 
     def _unit(self, name: str, sets: _Sets) -> Array:
         """What a solved target is a multiple of, (W,): the ideal actuator's energy, or 1."""
         if name in (HELD, EXTRA):
             return np.ones(sets.demand.count)
-        return drawn(sets.demand, self._chain(sets, "ideal"))
+        return self._drawn(sets, "ideal")
 
-    def _target(self, name: str) -> Callable[[_Sets], Array]:
-        """A solved target in its `_unit` as a function of sets of numbers, (W,)."""
-        alternative = name.removeprefix("walking_ratio_")
-        if name == HELD:
-            # The torque of joint 2 is negative: the upper end of what holds is the least.
-            return lambda s: self._chain(s, "reversible").holding(s.demand.standing).high[1]
+    def _target(self, name: str, sets: _Sets) -> Array:
+        """A solved target in its `_unit`, (W,)."""
         if name == EXTRA:
-            return lambda s: _extra(*(outcome(s.demand, self._chain(s, a)) for a in PAIR))
-        return lambda s: drawn(s.demand, self._chain(s, alternative))
+            return _extra(*(self._outcome(sets, alternative) for alternative in PAIR))
+        if name == HELD:
+            values = with_splits(sets.values, self.task.ratio)
+            chain = chain_at(sets.demand, self.task.catalog, "reversible", values)
+            # The torque of joint 2 is negative: the upper end of what holds is the least.
+            return printed_leg(chain.holding(sets.demand.standing).high)[:, 1]
+        return self._drawn(sets, name.removeprefix("walking_ratio_"))
 
     def _solved(self, name: str, free: Free, sets: _Sets, goal: Array) -> tuple[Array, Array]:
         """The number that gives a target, and the log density it brings, (W,) each."""
-        target = self._target(name)
         count = goal.size
-        if count == 0:
-            return goal, goal
+        every = np.arange(count, dtype=np.float64)
 
-        def at(z: Array, which: NDArray[np.intp]) -> Array:
-            missed: Array = (
-                target(sets.taken(which).with_number(free.key, free.at(z))) - goal[which]
-            )
-            return missed
+        def missed(z: Array, which: Array) -> Array:
+            own = sets.taken(which.astype(np.intp))
+            at: Array = self._target(name, own.with_number(free.key, free.at(z)))
+            return at - goal[which.astype(np.intp)]
 
-        ends = [np.full(count, free.coordinate(bound)) for bound in free.bounds]
-        every = np.arange(count)
-        root = find_root(  # type: ignore[call-overload]
-            lambda z, which: at(z, which.astype(np.intp)),  # passed on as floats
-            (ends[0], ends[1]),
-            args=(every,),
-            tolerances={"xatol": _CLOSE},
-        )
+        low, high = (np.full(count, end) for end in free.ends)
+        root = find_root(missed, (low, high), args=(every,), tolerances={"xatol": _CLOSE})
         good = np.flatnonzero(root.success)
-        log = np.full(count, -np.inf)
-        z = root.x[good]
-        step = np.where(z + _STEP > ends[1][good], -_STEP, _STEP)  # towards the inside
-        slope = (at(z + step, every[good]) - root.f_x[good]) / step
-        log[good] = -0.5 * z**2 - np.log(np.abs(slope))
-        value = np.full(count, free.centre)
-        value[good] = free.at(z)
+        log, value = np.full(count, -np.inf), np.full(count, free.centre)
+        if good.size:
+            z = root.x[good]
+            step = np.where(z + _STEP > high[good], -_STEP, _STEP)  # towards the inside
+            slope = (missed(z + step, every[good]) - root.f_x[good]) / step
+            log[good] = -0.5 * z**2 - np.log(np.abs(slope))
+            value[good] = free.at(z)
         return value, log
 
-    def _likelihood(self, sets: _Sets) -> Array:
-        """Zero where the other targets are met and every limit is kept, else minus infinity."""
-        if sets.demand.count == 0:
-            return np.zeros(0)
-        found = {
-            name: outcome(sets.demand, self._chain(sets, name))
-            for name in self.task.catalog.alternatives
-        }
-        good = (found["irreversible"].held == 0).all(axis=0)
-        good &= np.max([o.excess for o in found.values()], axis=0) <= 0
+    def _met(self, sets: _Sets) -> NDArray[np.bool_]:
+        """Whether the other targets are met and every limit is kept, (W,)."""
+        found = {name: self._outcome(sets, name) for name in self.task.catalog.alternatives}
+        held = printed_leg(found["irreversible"].holding.motor_torque)
+        good: NDArray[np.bool_] = (held == 0).all(axis=1)
+        for o in found.values():
+            good &= np.max([*o.excess.values()], axis=0) <= 0
         for name in self.targets.keys() - self.solved.keys():
             target = self.targets[name]
             if name == EXTRA:
                 value = _extra(*(found[a] for a in PAIR))
             else:
-                alternative = name.removeprefix("walking_ratio_")
-                value = (
-                    found[alternative].energy[PUBLISHED_LEG] / found["ideal"].energy[PUBLISHED_LEG]
-                )
+                own = found[name.removeprefix("walking_ratio_")].drawn[PUBLISHED_LEG]
+                value = own / found["ideal"].drawn[PUBLISHED_LEG]
             good &= np.abs(value - target.centre) <= target.half_width
-        return np.where(good, 0.0, -np.inf)
+        return good
 
 
-def _extra(reversible: BatchOutcome, irreversible: BatchOutcome) -> Array:
+def _extra(reversible: Outcome, irreversible: Outcome) -> Array:
     """Energy per middle leg and cycle by which the irreversible actuator draws more, (W,) [J]."""
-    energies = [np.mean(list(o.energy.values()), axis=0) for o in (reversible, irreversible)]
-    extra: Array = energies[1] - energies[0]
+    legs = [irreversible.drawn[leg] - reversible.drawn[leg] for leg in MIDDLE_LEGS]
+    extra: Array = np.mean(legs, axis=0)
     return extra
 
 
@@ -281,7 +269,7 @@ def _moves(
 
     def constants(x: Array, random: object) -> tuple[Array, Array]:
         q = x.copy()
-        q[:, posterior.constants] = posterior.drawn_constants(rng, len(x))
+        q[:, posterior.constants] = posterior.task.sliver.draws(rng, len(x))
         return q, np.zeros(len(x))
 
     def robot(x: Array, random: object) -> tuple[Array, Array]:

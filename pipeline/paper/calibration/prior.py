@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal, Self
 
@@ -22,6 +24,46 @@ Array = NDArray[np.float64]
 PRIOR_FILE = Path(__file__).parent / "prior.toml"
 
 
+class _Written(Table):
+    """What is known of a number before, as the file writes it.
+
+    Attributes:
+        value: Centre.
+        unit: Of the numbers.
+        deviation: One standard deviation; a factor where `scale` is ``log``.
+        bounds: Hard.
+        scale: ``log`` where the belief spreads over factors.
+        source: Where the belief comes from.
+        reason: Why.
+    """
+
+    expected = "value, unit, deviation, bounds, scale, source and reason"
+    value: Number
+    unit: str
+    deviation: Number
+    bounds: Pair
+    scale: Literal["linear", "log"]
+    source: str
+    reason: str
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        try:
+            dimension(self.unit)
+        except UnitError as error:
+            raise ValueError(str(error)) from None
+        least, most = self.bounds
+        if not least < most:
+            raise ValueError("bounds must be [low, high]")
+        if not least <= self.value <= most:
+            raise ValueError("the bounds exclude the value; widen them or move it")
+        if self.deviation <= (1 if self.scale == "log" else 0):
+            raise ValueError('deviation must be positive; a factor above 1 with scale = "log"')
+        if self.scale == "log" and min(to_si(x, self.unit) for x in (least, self.value)) <= 0:
+            raise ValueError("a logarithmic scale needs positive numbers")
+        return self
+
+
 @dataclass(frozen=True)
 class Free:
     """One free number.
@@ -33,8 +75,6 @@ class Free:
         bounds: Hard, SI.
         logarithmic: Whether the belief spreads over factors.
         unit: As written.
-        source: Where the belief comes from.
-        reason: Why.
     """
 
     key: str
@@ -43,13 +83,16 @@ class Free:
     bounds: tuple[float, float]
     logarithmic: bool
     unit: str
-    source: str
-    reason: str
+
+    @property
+    def ends(self) -> tuple[float, float]:
+        """The bounds as coordinates."""
+        return self.coordinate(self.bounds[0]), self.coordinate(self.bounds[1])
 
     @property
     def interval(self) -> tuple[float, float]:
         """What 95 % of the belief spans inside the bounds, as much left out below as above, SI."""
-        low, high = (ndtr(self.coordinate(bound)) for bound in self.bounds)
+        low, high = ndtr(self.ends)
         ends = ndtri(low + np.array([0.025, 0.975]) * (high - low))
         return self.value(ends[0]), self.value(ends[1])
 
@@ -82,31 +125,29 @@ class Prior:
         """Names in order."""
         return tuple(f.key for f in self.free)
 
-    @property
+    @cached_property
     def lower(self) -> Array:
         """Lower bounds in coordinates, (D,)."""
-        return np.array([f.coordinate(f.bounds[0]) for f in self.free])
+        return np.array([f.ends[0] for f in self.free])
 
-    @property
+    @cached_property
     def upper(self) -> Array:
         """Upper bounds in coordinates, (D,)."""
-        return np.array([f.coordinate(f.bounds[1]) for f in self.free])
+        return np.array([f.ends[1] for f in self.free])
 
     def values(self, z: Array) -> dict[str, float]:
         """SI values at coordinates (D,)."""
         return {f.key: f.value(float(x)) for f, x in zip(self.free, z, strict=True)}
 
-    def coordinates(self, values: dict[str, float]) -> Array:
+    def coordinates(self, values: Mapping[str, float]) -> Array:
         """Coordinates (D,) of SI values."""
         return np.array([f.coordinate(values[f.key]) for f in self.free])
 
     def draw(self, rng: np.random.Generator) -> Array:
         """Random coordinates from the Gaussian cut off at the bounds, (D,)."""
         z = rng.normal(size=len(self.free))
-        outside = (z < self.lower) | (z > self.upper)
-        while outside.any():
+        while (outside := (z < self.lower) | (z > self.upper)).any():
             z[outside] = rng.normal(size=int(outside.sum()))
-            outside = (z < self.lower) | (z > self.upper)
         return z
 
 
@@ -120,54 +161,11 @@ def load_prior(path: Path = PRIOR_FILE) -> Prior:
         table = read_toml_file(path)
     except UnreadableTextError as error:
         raise PriorError(f"{path.name}: cannot be read ({error})") from None
-    return Prior(tuple(_free(key, entry, path.name) for key, entry in table.items()))
-
-
-class _Written(Table):
-    """A free number as it stands in the file."""
-
-    expected = "value, unit, deviation, bounds, scale, source and reason"
-    value: Number
-    unit: str
-    deviation: Number
-    bounds: Pair
-    scale: Literal["linear", "log"]
-    source: str
-    reason: str
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
-        try:
-            dimension(self.unit)
-        except UnitError as error:
-            raise ValueError(str(error)) from None
-        least, most = self.bounds
-        if not least < most:
-            raise ValueError("bounds must be [low, high]")
-        if not least <= self.value <= most:
-            raise ValueError("the bounds exclude the value; widen them or move it")
-        if self.deviation <= (1 if self.scale == "log" else 0):
-            raise ValueError('deviation must be positive; a factor above 1 with scale = "log"')
-        if self.scale == "log" and min(to_si(x, self.unit) for x in (least, self.value)) <= 0:
-            raise ValueError("a logarithmic scale needs positive numbers")
-        return self
-
-
-def _free(key: str, entry: object, file: str) -> Free:
-    """One free number in SI units."""
-    written = checked(_Written, entry, f"{file}: '{one_line(key)}'", PriorError)
-
-    logarithmic = written.scale == "log"
-    deviation = (
-        math.log(written.deviation) if logarithmic else to_si(written.deviation, written.unit)
-    )
-    return Free(
-        key=key,
-        centre=to_si(written.value, written.unit),
-        deviation=deviation,
-        bounds=(to_si(written.bounds[0], written.unit), to_si(written.bounds[1], written.unit)),
-        logarithmic=logarithmic,
-        unit=written.unit,
-        source=written.source,
-        reason=written.reason,
-    )
+    free = []
+    for key, entry in table.items():
+        w = checked(_Written, entry, f"{path.name}: '{one_line(key)}'", PriorError)
+        logarithmic = w.scale == "log"
+        deviation = math.log(w.deviation) if logarithmic else to_si(w.deviation, w.unit)
+        bounds = (to_si(w.bounds[0], w.unit), to_si(w.bounds[1], w.unit))
+        free.append(Free(key, to_si(w.value, w.unit), deviation, bounds, logarithmic, w.unit))
+    return Prior(tuple(free))

@@ -16,34 +16,32 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from actuators.loading.build import Catalog
-from actuators.units import from_si, to_si
+from actuators.units import from_si
 from pipeline.errors import PipelineError
-from pipeline.paper.calibration.machine import (
-    ROBOT,
-    ActuatorPart,
-    RobotPart,
-    actuator_part,
-    catalog_with,
-    robot_part,
-    standing_targets,
-)
 from pipeline.paper.calibration.prior import Prior
-from pipeline.paper.calibration.quantities import computed, walking_extra
 from pipeline.paper.constants.motor_constants import Sliver, sliver
 from pipeline.paper.constants.table_entries import entries
-from pipeline.paper.published import Published
+from pipeline.paper.hexapod import (
+    ROBOT,
+    Outcome,
+    RobotPart,
+    outcomes,
+    robot_part,
+    solve_posture,
+    with_splits,
+)
+from pipeline.paper.published import EVEN, EXTRA, Published
+from pipeline.paper.quantities import computed
 from pipeline.robot.robot_file import RobotSpec
 
 Array = NDArray[np.float64]
 #: Rows met exactly by solving the posture.
 EXACT = ("standing_reaction_rm", "standing_torque_2", "standing_torque_3")
-EXTRA = "walking_extra_J"
-#: The energy difference stands for it among the fitted rows.
-EVEN = "break_even_standing_fraction"
 #: Met by the choice of the motor's constants, see `pipeline.paper.constants.motor_constants`.
 CHOSEN = ("ideal_current_2", "ideal_voltage_2", "rotor_current_2")
 _STEEP = 200.0  # residual per relative excess over a motor limit
 _STEP = 1e-4  # of a prior standard deviation, for derivatives
+_REMEMBERED = 64  # robots: derivatives of actuators and blocks of draws share them
 
 
 @dataclass(frozen=True)
@@ -57,20 +55,20 @@ class Target:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One point of the search.
+    """One set of numbers, evaluated.
 
     Attributes:
         values: Published quantities, SI, by id; and the fitted energy difference.
         excess: Motor limits, relative: peak over limit less one; negative is inside.
             Named ``<alternative>.<quantity>``.
         robot: The robot's part.
-        actuators: The actuators' part.
+        outcomes: The actuators' part, by alternative.
     """
 
     values: Mapping[str, float]
     excess: Mapping[str, float]
     robot: RobotPart
-    actuators: ActuatorPart
+    outcomes: Mapping[str, Outcome]
 
 
 @dataclass
@@ -86,7 +84,6 @@ class Problem:
         without: Targets left out.
         constants: The motor's three constants, by reference; the sliver's middle where None.
         net: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
-        posture_offset: Added to the reaction [N] and the torques [N*m] that fix the posture.
     """
 
     spec: RobotSpec
@@ -97,14 +94,12 @@ class Problem:
     without: tuple[str, ...] = ()
     constants: Mapping[str, float] | None = None
     net: bool = False
-    posture_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
     _robots: dict[bytes, RobotPart] = field(default_factory=dict, repr=False)
 
     @property
     def robot_columns(self) -> NDArray[np.intp]:
         """Coordinates that belong to the robot."""
-        own = [i for i, key in enumerate(self.prior.keys) if key.startswith(ROBOT + ".")]
-        return np.array(own, dtype=np.intp)
+        return np.flatnonzero([key.startswith(f"{ROBOT}.") for key in self.prior.keys])
 
     @property
     def actuator_columns(self) -> NDArray[np.intp]:
@@ -112,45 +107,21 @@ class Problem:
         return np.setdiff1d(np.arange(len(self.prior.free)), self.robot_columns)
 
     @property
+    def ratio(self) -> float:
+        """Total ratio of every alternative."""
+        return self.catalog.parameter("requirement.ratio").value
+
+    @property
     def targets(self) -> tuple[Target, ...]:
         """What the least-squares part fits; the posture meets the others exactly."""
         rows = [
-            Target(p.id, to_si(p.value, p.unit), to_si(p.half_width, p.unit))
+            Target(p.id, p.si, p.half_width_si)
             for p in self.published.values()
             if p.role == "target" and p.id not in (*EXACT, *CHOSEN, EVEN, *self.without)
         ]
         if EXTRA not in self.without:
             rows.append(extra_target(self.published, self.standing_legs))
         return tuple(rows)
-
-    def robot(self, z: Array) -> RobotPart:
-        """The robot's part at coordinates (D,), remembered."""
-        key = z[self.robot_columns].tobytes()
-        if key not in self._robots:
-            if len(self._robots) > 64:
-                self._robots.clear()
-            goal = standing_targets(self.published) + np.array(self.posture_offset)
-            self._robots[key] = robot_part(self.spec, self.prior.values(z), goal)
-        return self._robots[key]
-
-    def evaluate(self, z: Array) -> Evaluation:
-        """Everything at coordinates (D,).
-
-        Raises:
-            PipelineError: The robot cannot take this shape.
-        """
-        robot = self.robot(z)
-        ratio = self.catalog.parameter("requirement.ratio").value
-        catalog = catalog_with(self.catalog, self.numbers(z), ratio)
-        actuators = actuator_part(robot, catalog, net=self.net)
-        values = computed(robot, actuators, self.standing_legs)
-        values[EXTRA] = walking_extra(actuators.energy)
-        excess = {
-            f"{name}.{quantity}": value
-            for name, outcome in actuators.outcomes.items()
-            for quantity, value in outcome.excess.items()
-        }
-        return Evaluation(values, excess, robot, actuators)
 
     @cached_property
     def sliver(self) -> Sliver:
@@ -162,19 +133,46 @@ class Problem:
         constants = self.sliver.middle if self.constants is None else self.constants
         return self.prior.values(z) | dict(constants)
 
-    def residuals(self, z: Array, *, pull: float, free: float = 0.0) -> Array:
-        """Residual vector at z: the prior's coordinates, the targets, the limits.
+    def robot(self, z: Array) -> RobotPart:
+        """The robot's part at coordinates (D,), remembered.
 
-        Args:
-            z: Coordinates (D,).
-            pull: Weight of the distance from the printed values, per half width.
-            free: Half widths around the printed values within which nothing pulls.
+        Raises:
+            PipelineError: Out of reach, tipping, or no posture meets the targets.
         """
-        point = self.evaluate(z)
-        error = np.array([(point.values[t.name] - t.centre) / t.half_width for t in self.targets])
-        error = np.sign(error) * np.maximum(np.abs(error) - free, 0.0)
-        limits = _STEEP * np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
-        return np.concatenate([z, pull * error, limits])
+        key = z[self.robot_columns].tobytes()
+        if key not in self._robots:
+            if len(self._robots) > _REMEMBERED:
+                self._robots.clear()
+            own = {
+                k.split(".")[1]: v
+                for k, v in self.prior.values(z).items()
+                if k.startswith(f"{ROBOT}.")
+            }
+            goal = np.array([self.published[name].value for name in EXACT])
+            spec = solve_posture(self.spec.with_parameters(own), goal)
+            self._robots[key] = robot_part(spec)
+        return self._robots[key]
+
+    def actuators(self, z: Array) -> dict[str, float]:
+        """Numbers of components at coordinates (D,), SI, by reference."""
+        own = {k: v for k, v in self.numbers(z).items() if not k.startswith(f"{ROBOT}.")}
+        return with_splits(own, self.ratio)
+
+    def evaluate(self, z: Array) -> Evaluation:
+        """Everything at coordinates (D,).
+
+        Raises:
+            PipelineError: The robot cannot take this shape.
+        """
+        robot = self.robot(z)
+        found = outcomes(robot.demand, self.catalog, self.actuators(z))
+        values = computed(robot, found, self.standing_legs, net=self.net)
+        excess = {
+            f"{name}.{quantity}": float(value[0])
+            for name, outcome in found.items()
+            for quantity, value in outcome.excess.items()
+        }
+        return Evaluation(values, excess, robot, found)
 
     def solve(
         self,
@@ -190,44 +188,40 @@ class Problem:
         Args:
             start: Coordinates (D,).
             columns: Which coordinates may move.
-            pull: Weight of the printed values.
+            pull: Weight of the distance from the printed values, per half width.
             free: Half widths around them within which nothing pulls.
             evaluations: At most so many.
 
         Returns:
             Coordinates (D,).
         """
-
-        def full(x: Array) -> Array:
-            z = start.copy()
-            z[columns] = x
-            return z
+        targets, z = self.targets, start.copy()
 
         def residuals(x: Array) -> Array:
+            z[columns] = x
             try:
-                return self.residuals(full(x), pull=pull, free=free)
+                point = self.evaluate(z)
             except PipelineError:
-                # Out of reach or tipping: a wall, felt as a large but finite residual.
-                return np.full(self._size, 30.0)
+                # Out of reach or tipping: a wall, a large but finite residual.
+                return np.full(z.size + len(targets) + 4 * len(self.catalog.alternatives), 30.0)
+            error = np.array([(point.values[t.name] - t.centre) / t.half_width for t in targets])
+            error = np.sign(error) * np.maximum(np.abs(error) - free, 0.0)
+            limits = np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
+            return np.concatenate([z, pull * error, _STEEP * limits])
 
         lower, upper = self.prior.lower[columns], self.prior.upper[columns]
-        inside = np.clip(start[columns], lower + 1e-9, upper - 1e-9)
         found = optimize.least_squares(
             residuals,
-            inside,
+            np.clip(start[columns], lower + 1e-9, upper - 1e-9),
             jac=partial(_differences, residuals, upper),
             bounds=(lower, upper),
-            method="trf",
             x_scale=1.0,
             ftol=1e-8,
             xtol=1e-8,
             max_nfev=evaluations,
         )
-        return full(found.x)
-
-    @property
-    def _size(self) -> int:
-        return len(self.prior.free) + len(self.targets) + 4 * len(self.catalog.alternatives)
+        z[columns] = found.x
+        return z
 
     def unmet(self, point: Evaluation) -> list[str]:
         """Ids of printed values that a point does not give at printed precision."""
@@ -263,7 +257,7 @@ def fixed_before(published: Mapping[str, Published]) -> set[str]:
 
 def extra_target(published: Mapping[str, Published], standing_legs: int) -> Target:
     """The energy difference per middle leg and cycle that the printed break-even asks for [J]."""
-    row = published["break_even_standing_fraction"]
+    row = published[EVEN]
     held = standing_legs * published["reversible_leg_energy_3s"].value  # [J] per cycle's time
 
     def extra(fraction: float) -> float:
@@ -274,21 +268,9 @@ def extra_target(published: Mapping[str, Published], standing_legs: int) -> Targ
 
 
 def _differences(function: Callable[[Array], Array], upper: Array, x: Array) -> Array:
-    """Jacobian by one-sided differences, backwards where a step would leave the bounds.
-
-    Args:
-        function: Of coordinates (D,), returns residuals (R,).
-        upper: Bounds (D,).
-        x: Where, (D,).
-
-    Returns:
-        (R, D).
-    """
+    """Jacobian (R, D) by one-sided differences, backwards where a step would leave the bounds."""
     base = function(x)
-    out = np.empty((base.size, x.size))
-    for i in range(x.size):
-        step = _STEP if x[i] + _STEP <= upper[i] else -_STEP
-        moved = x.copy()
-        moved[i] += step
-        out[:, i] = (function(moved) - base) / step
-    return out
+    steps = np.where(x + _STEP <= upper, _STEP, -_STEP)
+    return np.stack(
+        [(function(x + row) - base) / row[i] for i, row in enumerate(np.diag(steps))], 1
+    )

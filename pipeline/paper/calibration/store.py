@@ -7,7 +7,6 @@ the old files as they were.
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -21,13 +20,13 @@ import tomlkit
 from actuators.loading.build import CATALOG, load_catalog
 from actuators.units import from_si
 from pipeline.paper.calibration.fingerprint import Fingerprint, fingerprint
-from pipeline.paper.calibration.machine import POSTURE, ROBOT
-from pipeline.paper.calibration.prior import Free, Prior, load_prior
-from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
+from pipeline.paper.calibration.prior import Prior, load_prior
 from pipeline.paper.constants.motor_constants import KEYS, UNITS
 from pipeline.paper.errors import CalibrationError
+from pipeline.paper.hexapod import POSTURE, ROBOT, SPLITS
 from pipeline.paper.published import load_published
 from pipeline.robot.robot_file import load_robot_file
+from reports.atomic import replacing
 
 RESULTS_FILE = Path(__file__).parent / "results" / "calibration.json"
 _DIGITS = 9
@@ -71,34 +70,34 @@ class Calibrated:
     Attributes:
         key: ``robot.<name>`` or ``<component>.<name>``.
         unit: As its file writes it.
-        prior: Centre before; None for the motor's constants, which Tables IV to VI fix.
-        prior_interval: 95 % belief before; None likewise.
         value: At the nearest point.
         low: 2.5 % quantile of the posterior, or the value where that is less.
         high: 97.5 % quantile of the posterior, or the value where that is greater.
+        verdict: One of `VERDICTS`.
+        r_hat: How well groups of walkers agree on it: 1 where they do [1].
+        effective: Effective number of independent draws behind these numbers.
+        prior: Centre before; None for the motor's constants, which Tables IV to VI fix.
+        prior_interval: 95 % belief before; None likewise.
         shift: Mean of the posterior less the prior's centre, in prior standard deviations.
         spread: Standard deviation of the posterior, in prior standard deviations.
         at_lower: Share of the posterior at the lower bound [1].
         at_upper: Share of the posterior at the upper bound [1].
-        verdict: One of `VERDICTS`.
-        r_hat: How well groups of walkers agree on it: 1 where they do [1].
-        effective: Effective number of independent draws behind these numbers.
     """
 
     key: str
     unit: str
-    prior: float | None
-    prior_interval: tuple[float, float] | None
     value: float
     low: float
     high: float
-    shift: float | None
-    spread: float | None
-    at_lower: float
-    at_upper: float
     verdict: str
     r_hat: float
     effective: float
+    prior: float | None = None
+    prior_interval: tuple[float, float] | None = None
+    shift: float | None = None
+    spread: float | None = None
+    at_lower: float = 0.0
+    at_upper: float = 0.0
 
     @property
     def at_bound(self) -> float:
@@ -115,22 +114,29 @@ class Calibrated:
 
 def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibrated]:
     """What the calibration says of every free number and of the motor's constants."""
-    best = np.array(results["nearest"]["z"])
-    known = results["posterior"]["numbers"]
+    from scipy.stats import truncnorm
+
+    known, nearest = results["posterior"]["numbers"], results["nearest"]
     out = []
-    for free, coordinate in zip(prior.free, best, strict=True):
+    for free, coordinate in zip(prior.free, nearest["z"], strict=True):
         own = known[free.key]
         low, high, value = (free.value(float(q)) for q in (own["low"], own["high"], coordinate))
+        shift, spread = own["mean"], own["spread"]
         out.append(
             Calibrated(
-                *(free.key, free.unit, free.centre, free.interval),
-                *(value, min(low, value), max(high, value)),
-                *(own["mean"], own["spread"], own["at_lower"], own["at_upper"]),
-                number_verdict(own["mean"], own["spread"], _prior_spread(free)),
-                *(own["r_hat"], own["effective"]),
+                *(free.key, free.unit, value, min(low, value), max(high, value)),
+                number_verdict(shift, spread, float(truncnorm.std(*free.ends))),
+                *(own["r_hat"], own["effective"], free.centre, free.interval),
+                *(shift, spread, own["at_lower"], own["at_upper"]),
             )
         )
-    return out + _constants(results)
+    for key in KEYS:
+        own, value = known[key], nearest["constants"][key]
+        low, high = min(own["low"], value), max(own["high"], value)
+        out.append(
+            Calibrated(key, UNITS[key], value, low, high, FIXED, own["r_hat"], own["effective"])
+        )
+    return out
 
 
 def number_verdict(shift: float, spread: float, prior_spread: float) -> str:
@@ -150,30 +156,6 @@ def number_verdict(shift: float, spread: float, prior_spread: float) -> str:
     return "not determined" if spread >= FREE_ABOVE * prior_spread else "narrowed"
 
 
-def _constants(results: Mapping[str, Any]) -> list[Calibrated]:
-    """The motor's three constants in the posterior."""
-    out = []
-    for key in KEYS:
-        own = results["posterior"]["numbers"][key]
-        value = results["nearest"]["constants"][key]
-        low, high = min(own["low"], value), max(own["high"], value)
-        out.append(
-            Calibrated(
-                *(key, UNITS[key], None, None, value, low, high),
-                *(None, None, 0.0, 0.0, FIXED, float(own["r_hat"]), float(own["effective"])),
-            )
-        )
-    return out
-
-
-def _prior_spread(free: Free) -> float:
-    """Standard deviation of the unit Gaussian cut off at the number's bounds."""
-    from scipy.stats import truncnorm
-
-    low, high = (free.coordinate(bound) for bound in free.bounds)
-    return float(truncnorm.std(low, high))
-
-
 def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[Path]:
     """Write the results and the calibrated values, all or nothing.
 
@@ -185,63 +167,72 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
     Returns:
         The files written.
     """
-    numbers = calibrated_numbers(results, load_prior())
-    documents = {robot: tomlkit.parse(robot.read_text(encoding="utf-8"))}
-    for number in numbers:
+    components = [path for path in catalog.glob("*.toml") if path.stem != "alternatives"]
+    before = {path: path.read_text(encoding="utf-8") for path in (robot, *components)}
+    documents = {path: tomlkit.parse(text) for path, text in before.items()}
+    _fill_in(documents, results, robot, catalog)
+    texts = {path: tomlkit.dumps(document) for path, document in documents.items()}
+    texts = {path: text for path, text in texts.items() if text != before[path] or path == robot}
+    with replacing(*texts, RESULTS_FILE) as (*temporary, results_file):
+        staged = dict(zip(texts, temporary, strict=True))
+        for path, text in texts.items():
+            staged[path].write_text(text, encoding="utf-8")
+        results["numbers"] = _fingerprint_of(staged, robot, catalog)
+        text = json.dumps(_rounded(results), separators=(",", ":"))
+        results_file.write_text(text + "\n", encoding="utf-8")
+    return [*texts, RESULTS_FILE]
+
+
+def _fingerprint_of(staged: Mapping[Path, Path], robot: Path, catalog: Path) -> Fingerprint:
+    """The numbers of the files as they are about to be."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for path in catalog.glob("*.toml"):
+            shutil.copyfile(staged.get(path, path), folder / path.name)
+        spec = load_robot_file(staged[robot])
+        return fingerprint(spec, load_catalog(folder), load_published(), load_prior())
+
+
+def _fill_in(
+    documents: Mapping[Path, Any], results: Mapping[str, Any], robot: Path, catalog: Path
+) -> None:
+    """Put every calibrated number into its file."""
+    for number in calibrated_numbers(results, load_prior()):
         component, name = number.key.split(".")
         path = robot if component == ROBOT else catalog / f"{component}.toml"
-        if path not in documents:
-            documents[path] = tomlkit.parse(path.read_text(encoding="utf-8"))
         reason = _REASONS[number.verdict] + (
             f"; at its {number.bound} bound in {100 * number.at_bound:.0f} % of the posterior"
             if number.at_bound >= AT_LEAST
             else ""
         )
-        _replace(documents[path], name, number.value, number.low, number.high, reason)
+        entry = documents[path]["parameters"][name]
+        _replace(entry, number.value, number.low, number.high, reason)
         if number.verdict == FIXED:
-            documents[path]["parameters"][name]["source"] = _FIXED_SOURCE
-    _posture(documents[robot], results)
-    _splits(documents, catalog, results, {n.key: n.value for n in numbers})
-    documents[robot]["gait"]["transfer_path"] = results["nearest"]["path"]
-    contents = {path: tomlkit.dumps(document) for path, document in documents.items()}
-    temporary = {
-        path: path.with_name(f".{path.name}.{os.getpid()}.tmp")
-        for path in (*contents, RESULTS_FILE)
-    }
-    try:
-        for path, text in contents.items():
-            temporary[path].write_text(text, encoding="utf-8")
-        results["numbers"] = _written(temporary, robot, catalog)
-        contents[RESULTS_FILE] = json.dumps(_rounded(results), separators=(",", ":")) + "\n"
-        for path, text in contents.items():
-            path.parent.mkdir(parents=True, exist_ok=True)
-            temporary[path].write_text(text, encoding="utf-8")
-        for path in contents:
-            os.replace(temporary[path], path)
-    finally:
-        for leftover in temporary.values():
-            leftover.unlink(missing_ok=True)
-    return list(contents)
-
-
-def _written(temporary: Mapping[Path, Path], robot: Path, catalog: Path) -> Fingerprint:
-    """The numbers of the files as they are about to be."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for path in catalog.glob("*.toml"):
-            shutil.copyfile(temporary.get(path, path), folder / path.name)
-        return fingerprint(
-            load_robot_file(temporary[robot]),
-            load_catalog(folder),
-            load_published(IDS, DIMENSIONS),
-            load_prior(),
+            entry["source"] = _FIXED_SOURCE
+    nearest = results["nearest"]
+    rows = ("the reaction of 192.6 N", "joint 2 in Table III", "joint 3 in Table III")
+    for name, row in zip(POSTURE, rows, strict=True):
+        spread = [m["posture"][name] for m in results["sets"]]
+        low, high = (float(q) for q in np.quantile(spread, [0.025, 0.975]))
+        value, entry = nearest["posture"][name], documents[robot]["parameters"][name]
+        _replace(entry, value, min(low, value), max(high, value), f"solved from {row}")
+    total = float(documents[catalog / "requirement.toml"]["parameters"]["ratio"]["value"])
+    for free, following in SPLITS.items():
+        first, second = (
+            documents[catalog / f"{reference.split('.')[0]}.toml"]["parameters"]["ratio"]
+            for reference in (free, following)
         )
+        low, high = first["interval"]
+        second["value"] = total / float(first["value"])
+        second["interval"] = [float(f"{total / float(end):.8g}") for end in (high, low)]
+        second["basis"] = "derived"
+        second["source"] = f"{total:g} over the ratio of {free.split('.')[0]}"
+        second["reason"] = ""
+    documents[robot]["gait"]["transfer_path"] = nearest["path"]
 
 
-def _replace(
-    document: tomlkit.TOMLDocument, name: str, value: float, low: float, high: float, reason: str
-) -> None:
-    entry: Any = document["parameters"][name]
+def _replace(entry: Any, value: float, low: float, high: float, reason: str) -> None:
+    """Put a calibrated number, SI, into its table."""
     unit = str(entry["unit"])
     written = [float(f"{from_si(x, unit):.8g}") for x in (value, low, high)]
     entry["value"] = written[0]
@@ -249,40 +240,6 @@ def _replace(
     entry["source"] = _SOURCE
     entry["reason"] = reason
     entry["interval"] = [min(written), max(written)]
-
-
-def _posture(document: tomlkit.TOMLDocument, results: dict[str, Any]) -> None:
-    """Numbers solved from section II.C and Table III."""
-    rows = ("the reaction of 192.6 N", "joint 2 in Table III", "joint 3 in Table III")
-    for name, row in zip(POSTURE, rows, strict=True):
-        spread = [m["posture"][name] for m in results["sets"]]
-        low, high = (float(q) for q in np.quantile(spread, [0.025, 0.975]))
-        value = results["nearest"]["posture"][name]
-        reason = f"solved from {row}"
-        _replace(document, name, value, min(low, value), max(high, value), reason)
-
-
-def _splits(
-    documents: dict[Path, Any], catalog: Path, results: dict[str, Any], values: dict[str, float]
-) -> None:
-    """The second ratio of each pair follows from the first and the published 400."""
-    requirement = tomlkit.parse((catalog / "requirement.toml").read_text(encoding="utf-8"))
-    total = float(requirement["parameters"]["ratio"]["value"])
-    for first, second in (("harmonic_drive", "timing_belt"), ("planetary", "hypoid")):
-        path = catalog / f"{second}.toml"
-        if path not in documents:
-            documents[path] = tomlkit.parse(path.read_text(encoding="utf-8"))
-        own = documents[catalog / f"{first}.toml"]["parameters"]["ratio"]
-        entry = documents[path]["parameters"]["ratio"]
-        low, high = own["interval"]
-        entry["value"] = total / float(own["value"])
-        entry["interval"] = [
-            float(f"{total / float(high):.8g}"),
-            float(f"{total / float(low):.8g}"),
-        ]
-        entry["basis"] = "derived"
-        entry["source"] = f"{total:g} over the ratio of {first}"
-        entry["reason"] = ""
 
 
 def _rounded(value: Any) -> Any:

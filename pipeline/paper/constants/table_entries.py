@@ -1,9 +1,9 @@
 """The electrical entries of Tables IV to VI as bounds on the motor's constants.
 
-At standstill Eq. 1, Ohm's law and P = U I make every entry a product of a motor torque with two
-numbers, u = 1 / k and w = R / k:
+At standstill Eq. 1, Ohm's law and P = U I make every entry a product of a motor torque G with
+powers of two numbers, u = 1 / k and w = R / k:
 
-    I = G u        U = G w        P = G^2 u w        E = 3 s (G2^2 + G3^2) u w
+    G        I = G u        U = G w        P = G^2 u w        E = 3 s (G2^2 + G3^2) u w
 
 so that each printed entry bounds u, w or their product. Rotor friction lowers the torque of Table
 V.
@@ -11,19 +11,25 @@ V.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.units import to_si
-from pipeline.paper.published import Published
+from pipeline.paper.published import ALTERNATIVES, CYCLE, Published
 
 Array = NDArray[np.float64]
-SECONDS = 3.0  # section IV.B adds up over the duration of a walking cycle
 LOADED = ("2", "3")  # joints of Tables IV to VI
 _SLACK = 1e-9  # as `Published.reproduced` has it
+#: Powers of u and w in each kind of entry.
+POWERS = {
+    "motor_torque": (0, 0),
+    "current": (1, 0),
+    "voltage": (0, 1),
+    "power": (1, 1),
+    "energy": (1, 1),
+}
 
 
 @dataclass(frozen=True)
@@ -33,115 +39,102 @@ class Entry:
     Attributes:
         id: Of the printed value.
         alternative: Which table.
-        what: ``motor_torque``, ``current``, ``voltage``, ``power`` or ``energy``.
-        joint: ``2`` or ``3``; both for the leg's energy.
+        kind: One of `POWERS`.
+        joint: ``2`` or ``3``; empty for the leg's energy.
+        ideal: Motor torque of the ideal actuator at joints 2 and 3 [N*m].
         low: Least magnitude that rounds to the printed one, SI.
         high: Greatest.
     """
 
     id: str
     alternative: str
-    what: str
+    kind: str
     joint: str
+    ideal: tuple[float, float]
     low: float
     high: float
+
+    @property
+    def powers(self) -> tuple[int, int]:
+        """Of u and w."""
+        return POWERS[self.kind]
+
+    def factor(self, friction: Array | float, held: Array | float) -> Array:
+        """What stands before u and w.
+
+        Args:
+            friction: Of the rotor [N*m].
+            held: What the reversible actuator's motor holds at joint 2 [N*m].
+        """
+        friction, held = np.asarray(friction, dtype=float), np.asarray(held, dtype=float)
+        torques = {
+            "ideal": [np.full(friction.shape, ideal) for ideal in self.ideal],
+            "rotor": [np.maximum(ideal - friction, 0.0) for ideal in self.ideal],
+            "reversible": [held, np.zeros(held.shape)],
+        }[self.alternative]
+        if self.kind == "energy":
+            return CYCLE * (torques[0] ** 2 + torques[1] ** 2)
+        own: Array = torques[LOADED.index(self.joint)]
+        return own**2 if self.kind == "power" else own
 
 
 def entries(published: Mapping[str, Published]) -> tuple[Entry, ...]:
     """Every electrical entry of Tables IV to VI and the energies made of them."""
+    ideal = joint_torques(published)
     out = []
-    for alternative in ("ideal", "rotor", "reversible"):
-        for what in ("motor_torque", "current", "voltage", "power"):
-            for joint in LOADED:
-                row = published[f"{alternative}_{what}_{joint}"]
-                out.append(_entry(row, alternative, what, joint))
-        out.append(_entry(published[f"{alternative}_leg_energy_3s"], alternative, "energy", ""))
+    for alternative in ALTERNATIVES[:3]:
+        for kind in POWERS:
+            for joint in ("",) if kind == "energy" else LOADED:
+                name = "leg_energy_3s" if kind == "energy" else f"{kind}_{joint}"
+                row = published[f"{alternative}_{name}"]
+                # All signs of a table are those of the joint's torque, so magnitudes are compared.
+                value, half = abs(row.si), row.half_width_si
+                slack = _SLACK * max(1.0, value)
+                low, high = value - half - slack, value + half + slack
+                out.append(Entry(row.id, alternative, kind, joint, ideal, low, high))
     return tuple(out)
 
 
-def _entry(row: Published, alternative: str, what: str, joint: str) -> Entry:
-    # All signs of a table are those of the joint's torque, so magnitudes are compared.
-    value, half = abs(to_si(row.value, row.unit)), to_si(row.half_width, row.unit)
-    slack = _SLACK * max(1.0, abs(row.value)) * (half / row.half_width if row.half_width else 1.0)
-    return Entry(row.id, alternative, what, joint, value - half - slack, value + half + slack)
-
-
-def joint_torques(published: Mapping[str, Published]) -> dict[str, float]:
+def joint_torques(published: Mapping[str, Published]) -> tuple[float, float]:
     """Magnitudes of Table III over the transmission ratio: what the ideal motor holds [N*m]."""
     ratio = published["transmission_ratio"].value
-    return {j: abs(published[f"standing_torque_{j}"].value) / ratio for j in LOADED}
-
-
-def motor_torques(
-    ideal: Mapping[str, float], friction: Array | float, held: Array | float
-) -> dict[tuple[str, str], Array]:
-    """Magnitude of every alternative's motor torque, by alternative and joint [N*m].
-
-    Args:
-        ideal: From `joint_torques`.
-        friction: Of the rotor [N*m].
-        held: What the reversible actuator's motor still holds at joint 2 [N*m].
-    """
-    friction = np.asarray(friction, dtype=float)
-    held = np.asarray(held, dtype=float)
-    out = {}
-    for joint in LOADED:
-        out["ideal", joint] = np.full(friction.shape, ideal[joint])
-        out["rotor", joint] = np.maximum(ideal[joint] - friction, 0.0)
-        out["reversible", joint] = held if joint == "2" else np.zeros(held.shape)
-    return out
+    two, three = (abs(published[f"standing_torque_{j}"].value) / ratio for j in LOADED)
+    return two, three
 
 
 def meets(
-    listed: tuple[Entry, ...],
-    ideal: Mapping[str, float],
+    listed: Sequence[Entry],
     friction: Array | float,
     held: Array | float,
-    u: Array | float,
-    w: Array | float,
+    u: Array,
+    w: Array,
+    hair: float = 0.0,
 ) -> NDArray[np.bool_]:
     """Whether each entry comes out as printed, shape (E, ...).
 
     Args:
         listed: The entries.
-        ideal: From `joint_torques`.
         friction: Of the rotor [N*m].
         held: By the reversible actuator's motor at joint 2 [N*m].
         u: 1 / k [A/(N*m)].
         w: R / k [V/(N*m)].
+        hair: By which a value may miss a bound, relative to the upper one.
     """
-    torque = motor_torques(ideal, friction, held)
-    u, w = np.asarray(u, dtype=float), np.asarray(w, dtype=float)
     rows = []
     for e in listed:
-        if e.what == "energy":
-            square = sum(torque[e.alternative, j] ** 2 for j in LOADED)
-            value = SECONDS * square * u * w
-        else:
-            own = torque[e.alternative, e.joint]
-            value = {
-                "motor_torque": own * np.ones_like(u),
-                "current": own * u,
-                "voltage": own * w,
-                "power": own**2 * u * w,
-            }[e.what]
-        rows.append((value >= e.low) & (value <= e.high))
+        a, b = e.powers
+        value = e.factor(friction, held) * u**a * w**b
+        rows.append((value >= e.low - hair * e.high) & (value <= e.high * (1 + hair)))
     return np.stack(np.broadcast_arrays(*rows))
 
 
 def limits(
-    listed: tuple[Entry, ...], torque: Mapping[tuple[str, str], Array], what: str
-) -> list[tuple[float, float]]:
-    """Bounds that the entries of one kind put on u, w or u w, one pair per entry."""
-    out = []
+    listed: Sequence[Entry], friction: float, held: float, powers: tuple[int, int]
+) -> dict[str, tuple[float, float]]:
+    """Bounds that the entries put on u, w or u w, by id."""
+    out = {}
     for e in listed:
-        if what == "power" and e.what == "energy":
-            factor = SECONDS * sum(float(torque[e.alternative, j]) ** 2 for j in LOADED)
-        elif e.what == what:
-            own = float(torque[e.alternative, e.joint])
-            factor = own**2 if what == "power" else own
-        else:
-            continue
-        if factor > 0:
-            out.append((e.low / factor, e.high / factor))
+        factor = float(e.factor(friction, held))
+        if e.powers == powers and factor > 0:
+            out[e.id] = (e.low / factor, e.high / factor)
     return out

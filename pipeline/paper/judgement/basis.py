@@ -9,7 +9,6 @@ from typing import Any
 from actuators.loading.build import Catalog
 from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior, load_prior
-from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
 from pipeline.paper.calibration.store import RESULTS_FILE, load_results
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.published import Published, load_published
@@ -115,7 +114,7 @@ def basis(given: Settings) -> Basis | str | None:
         return "the paper's ground forces are the least tangential ones, this run's are others"
     if given.regeneration.policy != "none":
         return "in the paper energy that flows back is lost, in this run it is used again"
-    published, prior = load_published(IDS, DIMENSIONS), load_prior()
+    published, prior = load_published(), load_prior()
     stored = results.get("numbers", {})
     now = fingerprint(given.robot.spec, given.catalog, published, prior)
     differ = set(differences(stored, now))

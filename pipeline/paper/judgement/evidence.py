@@ -1,4 +1,4 @@
-"""What a stored calibration knows of a computed quantity: before the fit, and with it left out."""
+"""What a stored calibration says of a computed quantity: before the fit, and with it left out."""
 
 from __future__ import annotations
 
@@ -8,11 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.paper.calibration.whole_robot import Totals
+from pipeline.paper.hexapod import Totals
 
-Array = NDArray[np.float64]
 #: Quantiles shown as low and high.
 BAND = (0.025, 0.975)
 #: Fewer values than this have no 95 % that is worth showing.
@@ -45,18 +43,24 @@ class Evidence:
     prior: Sequence[Point]
     left_out: Mapping[str, Sequence[Point]]
 
+    def of_totals(self, values: Callable[[Totals], Mapping[str, float]]) -> Evidence:
+        """The same sets, with what follows from the whole robot's energy as their values."""
+
+        def points(own: Sequence[Point]) -> list[Point]:
+            return [Point(values(p.totals), p.totals) for p in own]
+
+        left_out = {key: points(own) for key, own in self.left_out.items()}
+        return Evidence(points(self.posterior), points(self.prior), left_out)
+
 
 def evidence(results: Mapping[str, Any]) -> Evidence:
     """The sets of a stored calibration."""
-    return Evidence(
-        [_point(p) for p in results["sets"]],
-        [_point(p) for p in results["prior"]],
-        {key: [_point(p) for p in points] for key, points in results["left_out"].items()},
-    )
 
+    def points(stored: Sequence[Mapping[str, Any]]) -> list[Point]:
+        return [Point(numbers(p["values"]), p["totals"]) for p in stored]
 
-def _point(stored: Mapping[str, Any]) -> Point:
-    return Point(numbers(stored["values"]), stored["totals"])
+    left_out = {key: points(stored) for key, stored in results["left_out"].items()}
+    return Evidence(points(results["sets"]), points(results["prior"]), left_out)
 
 
 def numbers(values: Mapping[str, Any]) -> dict[str, float]:
@@ -71,8 +75,3 @@ def quantiles(values: Sequence[float]) -> Interval:
         return NONE
     low, high = np.quantile(known, BAND)
     return float(low), float(high)
-
-
-def share(points: Sequence[Point], holds: Callable[[Mapping[str, float]], bool]) -> float:
-    """Share of the points whose values satisfy a condition; NaN without any."""
-    return float(np.mean([holds(p.values) for p in points])) if points else math.nan

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from actuators.units import from_si
-from pipeline.paper.calibration.problem import EVEN, EXTRA, extra_target
+from pipeline.paper.calibration.problem import extra_target
 from pipeline.paper.constants.data_sheet import data_sheet
 from pipeline.paper.constants.table_entries import joint_torques
 from pipeline.paper.judgement.evidence import LEAST, NONE, Evidence, Interval, quantiles
-from pipeline.paper.published import Published
+from pipeline.paper.published import EVEN, EXTRA, Published
 
-_OTHERS = "the other targets and the prior"
-_DATA_SHEET = "the motor's data sheet"
 #: What each exactly met target fixes; nothing else knows these numbers of the robot.
 _FIXES = {
     "standing_reaction_rm": "trunk_com_left",
@@ -36,10 +34,10 @@ class Prediction:
         unit: Of the numbers.
         published: Printed, or implied by the printed break-even.
         half_width: Of it.
+        by: What predicts it.
         median: Predicted; NaN where nothing or too few sets predict it.
         interval: 95 % of the prediction.
         sets: How many sets met the others and have such a value; 0 for a data sheet.
-        by: What predicts it.
     """
 
     name: str
@@ -47,10 +45,10 @@ class Prediction:
     unit: str
     published: float
     half_width: float
-    median: float
-    interval: Interval
-    sets: int
     by: str
+    median: float = math.nan
+    interval: Interval = NONE
+    sets: int = 0
 
     @property
     def inside(self) -> bool | None:
@@ -68,57 +66,42 @@ def leave_one_out(published: Mapping[str, Published], known: Evidence) -> list[P
         published: The printed values.
         known: The calibration's sets.
     """
-    rows = [
-        Prediction(
-            *(name, name, published[name].unit, published[name].value, published[name].half_width),
-            *(math.nan, NONE, 0, f"nothing: it fixes {fixes}"),
-        )
-        for name, fixes in _FIXES.items()
-    ]
-    rows += [_by_data_sheet(published, name) for name in ("ideal_current_2", "ideal_voltage_2")]
-    for key, points in known.left_out.items():
-        for target in key.split("+"):
-            rows.append(_by_sets(published, target, key, [p.values[target] for p in points]))
-            if target == EXTRA:
-                rows.append(_by_sets(published, EVEN, key, [p.values[EVEN] for p in points]))
+
+    def head(name: str, without: str) -> tuple[str, str, str, float, float]:
+        if name == EXTRA:
+            target = extra_target(published, 1)
+            return name, without, "J", target.centre, target.half_width
+        row = published[name]
+        return name, without, row.unit, row.value, row.half_width
+
+    rows = [Prediction(*head(name, name), f"nothing: it fixes {of}") for name, of in _FIXES.items()]
+    for name, edges in _from_data_sheet(published).items():
+        low, middle, high = sorted(math.copysign(e, published[name].value) for e in edges)
+        rows.append(Prediction(*head(name, name), "the motor's data sheet", middle, (low, high)))
+    for without, points in known.left_out.items():
+        targets = without.split("+")
+        for name in [*targets, EVEN] if EXTRA in targets else targets:
+            own = Prediction(*head(name, without), "the other targets and the prior")
+            values = [from_si(p.values[name], own.unit) for p in points]
+            values = [v for v in values if not math.isnan(v)]
+            median = float(np.median(values)) if len(values) >= LEAST else math.nan
+            interval = quantiles(values)
+            rows.append(replace(own, median=median, interval=interval, sets=len(values)))
     return rows
 
 
-def _by_sets(
-    published: Mapping[str, Published], name: str, without: str, values: list[float]
-) -> Prediction:
-    if name == EXTRA:
-        target = extra_target(published, 1)
-        unit, centre, half = "J", target.centre, target.half_width
-    else:
-        row = published[name]
-        unit, centre, half = row.unit, row.value, row.half_width
-        values = [from_si(v, unit) for v in values]
-    known = [v for v in values if not math.isnan(v)]
-    median = float(np.median(known)) if len(known) >= LEAST else math.nan
-    return Prediction(
-        *(name, without, unit, centre, half, median, quantiles(known), len(known), _OTHERS)
-    )
-
-
-def _by_data_sheet(published: Mapping[str, Published], name: str) -> Prediction:
-    """Current from the data sheet's k, voltage from its R and the printed current."""
-    row, sheet = published[name], data_sheet()
-    torque = joint_torques(published)["2"]
-    current = published["ideal_current_2"]
-    sign = math.copysign(1.0, row.value)
-    if name == "ideal_current_2":
-        least, most = sheet.parameter("torque_constant").interval or NONE
-        edges = [torque / most, torque / sheet["torque_constant"], torque / least]
-    else:
-        least, most = sheet.parameter("resistance").interval or NONE
-        printed = abs(current.value)
-        edges = [
+def _from_data_sheet(published: Mapping[str, Published]) -> dict[str, Sequence[float]]:
+    """Magnitudes of current from the data sheet's k, of voltage from its R and printed current."""
+    sheet, current = data_sheet(), published["ideal_current_2"]
+    torque, _ = joint_torques(published)
+    constants = [sheet["torque_constant"], *(sheet.parameter("torque_constant").interval or NONE)]
+    least, most = sheet.parameter("resistance").interval or NONE
+    printed = abs(current.value)
+    return {
+        "ideal_current_2": [torque / constant for constant in constants],
+        "ideal_voltage_2": [
             least * (printed - current.half_width),
             sheet["resistance"] * printed,
             most * (printed + current.half_width),
-        ]
-    low, middle, high = sorted(sign * edge for edge in edges)
-    return Prediction(
-        *(name, name, row.unit, row.value, row.half_width, middle, (low, high), 0, _DATA_SHEET)
-    )
+        ],
+    }

@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.paper.calibration.calibrate import OUTPUTS
-
 
 @dataclass(frozen=True)
 class Index:
@@ -23,16 +21,6 @@ class Index:
     total: float
     half_width: float
 
-    @property
-    def low(self) -> float:
-        """Lower end of the interval."""
-        return self.total - self.half_width
-
-    @property
-    def high(self) -> float:
-        """Upper end of the interval."""
-        return self.total + self.half_width
-
 
 def ranking(results: Mapping[str, Any], output: str) -> list[Index]:
     """Every number's total index on an output, largest first."""
@@ -47,21 +35,23 @@ def leading(ranked: Sequence[Index]) -> list[Index]:
 
     One alone stands out; with more, nothing says which of them to measure first.
     """
-    return [row for row in ranked if row.high >= ranked[0].low]
+    least = ranked[0].total - ranked[0].half_width
+    return [row for row in ranked if row.total + row.half_width >= least]
 
 
 def sensitivity_rows(results: Mapping[str, Any]) -> list[dict[str, Any]]:
     """First-order and total Sobol indices, one row per output and number."""
     table = results["sensitivity"]
+    columns = {
+        "first_order": "S1",
+        "first_order_95": "S1_conf",
+        "total": "ST",
+        "total_95": "ST_conf",
+    }
     return [
-        {
-            "output": output,
-            "parameter": name,
-            "first_order": table[output]["S1"][i],
-            "first_order_95": table[output]["S1_conf"][i],
-            "total": table[output]["ST"][i],
-            "total_95": table[output]["ST_conf"][i],
-        }
-        for output in OUTPUTS
+        {"output": output, "parameter": name}
+        | {column: own[key][i] for column, key in columns.items()}
+        for output, own in table.items()
+        if isinstance(own, Mapping)
         for i, name in enumerate(table["names"])
     ]

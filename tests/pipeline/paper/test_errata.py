@@ -6,10 +6,6 @@ import pytest
 
 from actuators.energy.energy import StageEnergy, stage_energy
 from actuators.loading.build import load_catalog
-from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
-from pipeline.paper.constants.rotor_friction import friction_ranges
-from pipeline.paper.judgement.contradictions import contradiction
-from pipeline.paper.published import load_published
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import walk
 
@@ -33,12 +29,3 @@ def test_section_iv_a_1_gives_a_reason_that_binds_only_a_sum(at_the_joints: Stag
     index = at_the_joints.joints.index("lf_joint_3")
     assert at_the_joints.forward[index] == pytest.approx(0.07, abs=0.005)
     assert at_the_joints.reverse[index] == pytest.approx(0.24, abs=0.005)
-
-
-def test_table_v_contradicts_itself() -> None:
-    published = load_published(IDS, DIMENSIONS)
-    found = contradiction(published, friction_ranges(published))
-    assert found.apart
-    assert found.asked == pytest.approx((3.575, 3.62))
-    assert (1e3 * found.best.low, 1e3 * found.best.high) == pytest.approx((3.615, 3.625))
-    assert found.best.unmet == ("rotor_motor_torque_2", "rotor_leg_energy_3s")

@@ -4,39 +4,33 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from actuators.elements.hypoid import Hypoid
 from actuators.errors import SelfLockingError
-from actuators.loading.build import Catalog, load_catalog
+from actuators.loading.build import Catalog
 from actuators.shaft import ShaftSeries
-from pipeline.paper.calibration.machine import RobotPart, actuator_part, part_of
-from pipeline.paper.calibration.problem import EVEN
-from pipeline.paper.calibration.quantities import DIMENSIONS, IDS, computed
-from pipeline.paper.omissions.costs import costs_of, holding_friction
-from pipeline.paper.omissions.omissions import Omission, idle_break_even, omissions
-from pipeline.paper.published import load_published
-from pipeline.robot.robot_file import load_robot_file
+from pipeline.paper.hexapod import RobotPart, outcomes, printed_leg
+from pipeline.paper.omissions.omissions import (
+    Omission,
+    costs_of,
+    holding_friction,
+    idle_break_even,
+    omissions,
+)
+from pipeline.paper.published import EVEN, Published
+from pipeline.paper.quantities import computed
 
 HELD = 0.866  # of the reversible actuators, Table VI [W]
 
 
 @pytest.fixture(scope="module")
-def catalog() -> Catalog:
-    return load_catalog()
-
-
-@pytest.fixture(scope="module")
-def part(root: Path) -> RobotPart:
-    return part_of(load_robot_file(root / "urdf" / "hexapod.toml"))
-
-
-@pytest.fixture(scope="module")
-def rows(part: RobotPart, catalog: Catalog) -> tuple[Omission, ...]:
-    return omissions(part, catalog, load_published(IDS, DIMENSIONS))
+def rows(
+    part: RobotPart, catalog: Catalog, published: dict[str, Published]
+) -> tuple[Omission, ...]:
+    return omissions(part.demand, catalog, published)
 
 
 def of(rows: tuple[Omission, ...], word: str) -> list[Omission]:
@@ -46,7 +40,7 @@ def of(rows: tuple[Omission, ...], word: str) -> list[Omission]:
 def test_the_first_row_is_what_the_rest_of_the_judgement_says(
     rows: tuple[Omission, ...], part: RobotPart, catalog: Catalog
 ) -> None:
-    known = computed(part, actuator_part(part, catalog), 1)
+    known = computed(part, outcomes(part.demand, catalog))
     assert rows[0].break_even == pytest.approx(known[EVEN], rel=1e-12)
     for name, ratio in rows[0].ratios.items():
         assert ratio == pytest.approx(known[f"walking_ratio_{name}"], rel=1e-12)
@@ -66,7 +60,7 @@ def test_idle_drivers_in_closed_form_from_printed_numbers(watts: float, share: f
 def test_idle_drivers_through_the_costs_agree_with_the_closed_form(
     rows: tuple[Omission, ...], part: RobotPart, catalog: Catalog
 ) -> None:
-    held = costs_of(part, catalog).stand["reversible"]
+    held = costs_of(outcomes(part.demand, catalog)).stand["reversible"]
     found = of(rows, "drivers")
     assert len(found) == 2
     for row in found:
@@ -121,16 +115,17 @@ def test_the_chain_holds_down_to_its_holding_friction(
     chain = catalog.chain("irreversible")
     gear = chain.element("hypoid")
     assert isinstance(gear, Hypoid)
-    mu = holding_friction(chain, gear, part.standing_torque)
+    (torque,) = printed_leg(part.demand.standing)
+    mu = holding_friction(chain, gear, torque)
     for factor, draws in ((1.001, False), (0.999, True)):
-        power = chain.replaced(replace(gear, friction=factor * mu)).holding(part.standing_torque)
+        power = chain.replaced(replace(gear, friction=factor * mu)).holding(torque)
         assert (power.power.sum() > 0) == draws
     # In closed form, from the joint inwards: bearing, gear, pinion, and the motor side times n.
     p = {key: catalog.parameter(key).value for key in (
         "output_bearing.coulomb", "hypoid.ratio", "pinion.coulomb", "planetary.ratio",
         "planetary.coulomb", "rotor_re40.coulomb",
     )}  # fmt: skip
-    load = abs(part.standing_torque[1]) - p["output_bearing.coulomb"]
+    load = abs(torque[1]) - p["output_bearing.coulomb"]
     motor_side = p["planetary.coulomb"] + p["rotor_re40.coulomb"]
     held = p["pinion.coulomb"] + p["planetary.ratio"] * motor_side
     share = held * p["hypoid.ratio"] / load  # driven factor that still holds

@@ -3,33 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.paper.calibration import search
+from pipeline.paper.calibration import tasks
 from pipeline.paper.calibration.calibrate import posterior_summary
 from pipeline.paper.calibration.posterior import Posterior, sample
-from pipeline.paper.calibration.problem import EXTRA, Problem, Target
+from pipeline.paper.calibration.prior import Prior
+from pipeline.paper.calibration.problem import Problem, Target
 from pipeline.paper.constants.motor_constants import KEYS
-from pipeline.paper.constants.rotor_friction import HELD
+from pipeline.paper.published import EXTRA, HELD
 
 
 @pytest.fixture(scope="module")
-def robot_file(root: Path) -> str:
-    return str(root / "urdf" / "hexapod.toml")
-
-
-@pytest.fixture(scope="module")
-def own(robot_file: str) -> search.Robots:
-    return search.robots(robot_file, 3, 12)
+def own(robot_file: str) -> tasks.Robots:
+    return tasks.robots(robot_file, 3, 12)
 
 
 @pytest.fixture(scope="module")
 def task(robot_file: str) -> Problem:
-    return search.problem(robot_file, "harmonic")
+    return tasks.problem(robot_file, "harmonic")
 
 
 def drawn(density: Posterior, count: int) -> np.ndarray:
@@ -43,14 +38,13 @@ def drawn(density: Posterior, count: int) -> np.ndarray:
 
 
 def test_many_sets_at_once_are_each_set_by_itself(
-    own: search.Robots, task: Problem, robot_file: str
+    own: tasks.Robots, task: Problem, robot_file: str
 ) -> None:
     """What walkers ask for comes out of the exact machine: solved targets, all others, limits."""
     density = Posterior(task, own.demand)
     walkers = drawn(density, 6)
-    for x, found in zip(walkers, search._sets(density, own, walkers), strict=True):
-        alone = search.problem(robot_file, found["path"])
-        alone.constants = found["constants"]
+    for x, found in zip(walkers, tasks.sets_of(density, own, walkers), strict=True):
+        alone = replace(tasks.problem(robot_file, found["path"]), constants=found["constants"])
         point = alone.evaluate(np.array(found["z"]))
         assert max(point.excess.values()) <= 0
         assert point.values["irreversible_leg_energy_3s"] == 0
@@ -65,38 +59,31 @@ def test_many_sets_at_once_are_each_set_by_itself(
 
 
 def test_a_target_rises_or_falls_with_the_number_that_is_solved_for(
-    own: search.Robots, task: Problem
+    own: tasks.Robots, task: Problem
 ) -> None:
     """Else two sets would give one target, and the density would miss one of them."""
     density = Posterior(task, own.demand)
     x = density.start(np.random.default_rng(2), 40)
     sets = density.as_sets(x)
     for name, free in density.solved.items():
-        target = density._target(name)
-        ends = [free.coordinate(bound) for bound in free.bounds]
-        values = np.array(
-            [
-                target(sets.with_number(free.key, free.at(np.full(len(x), z))))
-                for z in np.linspace(*ends, 9)
-            ]
-        )
+        numbers = (free.at(np.full(len(x), z)) for z in np.linspace(*free.ends, 9))
+        values = [density._target(name, sets.with_number(free.key, n)) for n in numbers]
         steps = np.diff(values, axis=0)
         assert (steps > 0).all() or (steps < 0).all(), name
 
 
-def test_targets_left_out_are_not_asked_for(own: search.Robots, robot_file: str) -> None:
-    task = search.problem(robot_file, "harmonic", without=(HELD, EXTRA))
+def test_targets_left_out_are_not_asked_for(own: tasks.Robots, robot_file: str) -> None:
+    task = tasks.problem(robot_file, "harmonic", without=(HELD, EXTRA))
     density = Posterior(task, own.demand)
     assert not {HELD, EXTRA} & density.targets.keys()
     assert HELD not in density.solved
-    found = search._sets(density, own, drawn(density, 8))
+    found = tasks.sets_of(density, own, drawn(density, 8))
     held = [task.prior.values(np.array(f["z"]))["harmonic_drive.coulomb"] for f in found]
     assert np.std(held) > 0.1  # [N*m]: as wide as the prior leaves it
 
 
-def test_agreement_of_walkers_is_measured() -> None:
+def test_agreement_of_walkers_is_measured(prior: Prior) -> None:
     """R-hat is 1 where walkers agree, far from it where each stays by itself."""
-    prior = search.load_prior()
     rng = np.random.default_rng(0)
 
     def walkers(apart: float) -> list[list[dict[str, object]]]:
@@ -132,12 +119,12 @@ def one_drawn(wide: Posterior, rng: np.random.Generator) -> np.ndarray:
 
 
 def printed(
-    wide: Posterior, own: search.Robots, truth: np.ndarray, rng: np.random.Generator
+    wide: Posterior, own: tasks.Robots, truth: np.ndarray, rng: np.random.Generator
 ) -> tuple[Target, ...]:
     """The targets as a paper would print them of the truth, somewhere inside their widths."""
-    (found,) = search._sets(wide, own, truth)
+    (found,) = tasks.sets_of(wide, own, truth)
     alone = replace(wide.task, without=(), constants=found["constants"], _robots={})
-    alone.spec = search.problem(str(wide.task.spec.path), found["path"]).spec
+    alone.spec = tasks.problem(str(wide.task.spec.path), found["path"]).spec
     values = alone.evaluate(np.array(found["z"])).values
     centre = {t.name: values[t.name] + rng.uniform(-1, 1) * t.half_width for t in alone.targets}
     held = next(t for t in alone.targets if t.name == HELD)
@@ -153,7 +140,7 @@ def test_ranks_of_the_truth_are_uniform_over_draws_of_the_prior(robot_file: str)
     A set is drawn from the prior, its targets are printed, the posterior of what is printed is
     sampled: the rank of the truth among its draws is uniform in every number.
     """
-    own, task = search.robots(robot_file, 4, 60), search.problem(robot_file, "harmonic")
+    own, task = tasks.robots(robot_file, 4, 60), tasks.problem(robot_file, "harmonic")
     rng = np.random.default_rng(11)
     wide = Posterior(replace(task, without=(*(t.name for t in task.targets),)), own.demand)
     keys = [f.key for f in wide.free]

@@ -7,6 +7,7 @@ order, interruptions or the number of workers.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -15,42 +16,40 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.loading.build import CATALOG, load_catalog
+from actuators.energy.energy import stage_energy
+from actuators.loading.build import load_catalog
 from pipeline.errors import PipelineError
-from pipeline.paper.calibration.batch import Bank, bank, drawn
-from pipeline.paper.calibration.machine import POSTURE, RobotPart, catalog_with, with_transfer_path
 from pipeline.paper.calibration.posterior import Posterior, sample
-from pipeline.paper.calibration.prior import PRIOR_FILE, load_prior
-from pipeline.paper.calibration.problem import EXTRA, Evaluation, Problem
-from pipeline.paper.calibration.quantities import DIMENSIONS, IDS
-from pipeline.paper.calibration.whole_robot import totals
+from pipeline.paper.calibration.prior import load_prior
+from pipeline.paper.calibration.problem import Evaluation, Problem
 from pipeline.paper.constants.motor_constants import KEYS
-from pipeline.paper.published import PUBLISHED_FILE, load_published
+from pipeline.paper.hexapod import (
+    MIDDLE_LEGS,
+    POSTURE,
+    PUBLISHED_LEG,
+    Demand,
+    drawn,
+    joined,
+    printed_leg,
+    totals,
+)
+from pipeline.paper.published import EVEN, EXTRA, load_published
 from pipeline.robot.robot_file import load_robot_file
 
 Array = NDArray[np.float64]
+#: A set of numbers with what follows from it, as it is stored.
+Point = dict[str, Any]
 #: Paths of the foot that the search may choose.
 PATHS = ("cubic", "harmonic", "quintic", "cycloid")
+#: Outputs of the sensitivity analysis.
+OUTPUTS = (
+    *("walking_ratio_rotor", "walking_ratio_reversible", "walking_ratio_irreversible"),
+    *(EXTRA, EVEN),
+)
 _PULL = 3.0  # the nearest point: a third of a half width counts like one prior sigma
 _STRICT = 60.0  # whether a reading can be met at all: the prior hardly counts,
 _FREE = 0.97  # and inside its printed precision a row does not pull against the motor's limits
 _THIN = 10  # every so many steps of a walker are kept
-
-
-@cache
-def base_problem(
-    robot: str,
-    prior: str = str(PRIOR_FILE),
-    published: str = str(PUBLISHED_FILE),
-    catalog: str = str(CATALOG),
-) -> Problem:
-    """The problem of the files; calibrated numbers in them are overruled by the prior's."""
-    return Problem(
-        load_robot_file(Path(robot)),
-        load_catalog(catalog),
-        load_prior(Path(prior)),
-        load_published(IDS, DIMENSIONS, Path(published)),
-    )
 
 
 @dataclass(frozen=True)
@@ -72,6 +71,13 @@ class Reading:
 READ = Reading()
 
 
+@cache
+def base_problem(robot: str) -> Problem:
+    """The problem of the files; calibrated numbers in them are overruled by the prior's."""
+    spec = load_robot_file(Path(robot))
+    return Problem(spec, load_catalog(), load_prior(), load_published())
+
+
 def problem(
     robot: str, path: str, reading: Reading = READ, without: tuple[str, ...] = ()
 ) -> Problem:
@@ -84,22 +90,14 @@ def problem(
         without: Targets left out.
     """
     base = base_problem(robot)
-    spec = with_transfer_path(base.spec, path).with_parameters(
-        {"joint_1_axis_angle": math.radians(reading.axis_deg)}
-    )
+    axis = {"joint_1_axis_angle": math.radians(reading.axis_deg)}
+    spec = base.spec.with_gait(transfer_path=path).with_parameters(axis)
     return replace(
-        base,
-        spec=spec,
-        standing_legs=reading.legs,
-        without=without,
-        net=reading.net,
-        _robots={},
+        base, spec=spec, standing_legs=reading.legs, without=without, net=reading.net, _robots={}
     )
 
 
-def nearest(
-    robot: str, path: str, reading: Reading, start: list[float], evaluations: int
-) -> dict[str, Any]:
+def nearest(robot: str, path: str, reading: Reading, start: list[float], evaluations: int) -> Point:
     """The admissible point nearest to the prior's centre, from one start.
 
     Args:
@@ -111,18 +109,16 @@ def nearest(
     """
     task = problem(robot, path, reading)
     z = _feasible(task, np.array(start))
+    every = np.arange(z.size)
     try:
         z = task.solve(z, columns=task.actuator_columns, pull=_PULL)
-        z = task.solve(z, columns=np.arange(z.size), pull=_PULL, evaluations=evaluations)
-        point = task.evaluate(z)
+        z = task.solve(z, columns=every, pull=_PULL, evaluations=evaluations)
+        return _stored(task, z, task.evaluate(z), path)
     except PipelineError as error:
         return {"failed": str(error), "path": path}
-    return summary(task, z, point) | {"path": path}
 
 
-def read(
-    robot: str, path: str, reading: Reading, start: list[float], evaluations: int
-) -> dict[str, Any]:
+def closest(robot: str, path: str, reading: Reading, start: list[float], evaluations: int) -> Point:
     """As `nearest`, and where that misses a row, as close to the rows as the bounds allow.
 
     What is then still missed is out of reach of this reading, whatever the prior says.
@@ -130,33 +126,25 @@ def read(
     found = nearest(robot, path, reading, start, evaluations)
     if "failed" in found or found["admissible"]:
         return found
-    task = problem(robot, path, reading)
-    z = np.array(found["z"])
+    task, z = problem(robot, path, reading), np.array(found["z"])
+    every = np.arange(z.size)
     try:
-        z = task.solve(
-            z,
-            columns=np.arange(z.size),
-            pull=_STRICT,
-            free=_FREE,
-            evaluations=evaluations,
-        )
-        point = task.evaluate(z)
+        z = task.solve(z, columns=every, pull=_STRICT, free=_FREE, evaluations=evaluations)
+        return _stored(task, z, task.evaluate(z), path)
     except PipelineError:
         return found
-    return summary(task, z, point) | {"path": path}
 
 
 def _feasible(task: Problem, z: Array) -> Array:
     """Draw the robot's coordinates towards the centre until the robot can stand and walk."""
-    z = z.copy()
-    for _ in range(4):
+    z, own = z.copy(), task.robot_columns
+    for scale in (1.0, 0.5, 0.5, 0.5, 0.0):
+        z[own] *= scale
         try:
             task.robot(z)
         except PipelineError:
-            z[task.robot_columns] /= 2
-        else:
-            return z
-    z[task.robot_columns] = 0.0
+            continue
+        break
     return z
 
 
@@ -165,12 +153,12 @@ class Robots:
     """Robots drawn from the prior, in order of what the ideal actuator's printed leg draws.
 
     Attributes:
-        demand: What they ask of their joints; a robot is a column.
+        demand: What they ask of their joints; a robot is a set.
         paths: The foot's path of each.
         coordinates: Of each robot's numbers, (R, D).
     """
 
-    demand: Bank
+    demand: Demand
     paths: tuple[str, ...]
     coordinates: Array
 
@@ -190,29 +178,26 @@ def robots(robot: str, seed: int, count: int) -> Robots:
     tasks = {path: problem(robot, path) for path in PATHS}
     ideal = tasks[PATHS[0]].catalog.chain("ideal")
     fastest = ideal.motor.max_speed / np.asarray(ideal.ratio)  # of a joint [rad/s]
-    parts: list[RobotPart] = []
-    paths: list[str] = []
-    coordinates: list[Array] = []
-    while len(parts) < count:
+    found: list[tuple[Demand, str, Array]] = []
+    while len(found) < count:
         path = PATHS[int(rng.integers(len(PATHS)))]
         task = tasks[path]
         z = task.prior.draw(rng)
         try:
-            part = task.robot(z)
+            demand = task.robot(z).demand
         except PipelineError:
             continue
-        if np.abs(part.series.velocity).max() <= fastest:
-            parts.append(part)
-            paths.append(path)
-            coordinates.append(z[task.robot_columns])
-    demand = bank(parts)
-    order = np.argsort(drawn(demand, ideal))
+        if np.abs(demand.series.velocity).max() <= fastest:
+            found.append((demand, path, z[task.robot_columns]))
+    demands, paths, coordinates = zip(*found, strict=True)
+    demand = joined(demands)
+    order = np.argsort(drawn(demand.of_leg(PUBLISHED_LEG), ideal))
     return Robots(demand.taken(order), tuple(paths[i] for i in order), np.array(coordinates)[order])
 
 
 def posterior(
     robot: str, seed: int, number: int, without: tuple[str, ...], steps: int, bank_size: int
-) -> list[list[dict[str, Any]]]:
+) -> list[list[Point]]:
     """One ensemble of walkers in the posterior.
 
     Args:
@@ -227,13 +212,12 @@ def posterior(
         Per walker its sets over the steps that are kept: path, coordinates ``z`` and constants.
     """
     own = robots(robot, seed, bank_size)
-    task = problem(robot, PATHS[0], without=without)
-    density = Posterior(task, own.demand)
+    density = Posterior(problem(robot, PATHS[0], without=without), own.demand)
     chain = sample(density, [seed, 5000, number], steps)[::_THIN]
-    return [_sets(density, own, chain[:, w]) for w in range(chain.shape[1])]
+    return [sets_of(density, own, chain[:, w]) for w in range(chain.shape[1])]
 
 
-def _sets(density: Posterior, own: Robots, x: Array) -> list[dict[str, Any]]:
+def sets_of(density: Posterior, own: Robots, x: Array) -> list[Point]:
     """Walkers (N, D) as sets of numbers."""
     _, values = density.evaluate(x)
     prior, columns = density.task.prior, density.task.actuator_columns
@@ -253,75 +237,75 @@ def _sets(density: Posterior, own: Robots, x: Array) -> list[dict[str, Any]]:
     ]
 
 
-def prior_member(robot: str, paths: tuple[str, ...], seed: int, draw: int) -> dict[str, Any]:
-    """A draw from the prior: what follows without the paper's energies."""
+def prior_point(robot: str, seed: int, draw: int) -> Point:
+    """A draw from the prior: what follows without the paper's energies; see `point_of`."""
     rng = np.random.default_rng([seed, 1000, draw])
-    path = paths[int(rng.integers(len(paths)))]
+    path = PATHS[int(rng.integers(len(PATHS)))]
     task = problem(robot, path)
-    constants, _ = task.sliver.draw(rng)
-    return point_of(robot, path, task.prior.draw(rng).tolist(), constants)
+    (constants,) = task.sliver.draws(rng, 1)[:, : len(KEYS)]
+    z = task.prior.draw(rng).tolist()
+    return point_of(robot, path, z, dict(zip(KEYS, map(float, constants), strict=True)))
 
 
-def point_of(robot: str, path: str, z: list[float], constants: dict[str, float]) -> dict[str, Any]:
+def point_of(robot: str, path: str, z: list[float], constants: dict[str, float]) -> Point:
     """A set of numbers with all that the paper prints and the energy of the whole robot.
 
     The energy is left out where a motor leaves its limits.
     """
-    task = problem(robot, path)
-    task.constants = constants
+    task = replace(problem(robot, path), constants=constants)
     at = np.array(z)
     try:
         point = task.evaluate(at)
     except PipelineError as error:
         return {"failed": str(error), "path": path}
     inside = max(point.excess.values()) <= 0
-    found = summary(task, at, point) | {"path": path, "inside": inside}
+    found = _stored(task, at, point, path) | {"inside": inside}
     if inside:
-        ratio = task.catalog.parameter("requirement.ratio").value
-        catalog = catalog_with(task.catalog, task.numbers(at), ratio)
-        found["totals"] = totals(point.robot.robot, catalog)
+        chains = {name: outcome.chain for name, outcome in point.outcomes.items()}
+        found["totals"] = totals(point.robot.robot, chains)
     return found
 
 
-def summary(task: Problem, z: Array, point: Evaluation) -> dict[str, Any]:
-    """What is kept of a point: plain numbers."""
-    p = point.robot.robot.spec.parameters
-    ideal = point.actuators.walking["ideal"]
+def _stored(task: Problem, z: Array, point: Evaluation, path: str) -> Point:
+    """What is kept of a set: plain numbers."""
+    p, found = point.robot.robot.spec.parameters, point.outcomes
     numbers = task.numbers(z)
-    outcomes = point.actuators.outcomes
     return {
         "z": z.tolist(),
         "constants": {key: numbers[key] for key in KEYS},
         "posture": {k: p[k] for k in POSTURE},
         "values": dict(point.values),
-        "drawn": {name: dict(o.drawn) for name, o in outcomes.items()},
-        "returned": {name: dict(o.returned) for name, o in outcomes.items()},
+        "drawn": {name: _by_name(o.drawn) for name, o in found.items()},
+        "returned": {name: _by_name(o.returned) for name, o in found.items()},
         "excess": dict(point.excess),
         "errors": {t.name: (point.values[t.name] - t.centre) / t.half_width for t in task.targets},
         "unmet": task.unmet(point),
         "prior_distance": float(0.5 * z @ z),
         "admissible": task.admissible(point),
-        "electrical_over_mechanical": _over(ideal.joint.joints, ideal),
+        "electrical_over_mechanical": _electrical_over_mechanical(point),
+        "path": path,
     }
 
 
-def _over(joints: tuple[str, ...], result: Any) -> dict[str, float]:
-    from actuators.energy.energy import stage_energy
+def _by_name(energy: Mapping[str, Array]) -> dict[str, float]:
+    return {leg: float(energy[leg][0]) for leg in MIDDLE_LEGS}
 
-    electrical, mechanical = stage_energy(result, "el").forward, stage_energy(result, "m").forward
+
+def _electrical_over_mechanical(point: Evaluation) -> dict[str, float]:
+    """E_el(+) over E_m(+) of the ideal actuator, by joint of the printed leg."""
+    walking = point.outcomes["ideal"].walking
+    joints = [name for name in walking.joint.joints if name.startswith(f"{PUBLISHED_LEG}_")]
+    (el,), (m,) = (printed_leg(stage_energy(walking, stage).forward) for stage in ("el", "m"))
     return {
-        joint: float(electrical[j] / mechanical[j]) if mechanical[j] > 0 else math.inf
-        for j, joint in enumerate(joints)
-        if joint.startswith("rm_")
+        joint: float(e / given) if given > 0 else math.inf
+        for joint, e, given in zip(joints, el, m, strict=True)
     }
 
 
-def sensitivity_row(robot: str, path: str, rows: list[list[float]]) -> list[list[float]]:
-    """Outputs of the sensitivity analysis at several coordinates.
+def sensitivity_rows(robot: str, path: str, rows: list[list[float]]) -> list[list[float]]:
+    """`OUTPUTS` at several coordinates, NaN where the robot cannot walk.
 
-    Returns:
-        Per row the three walking ratios, the energy difference [J] and the break-even (0 where the
-        irreversible actuator always uses less), NaN where the robot cannot walk.
+    A break-even is 0 where the irreversible actuator always uses less.
     """
     task = problem(robot, path)
     out = []
@@ -329,16 +313,8 @@ def sensitivity_row(robot: str, path: str, rows: list[list[float]]) -> list[list
         try:
             values = task.evaluate(np.array(row)).values
         except PipelineError:
-            out.append([math.nan] * 5)
+            out.append([math.nan] * len(OUTPUTS))
             continue
-        even = values["break_even_standing_fraction"]
-        out.append(
-            [
-                values["walking_ratio_rotor"],
-                values["walking_ratio_reversible"],
-                values["walking_ratio_irreversible"],
-                values[EXTRA],
-                0.0 if math.isnan(even) else even,
-            ]
-        )
+        even = 0.0 if math.isnan(values[EVEN]) else values[EVEN]
+        out.append([*(values[name] for name in OUTPUTS[:-1]), even])
     return out

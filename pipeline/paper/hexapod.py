@@ -1,0 +1,330 @@
+"""The hexapod at sets of numbers: what its middle legs ask of their joints, what actuators draw.
+
+Only the two middle legs are followed. Each set of numbers has one column per joint of both, so that
+many sets go through a chain at once. The robot's part (geometry, gait, inverse dynamics) costs
+fifty times as much as the actuators'.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.chain import Chain, ChainResult, HoldingResult
+from actuators.energy.energy import split_integral, stage_energy
+from actuators.energy.limits import rms_over_time
+from actuators.loading.build import Catalog
+from actuators.shaft import ShaftSeries
+from pipeline.dynamics.joint_demand import motion_demand
+from pipeline.motion.walking import walking_motion
+from pipeline.paper.errors import CalibrationError
+from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.walk_stand import joint_series, stand, walk
+
+Array = NDArray[np.float64]
+Number = TypeVar("Number", float, Array)
+MIDDLE_LEGS = ("lm", "rm")
+PUBLISHED_LEG = "rm"
+JOINTS_PER_LEG = 3
+#: Robot numbers solved from the reaction and the torques of Table III.
+POSTURE = ("trunk_com_left", "joint_2_lateral", "body_height")
+#: Samples per half period: within 0.2 % of the converged energies, see tests.
+SAMPLES = 81
+ROBOT = "robot"
+#: Of each pair whose product is published, the ratio that is free, and the one that follows.
+SPLITS = {"harmonic_drive.ratio": "timing_belt.ratio", "planetary.ratio": "hypoid.ratio"}
+#: Per alternative: energy per cycle [J] and standing power [W] of the robot and its middle legs.
+Totals = dict[str, dict[str, float]]
+
+
+@dataclass(frozen=True)
+class Demand:
+    """What W sets of numbers ask of the joints of L legs: columns C = 3 L W, set by set.
+
+    Attributes:
+        series: Over a cycle (N, C); its time may be (N, C), each column's own [s].
+        standing: Torques standing on three feet (C,) [N*m].
+        legs: Names.
+    """
+
+    series: ShaftSeries
+    standing: Array
+    legs: tuple[str, ...] = MIDDLE_LEGS
+
+    @property
+    def columns(self) -> int:
+        """Columns per set."""
+        return JOINTS_PER_LEG * len(self.legs)
+
+    @property
+    def count(self) -> int:
+        """How many sets."""
+        return self.standing.size // self.columns
+
+    def taken(self, sets: NDArray[np.intp]) -> Demand:
+        """Some of the sets, also more than once, by number (W,)."""
+        return self._chosen((self.columns * sets[:, None] + np.arange(self.columns)).ravel())
+
+    def of_leg(self, leg: str) -> Demand:
+        """One of the legs."""
+        first = JOINTS_PER_LEG * self.legs.index(leg)
+        every = np.arange(self.standing.size).reshape(self.count, self.columns)
+        own = self._chosen(every[:, first : first + JOINTS_PER_LEG].ravel())
+        return replace(own, legs=(leg,))
+
+    def _chosen(self, columns: NDArray[np.intp]) -> Demand:
+        s = self.series
+        time = s.time if s.time.ndim == 1 else s.time[:, columns]
+        series = ShaftSeries(
+            tuple(s.joints[k] for k in columns),
+            time,
+            s.position[:, columns],
+            s.velocity[:, columns],
+            s.acceleration[:, columns],
+            s.torque[:, columns],
+            s.direction[:, columns],
+        )
+        return replace(self, series=series, standing=self.standing[columns])
+
+
+def joined(demands: Sequence[Demand]) -> Demand:
+    """Sets of several robots as one; shorter series repeat their last sample, without width."""
+    length = max(d.series.time.size for d in demands)
+
+    def padded(name: str) -> Array:
+        return np.concatenate([_padded(d.series, name, length) for d in demands], axis=1)
+
+    names = ("time", "position", "velocity", "acceleration", "torque", "direction")
+    joints = tuple(joint for d in demands for joint in d.series.joints)
+    standing = np.concatenate([d.standing for d in demands])
+    return Demand(ShaftSeries(joints, *(padded(name) for name in names)), standing)
+
+
+def _padded(series: ShaftSeries, name: str, length: int) -> Array:
+    values: Array = getattr(series, name)
+    columns = values[:, None] if values.ndim == 1 else values
+    rows = np.minimum(np.arange(length), len(values) - 1)
+    return np.broadcast_to(columns[rows], (length, len(series.joints)))
+
+
+@dataclass(frozen=True)
+class RobotPart:
+    """What a robot asks of its middle legs.
+
+    Attributes:
+        robot: With the posture solved.
+        reaction: Vertical force on the middle right foot, standing [N].
+        demand: One set.
+    """
+
+    robot: Robot
+    reaction: float
+    demand: Demand
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one alternative makes of a demand.
+
+    Attributes:
+        chain: The alternative.
+        walking: Every joint over a cycle.
+        holding: Every joint, standing on three feet.
+        drawn: Electrical energy E_el(+) per cycle, by leg, (W,) [J].
+        returned: E_el(-) per cycle, by leg, (W,) [J].
+        excess: Largest of a motor quantity over its limit, less one, by quantity, (W,).
+    """
+
+    chain: Chain
+    walking: ChainResult
+    holding: HoldingResult
+    drawn: Mapping[str, Array]
+    returned: Mapping[str, Array]
+    excess: Mapping[str, Array]
+
+    def consumed(self, leg: str, *, net: bool = False) -> float:
+        """What a leg of one set consumes per cycle [J]: E_el(+), or net of what returns."""
+        return float(self.drawn[leg][0] - (self.returned[leg][0] if net else 0.0))
+
+    @property
+    def held(self) -> Mapping[str, Array]:
+        """Motor torque, current, voltage and power of the printed leg of one set, (3,)."""
+        names = ("motor_torque", "current", "voltage", "power")
+        return {n: printed_leg(getattr(self.holding, n))[0] for n in names}
+
+
+def by_leg(values: Array, legs: int = len(MIDDLE_LEGS)) -> Array:
+    """Values of every column (C,) by set, leg and joint, (W, L, 3)."""
+    return values.reshape(-1, legs, JOINTS_PER_LEG)
+
+
+def printed_leg(values: Array) -> Array:
+    """Values of the columns (C,) of both legs, for the printed one by set and joint, (W, 3)."""
+    return by_leg(values)[:, MIDDLE_LEGS.index(PUBLISHED_LEG)]
+
+
+def robot_part(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:
+    """What the robot of a file asks as it stands.
+
+    Raises:
+        PipelineError: Out of reach or tipping.
+    """
+    robot, reaction, torque = standing_state(spec)
+    demand = motion_demand(robot, walking_motion(robot, samples=samples))
+    return RobotPart(robot, reaction, Demand(joint_series(demand, _joints(spec)), torque))
+
+
+def standing_state(spec: RobotSpec) -> tuple[Robot, float, Array]:
+    """Reaction at the middle right foot [N] and torques of the middle legs (6,) [N*m], standing."""
+    robot = load_robot(spec)
+    standing = stand(robot, {})
+    contacts, torque = standing.contacts, standing.demand.torque[0]
+    reaction = float(contacts.force_world[0, contacts.legs.index(PUBLISHED_LEG), 2])
+    return robot, reaction, torque[[robot.joints.index(j) for j in _joints(spec)]]
+
+
+def _joints(spec: RobotSpec) -> tuple[str, ...]:
+    legs = {leg.name: leg.joints for leg in spec.legs}
+    return tuple(joint for leg in MIDDLE_LEGS for joint in legs[leg])
+
+
+def solve_posture(spec: RobotSpec, target: Array) -> RobotSpec:
+    """Place joint 2, the body's height and the trunk's mass so that standing comes out as printed.
+
+    Statics of the loaded leg in its frontal plane, x outboard, R the reaction, phi the tibia's tilt
+    outboard, q2 the femur's rise (moments about joint 3, then about joint 2):
+
+        G3 = (m_t g c_t - R) L_t sin(phi)
+        G2 = m_f g c_f L_f cos(q2) + (m_t g - R) L_f cos(q2) + G3
+
+    The trunk's lateral shift then follows from the reaction, which is linear in it.
+
+    Args:
+        spec: The robot.
+        target: Reaction [N], torque of joint 2 and of joint 3 [N*m].
+
+    Raises:
+        CalibrationError: No posture meets the targets.
+    """
+    p = spec.parameters
+    reaction, torque_2, torque_3 = (float(x) for x in target)
+    weight_f, weight_t = p["femur_mass"] * p["gravity"], p["tibia_mass"] * p["gravity"]
+    femur, tibia = p["femur_length"], p["tibia_length"]
+    sine = torque_3 / ((weight_t * p["tibia_com"] - reaction) * tibia)
+    cosine = (torque_2 - torque_3) / ((weight_f * p["femur_com"] + weight_t - reaction) * femur)
+    if not (abs(sine) < 1 and 0 < cosine < 1):
+        raise CalibrationError("no posture of the robot gives the torques of Table III")
+    placed = {
+        "joint_2_lateral": p["robot_width"] / 2 - femur * cosine - tibia * sine,
+        "body_height": tibia * math.sqrt(1 - sine**2) - femur * math.sqrt(1 - cosine**2),
+    }
+    spec = spec.with_parameters(placed)
+    shifts = (0.0, 0.01)
+    found = [standing_state(spec.with_parameters({"trunk_com_left": x}))[1] for x in shifts]
+    slope = (found[1] - found[0]) / (shifts[1] - shifts[0])
+    return spec.with_parameters({"trunk_com_left": (reaction - found[0]) / slope})
+
+
+def with_splits(values: Mapping[str, Number], ratio: float) -> dict[str, Number]:
+    """Numbers of components, the second ratio of each pair following from the first.
+
+    Args:
+        values: By reference.
+        ratio: Total ratio of every alternative.
+    """
+    pairs = {first: second for first, second in SPLITS.items() if first in values}
+    return dict(values) | {second: ratio / values[first] for first, second in pairs.items()}
+
+
+def chain_at(
+    demand: Demand, catalog: Catalog, name: str, values: Mapping[str, float | Array]
+) -> Chain:
+    """An alternative for a demand's columns.
+
+    Args:
+        demand: Of W sets.
+        catalog: The alternatives.
+        name: Which.
+        values: Numbers that stand in for the catalogue's, SI by reference: one, or one per set.
+    """
+    own = {k: np.repeat(v, demand.columns) if np.ndim(v) else v for k, v in values.items()}
+    return catalog.chain(name, own)
+
+
+def drawn(demand: Demand, chain: Chain) -> Array:
+    """E_el(+) per cycle of the printed leg alone, (W,) [J]; both made for one leg."""
+    power = chain.moving(demand.series).electrical_power
+    forward, _ = split_integral(demand.series.time, power)
+    return by_leg(forward, len(demand.legs)).sum(axis=(1, 2))
+
+
+def outcome(demand: Demand, chain: Chain) -> Outcome:
+    """Take a demand through an alternative made for it."""
+    walking = chain.moving(demand.series)
+    energy, motor = stage_energy(walking, "el"), chain.motor
+    peaks = {
+        "speed": np.abs(walking.motor.velocity).max(axis=0) / motor.max_speed,
+        "voltage": np.abs(walking.voltage).max(axis=0) / motor.supply_voltage,
+        "current": np.abs(walking.current).max(axis=0) / motor.peak_current,
+        "rms_current": rms_over_time(demand.series.time, walking.current)
+        / motor.continuous_current,
+    }
+    forward, reverse = (by_leg(e).sum(axis=2) for e in (energy.forward, energy.reverse))
+    return Outcome(
+        chain,
+        walking,
+        chain.holding(demand.standing),
+        {leg: forward[:, k] for k, leg in enumerate(demand.legs)},
+        {leg: reverse[:, k] for k, leg in enumerate(demand.legs)},
+        {name: by_leg(peak).max(axis=(1, 2)) - 1 for name, peak in peaks.items()},
+    )
+
+
+def outcomes(
+    demand: Demand, catalog: Catalog, values: Mapping[str, float | Array] | None = None
+) -> dict[str, Outcome]:
+    """What every alternative makes of a demand; see `chain_at`."""
+    return {
+        name: outcome(demand, chain_at(demand, catalog, name, values or {}))
+        for name in catalog.alternatives
+    }
+
+
+def totals(robot: Robot, chains: Mapping[str, Chain], samples: int = SAMPLES) -> Totals:
+    """What Fig. 21 needs, for the paper's pair of middle legs and for the whole robot.
+
+    Standing on three feet is section II.C; the other legs are lifted and hold their own weight.
+
+    Args:
+        robot: With a floating base.
+        chains: Actuator alternatives.
+        samples: Per half period of the gait.
+
+    Returns:
+        Alternative to ``cycle_J``, ``stand_3_W``, ``stand_6_W``, ``pair_cycle_J`` and
+        ``pair_stand_W`` (standing on three feet).
+
+    Raises:
+        TippingError: A foot would have to pull.
+    """
+    walking = walk(robot, chains, samples=samples)
+    pair = [robot.joints.index(j) for j in _joints(robot.spec)]
+    on_three = stand(robot, chains, robot.spec.standing_feet).holding
+    on_six = stand(robot, chains, robot.leg_names).holding
+    out: Totals = {}
+    for name, result in walking.results.items():
+        forward = stage_energy(result, "el").forward
+        out[name] = {
+            "cycle_J": float(forward.sum()),
+            "pair_cycle_J": float(forward[pair].sum()),
+            "stand_3_W": float(on_three[name].power.sum()),
+            "stand_6_W": float(on_six[name].power.sum()),
+            "pair_stand_W": float(on_three[name].power[pair].sum()),
+        }
+    return out

@@ -1,0 +1,174 @@
+"""The hexapod at a set of numbers against the general functions, and its own pieces."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuators.loading.build import Catalog
+from pipeline.paper.calibration.checkpoint import Checkpoint
+from pipeline.paper.hexapod import (
+    MIDDLE_LEGS,
+    PUBLISHED_LEG,
+    SAMPLES,
+    RobotPart,
+    chain_at,
+    drawn,
+    joined,
+    outcome,
+    outcomes,
+    printed_leg,
+    robot_part,
+    solve_posture,
+    standing_state,
+    with_splits,
+)
+from pipeline.paper.judgement.fig_21 import crossing
+from pipeline.paper.published import CYCLE, DIMENSIONS, EXTRA
+from pipeline.paper.quantities import computed, pair_break_even
+from pipeline.robot.robot import Robot
+from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.walk_stand import walk
+
+
+def test_the_middle_legs_agree_with_a_whole_walk(hexapod: Robot, catalog: Catalog) -> None:
+    """At the same sampling the middle legs' energies are those of `walk`; at 81 within 0.2 %."""
+    walking = walk(hexapod, catalog.chains(), samples=751)
+    for samples, tolerance in ((751, 1e-9), (SAMPLES, 2e-3)):
+        found = outcomes(robot_part(hexapod.spec, samples).demand, catalog)
+        for name, supply in walking.supplies.items():
+            energy = dict(zip(supply.accounts, supply.supplied_energy, strict=True))
+            leg = sum(energy[f"rm_joint_{k}"] for k in (1, 2, 3))
+            assert found[name].consumed("rm") == pytest.approx(leg, rel=tolerance)
+
+
+def test_many_sets_at_once_are_each_set_by_itself(part: RobotPart, catalog: Catalog) -> None:
+    """Two robots of unequal length with two frictions, against one after the other."""
+    shorter = robot_part(part.robot.spec.with_parameters({"femur_mass": 1.0}), 61)
+    demands = [part.demand, shorter.demand]
+    friction = {"harmonic_drive.coulomb": np.array([0.5, 0.8])}
+    both = joined(demands)
+    assert both.count == 2
+    together = outcome(both, chain_at(both, catalog, "reversible", friction))
+    leg = both.of_leg(PUBLISHED_LEG)
+    alone_leg = drawn(leg, chain_at(leg, catalog, "reversible", friction))
+    for k, demand in enumerate(demands):
+        own = {key: float(values[k]) for key, values in friction.items()}
+        alone = outcome(demand, chain_at(demand, catalog, "reversible", own))
+        for name in MIDDLE_LEGS:
+            assert together.drawn[name][k] == pytest.approx(alone.consumed(name), rel=1e-12)
+            returned = alone.consumed(name) - alone.consumed(name, net=True)
+            assert together.returned[name][k] == pytest.approx(returned, rel=1e-9)
+        for name, excess in alone.excess.items():
+            assert together.excess[name][k] == pytest.approx(float(excess[0]), rel=1e-12)
+        held = printed_leg(together.holding.motor_torque)[k]
+        np.testing.assert_allclose(held, alone.held["motor_torque"], rtol=1e-12)
+        assert alone_leg[k] == pytest.approx(alone.consumed(PUBLISHED_LEG), rel=1e-12)
+        (again,) = printed_leg(both.taken(np.array([k])).standing)
+        np.testing.assert_array_equal(again, printed_leg(demand.standing)[0])
+
+
+@pytest.mark.parametrize(
+    ("quantity", "limit"),
+    [
+        ("speed", "max_speed"),
+        ("voltage", "supply_voltage"),
+        ("current", "peak_current"),
+        ("rms_current", "continuous_current"),
+    ],
+)
+def test_a_limit_is_kept_up_to_the_limit(
+    part: RobotPart, catalog: Catalog, quantity: str, limit: str
+) -> None:
+    chain = catalog.chain("reversible")
+    peak = (1 + outcome(part.demand, chain).excess[quantity][0]) * getattr(chain.motor, limit)
+    for factor in (1.001, 0.999):
+        limits = {"continuous_current": 1e-3, limit: factor * peak}
+        other = replace(chain, motor=replace(chain.motor, **limits))
+        assert (outcome(part.demand, other).excess[quantity][0] <= 0) == (factor > 1)
+
+
+def test_posture_is_solved_from_elsewhere(spec: RobotSpec) -> None:
+    other = spec.with_parameters(
+        {"femur_mass": 1.0, "trunk_com_left": 0.0, "joint_2_lateral": 0.1, "body_height": 0.29}
+    )
+    target = np.array([192.6, -30.71, 1.46])
+    _, reaction, torque = standing_state(solve_posture(other, target))
+    (torque,) = printed_leg(torque)
+    np.testing.assert_allclose([reaction, *torque[1:]], target, atol=1e-6)
+    assert torque[0] == pytest.approx(0, abs=1e-9)
+
+
+def test_split_ratios_keep_their_product(part: RobotPart, catalog: Catalog) -> None:
+    values = with_splits({"harmonic_drive.ratio": 120.0, "planetary.ratio": 10.0}, 400.0)
+    for found in outcomes(part.demand, catalog, values).values():
+        assert float(np.asarray(found.chain.ratio)) == pytest.approx(400)
+
+
+def test_every_printed_quantity_is_computed(part: RobotPart, catalog: Catalog) -> None:
+    values = computed(part, outcomes(part.demand, catalog))
+    assert set(values) == {*DIMENSIONS, EXTRA}
+    assert all(isinstance(v, float) for v in values.values())
+    some = computed(part, outcomes(part.demand, catalog.only(["reversible"])))
+    assert "reversible_leg_energy_3s" in some
+    assert not {"walking_ratio_reversible", "ideal_leg_energy_3s", EXTRA} & set(some)
+
+
+@pytest.mark.parametrize(
+    ("cycle", "held", "more", "less"),
+    [(120.0, 9.0, 200.0, 1.0), (10.0, 2.0, 10.5, 0.0), (50.0, 1.0, 400.0, 0.9)],
+)
+def test_at_the_crossing_both_actuators_draw_the_same_power(
+    cycle: float, held: float, more: float, less: float
+) -> None:
+    def excess(at: float) -> float:
+        reversible, irreversible = (
+            (1 - at) * walking / CYCLE + at * standing
+            for walking, standing in ((cycle, held), (more, less))
+        )
+        return irreversible - reversible
+
+    whole = {"reversible": {"c": cycle, "s": held}, "irreversible": {"c": more, "s": less}}
+    f = crossing(whole, "c", "s")
+    assert 0.0 < f < 1.0
+    assert excess(f) == pytest.approx(0.0, abs=1e-12 * more)
+    assert excess(f - 0.01) > 0.0 > excess(f + 0.01)
+
+
+@pytest.mark.parametrize("legs", [1, 2])
+def test_the_papers_break_even_adds_up_both_middle_legs(legs: int) -> None:
+    """Fig. 21: walking both draw, standing `legs` of them, the irreversible actuator nothing."""
+    energy = {
+        "reversible": {"lm": 100.0, "rm": 110.0},
+        "irreversible": {"lm": 140.0, "rm": 145.0},
+    }
+    power = 0.9  # of one loaded leg [W]
+    f = pair_break_even(energy, power, legs)
+    walking = {name: (1 - f) * sum(e.values()) for name, e in energy.items()}  # [J] per period
+    standing = f * legs * power * CYCLE
+    assert walking["irreversible"] == pytest.approx(walking["reversible"] + standing, rel=1e-12)
+
+
+def test_no_crossing_where_one_actuator_is_better_at_both() -> None:
+    better, worse = {"c": 100.0, "s": 1.0}, {"c": 200.0, "s": 2.0}
+    pairs = [(better, worse), (worse, better), (better, better), (better, {"c": 200.0, "s": 1.0})]
+    for one, other in pairs:
+        assert math.isnan(crossing({"reversible": one, "irreversible": other}, "c", "s"))
+
+
+def test_checkpoint_survives_a_kill(tmp_path: Path) -> None:
+    path = tmp_path / "work" / "tasks.jsonl"
+    store = Checkpoint(path, "inputs-1")
+    store.add("a", {"x": 1})
+    store.add("b", [1.5])
+    with path.open("a", encoding="utf-8") as file:
+        file.write('{"task": "c", "resu')  # cut short
+    again = Checkpoint(path, "inputs-1")
+    assert again.done == {"a": {"x": 1}, "b": [1.5]}
+    again.add("c", 3)
+    assert Checkpoint(path, "inputs-1").done["c"] == 3
+    assert Checkpoint(path, "other inputs").done == {}
