@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,6 +53,7 @@ class Demand:
 
 def demand(
     machine: Machine,
+    motion: str | Path | pandas.DataFrame | None = None,
     *,
     samples: int = SAMPLES,
     quasi_static: bool = False,
@@ -59,13 +61,15 @@ def demand(
     power_of: str | None = None,
     friction_coefficient: float | None = None,
 ) -> Demand:
-    """What one cycle of a machine's gait demands of its joints.
+    """What one cycle of a machine's gait, or another motion, demands of its joints.
 
     It holds for every machine whose bodies, gait and effects on bodies are the same: other
     actuators do not change it, except for ``least_power``.
 
     Args:
-        machine: From `load`, with a floating base.
+        machine: From `load`, with a floating base where it walks its gait.
+        motion: CSV file or table of joint positions and contacts in place of the gait, for a robot
+            on a fixed base, too; see `pipeline.simulation.own_motion` for its columns.
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         forces: Rule of the ground's forces: ``least_tangential``, ``least_torque`` or
@@ -76,18 +80,20 @@ def demand(
 
     Raises:
         StanceError: A foot would have to pull or slide.
-        PipelineError: The robot stands on a fixed base, or an argument is out of range.
+        PipelineError: The robot stands on a fixed base, or the motion or an argument cannot be
+            used.
     """
     given = machine.walking(
         samples=samples,
         quasi_static=quasi_static,
+        motion=Path(motion) if isinstance(motion, str) else motion,
         forces=ForceChoice(forces, power_of, friction_coefficient),
     )
-    motion = walking_motion(given.machine, samples=samples)
+    moved = given.motion or walking_motion(given.machine, samples=samples)
     demanded = demand_along(
-        given.machine, motion, quasi_static=quasi_static, adjust=given.adjust, forces=given.ground
+        given.machine, moved, quasi_static=quasi_static, adjust=given.adjust, forces=given.ground
     )
-    return Demand(motion, demanded, given.robot.sliding_joints)
+    return Demand(moved, demanded, given.robot.sliding_joints)
 
 
 def energy(

@@ -63,12 +63,13 @@ class Machine:
         Raises:
             PipelineError: The robot stands on a fixed base, or an option is out of range.
         """
-        if self.loaded is None or not self.loaded.robot.floating:
+        fixed = self.loaded is None or not self.loaded.robot.floating
+        if fixed and options.get("motion") is None:
             raise RobotFileError(
                 f"{self.path}: a robot on a stand neither stands nor walks; "
                 "give one with a floating base"
             )
-        return self.loaded.walking(**options)
+        return self.ready.walking(**options)
 
     def with_values(self, values: Mapping[str, object]) -> Machine:
         """The same machine with other numbers; no file is read for an actuator's or the gait's.

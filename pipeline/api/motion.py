@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result
@@ -15,6 +17,9 @@ from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from reports.table import Table
+
+if TYPE_CHECKING:
+    import pandas
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +107,7 @@ def walk(
     machine: Machine,
     actuator: str | None = None,
     *,
+    motion: str | Path | pandas.DataFrame | None = None,
     samples: int = SAMPLES,
     quasi_static: bool = False,
     regeneration: str = "none",
@@ -109,12 +115,14 @@ def walk(
     friction_coefficient: float | None = None,
     compare_forces: bool = False,
 ) -> Walk:
-    """Walk one cycle of the robot file's gait.
+    """Walk one cycle of the robot file's gait, or move as given.
 
     Args:
         machine: From `load`, with a floating base.
         actuator: Name of an alternative, which the ideal one is put beside, since ratios refer to
             it; all alternatives by default.
+        motion: CSV file or table of joint positions and contacts in place of the gait, for a robot
+            on a fixed base, too; see `pipeline.simulation.own_motion` for its columns.
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.
@@ -130,6 +138,7 @@ def walk(
         ActuatorError: No such alternative.
     """
     given = machine.walking(
+        motion=Path(motion) if isinstance(motion, str) else motion,
         samples=samples,
         quasi_static=quasi_static,
         regeneration=regeneration,

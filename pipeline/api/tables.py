@@ -76,6 +76,7 @@ def walked(
         regeneration=given.regeneration,
         adjust=given.adjust,
         forces=given.ground,
+        motion=given.motion,
     )
 
 
@@ -83,7 +84,8 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
     """The tables of one walking cycle, by name."""
     demand, supplies, results = walking.demand, walking.supplies, walking.results
     spec, legs = given.robot.spec, leg_joints(given.robot.spec)
-    gait = gait_of(spec)
+    gait = None if given.motion else gait_of(spec)
+    speed = gait.speed if gait else walking.motion.mean_speed if spec.floating else 0.0
     stages = {name: a.stage_names for name, a in given.catalog.alternatives.items()}
     weight = given.machine.mass * spec.parameters["gravity"]  # that the forces rest on [N]
 
@@ -96,7 +98,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
             demand, given.robot.sliding_joints
         ),
         "walking_contact_forces": lambda: walking_tables.walking_contact_forces(demand),
-        "walking_gait": lambda: walking_tables.walking_gait(gait),
+        "walking_gait": lambda: walking_tables.walking_gait(gait_of(spec)),
         "walking_base": lambda: walking_tables.walking_base(walking.motion),
         "walking_stability": lambda: table_of(
             cycle_energy.Stability, cycle_energy.stability(demand, walking.margins)
@@ -109,7 +111,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
         ),
         "robot_energy": lambda: table_of(
             cycle_energy.RobotEnergy,
-            cycle_energy.robot_energies(demand, supplies, legs, weight, gait.speed),
+            cycle_energy.robot_energies(demand, supplies, legs, weight, speed),
         ),
         "motor_limits": lambda: walking_tables.motor_limits(
             {name: limit_rows(result) for name, result in results.items()}
@@ -125,7 +127,10 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
         "walking_force_rules": lambda: _force_rules(given, walking),
         "parameters": lambda: _parameters(given),
     }
+    grounded = ("walking_contact_forces", "walking_base", "walking_stability")
     absent = {
+        **dict.fromkeys(grounded, not spec.floating),
+        "walking_gait": given.motion is not None,
         "foot_tracking": all(part.foot_target is None for part in walking.motion.segments),
         "quasi_static_torque": given.quasi_static,
         "quasi_static_energy": given.quasi_static,
@@ -173,7 +178,8 @@ def inputs_of(given: Settings) -> list[Path]:
     spec = given.robot.spec
     files = [*spec.sources, *([] if spec.build else [spec.urdf])]
     files += sorted((given.files.actuators or CATALOG).glob("*.toml"))
-    return [*files, *(path for path in (given.files.gait, given.files.model_path) if path)]
+    more = (given.files.gait, given.files.model_path, given.motion_file)
+    return [*files, *(path for path in more if path)]
 
 
 def metadata(given: Settings) -> dict[str, Any]:
@@ -193,6 +199,7 @@ def metadata(given: Settings) -> dict[str, Any]:
             "transfer_path": gait_table(spec).transfer_path,
             "effects": list(given.effects.names) if given.effects else [],
             **_forces_options(given),
+            **({"motion": str(given.motion_file or "a table")} if given.motion else {}),
         },
         "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
         "joint's direction; electrical power positive from supply to motor",

@@ -60,6 +60,14 @@ def parser() -> argparse.ArgumentParser:
     ):
         sub = _verb(verbs, verb, text)
         _run_options(sub)
+        if verb == "walk":
+            sub.add_argument(
+                "--motion",
+                type=named_path,
+                metavar="FILE",
+                help="CSV to move by instead of the gait: time_s, JOINT__position_rad and, unless "
+                "the base is fixed, LEG__contact (0 or 1); base__x_m to base__yaw_rad where known",
+            )
         sub.set_defaults(run=_run_reports)
 
     view = _verb(verbs, "view", "play robot, gait, forces and torques in a browser, in 3D")

@@ -43,5 +43,6 @@ def settings_of(options: argparse.Namespace) -> Settings:
         regeneration=options.regeneration,
         forces=force_choice(options),
         compare_forces=options.compare_forces,
+        motion=getattr(options, "motion", None),
         walks=options.verb != "stand",
     )

@@ -141,6 +141,11 @@ class MotionDemand:
         """Names of the columns."""
         return self.segments[0].joints
 
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last [s]; of a gait its period."""
+        return float(self.segments[-1].time[-1] - self.segments[0].time[0])
+
 
 def motion_demand(
     robot: Robot,

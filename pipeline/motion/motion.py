@@ -108,3 +108,10 @@ class Motion:
     def samples(self) -> int:
         """Number of samples over all segments."""
         return sum(segment.time.size for segment in self.segments)
+
+    @property
+    def mean_speed(self) -> float:
+        """Of a floating base, straight from its first place to its last [m/s]."""
+        first, last = self.segments[0], self.segments[-1]
+        way = last.configuration[-1, :3] - first.configuration[0, :3]
+        return float(np.linalg.norm(way) / (last.time[-1] - first.time[0]))

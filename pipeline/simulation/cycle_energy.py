@@ -168,14 +168,13 @@ def robot_energies(
         weight: Of the robot [N].
         speed: Of walking [m/s].
     """
-    assert demand.period is not None
     rows = []
     for name, supply in supplies.items():
         energy = float(supply.supplied_energy.sum())
-        power = energy / demand.period  # [W]
+        power = energy / demand.duration  # [W]
         transport = power / (weight * speed) if speed else None
         support = transfer = None
-        if BUS not in supply.accounts:
+        if BUS not in supply.accounts and None not in demand.contacts:
             support = _support_energy(demand, supply, legs) / energy
             transfer = 1 - support - leg_energies(supply, legs).get(HELD, 0.0) / energy
         dumped = float(supply.dumped_energy.sum())

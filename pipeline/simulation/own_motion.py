@@ -50,29 +50,30 @@ FEWEST_ROWS: Final = DEGREE + 1
 MOST_SLIP: Final = 0.01
 
 
-def read_motion(path: Path, robot: Robot) -> Motion:
-    """A motion from a CSV file; see the module for its columns.
+def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
+    """A motion from a CSV file or a table; see the module for its columns.
 
     Args:
-        path: The file; columns of the robot's joints other than positions are left unread.
+        source: Columns of the robot's joints other than positions are left unread.
         robot: With its payload.
 
     Raises:
         InvalidMotionError: It cannot be read; a column is missing, unknown or not a number; time
             does not increase; a position lies beyond its limits; contacts do not fit the motion.
     """
+    if isinstance(source, pd.DataFrame):
+        return _motion(source, robot)
     try:
-        table = pd.read_csv(path, comment="#")
+        table = pd.read_csv(source, comment="#")
     except (OSError, ValueError) as error:
-        raise InvalidMotionError(f"{path}: no CSV that can be read: {error}") from None
+        raise InvalidMotionError(f"{source}: no CSV that can be read: {error}") from None
     try:
-        return motion_of_table(table, robot)
+        return _motion(table, robot)
     except InvalidMotionError as error:
-        raise InvalidMotionError(f"{path}: {error}") from None
+        raise InvalidMotionError(f"{source}: {error}") from None
 
 
-def motion_of_table(table: pd.DataFrame, robot: Robot) -> Motion:
-    """A motion from a table with the columns of the file; see `read_motion`."""
+def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
     units = ["m" if joint in robot.sliding_joints else "rad" for joint in robot.joints]
     joints = [f"{j}__position_{unit}" for j, unit in zip(robot.joints, units, strict=True)]
     feet = [f"{leg}__contact" for leg in robot.leg_names] if robot.floating else []

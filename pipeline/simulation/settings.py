@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from actuators.errors import CatalogError
 from actuators.loading.build import CATALOG, Catalog, load_catalog
@@ -17,6 +18,7 @@ from pipeline.machine.motors import Motors, motors_of
 from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
 from pipeline.motion.gait import gait_table
 from pipeline.motion.gait_table import spec_with_gait
+from pipeline.motion.motion import Motion
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
@@ -27,6 +29,9 @@ from pipeline.simulation.ground_forces.force_choice import ForceChoice
 from pipeline.simulation.ground_forces.least_power import Adjust
 from pipeline.simulation.memory import refuse_beyond_memory
 from pipeline.simulation.walk_stand import Regeneration
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES = 51
@@ -107,6 +112,8 @@ class Settings:
         regeneration: What becomes of returned energy.
         forces: How the ground's forces are chosen.
         compare_forces: Whether the rules for them are to be compared.
+        motion: In place of the gait; None to walk.
+        motion_file: Where it was read; None without a file.
     """
 
     files: Files
@@ -123,6 +130,8 @@ class Settings:
     regeneration: Regeneration = field(default_factory=Regeneration)
     forces: ForceChoice = PAPER_FORCES
     compare_forces: bool = False
+    motion: Motion | None = None
+    motion_file: Path | None = None
 
     def walking(
         self,
@@ -132,6 +141,7 @@ class Settings:
         regeneration: str = "none",
         forces: ForceChoice = PAPER_FORCES,
         compare_forces: bool = False,
+        motion: Path | DataFrame | None = None,
         walks: bool = True,
     ) -> Settings:
         """The same machine, to walk in this way; defaults are the command line's.
@@ -142,10 +152,13 @@ class Settings:
             regeneration: ``none``, ``bus`` or a fraction of returned energy that is used again.
             forces: Rule and friction of the ground's forces.
             compare_forces: Whether what the rules cost is to be compared.
+            motion: Joint positions and contacts in place of the gait; see
+                `pipeline.simulation.own_motion`.
             walks: Whether a gait cycle will be computed, which must fit into memory.
 
         Raises:
             GaitError: Too few samples or too many, or forces that cannot be.
+            InvalidMotionError: The motion cannot be used.
             RobotFileError: No such regeneration.
         """
         if samples < LEAST_SAMPLES:
@@ -153,7 +166,7 @@ class Settings:
                 f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
                 "for energies within 1 %"
             )
-        if walks:
+        if walks and motion is None:
             refuse_beyond_memory(samples, len(self.robot.joints), len(self.catalog.alternatives))
         spec = self.robot.spec
         friction = gait_table(spec).friction_coefficient if spec.floating else None
@@ -163,8 +176,15 @@ class Settings:
             quasi_static=quasi_static,
             regeneration=regeneration_of(regeneration),
             forces=forces.on(friction).checked(self.catalog.alternatives),
-            compare_forces=compare_forces,
+            compare_forces=compare_forces and spec.floating,
+            motion=None if motion is None else self._moved(motion),
+            motion_file=motion if isinstance(motion, Path) else None,
         )
+
+    def _moved(self, motion: Path | DataFrame) -> Motion:
+        from pipeline.simulation.own_motion import read_motion  # pandas, where it is needed
+
+        return read_motion(motion, self.machine)
 
     @cached_property
     def _chains(self) -> dict[str, Actuators]:

@@ -185,8 +185,8 @@ def walking_base(motion: Motion) -> Table:
         ["base"],
         quantities,
         labels=_support([(segment.name, segment.time) for segment in motion.segments]),
-        description="The base link in the world (x ahead at t = 0, z against gravity) over one "
-        "gait cycle.",
+        description="The base link in the world (x ahead at t = 0, z against gravity) over "
+        + ("one gait cycle." if motion.period else "the motion as given."),
     )
 
 
@@ -223,7 +223,8 @@ def walking_joint_demand(demand: MotionDemand, sliding: Collection[str] = ()) ->
         demand.joints,
         quantities,
         labels=_support([(part.segment, part.time) for part in parts]),
-        description="One gait cycle; torque and velocity positive in the joint's direction.",
+        description=f"{'One gait cycle' if demand.period else 'The motion as given'}; torque and "
+        "velocity positive in the joint's direction.",
     )
 
 

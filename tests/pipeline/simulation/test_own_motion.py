@@ -16,7 +16,7 @@ from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.simulation.own_motion import ATTITUDE, PLACE, motion_of_table, read_motion
+from pipeline.simulation.own_motion import ATTITUDE, PLACE, read_motion
 
 
 def written(robot: Robot, motion: Motion, *, base: bool = False) -> pd.DataFrame:
@@ -71,7 +71,7 @@ def test_an_arm_on_a_stand_needs_no_contacts(root: Path) -> None:
     time = np.linspace(0.0, 2.0, 201)
     q = 0.2 * np.sin(np.pi * time)
     columns = {f"{joint}__position_rad": q for joint in robot.joints}
-    (segment,) = motion_of_table(pd.DataFrame({"time_s": time, **columns}), robot).segments
+    (segment,) = read_motion(pd.DataFrame({"time_s": time, **columns}), robot).segments
     np.testing.assert_allclose(
         segment.acceleration[:, 0], -(np.pi**2) * q, atol=1e-5
     )  # at the ends, too
@@ -140,7 +140,7 @@ def test_contacts_that_cannot_carry_the_robot_are_refused(
     for leg in hexapod.leg_names:
         still[f"{leg}__contact"] = int(leg in ("lf", "lm", "rf"))
     with pytest.raises(StanceError, match="tips at t = .* check which feet stand") as refused:
-        motion_demand(hexapod, motion_of_table(still, hexapod))
+        motion_demand(hexapod, read_motion(still, hexapod))
     assert "gait." not in str(refused.value)
 
 

@@ -1,0 +1,76 @@
+"""A motion of the user's own through the API and the command line, as the gait goes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import pipeline as lw
+from pipeline.motion.walking import walking_motion
+from pipeline.robot.robot import Robot
+from tests.command_line import Command
+from tests.pipeline.simulation.test_own_motion import written
+
+
+@pytest.fixture(scope="module")
+def path(hexapod: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = Path(tmp_path_factory.mktemp("motion")) / "walk.csv"
+    written(hexapod, walking_motion(hexapod, samples=201)).to_csv(path, index=False)
+    return path
+
+
+def test_demand_and_energy_of_the_gait_written_out_are_the_gaits(root: Path, path: Path) -> None:
+    machine = lw.load(root / "urdf" / "hexapod.toml")
+    gait, own = lw.demand(machine, samples=201), lw.demand(machine, path)
+    torque = gait.frame().filter(like="torque")
+    np.testing.assert_allclose(own.frame()[torque.columns], torque, atol=1e-6)
+    energies = lw.energy(machine, gait), lw.energy(machine, own)
+    for name, energy in energies[0].items():
+        np.testing.assert_allclose(energies[1][name], energy, rtol=1e-6)
+
+
+def test_walk_with_a_motion_writes_the_tables_that_make_sense(
+    command: Command, tmp_path: Path, path: Path
+) -> None:
+    gait, own = tmp_path / "gait", tmp_path / "own"
+    assert command("walk", gait, "--samples", "201") == 0
+    assert command("walk", own, "--motion", str(path)) == 0
+    names = [{file.name for file in folder.glob("*.csv")} for folder in (gait, own)]
+    assert names[0] - names[1] == {"walking_gait.csv", "foot_tracking.csv"}
+    assert names[1] < names[0]
+    for name in ("robot_energy", "walking_stage_energy", "walking_losses", "walking_base"):
+        one, other = (pd.read_csv(folder / f"{name}.csv") for folder in (gait, own))
+        numbers = one.select_dtypes("number")
+        scale = numbers.abs().max().to_numpy() + 1e-3
+        difference = (other[numbers.columns] - numbers).abs().max().to_numpy()
+        assert (difference < 1e-4 * scale).all(), name
+    assert '"motion": ' in (own / "robot_energy.meta.json").read_text(encoding="utf-8")
+
+
+def test_an_arm_on_a_fixed_base_moves_by_a_table(root: Path) -> None:
+    machine = lw.load(root / "urdf" / "leg.toml")
+    time = np.linspace(0.0, 1.0, 101)
+    joints = machine.ready.robot.joints
+    table = pd.DataFrame({"time_s": time}).assign(
+        **{f"{joint}__position_rad": 0.1 * np.sin(2 * np.pi * time) for joint in joints}
+    )
+    result = lw.walk(machine, motion=table)
+    assert result.energy.frame()["electrical_J"].gt(0).all()
+    assert result.table("robot_energy").frame()["cost_of_transport"].isna().all()
+    assert "walking_stability" not in result.tables
+    with pytest.raises(Exception, match="a robot on a stand neither stands nor walks"):
+        lw.walk(machine)
+
+
+def test_a_motion_that_cannot_be_is_one_line_and_exit_code_2(
+    command: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "bad.csv").write_text("time_s,lf_joint_1__position_rad\n0,0\n", encoding="utf-8")
+    assert command("walk", tmp_path / "out", "--motion", str(tmp_path / "bad.csv")) == 2
+    said = capsys.readouterr().err
+    assert "bad.csv: no column lf_joint_2__position_rad" in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "out").exists()
