@@ -21,7 +21,15 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from pipeline.robot.robot import parse_urdf
-from pipeline.robot.urdf_source import INERTIA_KEYS, MOVING, ends, numbers, read_elements
+from pipeline.robot.urdf_source import (
+    INERTIA_KEYS,
+    MOVING,
+    ends,
+    number,
+    numbers,
+    place,
+    read_elements,
+)
 
 Array = NDArray[np.float64]
 
@@ -167,7 +175,7 @@ def _name(element: ET.Element) -> str:
 
 def _mass(link: ET.Element, where: str) -> float:
     mass = link.find("inertial/mass")
-    return 0.0 if mass is None else float(numbers(mass, "value", where, (0,))[0])
+    return 0.0 if mass is None else number(mass, "value", where)
 
 
 def _moments(link: ET.Element, where: str) -> Array:
@@ -175,7 +183,7 @@ def _moments(link: ET.Element, where: str) -> Array:
     tensor = link.find("inertial/inertia")
     if tensor is None:
         return np.zeros(3)
-    xx, xy, xz, yy, yz, zz = (float(numbers(tensor, k, where, (0,))[0]) for k in INERTIA_KEYS)
+    xx, xy, xz, yy, yz, zz = (number(tensor, key, where) for key in INERTIA_KEYS)
     return np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
@@ -228,7 +236,7 @@ def _body(body: Body) -> list[Finding]:
         detail = f"with {', '.join(names)}{more}: one body of {mass:.6g} kg"
         findings.append(Finding(body.name, MERGED, True, detail, note=True))
     if mass < 0:
-        return findings  # told of its link
+        return findings  # reported for its link
     if mass == 0:
         return [*findings, *_without_mass(body)]
     findings.append(Finding(body.name, "mass positive", True, f"{mass:.6g} kg"))
@@ -264,18 +272,13 @@ def _centre_in_geometry(link: ET.Element, where: str) -> list[Finding]:
     inertial, name = link.find("inertial"), _name(link)
     if inertial is None:
         return []
-    origin = inertial.find("origin")
-    centre = np.zeros(3) if origin is None else numbers(origin, "xyz", where, (0, 0, 0))
+    centre, _ = place(inertial, where)
     boxes = []
     for shape in [*link.findall("visual"), *link.findall("collision")]:
         half = _half_size(shape, where)
         if half is None:
             return []  # a mesh: its extent is not known without the mesh file
-        place = shape.find("origin")
-        at, rpy = (
-            np.zeros(3) if place is None else numbers(place, key, where, (0, 0, 0))
-            for key in ("xyz", "rpy")
-        )
+        at, rpy = place(shape, where)
         boxes.append((at, pin.rpy.rpyToMatrix(rpy), half))
     if not boxes:
         return []
@@ -305,10 +308,10 @@ def _half_size(shape: ET.Element, where: str) -> Array | None:
         return numbers(solid, "size", where, (0, 0, 0)) / 2
     if solid.tag == "mesh":
         return None
-    radius = float(numbers(solid, "radius", where, (0,))[0])
+    radius = number(solid, "radius", where)
     if solid.tag == "sphere":
         return np.full(3, radius)
-    length = float(numbers(solid, "length", where, (0,))[0])
+    length = number(solid, "length", where)
     return np.array([radius, radius, length / 2 + (radius if solid.tag == "capsule" else 0)])
 
 
@@ -338,7 +341,7 @@ def _limits(joint: ET.Element, kind: str, where: str) -> list[Finding]:
     if limit is None:  # of a continuous joint, which needs none
         return [Finding(name, "limits", True, "a continuous joint without limits")]
     value = {
-        key: float(numbers(limit, key, where, (0,))[0])
+        key: number(limit, key, where)
         for key in ("lower", "upper", "effort", "velocity")
         if limit.get(key) is not None
     }
@@ -378,24 +381,21 @@ def _in_radians(name: str, lower: float, upper: float) -> Finding:
 def _sizes(root: ET.Element, bodies: Sequence[Body], where: str) -> list[Finding]:
     """Lengths in metres, inertias and masses that fit them."""
     findings = []
-    away: dict[str, float] = {}  # from the root along the joints [m]
-    waiting = root.findall("joint")
-    above = {ends(joint)[1] for joint in waiting}
-    while waiting:
-        for joint in list(waiting):
-            parent, child = ends(joint)
-            if parent in above and parent not in away:
-                continue
-            waiting.remove(joint)
-            origin = joint.find("origin")
-            offset = 0.0
-            if origin is not None:
-                offset = float(np.linalg.norm(numbers(origin, "xyz", where, (0, 0, 0))))
-            away[child] = away.get(parent, 0.0) + offset
-            if offset > LONGEST:
-                assert origin is not None
-                detail = f"origin {origin.get('xyz')}: {offset:g} m from its parent; millimetres?"
-                findings.append(Finding(_name(joint), "lengths in metres", False, detail))
+    above = {ends(joint)[1]: joint for joint in root.findall("joint")}
+
+    def distance(link: str) -> float:
+        """From the root along the joints [m]."""
+        if link not in above:
+            return 0.0
+        return distance(ends(above[link])[0]) + float(np.linalg.norm(place(above[link], where)[0]))
+
+    away = {link: distance(link) for link in above}
+    for joint in above.values():
+        xyz, _ = place(joint, where)
+        if (offset := float(np.linalg.norm(xyz))) > LONGEST:
+            written = " ".join(f"{x:g}" for x in xyz)
+            detail = f"origin {written}: {offset:g} m from its parent; millimetres?"
+            findings.append(Finding(_name(joint), "lengths in metres", False, detail))
     reach = furthest = max(away.values(), default=0.0)
     for body in bodies:
         mass = float(body.inertia.mass)

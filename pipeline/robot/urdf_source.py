@@ -1,14 +1,14 @@
 """A URDF as text and as elements that know their line, with the faults that readers pass over.
 
-A URDF reader says of a broken file that it is broken. Here every fault is told with its line and
-element, before Pinocchio sees the text.
+A URDF reader says of a broken file that it is broken. Here every fault is reported with its line
+and element, before Pinocchio sees the text.
 """
 
 from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.parsers import expat
 
@@ -26,6 +26,14 @@ MOVING = ("revolute", "continuous", "prismatic")
 #: What computes as a joint of no coordinate, and what has more than one.
 TYPES = (*MOVING, "fixed", "floating", "planar")
 INERTIA_KEYS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+#: Shapes, and how many numbers each of their attributes has; a file's name is none.
+_SHAPES: Mapping[str, Mapping[str, int]] = {
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "mesh": {"filename": 0},
+}
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _NO_XML = ("solid ", "ply\n", "ply\r\n", "{")  # meshes and JSON, given by mistake
 
@@ -114,6 +122,10 @@ def shown(element: ET.Element, where: str) -> str:
     return f"{where}: line {line}: {named}" if line else f"{where}: {named}"
 
 
+def _fault(element: ET.Element, where: str, words: str) -> UrdfError:
+    return UrdfError(f"{shown(element, where)}: {words}")
+
+
 def numbers(element: ET.Element, key: str, where: str, default: Sequence[float]) -> Array:
     """The finite numbers of an attribute.
 
@@ -136,9 +148,29 @@ def numbers(element: ET.Element, key: str, where: str, default: Sequence[float])
             return values
     count = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers"
     comma = "; write decimal dots" if re.search(r"\d,\d", text) else ""
-    raise UrdfError(
-        f"{shown(element, where)}: {key} = '{one_line(text)[:60]}', expected {count}{comma}"
-    )
+    words = f"{key} = '{one_line(text)[:60]}', expected {count}{comma}"
+    raise _fault(element, where, words)
+
+
+def number(element: ET.Element, key: str, where: str) -> float:
+    """One finite number, zero without the attribute.
+
+    Raises:
+        UrdfError: As for `numbers`.
+    """
+    return float(numbers(element, key, where, (0,))[0])
+
+
+def place(element: ET.Element, where: str) -> tuple[Array, Array]:
+    """An element's ``<origin>``: xyz [m] and rpy [rad], zero without one.
+
+    Raises:
+        UrdfError: As for `numbers`.
+    """
+    origin = element.find("origin")
+    if origin is None:
+        return np.zeros(3), np.zeros(3)
+    return numbers(origin, "xyz", where, (0, 0, 0)), numbers(origin, "rpy", where, (0, 0, 0))
 
 
 def read_elements(text: str, where: str) -> Placed:
@@ -159,18 +191,17 @@ def read_elements(text: str, where: str) -> Placed:
         raise UrdfError(f"{where}: the root element is <{root.tag}>, expected <robot>{what}")
     for element in root.iter():
         if element.tag.startswith("xacro:"):
-            raise UrdfError(
-                f"{shown(element, where)}: a macro; expand the file first: xacro FILE > robot.urdf"
-            )
-    links = _named(root, "link", where)
-    joints = _named(root, "joint", where)
+            words = "a macro; expand the file first: xacro FILE > robot.urdf"
+            raise _fault(element, where, words)
+    links, joints = (_named(root, tag, where) for tag in ("link", "joint"))
     if not links:
         raise UrdfError(f"{where}: no <link>; a robot has at least one")
     for link in links.values():
-        _look_at_link(link, where)
+        _check_link(link, where)
     for joint in joints.values():
-        _look_at_joint(joint, list(links), list(joints), where)
-    _look_at_tree(root, links, where)
+        _check_joint(joint, list(links), list(joints), where)
+        _check_motion(joint, where)
+    _check_tree(root, links, where)
     return root
 
 
@@ -186,153 +217,120 @@ def _named(root: Placed, tag: str, where: str) -> dict[str, ET.Element]:
     """The root's children of one kind by name."""
     out: dict[str, ET.Element] = {}
     for element in root.findall(tag):
-        name = element.get("name")
-        if not name or not name.strip():
-            raise UrdfError(f"{shown(element, where)}: has no name")
+        name = element.get("name", "")
+        if not name.strip():
+            raise _fault(element, where, "has no name")
         if name in out:
             first = getattr(out[name], "line", 0)
-            raise UrdfError(
-                f"{shown(element, where)}: the name is taken by line {first}; rename one"
-            )
+            raise _fault(element, where, f"the name is taken by line {first}; rename one")
         out[name] = element
     return out
 
 
-def _origin(element: ET.Element, where: str) -> None:
-    origin = element.find("origin")
-    if origin is not None:
-        numbers(origin, "xyz", where, (0, 0, 0))
-        numbers(origin, "rpy", where, (0, 0, 0))
-
-
-def _look_at_link(link: ET.Element, where: str) -> None:
+def _check_link(link: ET.Element, where: str) -> None:
     inertial = link.find("inertial")
-    place = shown(link, where)
     if inertial is not None:
-        _origin(inertial, where)
+        place(inertial, where)
         mass, tensor = inertial.find("mass"), inertial.find("inertia")
         if mass is None or tensor is None:
             lacking = "mass" if mass is None else "inertia"
-            raise UrdfError(f"{place}: <inertial> without <{lacking}>; give both")
-        if mass.get("value") is None:
-            raise UrdfError(f"{place}: <mass> without value [kg]")
-        _inertial_number(mass, "value", link, where)
-        for key in INERTIA_KEYS:
-            if tensor.get(key) is None:
-                raise UrdfError(f"{place}: <inertia> without {key} [kg*m^2]")
-            _inertial_number(tensor, key, link, where)
+            raise _fault(link, where, f"<inertial> without <{lacking}>; give both")
+        given = [(mass, "value", "kg"), *((tensor, key, "kg*m^2") for key in INERTIA_KEYS)]
+        for element, key, unit in given:
+            if element.get(key) is None:
+                raise _fault(link, where, f"<{element.tag}> without {key} [{unit}]")
+            try:
+                number(element, key, where)
+            except UrdfError as error:  # which link's
+                raise UrdfError(f"{error} (link '{one_line(link.get('name'))}')") from None
     for shape in (*link.findall("visual"), *link.findall("collision")):
-        _origin(shape, where)
-        _look_at_shape(shape, place, where)
+        place(shape, where)
+        solid = shape.find("geometry/*")
+        if solid is None:
+            words = f"<{shape.tag}> without <geometry> and a shape in it"
+            raise _fault(link, where, words)
+        if solid.tag not in _SHAPES:
+            words = f"shape <{solid.tag}>; {closest(solid.tag, list(_SHAPES))}"
+            raise _fault(link, where, words)
+        for key, count in _SHAPES[solid.tag].items():
+            if not solid.get(key):
+                raise UrdfError(f"{shown(solid, where)} without {key}")
+            if count:
+                numbers(solid, key, where, (0,) * count)
 
 
-def _inertial_number(element: ET.Element, key: str, link: ET.Element, where: str) -> None:
-    try:
-        numbers(element, key, where, (0,))
-    except UrdfError as error:  # which link's
-        raise UrdfError(f"{error} (link '{one_line(link.get('name'))}')") from None
-
-
-def _look_at_shape(shape: ET.Element, place: str, where: str) -> None:
-    geometry = shape.find("geometry")
-    if geometry is None or len(geometry) == 0:
-        raise UrdfError(f"{place}: <{shape.tag}> without <geometry> and a shape in it")
-    solid = geometry[0]
-    needs = {
-        "box": {"size": 3},
-        "sphere": {"radius": 1},
-        "cylinder": {"radius": 1, "length": 1},
-        "capsule": {"radius": 1, "length": 1},
-        "mesh": {},
-    }
-    if solid.tag not in needs:
-        raise UrdfError(f"{place}: shape <{solid.tag}>; {closest(solid.tag, list(needs))}")
-    for key, count in needs[solid.tag].items():
-        if solid.get(key) is None:
-            raise UrdfError(f"{shown(solid, where)} without {key}")
-        numbers(solid, key, where, (0,) * count)
-    if solid.tag == "mesh" and not solid.get("filename"):
-        raise UrdfError(f"{shown(solid, where)} without filename")
-
-
-def _look_at_joint(joint: ET.Element, links: list[str], joints: list[str], where: str) -> None:
-    place = shown(joint, where)
+def _check_joint(joint: ET.Element, links: list[str], joints: list[str], where: str) -> None:
+    """Its type, and the names of what it joins."""
     kind = joint.get("type")
     if kind is None:
-        raise UrdfError(f"{place}: has no type; known: {', '.join(TYPES)}")
+        raise _fault(joint, where, f"has no type; known: {', '.join(TYPES)}")
     if kind not in TYPES:
-        raise UrdfError(f"{place}: type '{one_line(kind)}'; {closest(kind, TYPES)}")
-    _origin(joint, where)
+        raise _fault(joint, where, f"type '{one_line(kind)}'; {closest(kind, TYPES)}")
+    place(joint, where)
     for tag in ("parent", "child"):
         end = joint.find(tag)
         name = None if end is None else end.get("link")
         if not name:
-            raise UrdfError(f"{place}: has no <{tag} link=...>")
+            raise _fault(joint, where, f"has no <{tag} link=...>")
         if name not in links:
-            raise UrdfError(f"{place}: {tag} '{one_line(name)}' is no link; {closest(name, links)}")
+            words = f"{tag} '{one_line(name)}' is no link; {closest(name, links)}"
+            raise _fault(joint, where, words)
     if len(set(ends(joint))) == 1:
-        raise UrdfError(f"{place}: parent and child are the same link")
-    axis = joint.find("axis")
-    if axis is not None and kind in (*MOVING, "planar"):
-        direction = numbers(axis, "xyz", where, (1, 0, 0))
-        if not direction.any():
-            raise UrdfError(f"{place}: <axis> '{axis.get('xyz')}' has no direction")
-    limit = joint.find("limit")
-    if limit is None:
-        if kind in ("revolute", "prismatic"):
-            raise UrdfError(
-                f"{place}: a {kind} joint needs <limit> with lower, upper, effort and velocity"
-            )
-    elif kind in MOVING:
+        raise _fault(joint, where, "parent and child are the same link")
+    mimic = joint.find("mimic")
+    other = "" if mimic is None else mimic.get("joint", "")
+    if mimic is not None and other not in joints:
+        words = f"mimics '{one_line(other)}', which is no joint; {closest(other, joints)}"
+        raise _fault(joint, where, words)
+
+
+def _check_motion(joint: ET.Element, where: str) -> None:
+    """Its axis, limits and friction."""
+    kind, axis, limit = joint.get("type"), joint.find("axis"), joint.find("limit")
+    directed = kind in (*MOVING, "planar")
+    if axis is not None and directed and not numbers(axis, "xyz", where, (1, 0, 0)).any():
+        raise _fault(joint, where, f"<axis> '{axis.get('xyz')}' has no direction")
+    if limit is None and kind in ("revolute", "prismatic"):
+        words = f"a {kind} joint needs <limit> with lower, upper, effort and velocity"
+        raise _fault(joint, where, words)
+    if limit is not None and kind in MOVING:
         for key in ("effort", "velocity"):
             if limit.get(key) is None:
-                raise UrdfError(f"{place}: <limit> without {key}")
-            if numbers(limit, key, where, (0,))[0] < 0:
-                raise UrdfError(
-                    f"{place}: <limit>: {key} = '{one_line(limit.get(key))}', may not be negative"
-                )
+                raise _fault(joint, where, f"<limit> without {key}")
+            if number(limit, key, where) < 0:
+                written = one_line(limit.get(key))
+                raise _fault(joint, where, f"<limit>: {key} = '{written}', may not be negative")
         for key in ("lower", "upper"):
-            numbers(limit, key, where, (0,))
-    mimic = joint.find("mimic")
-    if mimic is not None:
-        other = mimic.get("joint", "")
-        if other not in joints:
-            raise UrdfError(
-                f"{place}: mimics '{one_line(other)}', which is no joint; {closest(other, joints)}"
-            )
+            number(limit, key, where)
     dynamics = joint.find("dynamics")
     if dynamics is not None:
         for key in ("damping", "friction"):
-            numbers(dynamics, key, where, (0,))
+            number(dynamics, key, where)
 
 
-def _look_at_tree(root: Placed, links: dict[str, ET.Element], where: str) -> None:
+def _check_tree(root: Placed, links: dict[str, ET.Element], where: str) -> None:
+    """Every link but one hangs on one joint, and none on itself."""
     above: dict[str, ET.Element] = {}
     for joint in root.findall("joint"):
         child = ends(joint)[1]
         if child in above:
-            raise UrdfError(
-                f"{shown(joint, where)}: its child '{one_line(child)}' already hangs on joint "
+            words = (
+                f"its child '{one_line(child)}' already hangs on joint "
                 f"'{one_line(above[child].get('name'))}'; closed chains are no URDF"
             )
+            raise _fault(joint, where, words)
         above[child] = joint
     roots = [name for name in links if name not in above]
     if len(roots) > 1:
-        raise UrdfError(
-            f"{shown(links[roots[1]], where)}: hangs on no joint, and neither does "
-            f"'{one_line(roots[0])}'; all links but one are some joint's child"
+        words = (
+            f"hangs on no joint, and neither does '{one_line(roots[0])}'; all links but one are "
+            "some joint's child"
         )
-    reached = set(roots)
-    below: dict[str, list[str]] = {}
-    for child, joint in above.items():
-        below.setdefault(ends(joint)[0], []).append(child)
-    stack = list(roots)
-    while stack:
-        for child in below.get(stack.pop(), ()):
-            reached.add(child)
-            stack.append(child)
+        raise _fault(links[roots[1]], where, words)
+    reached = list(roots)
+    for parent in reached:  # grows while it runs
+        reached += [child for child, joint in above.items() if ends(joint)[0] == parent]
     for name, link in links.items():
         if name not in reached:
-            raise UrdfError(
-                f"{shown(link, where)}: the joints above it run in a circle and hang on no root"
-            )
+            words = "the joints above it run in a circle and hang on no root"
+            raise _fault(link, where, words)

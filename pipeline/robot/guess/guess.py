@@ -98,7 +98,7 @@ def guess_robot(
         posture = layout.by_leg(known)[0]
         stance = standing.of_pose(posture, f"pose '{pose_name}' of {_name(source.srdf)}")
     if stance is not None:
-        pace = find_pace(chains, stance, standing.lower, standing.upper)
+        pace = find_pace(chains, stance, standing.limits)
     else:
         stance, pace = _searched(standing)
     return Guess(source, root, limbs, held, stance, pace, mass)
@@ -128,7 +128,7 @@ def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
     """
     best: tuple[float, Stance, Pace | None] | None = None
     for stance in islice(standing.candidates(), _STANCES):
-        pace = find_pace(standing.chains, stance, standing.lower, standing.upper)
+        pace = find_pace(standing.chains, stance, standing.limits)
         height = float((standing.chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
         stroke = pace.stroke / height if pace else 0.0
         if stroke >= _STROKE:

@@ -42,14 +42,13 @@ class Pace:
     period: float
 
 
-def find_pace(chains: LegChains, stance: Stance, lower: Array, upper: Array) -> Pace | None:
+def find_pace(chains: LegChains, stance: Stance, limits: tuple[Array, Array]) -> Pace | None:
     """The longest stroke of a row of shorter and shorter ones that every leg can do.
 
     Args:
         chains: The legs.
         stance: About which they walk.
-        lower: Limits of the legs' joints, shape (L, K) [rad, m].
-        upper: Likewise.
+        limits: Lower and upper of the legs' joints, each (L, K) [rad, m].
 
     Returns:
         None where the legs cannot take even the shortest.
@@ -57,38 +56,29 @@ def find_pace(chains: LegChains, stance: Stance, lower: Array, upper: Array) -> 
     height = float((chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
     about = replace(chains, nominal=stance.posture)
     follows = np.array([not own.lacks for own in freedoms(about)])
+    room = np.where(follows[:, None], 1.0, [1.0, 0.0, 1.0])  # which corners a leg is to reach
+
+    def possible(stroke: float, lift: float) -> bool:
+        """Feet reach all corners of a step, with room to the sides, within the limits."""
+        x, y, z = stroke / 2, _SIDE * stroke, lift
+        corners = [(a * x, b * y, c * z) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (0, 1)]
+        target = stance.feet + np.array(corners)[:, None, :] * room
+        q, miss = reach(about, target, stance.posture)
+        inside = (q >= limits[0]) & (q <= limits[1]) | ~about.real
+        off = np.linalg.norm(foot_positions(about, q) - target, axis=-1)
+        return bool(miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and inside.all())
+
     # A leg that lacks a direction leaves its path when it lifts its foot: less lift, less of that.
     shares = (_LIFT,) if follows.all() else (_LIFT, _LIFT / 2, _LIFT / 4)
     strokes = [_rounded(_FIRST * height * _SHRINK**k) for k in range(_TRIES)]
-    least = strokes[-1], _rounded(shares[-1] * strokes[-1])
-    if not _can_do(about, stance, (lower, upper), least, follows):
+    if not possible(strokes[-1], _rounded(shares[-1] * strokes[-1])):
         return None
     for stroke in strokes:
         for share in shares:
-            lift = _rounded(share * stroke)
-            if _can_do(about, stance, (lower, upper), (stroke, lift), follows):
+            if possible(stroke, lift := _rounded(share * stroke)):
                 # Robots of one shape walk alike where the period goes with the root of height.
                 return Pace(stroke, lift, _rounded(_PERIOD * (height / _HEIGHT) ** 0.5))
     return None
-
-
-def _can_do(
-    about: LegChains,
-    stance: Stance,
-    limits: tuple[Array, Array],
-    step: tuple[float, float],
-    follows: NDArray[np.bool_],
-) -> bool:
-    """Whether feet reach all corners of a step, with room to the sides, within the limits."""
-    (stroke, lift), (lower, upper) = step, limits
-    x, y, z = stroke / 2, _SIDE * stroke, lift
-    corners = [(a * x, b * y, c * z) for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (0, 1)]
-    room = np.array(corners)[:, None, :] * np.where(follows[:, None], 1.0, [1.0, 0.0, 1.0])
-    target = stance.feet + room
-    q, miss = reach(about, target, stance.posture)
-    inside = (q >= lower) & (q <= upper) | ~about.real
-    off = np.linalg.norm(foot_positions(about, q) - target, axis=-1)
-    return bool(miss.max() <= ACCEPTED and off.max() <= _ASTRAY * stroke and inside.all())
 
 
 def shorter(pace: Pace | None) -> Iterator[Pace]:

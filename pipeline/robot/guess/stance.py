@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pinocchio as pin
@@ -47,6 +48,12 @@ _SINGULAR = 0.25  # of the largest smallest singular value that the leg has
 _LEVEL = 0.03  # of the reach: feet within that are of one height, before they are levelled
 _MIRRORED = 0.02  # of the reach
 _ROUNDS = 2  # over the legs, at each height
+_SLACK = 1e-6  # beyond a limit [rad, m]
+_SIDEWAYS = np.array([1.0, -1.0, 1.0])  # what mirrors left and right
+_REASON = (
+    "level feet under their joints, clear of limits and singular postures, that stand firmly and "
+    f"leave a stroke: the best of a search of {_POSTURES} postures of each leg"
+)
 
 
 @dataclass(frozen=True)
@@ -68,10 +75,28 @@ class Stance:
     reason: str
 
 
+@dataclass(frozen=True)
+class _Drawn:
+    """Postures that were drawn, M of each leg.
+
+    Attributes:
+        q: Shape (M, L, K) [rad, m].
+        feet: Shape (M, L, 3) [m].
+        origins: Of their joints, shape (M, L, K, 3) [m].
+        marks: For torque, limits and singularity, shape (M, L); negative where one does not stand.
+    """
+
+    q: Array
+    feet: Array
+    origins: Array
+    marks: Array
+
+
+@dataclass(frozen=True)
 class Standing:
     """A robot whose stance is sought.
 
-    Args:
+    Attributes:
         model: With a floating base.
         chains: Its legs.
         layout: Their joints among the columns.
@@ -81,20 +106,49 @@ class Standing:
         where: File, for messages.
     """
 
-    def __init__(
-        self,
-        model: pin.Model,
-        chains: LegChains,
-        layout: LegColumns,
-        columns: NDArray[np.intp],
-        held: Array,
-        margin: Margin,
-        where: str,
-    ) -> None:
-        self.model, self.chains, self.layout = model, chains, layout
-        self.columns, self.held, self.margin, self.where = columns, held, margin, where
-        lower, upper = model.lowerPositionLimit[columns], model.upperPositionLimit[columns]
-        self.lower, self.upper = (layout.by_leg(x[None])[0] for x in (lower, upper))
+    model: pin.Model
+    chains: LegChains
+    layout: LegColumns
+    columns: NDArray[np.intp]
+    held: Array
+    margin: Margin
+    where: str
+
+    @cached_property
+    def limits(self) -> tuple[Array, Array]:
+        """Of the legs' joints, each (L, K) [rad, m]."""
+        ends = self.model.lowerPositionLimit, self.model.upperPositionLimit
+        lower, upper = (self.layout.by_leg(end[self.columns][None])[0] for end in ends)
+        return lower, upper
+
+    @cached_property
+    def _limited(self) -> tuple[NDArray[np.bool_], Array, Array]:
+        """Which joints have limits that are any, and these within a turn, each (L, K)."""
+        lower, upper = self.limits
+        limited = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < 4 * np.pi)
+        limited &= upper > lower
+        return limited, np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
+
+    @cached_property
+    def _range(self) -> tuple[Array, Array]:
+        """Where postures are drawn, each (L, K)."""
+        limited, lower, upper = self._limited
+        far = np.where(self.chains.slides.T, 0.2 * self.chains.reach[:, None], _ENDLESS)
+        low, high = np.where(limited, lower, -far), np.where(limited, upper, far)
+        clear = _CLEAR * (high - low)
+        return low + clear, high - clear
+
+    @cached_property
+    def _pairs(self) -> dict[int, int]:
+        """Right legs whose hip mirrors an earlier leg's, and that leg."""
+        hips, size = self.chains.offset[0], self.chains.reach
+        pairs: dict[int, int] = {}
+        for leg, near in enumerate(_MIRRORED * size):
+            for other in range(leg if hips[leg, 1] != 0 else 0):
+                apart = np.linalg.norm(hips[leg] * _SIDEWAYS - hips[other])
+                if apart <= near and abs(size[leg] - size[other]) <= near:
+                    pairs[leg] = other
+        return pairs
 
     def of_pose(self, posture: Array, reason: str) -> Stance | None:
         """The stance of a pose, its feet levelled; None where that is out of reach or limits."""
@@ -103,22 +157,38 @@ class Standing:
         level[:, 2] = feet[:, 2].mean()
         return self._reached(level, posture, reason, float(np.abs(feet - level).max()))
 
-    def _reached(self, feet: Array, start: Array, reason: str, levelled: float) -> Stance | None:
-        chains = replace(self.chains, nominal=start)
-        q, miss = reach(chains, feet[None], start)
-        posture = q[0]
-        slack = 1e-6
-        inside = (posture >= self.lower - slack) & (posture <= self.upper + slack)
-        if miss.max() > ACCEPTED or not (inside | ~self.layout.real).all():
-            return None
-        stood = foot_positions(self.chains, q)[0]
-        margin = self._margin(stood, posture)
-        if margin <= 0:
-            return None
-        return Stance(stood, posture, margin, levelled, reason)
+    def candidates(self) -> Iterator[Stance]:
+        """Stances among the postures drawn, those of the best mark first.
 
-    def _margin(self, feet: Array, posture: Array) -> float:
-        return float(self.margin(feet[None], self._centre(posture)[None, :2])[0])
+        Raises:
+            RobotFileError: A leg has no posture that stands.
+        """
+        drawn, least = self._drawn()
+        stands = drawn.marks >= 0
+        heights = np.where(stands, drawn.feet[..., 2], np.nan)
+        lowest, highest = np.nanmin(heights, axis=0).max(), np.nanmax(heights, axis=0).min()
+        found = []
+        for height in np.linspace(lowest, highest, _HEIGHTS):
+            near = np.abs(drawn.feet[..., 2] - height) <= _LEVEL * self.chains.reach
+            near &= drawn.marks > 0
+            if near.any(axis=0).all():
+                found.append(self._best(drawn, near, float(height)))
+        for _, level, posture in sorted(found, key=lambda one: one[0], reverse=True):
+            for feet in (self._balanced(level), level):
+                stance = self._reached(feet, posture, _REASON, 0.0)
+                if stance and (self._smallest(stance.posture[None])[0] >= least).all():
+                    yield stance
+                    break
+
+    def _reached(self, feet: Array, start: Array, reason: str, levelled: float) -> Stance | None:
+        q, miss = reach(replace(self.chains, nominal=start), feet[None], start)
+        (posture,), (lower, upper) = q, self.limits
+        inside = (posture >= lower - _SLACK) & (posture <= upper + _SLACK) | ~self.layout.real
+        if miss.max() > ACCEPTED or not inside.all():
+            return None
+        stood = foot_positions(self.chains, q)
+        margin = float(self.margin(stood, self._centre(posture)[None, :2])[0])
+        return Stance(stood[0], posture, margin, levelled, reason) if margin > 0 else None
 
     def _centre(self, posture: Array) -> Array:
         """Centre of mass in the base frame [m], shape (3,)."""
@@ -126,84 +196,43 @@ class Standing:
         q[self.columns] = self.layout.by_joint(posture[None], self.held)[0]
         return np.array(pin.centerOfMass(self.model, self.model.createData(), q))
 
-    def candidates(self) -> Iterator[Stance]:
-        """Stances among the postures drawn, those of the best mark first.
+    def _drawn(self) -> tuple[_Drawn, Array]:
+        """Postures of every leg, and the least singular value that is not singular, (L,).
 
         Raises:
-            RobotFileError: A leg has no posture that stands.
+            RobotFileError: A leg has none that stands.
         """
-        chains, n_legs = self.chains, len(self.chains.names)
-        low, high = self._range()
+        chains, (limited, lower, upper), (low, high) = self.chains, self._limited, self._range
         q = low + (high - low) * spread(_POSTURES, chains.depth)[:, None, :]
         q = np.where(chains.real, q, 0.0)
-        origins = _origins(chains, q)  # (M, L, K, 3)
-        feet = foot_positions(chains, q)
+        feet, origins = foot_positions(chains, q), _origins(chains, q)
         smallest = self._smallest(q)
-        regular = _SINGULAR * smallest.max(axis=0)
-        stands = self._stands(feet, origins) & (smallest >= regular)
+        least = _SINGULAR * smallest.max(axis=0)
+        height = origins[..., 2].min(axis=2) - feet[..., 2]
+        stands = (height >= _BELOW * chains.reach) & (smallest >= least)
         if not stands.any(axis=0).all():
-            raise self._no_posture(int(stands.any(axis=0).argmin()))
-        marks = np.where(stands, self._marks(q, feet, smallest / smallest.max(axis=0)), -1.0)
-        heights = np.where(stands, feet[..., 2], np.nan)
-        lowest, highest = np.nanmin(heights, axis=0).max(), np.nanmax(heights, axis=0).min()
-        centre = self._centre(np.where(chains.real, (low + high) / 2, 0.0))
-        hips = float(self.margin(chains.offset[0][None], centre[None, :2])[0])
-        usual = max(hips, _LEVEL * chains.reach.min())  # hips may surround no area
-        found: list[tuple[float, Array, Array]] = []
-        for height in np.linspace(lowest, highest, _HEIGHTS):
-            stood = self._best(feet, origins, marks, float(height), (centre, usual))
-            if stood is not None:
-                mark, chosen, level = stood
-                found.append((mark, level, q[chosen, range(n_legs)]))
-        reason = (
-            "level feet under their joints, clear of limits and singular postures, that stand "
-            f"firmly and leave a stroke: the best of a search of {_POSTURES} postures of each leg"
-        )
-        for _, level, posture in sorted(found, key=lambda one: one[0], reverse=True):
-            for feet in (self._balanced(level), level):
-                stance = self._reached(feet, posture, reason, 0.0)
-                if stance and (self._smallest(stance.posture[None])[0] >= regular).all():
-                    yield stance
-                    break
-
-    def _marks(self, q: Array, feet: Array, regular: Array) -> Array:
-        """Of postures by leg: torque, limits and singularity, shape (M, L)."""
-        chains = self.chains
+            leg = chains.names[int(stands.any(axis=0).argmin())]
+            raise RobotFileError(
+                f"{self.where}: no posture of leg '{leg}' within its limits puts its foot below "
+                "its joints and under the hip; name other feet with --foot, or give a pose "
+                "'standing' in an SRDF beside the URDF"
+            )
         hips = np.maximum(chains.offset[0, :, 2] - feet[..., 2], 1e-9)
         rise = foot_jacobians(chains, q)[1][..., 2, :]  # of the foot by every joint, (M, L, K)
         lever = np.linalg.norm(np.where(chains.slides.T, 0.0, rise), axis=-1)
-        limited, low, high = self._limited()
-        half = np.where(limited, (high - low) / 2, 1.0)
-        clear = np.where(limited, np.minimum(q - low, high - q) / half, 1.0).min(axis=-1)
-        marks: Array = np.clip(clear, 0.0, 1.0) * regular / (1 + (lever / (hips / 2)) ** 2)
-        return marks
+        half = np.where(limited, (upper - lower) / 2, 1.0)
+        room = np.where(limited, np.minimum(q - lower, upper - q) / half, 1.0).min(axis=-1)
+        marks = np.clip(room, 0.0, 1.0) * (smallest / smallest.max(axis=0))
+        marks /= 1 + (lever / (hips / 2)) ** 2
+        return _Drawn(q, feet, origins, np.where(stands, marks, -1.0)), least
 
-    def _no_posture(self, leg: int) -> RobotFileError:
-        return RobotFileError(
-            f"{self.where}: no posture of leg '{self.chains.names[leg]}' within its limits puts "
-            "its foot below its joints and under the hip; name other feet with --foot, or give a "
-            "pose 'standing' in an SRDF beside the URDF"
-        )
-
-    def _limited(self) -> tuple[NDArray[np.bool_], Array, Array]:
-        """Which joints have limits that are any, and these within a turn, each (L, K)."""
-        lower, upper = self.lower, self.upper
-        limited = np.isfinite(lower) & np.isfinite(upper) & (upper - lower < 4 * np.pi)
-        limited &= upper > lower
-        return limited, np.maximum(lower, -np.pi), np.minimum(upper, np.pi)
-
-    def _range(self) -> tuple[Array, Array]:
-        """Where postures are drawn, each (L, K)."""
-        limited, lower, upper = self._limited()
-        far = np.where(self.chains.slides.T, 0.2 * self.chains.reach[:, None], _ENDLESS)
-        lower, upper = np.where(limited, lower, -far), np.where(limited, upper, far)
-        clear = _CLEAR * (upper - lower)
-        return lower + clear, upper - clear
-
-    def _stands(self, feet: Array, origins: Array) -> NDArray[np.bool_]:
-        """Which postures of which legs have the foot below all of the leg, shape (M, L)."""
-        height = origins[..., 2].min(axis=2) - feet[..., 2]
-        return np.asarray(height >= _BELOW * self.chains.reach)
+    @cached_property
+    def _usual(self) -> tuple[Array, float]:
+        """Centre of mass of legs in the middle (2,), and the margin of feet below hips [m]."""
+        low, high = self._range
+        centre = self._centre(np.where(self.chains.real, (low + high) / 2, 0.0))[:2]
+        hips = float(self.margin(self.chains.offset[0][None], centre[None])[0])
+        return centre, max(hips, _LEVEL * self.chains.reach.min())  # hips may surround no area
 
     def _smallest(self, q: Array) -> Array:
         """Smallest singular value among the directions that a leg has, shape (M, L)."""
@@ -212,84 +241,46 @@ class Standing:
         return np.asarray(values[:, range(len(last)), last])
 
     def _best(
-        self,
-        feet: Array,
-        origins: Array,
-        marks: Array,
-        height: float,
-        about: tuple[Array, float],
-    ) -> tuple[float, NDArray[np.intp], Array] | None:
-        """The postures of the best mark with feet at a height; None where a leg has none.
+        self, drawn: _Drawn, near: NDArray[np.bool_], height: float
+    ) -> tuple[float, Array, Array]:
+        """The postures of the best mark with feet at a height.
 
         Args:
-            feet: Of all postures, shape (M, L, 3) [m].
-            origins: Of their joints, shape (M, L, K, 3) [m].
-            marks: Of the postures by leg, shape (M, L); negative where they do not stand.
+            drawn: All postures.
+            near: Those whose feet are at the height, shape (M, L).
             height: Of the feet in the base frame [m].
-            about: Centre of mass and margin of feet below their hips [m].
 
         Returns:
-            The mark, of every leg a posture's index, and their feet, levelled (L, 3) [m].
+            The mark, the feet, levelled (L, 3) [m], and the postures (L, K).
         """
-        chains, pairs = self.chains, self._pairs()
-        n_legs = len(chains.names)
-        near = (np.abs(feet[..., 2] - height) <= _LEVEL * chains.reach) & (marks > 0)
-        if not near.any(axis=0).all():
-            return None
-        centre, usual = about
+        pairs, n_legs, marks = self._pairs, near.shape[1], drawn.marks
+        centre, usual = self._usual
         chosen = np.where(near, marks, -1.0).argmax(axis=0)
-        level = self._mirror(feet[chosen, range(n_legs)])
+        level = drawn.feet[chosen, range(n_legs)]
+        for leg, other in pairs.items():
+            level[leg] = level[other] * _SIDEWAYS
         level[:, 2] = height
         mark = 0.0
         for leg in [leg for leg in range(n_legs) if leg not in pairs] * _ROUNDS:
             own = np.flatnonzero(near[:, leg])
             tried = np.repeat(level[None], own.size, axis=0)
-            tried[:, leg, :2] = feet[own, leg, :2]
+            tried[:, leg, :2] = drawn.feet[own, leg, :2]
             for other in (k for k, first in pairs.items() if first == leg):
-                tried[:, other, :2] = feet[own, leg, :2] * [1, -1]
-            share = self.margin(tried, np.repeat(centre[None, :2], own.size, axis=0)) / usual
-            share = np.maximum(share, 0.0)
+                tried[:, other, :2] = drawn.feet[own, leg, :2] * _SIDEWAYS[:2]
+            share = np.maximum(self.margin(tried, np.tile(centre, (own.size, 1))) / usual, 0.0)
             rest = [k for k in range(n_legs) if k != leg and pairs.get(k) != leg]
-            others = np.log(marks[chosen[rest], rest]).sum()
-            legs = np.exp((others + (n_legs - len(rest)) * np.log(marks[own, leg])) / n_legs)
-            best = int((legs * share / (1 + share)).argmax())
-            mark = float((legs * share / (1 + share))[best])
-            chosen[leg], level = own[best], tried[best]
-        return mark, self._partners(chosen, feet, origins, near), level
-
-    def _partners(
-        self, chosen: NDArray[np.intp], feet: Array, origins: Array, near: NDArray[np.bool_]
-    ) -> NDArray[np.intp]:
-        """Right legs in the mirror image of their left ones, knee and all."""
-        flip = np.array([1.0, -1.0, 1.0])
-        out = chosen.copy()
-        for leg, partner in self._pairs().items():
-            own, k = np.flatnonzero(near[:, leg]), out[partner]
-            apart = np.linalg.norm(origins[own, leg] - flip * origins[k, partner], axis=-1).sum(-1)
-            apart += np.linalg.norm(feet[own, leg] - flip * feet[k, partner], axis=-1)
-            out[leg] = own[int(apart.argmin())]
-        return out
-
-    def _pairs(self) -> dict[int, int]:
-        """Right legs whose hip mirrors an earlier leg's, and that leg."""
-        chains, hips = self.chains, self.chains.offset[0]
-        pairs: dict[int, int] = {}
-        for leg in range(len(chains.names)):
-            for other in range(leg):
-                apart = np.linalg.norm(hips[leg] * [1, -1, 1] - hips[other])
-                alike = (
-                    abs(chains.reach[leg] - chains.reach[other]) <= _MIRRORED * chains.reach[leg]
-                )
-                if apart <= _MIRRORED * chains.reach[leg] and alike and hips[leg, 1] != 0:
-                    pairs[leg] = other
-        return pairs
-
-    def _mirror(self, feet: Array) -> Array:
-        """Feet of mirrored legs at mirrored places."""
-        out = feet.copy()
-        for leg, other in self._pairs().items():
-            out[leg] = out[other] * [1, -1, 1]
-        return out
+            logs = np.log(marks[chosen[rest], rest]).sum()
+            logs = logs + (n_legs - len(rest)) * np.log(marks[own, leg])
+            all_marks = np.exp(logs / n_legs) * share / (1 + share)
+            best = int(all_marks.argmax())
+            mark, chosen[leg], level = float(all_marks[best]), own[best], tried[best]
+        for leg, other in pairs.items():  # in the mirror image of the left leg, knee and all
+            own, k = np.flatnonzero(near[:, leg]), chosen[other]
+            bent = drawn.origins[own, leg] - _SIDEWAYS * drawn.origins[k, other]
+            foot = drawn.feet[own, leg] - _SIDEWAYS * drawn.feet[k, other]
+            apart = np.linalg.norm(bent, axis=-1).sum(-1) + np.linalg.norm(foot, axis=-1)
+            chosen[leg] = own[int(apart.argmin())]
+        return mark, level, drawn.q[chosen, range(n_legs)]
 
     def _balanced(self, feet: Array) -> Array:
         """Feet with front and rear as mirror images, shape (L, 3) [m]; as they are without such."""
@@ -305,9 +296,7 @@ class Standing:
 
 def _origins(chains: LegChains, q: Array) -> Array:
     """Origins of the joints in the base frame [m], shape (M, L, K, 3)."""
-    origins = np.repeat(chains.offset[0][None, :, None], q.shape[0], axis=0)
-    parts = [origins]
-    for j in range(1, chains.depth):
-        inner = replace(chains.shortened(j), foot=chains.offset[j])
-        parts.append(foot_positions(inner, q[..., :j])[:, :, None])
-    return np.concatenate(parts, axis=2)
+    inner = (replace(chains.shortened(j), foot=chains.offset[j]) for j in range(1, chains.depth))
+    outer = [foot_positions(each, q[..., : each.depth]) for each in inner]
+    hips = np.broadcast_to(chains.offset[0], (q.shape[0], *chains.offset[0].shape))
+    return np.stack([hips, *outer], axis=2)
