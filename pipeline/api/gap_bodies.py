@@ -14,7 +14,7 @@ from pipeline.simulation.found_bodies import (
     found_bodies,
     not_in_urdf,
 )
-from reports.pages.bodies_words import URDF_FILE
+from reports.pages.gap_words import URDF_FILE
 from reports.table import Table
 from reports.tables.gap import bodies
 from reports.writer import write_text

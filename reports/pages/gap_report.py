@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,7 +11,13 @@ import numpy as np
 from pipeline.effects.base import place_text
 from pipeline.identification.compare.circumstances import WHOLE
 from pipeline.identification.compare.stages import noise_floor, overall
-from pipeline.identification.results import ACCEPTED, REJECTED, UNEXPLAINED, Remainder, named
+from pipeline.identification.results import (
+    ACCEPTED,
+    REJECTED,
+    UNEXPLAINED,
+    Remainder,
+    named,
+)
 from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.story import Story
 from pipeline.simulation.found_bodies import FoundBodies
@@ -27,11 +34,27 @@ from reports.page import (
     Text,
     table_block,
 )
-from reports.pages import gap_words as words
-from reports.pages.bodies_words import URDF_FILE, bodies_blocks, bodies_words
+from reports.pages.gap_words import (
+    MANY_EFFECTS,
+    URDF_FILE,
+    WORDS,
+    bodies_blocks,
+    bodies_words,
+    energy_words,
+    held_out_words,
+    left_words,
+    low_confidence,
+    one_way_words,
+    priced,
+    smaller_words,
+    what_words,
+    where_words,
+    whole_joints,
+)
 from reports.pages.motor_words import motors_text
 from reports.pages.names import legs_text
 from reports.table import Table
+from reports.words import number, percent
 
 TONES = {
     "accepted": "good",
@@ -97,35 +120,31 @@ def _numbers(story: Story) -> tuple[Number, ...]:
     effects = f"effect{'s' * (len(found) != 1)} found"
     return (
         Number(
-            f"{words.number(before)} {unit}",
+            f"{number(before)} {unit}",
             "gap, root mean square: measured minus predicted, model as it was",
         ),
-        Number(
-            f"{words.number(after)} {unit}", "the same with what was found, on held-out data", ended
-        ),
-        Number(f"{words.number(story.noise)} {unit}", "noise floor of the logs"),
+        Number(f"{number(after)} {unit}", "the same with what was found, on held-out data", ended),
+        Number(f"{number(story.noise)} {unit}", "noise floor of the logs"),
         Number(str(len(found)), effects + listed),
     )
 
 
 def _first(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
     """One sentence each: where, what is fitted, what it predicts, what it costs, whose motors."""
-    naming = story.naming
-    before, _, after = _whole(story)
-    return (
-        words.where_short(story.where.rows),
-        words.fitted_words(naming),
-        *filter(None, [bodies_words(bodies)]),
-        f"**Predicted:** held-out data, which had no say in it: the gap of all joints is "
-        f"{words.number(after)} {naming.unit}, {words.number(before)} {naming.unit} before.",
-        *(
-            (f"**What it costs,** one gait cycle: {cost}.",)
-            if story.energy and (cost := words.cost_words(story.energy, story.given.alternative))
-            else ()
-        ),
-        words.left_words(story.weighed.left),
+    naming, (before, _, after) = story.naming, _whole(story)
+    levels = Counter(f.level for f in naming.found)
+    said = (
+        WORDS("where_short", whole_joints(story.where.rows)),
+        WORDS("fitted", naming.found, [f"{count} {level}" for level, count in levels.items()]),
+        bodies_words(bodies),
+        WORDS("predicted", before, after, naming.unit),
+        WORDS("cost_short", story.energy, priced(story.energy, story.given.alternative))
+        if story.energy
+        else "",
+        left_words(story),
         whose_motors(story),
     )
+    return tuple(filter(None, said))
 
 
 def whose_motors(story: Story) -> str:
@@ -138,27 +157,23 @@ def whose_motors(story: Story) -> str:
 
 def answer(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
     """The first lines: where, what, bodies, how much smaller, what it costs, what is left."""
-    naming, weighed = story.naming, story.weighed
-    out = [
-        words.where_words(story.where.rows),
-        words.what_words(
-            naming, story.where.measurements[0].channels, unexplained=story.unexplained
+    weighed, found, decides = story.weighed, story.naming.found, bool(story.decides)
+    excitations = list(dict.fromkeys(f.excitation for f in found if f.rivals))
+    joints = [story.given.model.joints[j] for j in weighed.joints]
+    said = (
+        *(
+            f"**Nothing below is an explanation while this stands:** {text}."
+            for text in story.suspected
         ),
-        *filter(None, [bodies_words(bodies)]),
-        words.shrink_words(naming.found, _joints(story), _whole(story), naming.unit, story.noise),
-    ]
-    if story.energy is not None:
-        out.append(words.energy_words(story.energy, story.given.alternative))
-    undecided = words.rival_words(naming.found, bool(story.decides))
-    out += [undecided] if undecided else []
-    if weighed.unexplained or not story.suspected:
-        out.append(words.left_words(weighed.left))
-    return (*words.suspected_words(story.suspected), *out)
-
-
-def _joints(story: Story) -> list[str]:
-    """Per effect, the joint at which it shows."""
-    return [story.given.model.joints[j] for j in story.weighed.joints]
+        where_words(story.where.rows),
+        what_words(story),
+        bodies_words(bodies),
+        smaller_words(found, joints, _whole(story), story.naming.unit, story.noise),
+        energy_words(story.energy, story.given.alternative) if story.energy else "",
+        WORDS("undecided", low_confidence(found), excitations, decides),
+        left_words(story) if weighed.unexplained or not story.suspected else "",
+    )
+    return tuple(filter(None, said))
 
 
 def _whole(story: Story) -> tuple[float, float, float]:
@@ -358,8 +373,8 @@ def _left(story: Story) -> Section:
     blocks: list[Block] = [block]
     if story.decides:
         blocks.append(Text(f"The motion that decides: {story.decides}."))
-    uncertain = words.doubts(story.naming.found)
-    if len(uncertain) > words.TOLD:
+    uncertain = low_confidence(story.naming.found)
+    if len(uncertain) > MANY_EFFECTS:
         blocks += [Text("Names that are not certain:"), Points(tuple(uncertain))]
     if story.naming.notes:
         blocks.append(Points(story.naming.notes))
@@ -377,14 +392,14 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
     texts = [f"**Note:** {warning}." for warning in story.given.warnings]
     texts += [
         f"Compared at a bandwidth of {settings.cutoff:.3g} Hz ({settings.reason}). "
-        f"{words.percent(float(np.mean(shares)))} of the rows count, by joint: not those whose "
+        f"{percent(float(np.mean(shares)))} of the rows count, by joint: not those whose "
         "filter sees the joint stop or turn back, where friction takes any value, nor the ends of "
         "the log.",
         f"Blocks of the log fit, choose between candidates or are held out to prove: {parts.rule}, "
         f"{parts.guard:.2g} s apart, so that none holds a trace of another. "
-        + words.held_out_words(story.where.measurements),
+        + held_out_words(story.where.measurements),
     ]
-    texts += words.one_way_words(story.where.measurements, story.weighed.joints)
+    texts += one_way_words(story.where.measurements, story.weighed.joints)
     if parts.warning:
         texts.append(f"**Note:** {parts.warning}.")
     odd = [value != "ok" for value in tables["quality"].columns["verdict"]]

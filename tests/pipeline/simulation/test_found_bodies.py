@@ -15,7 +15,7 @@ from pipeline.machine.machine import MachineModel
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.found_bodies import corrected_urdf, found_bodies, not_in_urdf
 from pipeline.simulation.rigid_bodies import changed_model
-from reports.pages.bodies_words import body_words
+from reports.pages.gap_words import body_words
 
 #: A link with a cover, a link whose mass is its tool's alone, and what must stay in the text.
 ARM = """<?xml version='1.0' encoding="ISO-8859-1"?>

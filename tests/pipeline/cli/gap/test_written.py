@@ -21,7 +21,7 @@ from pipeline.identification.results import (
 from pipeline.identification.selection.identify import estimated_alone, identify
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.written import Weighed, weigh_found
-from reports.pages.gap_words import shrink_words
+from reports.pages.gap_words import smaller_words
 from tests.pipeline.identification import bench_leg as leg
 
 JOINT = "rm_joint_1"
@@ -87,7 +87,7 @@ def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) 
     tolerances, last = result.stages[1], result.stages[-1]
     assert last is tolerances
     whole = (overall(result.stages[0].gap), overall(tolerances.gap), overall(last.gap))
-    words = shrink_words(result.found, [JOINT], whole, "A", 0.004)
+    words = smaller_words(result.found, [JOINT], whole, "A", 0.004)
     assert "no name is sure enough to be written" in words
     assert "coulomb_friction" not in words
 
