@@ -7,13 +7,11 @@ the edge, in millimetres, is a matter of geometry: with and without each of them
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from pipeline.motion.gait import body_rotation, gait_of, gait_table
 from pipeline.motion.motion import Segment
-from pipeline.motion.support import support_edges
-from pipeline.robot.kinematics import foot_positions
+from pipeline.motion.support import stance_and_centre, support_edges
 from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -49,12 +47,10 @@ def margin_and_remedy(robot: Robot, segment: Segment, sample: int, margin: float
 
 def _shifts(robot: Robot, segment: Segment, sample: int) -> list[tuple[float, str, str]]:
     """By how much each cause moves the centre of mass inwards [m], what it is, what to change."""
-    q, table = segment.configuration[sample], gait_table(robot.spec)
-    rotation = robot.base_rotation(q[None])
-    turn = np.eye(3) if rotation is None else np.asarray(rotation[0])
-    stance = [robot.leg_names.index(leg) for leg in segment.stance]
-    feet = foot_positions(robot.chains, robot.leg_positions(q[None]))[0, stance] @ turn.T
-    centre = pin.centerOfMass(robot.model, robot.model.createData(), q) - q[:3]
+    table = gait_table(robot.spec)
+    rotation = robot.base_rotation(segment.configuration[[sample]])
+    turn = np.eye(3) if rotation is None else rotation[0]
+    feet, centre = (x[sample] for x in stance_and_centre(robot, segment))
     edges = support_edges(feet[None])
     distance = np.where(edges.used, edges.distance(centre[None, :2]), np.inf)[0]
     inward = edges.inward[0, int(distance.argmin())]

@@ -31,30 +31,33 @@ def start_postures(robot: Robot, target: Array) -> Array:
     return q
 
 
-def refuse_beyond_limits(robot: Robot, q: Array, time: Array) -> None:
+def refuse_beyond_limits(
+    robot: Robot,
+    q: Array,
+    time: Array,
+    remedy: str = "change the stroke, the neutral foot or the limits",
+) -> None:
     """Refuse joint positions outside the URDF's limits.
 
     Args:
         robot: With limits.
-        q: Joint positions by leg [rad], shape (N, L, 3).
+        q: Joint positions [rad, m], shape (N, J).
         time: For messages [s], shape (N,).
+        remedy: What to do.
 
     Raises:
         GaitError: One lies beyond; names joint, instant and limits.
     """
-    flat = robot.joint_positions(q)
     lower, upper = robot.limits
-    beyond = np.maximum(flat - upper, lower - flat)
-    if beyond.max() > 1e-9:
-        sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
-        slides = robot.sliding[joint]
-        scale, digits, unit = (1.0, 4, "m") if slides else (180 / np.pi, 1, "deg")
-        there, low, high = (
-            f"{scale * float(x):.{digits}f}"
-            for x in (flat[sample, joint], lower[joint], upper[joint])
-        )
-        raise GaitError(
-            f"joint '{robot.joints[joint]}' would have to reach {there} {unit} at "
-            f"t = {time[sample]:.4g} s, its limits are {low} to {high} {unit}; "
-            "change the stroke, the neutral foot or the limits"
-        )
+    beyond = np.maximum(q - upper, lower - q)
+    if beyond.max() <= 1e-9:
+        return
+    sample, joint = np.unravel_index(int(beyond.argmax()), beyond.shape)
+    scale, digits, unit = (1.0, 4, "m") if robot.sliding[joint] else (180 / np.pi, 1, "deg")
+    there, low, high = (
+        f"{scale * float(x):.{digits}f}" for x in (q[sample, joint], lower[joint], upper[joint])
+    )
+    raise GaitError(
+        f"joint '{robot.joints[joint]}' would have to reach {there} {unit} at "
+        f"t = {time[sample]:.4g} s, its limits are {low} to {high} {unit}; {remedy}"
+    )

@@ -47,7 +47,7 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     time = np.zeros(1)
     in_base = (target @ body)[None]
     q = solve_positions(robot.chains, in_base, start, time)
-    refuse_beyond_limits(robot, q, time)
+    refuse_beyond_limits(robot, robot.joint_positions(q), time)
     still = robot.tangent(np.zeros((1, len(robot.joints))))
     configuration = robot.configuration(robot.joint_positions(q), np.zeros((1, 3)))
     if robot.floating:

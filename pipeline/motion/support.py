@@ -5,7 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
+
+from pipeline.motion.motion import Segment
+from pipeline.robot.kinematics import foot_positions
+from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
 _ON_EDGE = 1e-12  # [m]
@@ -59,6 +64,23 @@ def support_edges(feet: Array) -> SupportEdges:
     for k in range(n_feet):
         used &= _left_of(start, edge, length, xy[:, k, None]) >= -_ON_EDGE
     return SupportEdges(start, edge, length, used)
+
+
+def stance_and_centre(robot: Robot, segment: Segment) -> tuple[Array, Array]:
+    """Standing feet (N, F, 3) and centre of mass (N, 3) from the base, world's directions [m].
+
+    Args:
+        robot: With a floating base.
+        segment: The motion.
+    """
+    q = segment.configuration
+    stance = [robot.leg_names.index(leg) for leg in segment.stance]
+    feet = foot_positions(robot.chains, robot.leg_positions(q))[:, stance]
+    rotation = robot.base_rotation(q)
+    if rotation is not None:
+        feet = np.einsum("nij,nfj->nfi", rotation, feet)
+    data = robot.model.createData()
+    return feet, np.array([pin.centerOfMass(robot.model, data, row) for row in q]) - q[:, :3]
 
 
 def support_margin(feet: Array, point: Array) -> Array:

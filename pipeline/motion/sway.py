@@ -23,8 +23,8 @@ from pipeline.errors import GaitError
 from pipeline.motion.feet import Course
 from pipeline.motion.gait import Gait, gait_table
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.support import support_edges
-from pipeline.robot.kinematics import foot_jacobians, foot_positions
+from pipeline.motion.support import stance_and_centre, support_edges
+from pipeline.robot.kinematics import foot_jacobians
 from pipeline.robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -116,13 +116,10 @@ def _points(robot: Robot, motion: Motion) -> _Points:
 
 def _points_of(robot: Robot, segment: Segment) -> tuple[Array, Array, Array, Array]:
     q, v, a = segment.configuration, segment.velocity, segment.acceleration
-    rotation = robot.base_rotation(q)
+    place, rotation = q[:, :3], robot.base_rotation(q)
     turn = np.broadcast_to(np.eye(3), (q.shape[0], 3, 3)) if rotation is None else rotation
-    legs = [robot.leg_names.index(leg) for leg in segment.stance]
-    feet = foot_positions(robot.chains, robot.leg_positions(q))[:, legs]
-    world = np.einsum("nij,nfj->nfi", turn, feet) + q[:, None, :3]
-    data = robot.model.createData()
-    centre = np.array([pin.centerOfMass(robot.model, data, row) for row in q])
+    feet, centre = stance_and_centre(robot, segment)
+    world, centre = feet + place[:, None], centre + place
     normal = segment.ground_normal
     height = ((centre - world[:, 0]) @ normal) / normal[2]
     wrench = np.asarray(pin.rneaInParallel(1, robot.pool(1), q.T, v.T, a.T)).T[:, :6]

@@ -28,15 +28,11 @@ class TransferPath:
         name: How the robot file and the command line call it.
         advance: Phase in [0, 1], shape (N,), to progress over ground from 0 to 1 with derivatives.
         lift: Phase to height from 0 over 1 (at phase 0.5) back to 0 with derivatives.
-        peak_advance_rate: Largest first derivative of `advance` [1].
-        smooth_acceleration: Whether the acceleration along the ground vanishes at both ends.
     """
 
     name: str
     advance: Callable[[Array], Profile]
     lift: Callable[[Array], Profile]
-    peak_advance_rate: float
-    smooth_acceleration: bool
 
 
 def _cubic_advance(s: Array) -> Profile:
@@ -78,10 +74,10 @@ def _cycloid_advance(s: Array) -> Profile:
 TRANSFER_PATHS: dict[str, TransferPath] = {
     path.name: path
     for path in (
-        TransferPath("cubic", _cubic_advance, _quartic_lift, 1.5, False),
-        TransferPath("harmonic", _harmonic_advance, _harmonic_lift, np.pi / 2, False),
-        TransferPath("quintic", _quintic_advance, _sextic_lift, 1.875, True),
-        TransferPath("cycloid", _cycloid_advance, _harmonic_lift, 2.0, True),
+        TransferPath("cubic", _cubic_advance, _quartic_lift),
+        TransferPath("harmonic", _harmonic_advance, _harmonic_lift),
+        TransferPath("quintic", _quintic_advance, _sextic_lift),
+        TransferPath("cycloid", _cycloid_advance, _harmonic_lift),
     )
 }
 

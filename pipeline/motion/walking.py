@@ -98,7 +98,7 @@ def _segment(
     shift = None if sway is None else sway.course(begin + (end - begin) * passed)
     feet = _feet(gait, begin, end, passed, shift)
     q = solve_positions(robot.chains, feet.position, start, time)
-    refuse_beyond_limits(robot, q, time)
+    refuse_beyond_limits(robot, robot.joint_positions(q), time)
     q_dot, q_ddot = solve_rates(
         robot.chains, q, feet.velocity, feet.acceleration, time, feet.position
     )

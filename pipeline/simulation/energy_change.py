@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.gait import gait_of
 from pipeline.robot.robot import Robot
-from pipeline.simulation.break_even import break_even
 from pipeline.simulation.edited import Effects
 from pipeline.simulation.walk_stand import Adjust, stand, walk
 
@@ -68,11 +67,12 @@ def energy_change(
         TippingError: With the effects a foot would have to pull.
     """
     period = gait_of(robot.spec).period
-    before = _costs(robot, chains, None)
-    if known is not None:
+    if known is None:
+        before = _costs(robot, chains, None)
+    else:
         before = _costs(known.robot, known.chains(chains), known.demand)
-    told = {name: chain for name, chain in chains.items() if effects.counts_in(name)}
-    after = _costs(effects.robot, effects.chains(told), effects.demand)
+    complete = {name: chain for name, chain in chains.items() if effects.counts_in(name)}
+    after = _costs(effects.robot, effects.chains(complete), effects.demand)
     return EnergyChange(before, after, crossing(before, period), crossing(after, period))
 
 
@@ -96,3 +96,20 @@ def crossing(costs: Mapping[str, Cost], period: float) -> float:
     extra = (irreversible.middle_cycle - reversible.middle_cycle) / period  # [W]
     saved = reversible.middle_standing - irreversible.middle_standing  # [W]
     return break_even(extra, saved)
+
+
+def break_even(extra: float, saved: float) -> float:
+    """Fraction of time standing at which two actuators cost the same; above it the second pays.
+
+    (1 - f) extra = f saved, both over the same time (Fig. 21 of the paper).
+
+    Args:
+        extra: What the second one costs more walking [J, or W].
+        saved: What it costs less standing for as long [J, or W].
+
+    Returns:
+        f, or NaN where it never costs more walking, or saves nothing standing.
+    """
+    if extra <= 0 or saved <= 0:
+        return math.nan
+    return extra / (extra + saved)

@@ -27,11 +27,12 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from actuators.errors import closest
-from pipeline.errors import InvalidMotionError
+from pipeline.errors import GaitError, InvalidMotionError
 from pipeline.motion.base_motion import base_quaternions, one_sign
 from pipeline.motion.gait import body_rotation, gait_table
 from pipeline.motion.ground import Ground
 from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.postures import refuse_beyond_limits
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
@@ -89,7 +90,13 @@ def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
     if np.any(np.diff(time) <= 0):
         row = int(np.argmax(np.diff(time) <= 0)) + 1
         raise InvalidMotionError(f"row {row + 2}: time_s does not increase; sort the rows")
-    _refuse_beyond_limits(robot, time, q)
+    turned, (lower, upper) = np.radians(q), robot.limits
+    fits = np.all((turned >= lower) & (turned <= upper))
+    why = "in degrees they would fit: give them in rad" if fits else "correct them or the limits"
+    try:
+        refuse_beyond_limits(robot, q, time, f"positions are read in rad and m; {why}")
+    except GaitError as error:
+        raise InvalidMotionError(str(error)) from None
     contact = values[feet].to_numpy()
     if not np.isin(contact, (0.0, 1.0)).all():
         raise InvalidMotionError("a LEG__contact is neither 0 nor 1: 1 where the foot carries load")
@@ -142,21 +149,6 @@ def _numbers(table: pd.DataFrame, columns: list[str]) -> pd.DataFrame:
         row, column = np.argwhere(bad)[0]
         raise InvalidMotionError(f"row {row + 2}: {columns[column]} is not a finite number")
     return values
-
-
-def _refuse_beyond_limits(robot: Robot, time: Array, q: Array) -> None:
-    lower, upper = robot.limits
-    beyond = np.maximum(q - upper, lower - q)
-    if beyond.max() <= 1e-9:
-        return
-    row, joint = np.unravel_index(int(beyond.argmax()), q.shape)
-    unit, turned = ("m", q[:, joint]) if robot.sliding[joint] else ("rad", np.radians(q[:, joint]))
-    fits = np.all((turned >= lower[joint]) & (turned <= upper[joint])) and unit == "rad"
-    raise InvalidMotionError(
-        f"joint '{robot.joints[joint]}' is at {q[row, joint]:.4g} {unit} at t = {time[row]:.4g} s, "
-        f"its limits are {lower[joint]:.4g} to {upper[joint]:.4g} {unit}"
-        + ("; in degrees it would fit: the column is in rad" if fits else "")
-    )
 
 
 def _phases(time: Array, contact: NDArray[np.bool_]) -> list[tuple[slice, NDArray[np.bool_]]]:

@@ -13,7 +13,7 @@ from pipeline.paper.hexapod import Totals
 from pipeline.paper.judgement.evidence import BAND, Evidence, Point
 from pipeline.paper.judgement.rows import PREDICTED_BY, Row, judged
 from pipeline.paper.published import CYCLE, EVEN, PAIR
-from pipeline.simulation.break_even import break_even
+from pipeline.simulation.energy_change import break_even
 
 Array = NDArray[np.float64]
 MINUTE = 60.0  # [s]

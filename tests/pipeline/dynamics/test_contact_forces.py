@@ -19,7 +19,6 @@ from pipeline.errors import GaitError, SlidingError, TippingError
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.payload import with_payload
 from pipeline.motion.standing import standing_posture
-from pipeline.motion.support import support_margin
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 
@@ -256,14 +255,6 @@ def test_a_slope_steeper_than_friction_holds_is_named_with_what_is_missing(
 def test_a_friction_coefficient_that_no_ground_has_is_refused(coefficient: float) -> None:
     with pytest.raises(GaitError, match="friction coefficient .* finite number above 0"):
         GroundForces(friction_coefficient=coefficient)
-
-
-def test_margin_is_the_distance_to_the_nearest_edge() -> None:
-    square = np.array([[[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]], dtype=float)
-    for point, margin in (((0, 0), 1.0), ((0.5, 0.2), 0.5), ((1.25, 0), -0.25)):
-        assert support_margin(square, np.array([point], dtype=float))[0] == pytest.approx(margin)
-    shuffled = square[:, [2, 0, 3, 1]]
-    assert support_margin(shuffled, np.array([[0.5, 0.2]]))[0] == pytest.approx(0.5)
 
 
 def test_walking_needs_little_friction_and_stays_stable(hexapod: Robot, walk: Motion) -> None:

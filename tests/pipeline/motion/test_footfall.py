@@ -10,7 +10,7 @@ from pipeline.motion.feet import support_course
 from pipeline.motion.footfall import GAITS, Footfall, in_turn, named, own
 from pipeline.motion.gait import Gait
 from pipeline.motion.ground import Ground
-from pipeline.motion.support import longitudinal_margin, support_margin
+from pipeline.motion.support import longitudinal_margin
 from pipeline.robot.robot_file import LegSpec
 
 PITCH, WIDTH, STROKE = 0.3, 0.5, 0.2  # [m]
@@ -137,11 +137,3 @@ def test_too_few_feet_are_told_with_when_and_which() -> None:
         named("tripod", pairs(3), 0.4).stances()
     with pytest.raises(GaitError, match=r"only 2 feet stand \(\w+, \w+\).*raise gait.duty_factor"):
         named("wave", pairs(2), 0.7).stances()
-
-
-def test_the_longitudinal_margin_is_never_less_than_the_margin() -> None:
-    rng = np.random.default_rng(3)
-    feet, point = rng.normal(size=(200, 5, 3)), 0.2 * rng.normal(size=(200, 2))
-    inside = support_margin(feet, point) > 0
-    assert inside.any()
-    assert (longitudinal_margin(feet, point) >= support_margin(feet, point))[inside].all()

@@ -1,8 +1,8 @@
-"""The gait against its own definition, by finite differences and at contact events."""
+"""The hexapod's gait against its definition, and the numbers that make none."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,182 +10,104 @@ import pytest
 from pipeline.errors import GaitError, OutOfReachError
 from pipeline.motion.motion import Motion
 from pipeline.motion.standing import standing_posture
-from pipeline.motion.transfer_path import TRANSFER_PATHS, transfer_path
+from pipeline.motion.transfer_path import transfer_path
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.robot import Robot, load_robot
 
+#: Path to its largest rate over ground [1], and whether acceleration vanishes at both ends.
+PATHS = {
+    "cubic": (1.5, False),
+    "harmonic": (np.pi / 2, False),
+    "quintic": (1.875, True),
+    "cycloid": (2.0, True),
+}
 
-def with_path(robot: Robot, name: str) -> Robot:
-    return load_robot(robot.spec.with_gait(transfer_path=name))
 
-
-@pytest.mark.parametrize("name", TRANSFER_PATHS)
-def test_profiles_are_their_own_derivatives(name: str) -> None:
-    path = transfer_path(name)
-    s = np.linspace(0.01, 0.99, 50)
-    h = 1e-6
+@pytest.mark.parametrize("name", PATHS)
+def test_transfer_paths_go_from_rest_to_rest_by_their_own_derivatives(name: str) -> None:
+    path, s, h = transfer_path(name), np.linspace(0.01, 0.99, 50), 1e-6
     for profile in (path.advance, path.lift):
-        _, first, second = profile(s)
-        np.testing.assert_allclose(
-            (profile(s + h)[0] - profile(s - h)[0]) / (2 * h), first, atol=1e-8
-        )
-        np.testing.assert_allclose(
-            (profile(s + h)[1] - profile(s - h)[1]) / (2 * h), second, atol=1e-6
-        )
-
-
-@pytest.mark.parametrize("name", TRANSFER_PATHS)
-def test_profiles_start_and_end_at_rest_on_the_ground(name: str) -> None:
-    path = transfer_path(name)
-    ends = np.array([0.0, 1.0])
-    advance, advance_1, _ = path.advance(ends)
-    lift, lift_1, _ = path.lift(ends)
+        for order, atol in ((0, 1e-8), (1, 1e-6)):
+            slope = (profile(s + h)[order] - profile(s - h)[order]) / (2 * h)
+            np.testing.assert_allclose(slope, profile(s)[order + 1], atol=atol)
+    ends, middle = np.array([0.0, 1.0]), np.array([0.5])
+    (advance, rate, acceleration), (lift, lift_rate, _) = path.advance(ends), path.lift(ends)
     np.testing.assert_allclose(advance, [0, 1], atol=1e-12)
-    np.testing.assert_allclose([lift, advance_1, lift_1], 0, atol=1e-12)
-    assert path.lift(np.array([0.5]))[0] == pytest.approx(1)
-    fine = path.advance(np.linspace(0, 1, 100001))[1]
-    assert fine.max() == pytest.approx(path.peak_advance_rate, rel=1e-8)
+    np.testing.assert_allclose([lift, rate, lift_rate], 0, atol=1e-12)
+    assert path.lift(middle)[0] == pytest.approx(1)
+    assert path.advance(middle)[0] == pytest.approx(0.5)
+    fastest, smooth = PATHS[name]
+    assert path.advance(np.linspace(0, 1, 100001))[1].max() == pytest.approx(fastest, rel=1e-8)
+    assert np.allclose(acceleration, 0.0, atol=1e-9) == smooth
 
 
-@pytest.mark.parametrize("name", TRANSFER_PATHS)
-def test_a_smooth_path_is_one_whose_acceleration_vanishes_at_both_ends(name: str) -> None:
-    path = transfer_path(name)
-    ends = path.advance(np.array([0.0, 1.0]))[2]
-    assert np.allclose(ends, 0.0, atol=1e-9) == path.smooth_acceleration
-    assert path.advance(np.array([0.5]))[0] == pytest.approx(0.5)  # there and back alike
-
-
-@pytest.mark.parametrize("name", TRANSFER_PATHS)
-def test_joint_rates_are_finite_differences(hexapod: Robot, name: str) -> None:
-    motion = walking_motion(with_path(hexapod, name), samples=3001)
-    for segment in motion.segments:
-        dt = segment.time[1] - segment.time[0]
-        joints = hexapod.position_index
-        q = segment.configuration[:, joints]
-        v = segment.velocity[:, hexapod.velocity_index]
-        a = segment.acceleration[:, hexapod.velocity_index]
-        np.testing.assert_allclose((q[2:] - q[:-2]) / (2 * dt), v[1:-1], atol=2e-5)
-        np.testing.assert_allclose((v[2:] - v[:-2]) / (2 * dt), a[1:-1], atol=5e-4)
-
-
-def test_foot_velocity_over_ground_is_continuous(hexapod: Robot, walk: Motion) -> None:
-    """A foot rests on the ground on both sides of lift-off and touch-down."""
+def test_feet_rest_on_the_ground_and_the_body_moves_on(hexapod: Robot, walk: Motion) -> None:
+    """Also on both sides of lift-off and touch-down; the first set supports first."""
     speed = hexapod.spec.parameters["walking_speed"]
+    assert [s.stance for s in walk.segments] == [("lf", "lr", "rm"), ("rf", "rr", "lm")]
     for segment in walk.segments:
         q = hexapod.leg_positions(segment.configuration)
-        _, jacobian = foot_jacobians(hexapod.chains, q)
         rate = segment.velocity[:, hexapod.velocity_index].reshape(q.shape)
-        foot = np.einsum("nlij,nlj->nli", jacobian, rate) + [speed, 0, 0]
-        np.testing.assert_allclose(foot[[0, -1]], 0, atol=1e-9)
+        foot = np.einsum("nlij,nlj->nli", foot_jacobians(hexapod.chains, q)[1], rate)
+        foot += [speed, 0, 0]
         stance = [hexapod.leg_names.index(leg) for leg in segment.stance]
+        np.testing.assert_allclose(foot[[0, -1]], 0, atol=1e-9)
         np.testing.assert_allclose(foot[:, stance], 0, atol=1e-9)
-
-
-def test_segments_join(hexapod: Robot, walk: Motion) -> None:
-    first, second = walk.segments
-    assert first.time[-1] == second.time[0] == pytest.approx(1.5)
-    joints = hexapod.position_index
-    np.testing.assert_allclose(first.configuration[-1], second.configuration[0], atol=1e-9)
-    np.testing.assert_allclose(
-        second.configuration[-1, joints], first.configuration[0, joints], atol=1e-9
-    )
-    np.testing.assert_allclose(first.velocity[-1], second.velocity[0], atol=1e-8)
+        base, velocity = segment.configuration[:, :3], segment.velocity[:, :6]
+        np.testing.assert_allclose(base[:, 0], speed * segment.time, atol=1e-12)
+        np.testing.assert_allclose(velocity, np.tile([speed, 0, 0, 0, 0, 0], (len(base), 1)))
+        assert not base[:, 1:].any()
+        assert not segment.acceleration[:, :6].any()
 
 
 def test_stroke_and_lift_are_those_of_table_ii(hexapod: Robot, walk: Motion) -> None:
     middle = hexapod.leg_names.index("rm")
-    feet = [
+    support, transfer = (
         foot_positions(hexapod.chains, hexapod.leg_positions(s.configuration))[:, middle]
         for s in walk.segments
-    ]
-    support, transfer = feet
-    assert "rm" in walk.segments[0].stance
+    )
     assert support[0, 0] - support[-1, 0] == pytest.approx(0.240)
     assert np.ptp(transfer[:, 2]) == pytest.approx(0.075)
     assert np.ptp(support[:, 2]) == pytest.approx(0, abs=1e-9)
 
 
-def test_standing_lifts_the_other_feet(hexapod: Robot) -> None:
-    segment = standing_posture(hexapod)
-    feet = foot_positions(hexapod.chains, hexapod.leg_positions(segment.configuration))[0]
-    ground = -hexapod.spec.parameters["body_height"]
-    for leg, foot in zip(hexapod.leg_names, feet, strict=True):
-        lifted = 0.0 if leg in ("lf", "lr", "rm") else 0.075
-        assert foot[2] == pytest.approx(ground + lifted, abs=1e-9)
-
-
-def test_a_stroke_beyond_reach_is_refused(hexapod: Robot) -> None:
-    spec = hexapod.spec.with_parameters({"foot_stroke": 1.2, "walking_speed": 0.8})
-    with pytest.raises(OutOfReachError, match=r"leg '\w+' at t = .* beyond its reach"):
-        walking_motion(load_robot(spec))
-
-
-def test_stroke_and_speed_agree_within_a_millionth(hexapod: Robot) -> None:
-    for share, good in ((5e-7, True), (2e-6, False), (-2e-6, False)):
-        spec = hexapod.spec.with_parameters({"walking_speed": 0.16 * (1 + share)})
-        robot = load_robot(spec)
-        if good:
-            walking_motion(robot, samples=2)
-            continue
-        with pytest.raises(GaitError, match="change one"):
-            walking_motion(robot, samples=2)
+@pytest.mark.parametrize("feet", [("lf", "lr", "rm"), ("lf", "lm", "lr", "rf", "rr")])
+def test_standing_lifts_the_other_feet(hexapod: Robot, feet: tuple[str, ...]) -> None:
+    segment = standing_posture(hexapod, feet)
+    found = foot_positions(hexapod.chains, hexapod.leg_positions(segment.configuration))[0]
+    expected = np.array([leg.neutral_foot for leg in hexapod.spec.legs])
+    expected[[leg not in feet for leg in hexapod.leg_names], 2] += 0.075
+    np.testing.assert_allclose(found, expected, atol=1e-9)
+    assert not segment.velocity.any()
+    assert not segment.acceleration.any()
+    assert segment.name == f"standing on {', '.join(feet)}"
 
 
 @pytest.mark.parametrize(
-    "tripods",
+    ("numbers", "gait", "message"),
     [
-        (("lf", "lr", "rm"),),
-        (("lf", "lr", "rm"), ("rf", "rr")),
-        (("lf", "lr", "rm"), ("rf", "rr", "rm")),
-        (("lf", "lr"), ("rm", "rf"), ("rr", "lm")),
+        ({"foot_stroke": 1.2, "walking_speed": 0.8}, {}, r"leg '\w+' at t = .* beyond its reach"),
+        ({"walking_speed": 0.2}, {}, "foot_stroke is 0.24 m; change one"),
+        ({"walking_speed": 0.16 * (1 + 2e-6)}, {}, "change one"),
+        ({"walking_speed": 0.16 * (1 - 2e-6)}, {}, "change one"),
+        ({}, {"transfer_path": "cyclod"}, "did you mean 'cycloid'"),
+        ({}, {"tripods": [["lf", "lr", "rm"]]}, "must part the legs .* in two sets"),
+        ({}, {"tripods": [["lf", "lr", "rm"], ["rf", "rr"]]}, "must part the legs"),
+        ({}, {"tripods": [["lf", "lr", "rm"], ["rf", "rr", "rm"]]}, "must part the legs"),
+        ({}, {"tripods": [["lf", "lr"], ["rm", "rf"], ["rr", "lm"]]}, "must part the legs"),
     ],
 )
-def test_sets_that_do_not_part_the_legs_in_two_are_refused(
-    hexapod: Robot, tripods: tuple[tuple[str, ...], ...]
+def test_numbers_that_cannot_be_walked_are_refused(
+    hexapod: Robot, numbers: dict[str, float], gait: dict[str, Any], message: str
 ) -> None:
-    robot = replace(hexapod, spec=hexapod.spec.with_gait(tripods=[list(t) for t in tripods]))
-    with pytest.raises(GaitError, match="must part the legs .* in two sets"):
-        walking_motion(robot)
+    robot = load_robot(hexapod.spec.with_parameters(numbers).with_gait(**gait))
+    with pytest.raises((GaitError, OutOfReachError), match=message):
+        walking_motion(robot, samples=51)
 
 
-def test_the_first_set_supports_first_and_the_body_moves_on(hexapod: Robot, walk: Motion) -> None:
-    speed = hexapod.spec.parameters["walking_speed"]
-    assert tuple(s.stance for s in walk.segments) == (
-        ("lf", "lr", "rm"),
-        ("rf", "rr", "lm"),
-    )
-    for segment in walk.segments:
-        base, rate = segment.configuration[:, :3], segment.velocity[:, :6]
-        np.testing.assert_allclose(base[:, 0], speed * segment.time, atol=1e-12)
-        assert not base[:, 1:].any()
-        np.testing.assert_allclose(rate, np.tile([speed, 0, 0, 0, 0, 0], (len(rate), 1)))
-        assert not segment.acceleration[:, :6].any()
-
-
-def test_standing_on_feet_of_ones_choice(hexapod: Robot) -> None:
-    segment = standing_posture(hexapod, ("lf", "lm", "lr", "rf", "rr"))
-    feet = foot_positions(hexapod.chains, hexapod.leg_positions(segment.configuration))[0]
-    neutral = np.array([leg.neutral_foot for leg in hexapod.spec.legs])
-    neutral[hexapod.leg_names.index("rm"), 2] += hexapod.spec.parameters["foot_lift"]
-    np.testing.assert_allclose(feet, neutral, atol=1e-9)
-    assert not segment.velocity.any()
-    assert not segment.acceleration.any()
-    assert segment.name == "standing on lf, lm, lr, rf, rr"
-
-
-def test_numbers_that_contradict_each_other_are_refused(hexapod: Robot) -> None:
-    spec = hexapod.spec.with_parameters({"walking_speed": 0.2})
-    with pytest.raises(GaitError, match="foot_stroke is 0.24 m"):
-        walking_motion(load_robot(spec))
-
-
-@pytest.mark.parametrize("samples", [0, 1, -5])
-def test_too_few_samples_are_refused(hexapod: Robot, samples: int) -> None:
+def test_stroke_and_speed_may_differ_by_less_than_a_millionth(hexapod: Robot) -> None:
+    spec = hexapod.spec.with_parameters({"walking_speed": 0.16 * (1 + 5e-7)})
+    walking_motion(load_robot(spec), samples=2)
     with pytest.raises(GaitError, match="at least 2"):
-        walking_motion(hexapod, samples=samples)
-
-
-def test_an_unknown_path_offers_the_closest(hexapod: Robot) -> None:
-    with pytest.raises(GaitError, match="did you mean 'cycloid'"):
-        walking_motion(with_path(hexapod, "cyclod"))
+        walking_motion(hexapod, samples=1)

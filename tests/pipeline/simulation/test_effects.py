@@ -178,6 +178,24 @@ def test_bodies_and_motors_count_in_every_alternative(hexapod: Robot, catalog: C
         assert change.after[name].cycle > change.before[name].cycle
 
 
+def test_energies_count_what_springs_add_to_the_demand(hexapod: Robot, catalog: Catalog) -> None:
+    """Before with what is known already, after with all of it; the actuators are the same."""
+    chains = {name: catalog.chain(name) for name in ("reversible", "irreversible")}
+    values = {"stiffness": 40.0, "rest": 0.1}
+    spring = with_effect(hexapod, catalog, "parallel_spring", JOINT, values)
+    change = energy_change(hexapod, chains, spring)
+    for name, chain in chains.items():
+        assert spring.chain(chain) is chain
+        expected = walk(hexapod, chains, samples=SAMPLES, adjust=spring.demand).supplies[name]
+        held = stand(hexapod, chains, adjust=spring.demand).holding[name]
+        assert change.after[name].cycle == pytest.approx(expected.supplied_energy.sum())
+        assert change.after[name].standing == pytest.approx(held.power.sum())
+        assert change.after[name].cycle != pytest.approx(change.before[name].cycle, rel=1e-3)
+    again = energy_change(hexapod, chains, spring, known=spring)
+    assert again.before == again.after == change.after
+    assert again.break_even_before == pytest.approx(change.break_even_after, nan_ok=True)
+
+
 def test_at_the_break_even_both_cost_the_same() -> None:
     costs = {
         "reversible": Cost(300.0, 20.0, 120.0, 9.0),

@@ -112,7 +112,7 @@ def changed(column: str, row: int | slice, value: object) -> Callable[[pd.DataFr
             lambda t: t.assign(
                 **{c: np.degrees(t[c]) for c in t.columns if c.endswith("position_rad")}
             ),
-            r"its limits are .* rad; in degrees it would fit: the column is in rad",
+            "its limits are .* deg; .* in degrees they would fit: give them in rad",
         ),
     ],
 )
