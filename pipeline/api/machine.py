@@ -13,7 +13,6 @@ from pipeline.api.init import robot_file_of
 from pipeline.effects.model_file import Edit, EditParameter, ModelFile, new_model_file
 from pipeline.effects.registry import effect_named
 from pipeline.errors import RobotFileError
-from pipeline.identification.workflow.model_writer import model_text
 from pipeline.logs.errors import EffectError
 from pipeline.robot.published import published_names
 from pipeline.simulation.edited import IDEAL
@@ -152,6 +151,8 @@ class Machine:
             RobotFileError: The machine has no effects.
             ReportError: The file cannot be written.
         """
+        from pipeline.identification.workflow.model_writer import model_text
+
         file, target = self.model, Path(path)
         if file is None:
             raise RobotFileError(f"{self.path}: the machine has no effects to write")

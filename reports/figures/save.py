@@ -19,7 +19,6 @@ from reports.figures.style import house_style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-DOTS_PER_INCH = 150
 _PNG = {"compress_level": 4}  # half the time of the default, for a few per cent more bytes
 #: Decimals of a line's data: below what any picture shows, above what rounding differs in.
 _DECIMALS = 11
@@ -42,12 +41,11 @@ def arrange(figure: Figure) -> None:
 
 
 def save_figure(figure: Figure, folder: Path, name: str) -> None:
-    """Write `<name>.png` (150 dots per inch) and `<name>.svg`, whole or not at all.
+    """Write `<name>.png` (at the style's 150 dots per inch) and `<name>.svg`, whole or not at all.
 
     Raises:
         OutputError: The folder cannot be written.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 
     for line in (line for axes in figure.axes for line in axes.lines):
@@ -57,11 +55,12 @@ def save_figure(figure: Figure, folder: Path, name: str) -> None:
     targets = (folder / f"{name}.png", folder / f"{name}.svg")
     with house_style(), replacing(*targets) as (png, svg):
         arrange(figure)
-        figure.set_dpi(DOTS_PER_INCH)
-        # Not `savefig`: it draws every figure once more than it is written.
+        # Not `savefig`: it draws every figure once more than it is written; and the canvas on
+        # which it was laid out, which has measured every text.
         with png.open("wb") as stream:
             metadata: dict[str, Any] = {"Software": None}
-            FigureCanvasAgg(figure).print_png(stream, metadata=metadata, pil_kwargs=_PNG)
+            canvas: Any = figure.canvas
+            canvas.print_png(stream, metadata=metadata, pil_kwargs=_PNG)
         with svg.open("wb") as stream:
             metadata = {"Date": None, "Creator": None}
             FigureCanvasSVG(figure).print_svg(stream, metadata=metadata)
