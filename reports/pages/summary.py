@@ -10,7 +10,7 @@ from pipeline.motion.gait import gait_table
 from pipeline.paper.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
 from pipeline.paper.judgement.basis import Basis, Judged
 from pipeline.paper.judgement.readings import readings, verdict
-from pipeline.paper.judgement.sensitivity import Index, leading, ranking
+from pipeline.paper.judgement.sensitivity import ranking
 from pipeline.simulation.settings import Settings
 from reports.html import write_html
 from reports.markdown import write_markdown
@@ -26,9 +26,16 @@ from reports.pages.robot_page import (
     first_picture,
     gait_section,
 )
-from reports.pages.summary_first import first_sentences, numbers_first
-from reports.pages.summary_words import answer, percent, roles_text
+from reports.pages.summary_words import (
+    answer,
+    first_sentences,
+    index_words,
+    measure_next,
+    numbers_first,
+    roles_text,
+)
 from reports.table import Table
+from reports.words import percent
 
 TONES = {
     "reproduced": "good",
@@ -236,7 +243,7 @@ def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Sect
             Text("Largest total sensitivities (share of variance with interactions, 95 %):"),
             Points(
                 tuple(
-                    f"{text}: " + ", ".join(_index(row) for row in ranked[:3])
+                    f"{text}: " + ", ".join(index_words(row) for row in ranked[:3])
                     for text, ranked in ranks.items()
                 )
             ),
@@ -278,29 +285,6 @@ def _conclusions(judged: Judged, tables: Mapping[str, Table], out: Path) -> Sect
             ),
             Points(tuple(notes)),
         ),
-    )
-
-
-def _index(row: Index) -> str:
-    return f"`{row.parameter}` ({100 * row.total:.0f} ± {percent(row.half_width)})"
-
-
-def measure_next(ranked: Sequence[Index]) -> str:
-    """Which number to measure next, if the sensitivities can tell.
-
-    Args:
-        ranked: Total indices on what is to be known better, largest first.
-    """
-    first = leading(ranked)
-    if len(first) == 1:
-        return (
-            f"**Measure next:** `{first[0].parameter}`, the number that moves the break-even most; "
-            "the interval of its index lies above all others."
-        )
-    return (
-        "What to measure next is not decided: the intervals of "
-        + " and ".join(_index(row) for row in first)
-        + " overlap."
     )
 
 
