@@ -64,36 +64,33 @@ class Parameter:
         return (high - low) / (2.0 * _SIGMAS_95 * abs(self.value))
 
     def __post_init__(self) -> None:
+        if wrong := self._wrong():
+            raise ParameterError(f"'{self.name}': {wrong}")
+
+    def _wrong(self) -> str:
+        """What contradicts; empty where nothing does."""
         if not math.isfinite(self.value):
-            raise ParameterError(f"'{self.name}': {self.value} is not a finite number: give one")
+            return f"{self.value} is not a finite number: give one"
+        written = f"{self.value_as_written:g} {self.unit}"
         if abs(self.value) > LARGEST:
-            raise ParameterError(
-                f"'{self.name}': {self.value_as_written:g} {self.unit} is beyond any machine; "
-                "check its unit"
-            )
+            return f"{written} is beyond any machine; check its unit"
         if self.basis not in BASES:
-            raise ParameterError(
-                f"'{self.name}': unknown basis {self.basis!r:.40}: {closest(self.basis, BASES)}"
-            )
+            return f"unknown basis {self.basis!r:.40}: {closest(self.basis, BASES)}"
         if not self.source.strip():
-            raise ParameterError(f"'{self.name}': no source: say where the number comes from")
+            return "no source: say where the number comes from"
         if self.basis in UNCERTAIN_BASES and self.interval is None:
-            raise ParameterError(
-                f"'{self.name}': basis '{self.basis}' needs an interval = [low, high]"
-            )
+            return f"basis '{self.basis}' needs an interval = [low, high]"
         if self.basis == "assumed" and not self.reason.strip():
-            raise ParameterError(f"'{self.name}': basis 'assumed' needs a reason")
+            return "basis 'assumed' needs a reason"
         for kind, pair in (("interval", self.interval), ("bounds", self.bounds)):
             if pair is None:
                 continue
-            low, high = (from_si(x, self.unit) for x in pair)
+            span = "[{:g}, {:g}]".format(*(from_si(x, self.unit) for x in pair))
             if not pair[0] <= pair[1]:
-                raise ParameterError(f"'{self.name}': {kind} [{low:g}, {high:g}] runs backwards")
+                return f"{kind} {span} runs backwards"
             if not pair[0] <= self.value <= pair[1]:
-                raise ParameterError(
-                    f"'{self.name}': value {self.value_as_written:g} {self.unit} lies outside "
-                    f"its {kind} [{low:g}, {high:g}]: correct one of them"
-                )
+                return f"value {written} lies outside its {kind} {span}: correct one of them"
+        return ""
 
 
 class ParameterSet(Mapping[str, float]):
@@ -183,6 +180,54 @@ def read_toml(path: str | Path) -> dict[str, Any]:
         raise ParameterError(f"{one_line(path)}: {error}") from None
 
 
+class _Written(Table):
+    """A parameter as it stands in a file."""
+
+    expected = "{value, unit, basis, source}"
+    value: Number
+    unit: str
+    basis: str
+    source: str
+    interval: Pair | None = None
+    bounds: Pair | None = None
+    reason: str = ""
+
+
+class _Names(Table):
+    """Parameters by name."""
+
+    noun = "parameter"
+    expected = "parameters by name"
+
+
+def _parameter(name: str, expected: str, entry: _Written) -> Parameter:
+    """One parameter in SI units, of the dimension that is expected."""
+    unit = entry.unit
+    try:
+        found = dimension(unit)
+        if found != expected:
+            raise UnitError(
+                f"'{unit}' is a unit of {found}, expected {expected} such as '{si_unit(expected)}'"
+            )
+        si: dict[str, Any] = entry.model_dump() | {"value": to_si(entry.value, unit)}
+        for kind in ("interval", "bounds"):
+            if si[kind] is not None:
+                si[kind] = tuple(to_si(x, unit) for x in si[kind])
+        return Parameter(name=name, value_as_written=entry.value, **si)
+    except ActuatorError as error:
+        raise ValueError(str(error).removeprefix(f"'{name}'").lstrip(": ")) from None
+
+
+@cache
+def _table(schema: tuple[tuple[str, str], ...], optional: frozenset[str]) -> type[_Names]:
+    """The table of the parameters of a schema, which become `Parameter` as they are read."""
+    fields: dict[str, Any] = {}
+    for name, kind in schema:
+        entry = Annotated[_Written, AfterValidator(partial(_parameter, name, kind))]
+        fields[name] = (entry | None, None) if name in optional else (entry, ...)
+    return create_model("_Named", __base__=_Names, **fields)
+
+
 def parameters_from_table(
     table: object, schema: Mapping[str, str], where: str, optional: frozenset[str] = frozenset()
 ) -> ParameterSet:
@@ -199,7 +244,7 @@ def parameters_from_table(
         ParameterError: A name or key that is unknown or missing, a value that is not a finite
             number of the right dimension, or attributes that contradict one another; all of them.
     """
-    names = _named(tuple(schema.items()), optional)
+    names = _table(tuple(schema.items()), optional)
     read = checked(names, table, where, ParameterError)
     rows = (getattr(read, name) for name in schema)
     return ParameterSet(tuple(row for row in rows if row is not None), where)
@@ -223,70 +268,3 @@ def load_parameters(
     if table not in contents:
         raise ParameterError(f"{name}: no table [{table}]: {closest(table, list(contents))}")
     return parameters_from_table(contents[table], schema, f"{name} [{table}]")
-
-
-class _Written(Table):
-    """A parameter as it stands in a file."""
-
-    expected = "{value, unit, basis, source}"
-    value: Number
-    unit: str
-    basis: str
-    source: str
-    interval: Pair | None = None
-    bounds: Pair | None = None
-    reason: str = ""
-
-
-class _Names(Table):
-    """Parameters by name."""
-
-    noun = "parameter"
-    expected = "parameters by name"
-
-
-@cache
-def _named(schema: tuple[tuple[str, str], ...], optional: frozenset[str]) -> type[_Names]:
-    """The table of the parameters of a schema, which become `Parameter` as they are read."""
-    fields: dict[str, Any] = {}
-    for name, kind in schema:
-        entry = Annotated[_Written, AfterValidator(partial(_parameter, name, kind))]
-        fields[name] = (entry | None, None) if name in optional else (entry, ...)
-    return create_model("_Named", __base__=_Names, **fields)
-
-
-def _parameter(name: str, expected: str, entry: _Written) -> Parameter:
-    """One parameter in SI units.
-
-    Args:
-        name: Its key.
-        expected: Dimension it must have.
-        entry: As written.
-
-    Raises:
-        ValueError: A unit of another dimension, or attributes that contradict one another.
-    """
-    unit = entry.unit
-    try:
-        found = dimension(unit)
-        if found != expected:
-            raise UnitError(
-                f"'{unit}' is a unit of {found}, expected {expected} such as '{si_unit(expected)}'"
-            )
-        return Parameter(
-            name=name,
-            value=to_si(entry.value, unit),
-            unit=unit,
-            value_as_written=entry.value,
-            basis=entry.basis,
-            source=entry.source,
-            interval=_in_si(entry.interval, unit),
-            bounds=_in_si(entry.bounds, unit),
-            reason=entry.reason,
-        )
-    except ActuatorError as error:
-        raise ValueError(str(error).removeprefix(f"'{name}'").lstrip(": ")) from None
-
-
-def _in_si(pair: Interval | None, unit: str) -> Interval | None:
-    return None if pair is None else (to_si(pair[0], unit), to_si(pair[1], unit))

@@ -32,7 +32,7 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Final, Literal, Self
 
@@ -122,14 +122,7 @@ class ModelFile:
 
     def with_edits(self, edits: Sequence[Edit]) -> ModelFile:
         """The same with further edits at the end."""
-        return ModelFile(
-            self.robot,
-            self.robot_sha256,
-            self.alternative,
-            self.actuators_sha256,
-            (*self.edits, *edits),
-            self.changed,
-        )
+        return replace(self, edits=(*self.edits, *edits))
 
 
 def _sha256(text: str) -> str:
@@ -317,14 +310,9 @@ def read_model_file(path: Path, catalog: Path | None = None) -> ModelFile:
         raise ModelFileError(f"{one_line(path)}: {error}") from None
     model = checked(_Model, table, where, ModelFileError)
     robot, hashes = path.parent / model.robot.file, model.actuators.sha256
-    return ModelFile(
-        robot=robot,
-        robot_sha256=model.robot.sha256,
-        alternative=model.actuators.alternative,
-        actuators_sha256=hashes,
-        edits=tuple(map(_as_edit, model.edit)),
-        changed=_changed(where, robot, model.robot.sha256, hashes, catalog),
-    )
+    edits, alternative = tuple(map(_as_edit, model.edit)), model.actuators.alternative
+    file = ModelFile(robot, model.robot.sha256, alternative, hashes, edits)
+    return replace(file, changed=_changed(file, where, catalog))
 
 
 def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
@@ -340,32 +328,27 @@ def edits_in(text: str, where: str = "model.toml") -> tuple[Edit, ...]:
     return tuple(map(_as_edit, checked(_Model, table, where, ModelFileError).edit))
 
 
-def _changed(
-    where: str, robot: Path, robot_hash: str, hashes: Mapping[str, str], catalog: Path | None
-) -> tuple[str, ...]:
+def _changed(file: ModelFile, where: str, catalog: Path | None) -> tuple[str, ...]:
     """Files that are not those of the hashes, in words."""
     out = []
     since = "is not the one its effects were found with (other SHA-256)"
-    if file_sha256(robot) != robot_hash:
-        out.append(f"{where}: {one_line(robot.name)} {since}: they may not fit it any more")
-    if catalog is None and hashes and robot.suffix.lower() == ".toml":
-        catalog = actuator_folder(load_robot_file(robot))
-    for name, written in hashes.items():
-        file = (catalog or CATALOG) / Path(name).name
-        if not file.exists() or file_sha256(file) != written:
+    if file_sha256(file.robot) != file.robot_sha256:
+        out.append(f"{where}: {one_line(file.robot.name)} {since}: they may not fit it any more")
+    if catalog is None and file.actuators_sha256 and file.robot.suffix.lower() == ".toml":
+        catalog = actuator_folder(load_robot_file(file.robot))
+    for name, written in file.actuators_sha256.items():
+        actuator = (catalog or CATALOG) / Path(name).name
+        if not actuator.exists() or file_sha256(actuator) != written:
             out.append(f"{where}: actuator file {one_line(name)} {since}")
     return tuple(out)
 
 
 def _as_edit(entry: _Edit) -> Edit:
     """An edit, its parameters in the effect's order."""
-    written = {p.name: entry.parameters.get(p.name) for p in effect_named(entry.effect).parameters}
     parameters = tuple(
-        EditParameter(name, p.value, p.unit, p.interval or (p.value, p.value))
-        for name, p in written.items()
-        if p is not None
+        EditParameter(known.name, p.value, p.unit, p.interval or (p.value, p.value))
+        for known in effect_named(entry.effect).parameters
+        if (p := entry.parameters.get(known.name)) is not None
     )
-    share = math.nan if entry.share is None else entry.share
-    return Edit(
-        entry.effect, entry.place, parameters, entry.basis, entry.source, entry.level, share
-    )
+    written = entry.model_dump(exclude={"parameters"}, exclude_none=True)
+    return Edit(**written, parameters=parameters)

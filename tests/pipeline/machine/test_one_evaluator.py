@@ -6,7 +6,7 @@ import ast
 from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
-ANSWERS = ("moving", "holding", "driving", "loss", "stored")
+ANSWERS = ("moving", "holding", "driving", "loss", "stored", "drawn")
 
 
 def asks_elements(text: str) -> bool:
