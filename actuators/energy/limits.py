@@ -50,25 +50,23 @@ def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:
     rows = []
     rms = rms_over_time(time, result.current)
     for j, (joint, motor) in enumerate(zip(result.joint.joints, result.motors, strict=True)):
-        instantaneous = (
+        for quantity, unit, limit, values in (
             ("speed", "rad/s", motor.max_speed, result.motor.velocity),
             ("voltage", "V", motor.supply_voltage, result.voltage),
             ("current", "A", motor.peak_current, result.current),
-        )
-        for quantity, unit, limit, values in instantaneous:
-            magnitude = np.abs(values[:, j])
-            at = int(np.argmax(magnitude))
-            peak = float(magnitude[at])
-            share = time_over(time, magnitude, limit) / span
-            rows.append(
-                LimitRow(joint, quantity, unit, limit, peak, float(time[at]), share, peak > limit)
-            )
-        limit, value = motor.continuous_current, float(rms[j])
-        over = value > limit
-        rows.append(
-            LimitRow(joint, "rms_current", "A", limit, value, float(time[0]), float(over), over)
-        )
+        ):
+            size = np.abs(values[:, j])
+            at = int(np.argmax(size))
+            share = time_over(time, size, limit) / span
+            row = (joint, quantity, unit, limit, float(size[at]), float(time[at]), share)
+            rows.append(LimitRow(*row, breach=float(size[at]) > limit))
+        rows.append(_lasting(joint, motor, float(rms[j]), float(time[0])))
     return tuple(rows)
+
+
+def _lasting(joint: str, motor: DCMotor, rms: float, start: float) -> LimitRow:
+    limit = motor.continuous_current
+    return LimitRow(joint, "rms_current", "A", limit, rms, start, float(rms > limit), rms > limit)
 
 
 def standing_rows(
@@ -84,14 +82,13 @@ def standing_rows(
     rows = []
     for j, (joint, motor) in enumerate(zip(joints, motors, strict=True)):
         current, voltage = abs(float(holding.current[j])), abs(float(holding.voltage[j]))
-        rows += [
-            LimitRow(joint, quantity, unit, limit, value, 0.0, float(value > limit), value > limit)
-            for quantity, unit, limit, value in (
-                ("voltage", "V", motor.supply_voltage, voltage),
-                ("current", "A", motor.peak_current, current),
-                ("rms_current", "A", motor.continuous_current, current),
-            )
-        ]
+        for quantity, unit, limit, value in (
+            ("voltage", "V", motor.supply_voltage, voltage),
+            ("current", "A", motor.peak_current, current),
+        ):
+            over = value > limit
+            rows.append(LimitRow(joint, quantity, unit, limit, value, 0.0, float(over), over))
+        rows.append(_lasting(joint, motor, current, 0.0))
     return tuple(rows)
 
 

@@ -22,12 +22,6 @@ def test_every_parameter_names_basis_and_source():
         assert parameter.bounds is not None or parameter.basis in ("published", "datasheet")
 
 
-def test_alternative_3_counts_rotor_friction_once():
-    names = [e.name for e in load_catalog().chain("reversible").elements]
-    assert "rotor_friction" not in names
-    assert "rotor_inertia" in names
-
-
 def test_motor_is_consistent_with_its_data_sheet():
     p = load_catalog().parameter
     k, r = p("motor_re40_24v.torque_constant").value, p("motor_re40_24v.resistance").value
@@ -170,13 +164,6 @@ def test_a_component_that_no_alternative_names_is_left_out(copy):
 def test_a_component_that_no_alternative_names_is_read_all_the_same(copy):
     (copy / "spare.toml").write_text("title = 3\n")
     with pytest.raises(ActuatorError, match=r"spare\.toml"):
-        load_catalog(copy)
-
-
-def test_a_number_that_no_alternative_names_is_refused_in_a_component_that_is_in_use(copy):
-    path = copy / "alternatives.toml"
-    path.write_text(path.read_text().replace('viscous = "pinion.viscous"\n', ""))
-    with pytest.raises(CatalogError, match=r"pinion\.toml: parameter 'viscous' is used by no"):
         load_catalog(copy)
 
 

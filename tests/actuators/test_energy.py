@@ -203,13 +203,6 @@ def test_limits_at_standstill_in_closed_form():
     assert [key for key, row in rows.items() if row.breach] == [("a", "voltage")]
 
 
-def test_root_mean_square_of_a_line_is_exact():
-    t = np.array([0.0, 3.0])
-    assert rms_over_time(t, np.array([[0.0], [3.0]]))[0] == pytest.approx(np.sqrt(3.0))
-    assert rms_over_time(t, np.array([[1.0], [4.0]]))[0] == pytest.approx(np.sqrt(7.0))
-    assert rms_over_time(t, np.array([[-1.0], [2.0]]))[0] == pytest.approx(1.0)
-
-
 def test_a_peak_at_its_limit_is_no_breach():
     """The data sheet permits the limit itself, at every instant and root mean square."""
     chain = CHAINS["ideal"]
@@ -235,16 +228,13 @@ def test_a_peak_at_its_limit_is_no_breach():
     assert (over.breach, over.share_over, over.peak_time) == (True, 1.0, 0.0)
 
 
-def test_time_over_a_limit_counts_the_part_of_each_line_above_it():
-    t = np.array([0.0, 1.0, 3.0, 4.0, 6.0])
-    m = np.array([0.0, 4.0, 8.0, 8.0, 4.0])
-    assert time_over(t, m, 5.0) == pytest.approx(2.0 * 0.75 + 1.0 + 2.0 * 0.75)
-    assert time_over(t, m, 8.0) == 0.0
-    assert time_over(t, m, 0.0) == pytest.approx(6.0)
+@pytest.mark.parametrize(("a", "b", "rms"), [(0, 3, 3**0.5), (1, 4, 7**0.5), (-1, 2, 1.0)])
+def test_root_mean_square_of_a_line_is_exact(a, b, rms):
+    assert rms_over_time(np.array([0.0, 3.0]), np.array([[a], [b]]))[0] == pytest.approx(rms)
+
+
+@pytest.mark.parametrize(("limit", "over"), [(5.0, 4.0), (8.0, 0.0), (0.0, 6.0), (np.inf, 0.0)])
+def test_time_over_a_limit_counts_the_part_of_each_line_above_it(limit, over):
+    t, m = np.array([0.0, 1.0, 3.0, 4.0, 6.0]), np.array([0.0, 4.0, 8.0, 8.0, 4.0])
+    assert time_over(t, m, limit) == pytest.approx(over)
     assert time_over(t, np.full(5, 4.0), 4.0) == 0.0
-
-
-def test_time_over_a_limit_on_a_triangle():
-    t, m = np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 0.0])
-    assert time_over(t, m, 1.0) == pytest.approx(1.0)
-    assert time_over(t, m, np.inf) == 0.0

@@ -10,55 +10,38 @@ JOINT_TORQUES = np.array([0.0, -30.71, 1.46])  # Table III [N*m]
 
 # quantity, joint, value, half of the printed precision. Table V's motor torque of joint 2 and its
 # energy are missing: the other entries exclude them, see ERRATA.md.
-TABLE_IV = [
-    ("motor_torque", 2, -0.0768, 0.00005),
-    ("motor_torque", 3, 0.00365, 0.000005),
-    ("current", 2, -2.54, 0.005),
-    ("current", 3, 0.121, 0.0005),
-    ("voltage", 2, -0.803, 0.0005),
-    ("voltage", 3, 0.038, 0.0005),
-    ("power", 2, 2.04, 0.005),
-    ("power", 3, 0.005, 0.0005),
-]
-TABLE_V = [
-    ("motor_torque", 3, 0.00003, 0.000005),
-    ("current", 2, -2.42, 0.005),
-    ("current", 3, 0.0, 0.005),
-    ("voltage", 2, -0.766, 0.0005),
-    ("voltage", 3, 0.0, 0.0005),
-    ("power", 2, 1.86, 0.005),
-    ("power", 3, 0.0, 0.0005),
-]
-TABLE_VI = [
-    ("motor_torque", 2, -0.04998, 0.000005),
-    ("motor_torque", 3, 0.0, 0.000005),
-    ("current", 2, -1.66, 0.005),
-    ("current", 3, 0.0, 0.0005),
-    ("voltage", 2, -0.523, 0.0005),
-    ("voltage", 3, 0.0, 0.0005),
-    ("power", 2, 0.866, 0.0005),
-    ("power", 3, 0.0, 0.0005),
+PRINTED = [
+    ("ideal", "motor_torque", 2, -0.0768, 0.00005),  # Table IV
+    ("ideal", "motor_torque", 3, 0.00365, 0.000005),
+    ("ideal", "current", 2, -2.54, 0.005),
+    ("ideal", "current", 3, 0.121, 0.0005),
+    ("ideal", "voltage", 2, -0.803, 0.0005),
+    ("ideal", "voltage", 3, 0.038, 0.0005),
+    ("ideal", "power", 2, 2.04, 0.005),
+    ("ideal", "power", 3, 0.005, 0.0005),
+    ("rotor", "motor_torque", 3, 0.00003, 0.000005),  # Table V
+    ("rotor", "current", 2, -2.42, 0.005),
+    ("rotor", "current", 3, 0.0, 0.005),
+    ("rotor", "voltage", 2, -0.766, 0.0005),
+    ("rotor", "voltage", 3, 0.0, 0.0005),
+    ("rotor", "power", 2, 1.86, 0.005),
+    ("rotor", "power", 3, 0.0, 0.0005),
+    ("reversible", "motor_torque", 2, -0.04998, 0.000005),  # Table VI
+    ("reversible", "motor_torque", 3, 0.0, 0.000005),
+    ("reversible", "current", 2, -1.66, 0.005),
+    ("reversible", "current", 3, 0.0, 0.0005),
+    ("reversible", "voltage", 2, -0.523, 0.0005),
+    ("reversible", "voltage", 3, 0.0, 0.0005),
+    ("reversible", "power", 2, 0.866, 0.0005),
+    ("reversible", "power", 3, 0.0, 0.0005),
 ]
 
 
-def check(alternative, quantity, joint, value, half_width):
+@pytest.mark.parametrize("row", PRINTED, ids=lambda r: f"{r[0]}_{r[1]}_{r[2]}")
+def test_tables_iv_v_and_vi(row):
+    alternative, quantity, joint, value, half_width = row
     held = CHAINS[alternative].holding(JOINT_TORQUES)
     assert abs(getattr(held, quantity)[joint - 1] - value) <= half_width * (1 + 1e-9)
-
-
-@pytest.mark.parametrize("row", TABLE_IV, ids=lambda r: f"{r[0]}_{r[1]}")
-def test_table_iv_ideal(row):
-    check("ideal", *row)
-
-
-@pytest.mark.parametrize("row", TABLE_V, ids=lambda r: f"{r[0]}_{r[1]}")
-def test_table_v_rotor(row):
-    check("rotor", *row)
-
-
-@pytest.mark.parametrize("row", TABLE_VI, ids=lambda r: f"{r[0]}_{r[1]}")
-def test_table_vi_reversible(row):
-    check("reversible", *row)
 
 
 @pytest.mark.parametrize(
