@@ -8,7 +8,8 @@ friction is its own: it acts between motor and frame, and does work on theta.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import itertools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -184,7 +185,8 @@ def drivetrains_of(actuators: Actuators, names: Sequence[str]) -> Drivetrains:
 def _merged(
     name: str, joint: ShaftSeries, parts: Sequence[tuple[list[int], ChainResult]]
 ) -> ChainResult:
-    first = parts[0][1]
+    """The results of some columns each as one result of all columns."""
+    results = [result for _, result in parts]
 
     def gathered(values: Sequence[Array | None]) -> Array:
         out = np.zeros(joint.torque.shape)
@@ -198,29 +200,27 @@ def _merged(
         columns = {field: gathered([getattr(side, field) for side in sides]) for field in fields}
         return ShaftSeries(joints=joint.joints, time=joint.time, **columns)
 
-    def of_result(attribute: str) -> Array:
-        return gathered([getattr(result, attribute) for _, result in parts])
+    def by_element(rows: Sequence[Mapping[str, Array]]) -> dict[str, Array]:
+        return {
+            k: gathered([r.get(k) for r in rows]) for k in dict.fromkeys(itertools.chain(*rows))
+        }
 
-    def union(attribute: str, last: str = "") -> dict[str, Array]:
-        keys: dict[str, None] = {}
-        for _, result in parts:
-            keys |= dict.fromkeys(getattr(result, attribute))
-        ordered = [k for k in keys if k != last] + [k for k in keys if k == last]
-        return {k: gathered([getattr(r, attribute).get(k) for _, r in parts]) for k in ordered}
-
-    motors = {k: m for columns, r in parts for k, m in zip(columns, r.motors, strict=True)}
-    *inner, motor = first.shafts
+    *inner, motor = results[0].shafts
     # Shafts that all of them have, and the motors' whatever they are called.
-    shared = [stage for stage in inner if all(stage in result.shafts for _, result in parts)]
-    shafts = {stage: of_shaft([r.shafts[stage] for _, r in parts]) for stage in shared}
-    shafts[motor] = of_shaft([result.motor for _, result in parts])
+    shared = [stage for stage in inner if all(stage in r.shafts for r in results)]
+    shafts = {stage: of_shaft([r.shafts[stage] for r in results]) for stage in shared}
+    shafts[motor] = of_shaft([r.motor for r in results])
+    losses = by_element([r.losses for r in results])
+    last = tuple(results[0].losses)[-1]  # copper
+    losses[last] = losses.pop(last)
+    motors = {k: m for columns, r in parts for k, m in zip(columns, r.motors, strict=True)}
     return ChainResult(
         chain=name,
         shafts=shafts,
-        losses=union("losses", last=tuple(first.losses)[-1]),
-        stored=union("stored"),
-        current=of_result("current"),
-        voltage=of_result("voltage"),
-        electrical_power=of_result("electrical_power"),
+        losses=losses,
+        stored=by_element([r.stored for r in results]),
+        current=gathered([r.current for r in results]),
+        voltage=gathered([r.voltage for r in results]),
+        electrical_power=gathered([r.electrical_power for r in results]),
         motors=tuple(motors[k] for k in range(len(motors))),
     )

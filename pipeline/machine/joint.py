@@ -1,10 +1,10 @@
-"""One joint's drivetrain and sensors: laws in a row, what stands beside them, and their answers.
+"""One joint's drivetrain and sensors: laws in a row, springs beside them, and their answers.
 
-Everything is told at the joint side: the motor's angle is divided by the ratio, its torque
+Everything is referred to the joint side: the motor's angle is divided by the ratio, its torque
 multiplied with it. A joint at q that demands the torque tau of its drivetrain gets it from
 
-    load    sigma = tau + springs and ripples at q        `beside`
-    motion  theta = q + compliance sigma + (backlash / 2) tanh(sigma / crossing)      `wind`
+    load    sigma = tau + springs and ripples at q        `drive_load`
+    motion  theta = q + compliance sigma + (backlash / 2) tanh(sigma / crossing)    `deflection`
     motor   the elements in a row                         `at_motor`, `holding`
 
 and from what coupled motors carry, which `pipeline.machine.drivetrains` adds.
@@ -12,6 +12,7 @@ and from what coupled motors carry, which `pipeline.machine.drivetrains` adds.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -86,14 +87,11 @@ class JointModel:
     @property
     def ratio(self) -> float:
         """Motor speed over joint speed."""
-        total = 1.0
-        for element in self.elements:
-            total *= float(np.asarray(element.gearing))
-        return total
+        return math.prod(float(np.asarray(element.gearing)) for element in self.elements)
 
     @property
-    def wound(self) -> bool:
-        """Whether motor and joint turn apart from one another."""
+    def is_elastic(self) -> bool:
+        """Whether motor and joint turn apart from one another, by elasticity or backlash."""
         return self.compliance != 0.0 or self.backlash != 0.0
 
     def with_element(self, element: Element, *, at_motor: bool = False) -> JointModel:
@@ -113,7 +111,7 @@ class JointModel:
             name, k = f"{element.name}_{k}", k + 1
         return replace(element, name=name)
 
-    def beside(self, position: Array, torque: Array) -> Array:
+    def drive_load(self, position: Array, torque: Array) -> Array:
         """What the drivetrain has to supply with springs and ripples beside it, (...) [N*m].
 
         Args:
@@ -124,13 +122,13 @@ class JointModel:
             torque = torque + law.torque(position)
         return torque
 
-    def wind(self, load: Array) -> Array:
+    def deflection(self, load: Array) -> Array:
         """Motor angle less joint angle at the joint side under a load (...) [N*m], (...) [rad]."""
-        wind: Array = self.compliance * load
+        deflection: Array = self.compliance * load
         if self.backlash:
             flank = np.tanh(load / max(self.crossing, _LEAST_CROSSING))
-            wind = wind + 0.5 * self.backlash * flank
-        return wind
+            deflection = deflection + 0.5 * self.backlash * flank
+        return deflection
 
     def at_motor(self, side: ShaftSeries) -> ShaftSeries:
         """What the motor's shaft needs for a motion and load at the joint side (inverse)."""
@@ -164,7 +162,7 @@ class JointModel:
 
     @property
     def chain(self) -> Chain:
-        """Elements and motor as a chain, whose losses are told element by element.
+        """Elements and motor as a chain, whose losses are reported element by element.
 
         Raises:
             ModelError: The model has no motor here.
@@ -185,8 +183,5 @@ def joints_of(chain: Chain | None, names: tuple[str, ...]) -> tuple[JointModel, 
         names: Of the joints.
     """
     if chain is None:
-        return tuple(JointModel(name) for name in names)
-    return tuple(
-        JointModel(name, elements=chain.elements, motor=chain.motor, stages=chain.stages)
-        for name in names
-    )
+        return tuple(map(JointModel, names))
+    return tuple(JointModel(n, chain.elements, chain.motor, stages=chain.stages) for n in names)

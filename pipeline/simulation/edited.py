@@ -105,7 +105,7 @@ class Effects:
         """
         torque = np.array(demand.torque)
         for k, actuator in enumerate(self._machine.actuators):
-            torque[:, k] = actuator.beside(demand.position[:, k], torque[:, k])
+            torque[:, k] = actuator.drive_load(demand.position[:, k], torque[:, k])
         squeeze = self._machine.bodies.squeeze
         if squeeze and segment.stance:
             robot = self.robot

@@ -271,7 +271,7 @@ class ForwardSimulator:
         bias = pin.rnea(self._rigid, self._data, full, self._spread(v), np.zeros(self._rigid.nv))
         load = np.asarray(bias)[self._columns]
         for k, actuator in enumerate(self._actuators):
-            load[k] = actuator.beside(q[k], load[k])
+            load[k] = actuator.drive_load(q[k], load[k])
         mass = np.asarray(pin.crba(self._rigid, self._data, full))
         mass = (np.triu(mass) + np.triu(mass, 1).T)[np.ix_(self._columns, self._columns)]
         _, current = now.electrical(q + self._offset, self._ratio * v)

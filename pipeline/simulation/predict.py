@@ -127,13 +127,13 @@ class Simulator:
         offset = np.array([a.encoder_offset for a in model.actuators])
         q = m.q - offset if offset.any() else m.q
         torque = self._bodies.torque(model, (q, m.v, m.a))
-        if not m.at_motor or not any(a.wound for a in model.actuators):
+        if not m.at_motor or not any(a.is_elastic for a in model.actuators):
             return q, torque
         # The encoder sits on the motor: the link lags behind by the elastic deflection.
         deflection = np.zeros_like(q)
         for k, a in enumerate(model.actuators):
-            if a.wound:
-                deflection[:, k] = m.lowpass(a.wind(self._load(model, k, q, torque)))
+            if a.is_elastic:
+                deflection[:, k] = m.lowpass(a.deflection(self._load(model, k, q, torque)))
         rate = m.derivative(deflection)
         q = q - deflection
         return q, self._bodies.torque(model, (q, m.v - rate, m.a - m.derivative(rate)))
@@ -143,7 +143,7 @@ class Simulator:
         m, joints = self.measurement, model.actuators
 
         def demand(i: int) -> Array:
-            asked = joints[i].beside(q[:, i], torque[:, i])
+            asked = joints[i].drive_load(q[:, i], torque[:, i])
             if not joints[i].apart:
                 return asked
             own = self._side(i, (q[:, i], m.v[:, i], m.a[:, i]), asked)
@@ -172,8 +172,8 @@ class Simulator:
         m, a, drives = self.measurement, model.actuators[k], model.drivetrains
         load = self._load(model, k, q, torque)
         position, velocity, acceleration = (drives.turned(k, x) for x in (m.q, m.v, m.a))
-        if a.wound and not m.at_motor:
-            deflection = m.lowpass(a.wind(load))
+        if a.is_elastic and not m.at_motor:
+            deflection = m.lowpass(a.deflection(load))
             rate = m.derivative(deflection)
             position, velocity = position + deflection, velocity + rate
             acceleration = acceleration + m.derivative(rate)

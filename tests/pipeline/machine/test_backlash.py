@@ -15,7 +15,7 @@ VALUES = {"width": 0.01, "stiffness": 1e3, "crossing": 0.2}
 def lead(torque: np.ndarray) -> np.ndarray:
     """How far the motor leads its joint."""
     model = effect_named("backlash").apply(leg.leg_model(), J3, VALUES)
-    return model.actuator(J3[0]).wind(torque)
+    return model.actuator(J3[0]).deflection(torque)
 
 
 def test_play_is_odd_nothing_without_load_and_ends_at_its_flanks() -> None:
