@@ -144,15 +144,9 @@ class Robot:
         quaternion = configuration[:, 3:7]
         if np.array_equal(quaternion, np.broadcast_to([0.0, 0.0, 0.0, 1.0], quaternion.shape)):
             return None
-        x, y, z, w = quaternion.T
-        return np.stack(
-            [
-                np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)], -1),
-                np.stack([2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)], -1),
-                np.stack([2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)], -1),
-            ],
-            axis=-2,
-        )
+        from scipy.spatial.transform import Rotation
+
+        return np.asarray(Rotation.from_quat(quaternion).as_matrix())
 
     def configuration(self, joint_positions: Array, base_position: Array | None = None) -> Array:
         """Assemble Pinocchio configurations.

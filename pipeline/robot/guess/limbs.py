@@ -68,10 +68,8 @@ def find_limbs(
         reason = "named by --foot"
     else:
         chosen, reason = _looked_for(model, data, where)
-    _refuse_few(model, chosen, where)
     paths = [_path(model, model.frames[k].parentJoint) for k in chosen]
-    _refuse_shared(model, chosen, where)
-    _refuse_long(model, chosen, paths, where)
+    _refuse(model, chosen, paths, where)
     joints = [tuple(str(model.names[j]) for j in path) for path in paths]
     frames = [str(model.frames[k].name) for k in chosen]
     places = np.array([data.oMf[k].translation for k in chosen])
@@ -157,18 +155,6 @@ def _some(model: pin.Model, frames: Sequence[int]) -> str:
     return ", ".join(shown)
 
 
-def _refuse_few(model: pin.Model, chosen: Sequence[int], where: str) -> None:
-    if len(chosen) >= _FEWEST:
-        return
-    found = f" ({_some(model, chosen)})" if chosen else ""
-    feet = {0: "no foot", 1: "one foot", 2: "two feet"}[len(chosen)]
-    leaves = _outermost(model, _bodies(model))
-    raise RobotFileError(
-        f"{where}: {feet} found{found}; a gait that is statically stable needs three feet on the "
-        f"ground. If there are more, name them with --foot; chains end in {_some(model, leaves)}"
-    )
-
-
 def _spaced(name: str) -> str:
     """A name with its humps parted: LeftFootLink to Left Foot Link."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
@@ -185,7 +171,22 @@ def _shared(model: pin.Model, chosen: Sequence[int]) -> tuple[int, int, int] | N
     return None
 
 
-def _refuse_shared(model: pin.Model, chosen: Sequence[int], where: str) -> None:
+def _refuse(
+    model: pin.Model, chosen: Sequence[int], paths: Sequence[list[int]], where: str
+) -> None:
+    """Too few feet, two on one leg, or legs that are too long.
+
+    Raises:
+        RobotFileError: Any of these; says what to name.
+    """
+    if len(chosen) < _FEWEST:
+        found = f" ({_some(model, chosen)})" if chosen else ""
+        feet = {0: "no foot", 1: "one foot", 2: "two feet"}[len(chosen)]
+        leaves = _some(model, _outermost(model, _bodies(model)))
+        raise RobotFileError(
+            f"{where}: {feet} found{found}; a gait that is statically stable needs three feet on "
+            f"the ground. If there are more, name them with --foot; chains end in {leaves}"
+        )
     shared = _shared(model, chosen)
     if shared is not None:
         one, other = (model.frames[i].name for i in shared[:2])
@@ -193,11 +194,6 @@ def _refuse_shared(model: pin.Model, chosen: Sequence[int], where: str) -> None:
             f"{where}: feet '{one}' and '{other}' both hang on joint '{model.names[shared[2]]}'; a "
             "leg has one foot and joints of its own: name the feet with --foot, one for each leg"
         )
-
-
-def _refuse_long(
-    model: pin.Model, chosen: Sequence[int], paths: Sequence[list[int]], where: str
-) -> None:
     for k, path in zip(chosen, paths, strict=True):
         if len(path) > MOST_JOINTS:
             raise RobotFileError(

@@ -23,13 +23,10 @@ from pipeline.robot.robot_file import load_robot_file
 N = 20
 
 
-@pytest.fixture(scope="module", params=["hexapod.toml", "hexapod_axis90.toml", "leg.toml"])
+@pytest.fixture(scope="module", params=["hexapod", "tilted", "hexapod_axis90", "leg"])
 def robot(request: pytest.FixtureRequest, root: Path) -> Robot:
-    return load_robot(load_robot_file(root / "urdf" / request.param))
-
-
-@pytest.fixture(scope="module")
-def tilted(root: Path) -> Robot:
+    if request.param != "tilted":
+        return load_robot(load_robot_file(root / "urdf" / f"{request.param}.toml"))
     spec = load_robot_file(root / "urdf" / "hexapod.toml")
     return load_robot(spec.with_parameters({"joint_1_axis_angle": 0.6}))
 
@@ -65,28 +62,12 @@ def test_positions_and_jacobians_agree_with_pinocchio(robot: Robot) -> None:
     np.testing.assert_allclose(ours_jacobian, jacobian, atol=1e-12)
 
 
-def test_tilted_axis_agrees_with_pinocchio(tilted: Robot) -> None:
-    q = random_positions(tilted)
-    feet, jacobian = pinocchio_feet(tilted, q)
-    ours, ours_jacobian = foot_jacobians(tilted.chains, q)
-    np.testing.assert_allclose(ours, feet, atol=1e-12)
-    np.testing.assert_allclose(ours_jacobian, jacobian, atol=1e-12)
-
-
 def test_force_torques_are_the_jacobian_transposed(robot: Robot) -> None:
     q = random_positions(robot)
     force = np.random.default_rng(5).normal(size=q.shape)
     _, jacobian = foot_jacobians(robot.chains, q)
     expected = np.einsum("nlij,nli->nlj", jacobian, force)
     np.testing.assert_allclose(foot_force_torques(robot.chains, q, force), expected, atol=1e-12)
-
-
-def test_force_torques_of_a_tilted_axis_are_the_jacobian_transposed(tilted: Robot) -> None:
-    q = random_positions(tilted)
-    force = np.random.default_rng(6).normal(size=q.shape)
-    _, jacobian = pinocchio_feet(tilted, q)
-    expected = np.einsum("nlij,nli->nlj", jacobian, force)
-    np.testing.assert_allclose(foot_force_torques(tilted.chains, q, force), expected, atol=1e-12)
 
 
 def test_posture_of_some_legs_in_another_order(robot: Robot) -> None:

@@ -16,7 +16,7 @@ from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.standing import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
-from pipeline.robot.kinematics import foot_jacobians, foot_positions
+from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import leg_chains
 from pipeline.robot.robot import Robot, load_robot
 
@@ -149,17 +149,6 @@ def test_joints_stay_within_their_limits(hexapod: Robot, what: str) -> None:
                 make(robot)
 
 
-def test_feet_are_put_where_they_are_asked_for(hexapod: Robot) -> None:
-    """Anywhere within reach, from one start posture, and on its branch of the knee."""
-    rng = np.random.default_rng(5)
-    wanted = rng.uniform(-0.4, 0.4, (40, 6, 3))
-    target = foot_positions(hexapod.chains, wanted)
-    start = np.array([leg.start_posture for leg in hexapod.spec.legs])
-    found = solve_positions(hexapod.chains, target, start, np.arange(40.0))
-    np.testing.assert_allclose(foot_positions(hexapod.chains, found), target, atol=1e-9)
-    np.testing.assert_allclose(found, wanted, atol=1e-6)
-
-
 def test_a_foot_hardly_out_of_reach_is_refused_with_leg_and_instant(hexapod: Robot) -> None:
     """Legs stretched along a line, and a target 4 mm further out."""
     stretched = np.zeros((1, 6, 3))
@@ -184,22 +173,6 @@ def test_a_stretched_leg_has_no_rates(hexapod: Robot) -> None:
     q[1, 4, 2] = np.pi / 2
     with pytest.raises(OutOfReachError, match="leg 'rm' is stretched .* t = 0.5 s"):
         solve_rates(hexapod.chains, q, still, still, time)
-
-
-def test_rates_move_the_feet_as_asked(hexapod: Robot) -> None:
-    rng = np.random.default_rng(6)
-    q = rng.uniform(-0.3, 0.3, (10, 6, 3))
-    velocity, acceleration = rng.normal(size=(2, 10, 6, 3))
-    v, a = solve_rates(hexapod.chains, q, velocity, acceleration, np.zeros(10))
-    h = 3e-5
-    ahead, behind = (
-        foot_positions(hexapod.chains, q + s * h * v + 0.5 * h**2 * a) for s in (1.0, -1.0)
-    )
-    here = foot_positions(hexapod.chains, q)
-    np.testing.assert_allclose((ahead - behind) / (2 * h), velocity, rtol=1e-5)
-    np.testing.assert_allclose((ahead - 2 * here + behind) / h**2, acceleration, rtol=1e-3)
-    jacobian = foot_jacobians(hexapod.chains, q)[1]
-    np.testing.assert_allclose(np.einsum("nlij,nlj->nli", jacobian, v), velocity, atol=1e-12)
 
 
 LEG = """<robot name="r"><link name="base"/>
