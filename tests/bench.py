@@ -79,14 +79,13 @@ def csv_ratio(robot: Robot, motion: Motion) -> None:
 
 #: Module, function in it, and the phase of a run that its CPU time counts for.
 COUNTED = (
-    ("pipeline.cli.run", "settings", "loading"),
+    ("pipeline.cli.walking", "settings_of", "loading"),
     ("pipeline.api.reports", "stand", "computing"),
     ("pipeline.api.reports", "walked", "computing"),
-    ("pipeline.api.tables", "walked", "computing"),
     ("pipeline.api.reports", "write_table", "CSV and sidecars"),
     ("pipeline.api.judgement", "judged", "judging"),
     ("pipeline.api.figures", "write_figures", "figures"),
-    ("pipeline.api.judgement", "pages", "pages"),
+    ("reports.pages.summary", "write_summary", "pages"),
 )
 #: Times the phases of one run from within, heavy imports first so that they are counted as such.
 PHASES = """

@@ -133,7 +133,7 @@ def agreement(out: Path) -> str:
     """What is fitted, predicted and contradicted: the first paragraph of `summary.md`."""
     from pipeline.api.judgement import judged
     from pipeline.cli.main import parser
-    from pipeline.cli.run import settings_of
+    from pipeline.cli.options import settings_of
     from pipeline.paper.judgement.basis import basis
     from reports.pages.summary_words import first_paragraph
 

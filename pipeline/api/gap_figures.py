@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,9 @@ from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
 from pipeline.identification.compare.stages import Stage, overall
+from pipeline.identification.workflow.story import Told, signature_name
 from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.predict import Prediction
 from reports.figures.gap.in_time import GapTrace, gap_time_figure
 from reports.figures.gap.signature import Signature, gap_signature_figure
@@ -20,6 +23,8 @@ from reports.figures.gap.waterfall import GapStep, gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
 from reports.figures.style import NARROW, WIDTH
+from reports.pages.gap_report import write_report
+from reports.table import Table
 from reports.typeset import unit_text
 
 Array = NDArray[np.float64]
@@ -228,3 +233,24 @@ def signature_variable(
     if variable == "velocity of the other joint" and others:
         return f"velocity of {m.joints[others[0]]} [rad/s]", m.v[:, others[0]]
     return f"velocity of {name} [rad/s]", m.v[:, joint]
+
+
+def write_pictures_and_page(
+    told: Told, bodies: FoundBodies, tables: Sequence[Table], folder: Path
+) -> None:
+    """Every figure, then the page that shows them."""
+    story, where = told.story, told.story.where
+    model, weighed = story.given.model, told.story.weighed
+    write_where_map(where.rows, model.joints, model.name, folder)
+    write_waterfall(weighed.stages, story.noise, story.naming.unit, model.name, folder)
+    write_in_time(where.measurements, weighed.stages[1], weighed.stages[-1], told.shown, folder)
+    for found, pair, joint in zip(story.naming.found, weighed.pairs, weighed.joints, strict=True):
+        name = signature_name(found)
+        if name in story.signatures:
+            stem, place = Path(name).stem, found.place
+            write_signature(where.measurements, *pair, joint, found.effect, place, stem, folder)
+    footer = (
+        f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "
+        "input hashes, versions."
+    )
+    write_report(story, bodies, tables, folder, footer)

@@ -2,38 +2,60 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pipeline.api.gap_bodies import bodies_of, bodies_tables, write_model
-from pipeline.api.gap_meta import metadata
+from pipeline.api.gap_bodies import bodies_of, bodies_tables, refuse_own_urdf, write_model
+from pipeline.api.gap_meta import inputs_of, metadata
 from pipeline.api.gap_tables import (
+    base_table,
     candidates_table,
     forward_table,
     found_table,
+    motion_table,
     quality_table,
     rollout_tables,
     where_table,
 )
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result, by_name
-from pipeline.effects.model_file import edits_in
+from pipeline.effects.model_file import ModelFile, edits_in
 from pipeline.identification.compare.stages import overall
+from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
-from pipeline.identification.workflow.forward import rms
 from pipeline.identification.workflow.locate import Whereabouts, find_where, judged
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
-from pipeline.identification.workflow.story import Story, tell
+from pipeline.identification.workflow.story import Story, Told, tell
 from pipeline.identification.workflow.validate import check
+from pipeline.logs.quality.finding import Finding
 from pipeline.progress import Progress
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.table import Table
 
 
 @dataclass(frozen=True, eq=False)
-class MeasuredLog(Result):
+class LogResult(Result):
+    """What one step finds in logs.
+
+    Attributes:
+        given: The machine as the step computed it.
+        findings: What the logs are worth.
+    """
+
+    given: Setup
+    findings: Sequence[Finding]
+
+    @property
+    def quality(self) -> Table:
+        """What the logs are worth: one row per judgement."""
+        return self.table("quality")
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredLog(LogResult):
     """A log that was read and judged.
 
     Attributes:
@@ -44,35 +66,59 @@ class MeasuredLog(Result):
     path: Path
     mapping: Path | None
 
-    @property
-    def quality(self) -> Table:
-        """What the log is worth: one row per judgement."""
-        return self.table("quality")
-
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Result):
-    """Where model and machine disagree."""
+class Comparison(LogResult):
+    """Where model and machine disagree.
+
+    Attributes:
+        residuals: By joint and circumstance, with the predictions they rest on.
+    """
+
+    residuals: Whereabouts
 
     @property
     def where(self) -> Table:
         """The gap by joint and circumstance."""
         return self.table("where")
 
+    def _write(self, out: Path, decimal: str) -> None:
+        from pipeline.api.gap_figures import write_where_map
+
+        super()._write(out, decimal)
+        model = self.given.model
+        write_where_map(self.residuals.rows, model.joints, model.name, out)
+
 
 @dataclass(frozen=True, eq=False)
-class Identified(Result):
+class Identified(LogResult):
     """What the model lacks, and what it leaves once that is written into it.
 
     Attributes:
-        model: The machine with what was found and written.
-        story: Everything the page tells.
+        told: Everything that the files say.
         bodies: Those found to be others, and the corrected URDF.
+        step: ``name`` saves tables, ``add`` the model file with them, others pictures and a page.
+        machine: That was compared; None for the command line.
     """
 
-    model: Machine
-    story: Story
+    told: Told
     bodies: FoundBodies
+    step: str
+    machine: Machine | None = field(default=None, repr=False)
+
+    @property
+    def story(self) -> Story:
+        """What the page says."""
+        return self.told.story
+
+    @property
+    def model(self) -> Machine:
+        """The machine with what was found and written."""
+        assert self.machine is not None
+        text = self.told.model_file
+        if not text or self.step == "shrink":
+            return self.machine
+        return self.machine.with_model(replace(self.given.file, edits=edits_in(text)))
 
     @property
     def found(self) -> Table:
@@ -86,7 +132,7 @@ class Identified(Result):
 
     @property
     def gap(self) -> tuple[float, float]:
-        """Root mean square gap on rows that had no say, before and with the model as written."""
+        """Root mean square gap on held-out rows, before and with the model as written."""
         stages = self.story.weighed.stages
         return overall(stages[0].gap), overall(stages[-1].gap)
 
@@ -97,18 +143,32 @@ class Identified(Result):
 
     def _write(self, out: Path, decimal: str) -> None:
         super()._write(out, decimal)
-        write_model(out, self.story.weighed.text, self.bodies)
+        if self.step != "name":
+            write_model(out, self.told.model_file, self.bodies)
+        if self.step in ("all", "shrink"):
+            from pipeline.api.gap_figures import write_pictures_and_page
+
+            write_pictures_and_page(self.told, self.bodies, list(self.tables.values()), out)
 
 
 @dataclass(frozen=True, eq=False)
-class Driven(Result):
+class Driven(LogResult):
     """A model that drove itself under its servos' law.
 
     Attributes:
-        position_rms: Root mean square position error with all effects [rad].
+        drives: One for each log and model.
     """
 
-    position_rms: float
+    drives: Sequence[Drive]
+
+    @property
+    def position_rms(self) -> float:
+        """Root mean square position error with all effects [rad]."""
+        return self.errors()[-1][1]
+
+    def errors(self) -> list[tuple[str, float]]:
+        """Models in order of their effects, each with its position error [rad]."""
+        return [(model, rms(drives)) for model, drives in by_model(self.drives).items()]
 
 
 def read_log(
@@ -125,11 +185,9 @@ def read_log(
     Raises:
         GapError: The log cannot be used; one line says which row or column and why.
     """
-    more = {**options, "mapping": Path(mapping) if mapping else None, "step": "read"}
-    run = _Run(machine, [path], [], more)
-    intake, _, _ = take_in(run.given, run.options)
-    tables = [quality_table(judged(intake).findings)]
-    return MeasuredLog("gap read", by_name(tables), run.meta, Path(path), more["mapping"])
+    result = _analysed("read", machine, [path], mapping=mapping, **options)
+    assert isinstance(result, MeasuredLog)
+    return result
 
 
 def compare(logs: Any, machine: Machine, **options: Any) -> Comparison:
@@ -143,10 +201,9 @@ def compare(logs: Any, machine: Machine, **options: Any) -> Comparison:
     Raises:
         GapError: A log cannot be used, or does not fit the machine.
     """
-    run = _Run(machine, logs, (), {**options, "step": "where"})
-    where = run.where()
-    tables = [quality_table(where.intake.findings), where_table(where.rows)]
-    return Comparison("gap where", by_name(tables), run.meta)
+    result = _analysed("where", machine, logs, **options)
+    assert isinstance(result, Comparison)
+    return result
 
 
 def identify(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Identified:
@@ -155,19 +212,15 @@ def identify(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> 
     Args:
         logs: To learn from, from `read_log` or by path.
         machine: The model.
-        test: Logs that only prove: they decide nothing.
+        test: Logs that are held out: nothing is fitted to them.
         **options: See `pipeline.identification.workflow.options.Options`.
 
     Raises:
         GapError: A log cannot be used, or does not fit the machine.
     """
-    run = _Run(machine, logs, test, {**options, "step": "add"})
-    where = run.where()
-    told = tell(run.given, where, run.options, Progress())
-    model = machine
-    if told.model_file:
-        model = machine.with_model(replace(run.given.file, edits=edits_in(told.model_file)))
-    return run.told(where, told.story, model)
+    result = _analysed("add", machine, logs, test, **options)
+    assert isinstance(result, Identified)
+    return replace(result, machine=machine)
 
 
 def validate(logs: Any, machine: Machine, **options: Any) -> Identified:
@@ -181,9 +234,9 @@ def validate(logs: Any, machine: Machine, **options: Any) -> Identified:
     Raises:
         GapError: A log cannot be used, or the machine has no effects.
     """
-    run = _Run(machine, logs, (), {**options, "step": "shrink"})
-    where = run.where()
-    return run.told(where, check(run.given, where).story, machine)
+    result = _analysed("shrink", machine, logs, **options)
+    assert isinstance(result, Identified)
+    return replace(result, machine=machine)
 
 
 def forward(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Driven:
@@ -198,64 +251,91 @@ def forward(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> D
     Raises:
         GapError: A log does not say what drives the servos.
     """
-    run = _Run(machine, logs, test, {**options, "step": "forward"})
-    drives = drive_forward(run.given, run.where(), run.options)
-    joints = run.given.model.joints
-    tables = [forward_table(drives, joints), *rollout_tables(drives, joints)]
-    last = [d for d in drives if d.model == drives[-1].model]
-    return Driven("gap forward", by_name(tables), run.meta, rms(last))
+    result = _analysed("forward", machine, logs, test, **options)
+    assert isinstance(result, Driven)
+    return result
 
 
-class _Run:
-    """Options and machine of one call, as the workflow takes them."""
-
-    def __init__(self, machine: Machine, logs: Any, test: Any, options: dict[str, Any]) -> None:
-        mapping = options.get("mapping")
-        for log in (*_several(logs), *_several(test)):
-            if mapping is None and isinstance(log, MeasuredLog):
-                mapping = log.mapping
-        named = {**options, "mapping": Path(mapping) if mapping else None}
-        self.options = Options(
-            tuple(map(_path, _several(logs))),
-            holdout=tuple(map(_path, _several(test))),
-            robot=machine.path,
-            gait=machine.files.gait,
-            actuators=machine.files.actuators,
-            changes=machine.changes,
-            **named,
-        )
-        check_options(self.options, machine.model)
-        self.given: Setup = setup(self.options, machine.model)
-
-    def meta(self) -> dict[str, Any]:
-        """What every sidecar says of the run."""
-        return metadata(self.options, self.given)
-
-    def where(self) -> Whereabouts:
-        """Steps 1 and 2."""
-        intake, parts, fitted = take_in(self.given, self.options)
-        return find_where(self.given, self.given.model, intake, parts, fitted)
-
-    def told(self, where: Whereabouts, story: Story, model: Machine) -> Identified:
-        """A result of the workflow."""
-        naming = story.naming
-        tables = [
-            quality_table(where.intake.findings),
-            where_table(where.rows),
-            candidates_table(naming.candidates, naming.found, self.given.model),
-            found_table(naming.found, self.given.model),
-        ]
-        bodies = bodies_of(self.given, story.weighed.text)
-        tables += bodies_tables(bodies)
-        verb = f"gap {self.options.step}"
-        return Identified(verb, by_name(tables), self.meta, model, story, bodies)
+def _analysed(
+    step: str, machine: Machine, logs: Any, test: Any = (), *, mapping: Any = None, **options: Any
+) -> LogResult:
+    several = [[x] if isinstance(x, str | Path | MeasuredLog) else list(x) for x in (logs, test)]
+    own = [log.mapping for log in (*several[0], *several[1]) if isinstance(log, MeasuredLog)]
+    mapping = mapping or next((path for path in own if path), None)
+    paths = [tuple(x.path if isinstance(x, MeasuredLog) else Path(x) for x in s) for s in several]
+    asked = Options(
+        paths[0],
+        step=step,
+        holdout=paths[1],
+        robot=machine.path,
+        gait=machine.files.gait,
+        actuators=machine.files.actuators,
+        changes=machine.changes,
+        mapping=Path(mapping) if mapping else None,
+        **options,
+    )
+    return analyse(asked, known=machine.model)
 
 
-def _several(logs: Any) -> list[Any]:
-    if isinstance(logs, str | Path | MeasuredLog):
-        return [logs]
-    return list(logs)
+def analyse(
+    options: Options, progress: Progress | None = None, *, known: ModelFile | None = None
+) -> LogResult:
+    """Run one step, or all of them.
+
+    Args:
+        options: Of the run.
+        progress: Told what is being done.
+        known: Effects of the machine; those of the options' model file by default.
+
+    Raises:
+        PipelineError: Unusable robot.
+        ActuatorError: Unusable actuators.
+        GapError: Unusable log, mapping or model file.
+    """
+    progress = progress or Progress()
+    check_options(options, known)
+    given = setup(options, known)
+    refuse_own_urdf(given, options.out)
+    step = options.step
+
+    def common(tables: Sequence[Table], findings: Sequence[Finding]) -> tuple[Any, ...]:
+        verb = "gap" if step == "all" else f"gap {step}"
+        inputs = tuple(inputs_of(options, given))
+        return verb, by_name(tables), lambda: metadata(options, given), inputs, given, findings
+
+    progress.step("reading and judging the logs")
+    intake, parts, fitted = take_in(given, options)
+    if step == "read":
+        findings = judged(intake).findings
+        read = common([quality_table(findings)], findings)
+        return MeasuredLog(*read, options.logs[0], options.mapping)
+    progress.step("simulating the logs' motion")
+    where = find_where(given, given.model, intake, parts, fitted)
+    findings, joints = where.intake.findings, given.model.joints
+    tables = [quality_table(findings), where_table(where.rows)]
+    if step == "where":
+        return Comparison(*common(tables, findings), where)
+    if step == "forward":
+        progress.step("driving the model by its servos")
+        drives = drive_forward(given, where, options)
+        driven = [forward_table(drives, joints), *rollout_tables(drives, joints)]
+        return Driven(*common(driven, findings), drives)
+    if step == "shrink":
+        progress.step("weighing the model file's effects")
+        told = check(given, where)
+    else:
+        progress.step("letting effects compete")
+        told = tell(given, where, options, progress)
+    bodies = bodies_of(given, told.model_file)
+    tables += [*_answer_tables(told, given), *bodies_tables(bodies)]
+    return Identified(*common(tables, findings), told, bodies, step)
 
 
-def _path(log: Any) -> Path:
-    return log.path if isinstance(log, MeasuredLog) else Path(log)
+def _answer_tables(told: Told, given: Setup) -> list[Table]:
+    naming = told.story.naming
+    return [
+        candidates_table(naming.candidates, naming.found, given.model),
+        found_table(naming.found, given.model),
+        *([base_table(naming)] if naming.base else []),
+        *([motion_table(told.deciding, given.model.joints)] if told.deciding else []),
+    ]

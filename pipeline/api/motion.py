@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result
-from pipeline.api.tables import metadata, tables_of_standing, tables_of_walking, walked
+from pipeline.api.tables import inputs_of, metadata, tables_of_standing, tables_of_walking, walked
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.machine.drivetrains import Actuators
 from pipeline.simulation import walk_stand
@@ -100,7 +100,9 @@ def stand(
     given = machine.walking(forces=choice, walks=False)
     chains = _beside_ideal(given, actuator)
     result = walk_stand.stand(given.machine, chains, adjust=given.adjust, forces=given.ground)
-    return Stand("stand", tables_of_standing(given, result), lambda: metadata(given), result)
+    inputs = tuple(inputs_of(given))
+    tables = tables_of_standing(given, result)
+    return Stand("stand", tables, lambda: metadata(given), inputs, result)
 
 
 def walk(
@@ -146,7 +148,8 @@ def walk(
         compare_forces=compare_forces,
     )
     result = walked(given, _beside_ideal(given, actuator))
-    return Walk("walk", tables_of_walking(given, result), lambda: metadata(given), result)
+    inputs = tuple(inputs_of(given))
+    return Walk("walk", tables_of_walking(given, result), lambda: metadata(given), inputs, result)
 
 
 def _choice(rule: str, actuator: str | None, friction_coefficient: float | None) -> ForceChoice:

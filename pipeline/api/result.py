@@ -24,11 +24,13 @@ class Result:
 
     Attributes:
         verb: Of the command line that writes the same.
+        inputs: Files that were read; they stay where they lie in a folder that is written.
     """
 
     verb: str
     _tables: Mapping[str, Table | Callable[[], Table]] = field(repr=False)
     _meta: Callable[[], dict[str, Any]] = field(repr=False)
+    inputs: tuple[Path, ...] = field(repr=False)
 
     def table(self, name: str) -> Table:
         """One table, computed when it is first asked for.
@@ -70,7 +72,7 @@ class Result:
         Raises:
             ReportError: The folder cannot be written.
         """
-        with staged(Path(folder), self.verb) as out:
+        with staged(Path(folder), self.verb, inputs=self.inputs) as out:
             self._write(out, decimal)
         return Path(folder)
 

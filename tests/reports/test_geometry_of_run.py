@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from pipeline.api.figures import Drawings, drawings
 from pipeline.cli.main import parser
-from pipeline.cli.run import settings_of
+from pipeline.cli.options import settings_of
 from pipeline.simulation.walk_stand import stand, walk
 from reports.pages.names import leg_words, names_text
 from tests.reports import geometry

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.cli.main import parser
-from pipeline.cli.run import settings_of
+from pipeline.cli.options import settings_of
 from pipeline.paper.judgement.basis import Basis, basis
 from tests.command_line import Command, exit_code, rows_of
 from tests.pipeline.cli.robots import changed, edited_robot, own_robot

@@ -16,7 +16,7 @@ import pipeline as lw
 from actuators.errors import ActuatorError
 from actuators.loading.build import load_catalog
 from actuators.units import to_si
-from pipeline.cli.walk_options import changes_of
+from pipeline.cli.options import changes_of
 from pipeline.errors import PipelineError
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.settings import Settings

@@ -15,7 +15,7 @@ import pytest
 
 import pipeline.identification.workflow.setup
 from pipeline.blind.twin.trial import make_trial
-from pipeline.cli.gap.options import add_gap_options, options_of
+from pipeline.cli.gap import add_gap_options, options_of
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.locate import Whereabouts, find_where

@@ -14,7 +14,7 @@ import pytest
 import scipy.signal
 from numpy.typing import NDArray
 
-from pipeline.cli.gap.options import options_of
+from pipeline.cli.gap import options_of
 from pipeline.cli.main import main, parser
 from pipeline.effects.model_file import load_model
 from pipeline.identification.compare.stages import overall

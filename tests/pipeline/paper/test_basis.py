@@ -12,7 +12,7 @@ import pytest
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.api import judgement as judging
 from pipeline.cli.main import parser
-from pipeline.cli.run import settings_of
+from pipeline.cli.options import settings_of
 from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.judgement.basis import Basis, Judged, basis

@@ -1,0 +1,196 @@
+"""The verb `gap`: its options, one call, and what it says."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.cli.options import (
+    AddVerb,
+    add_machine_options,
+    add_out_option,
+    add_verbose_option,
+    changes_of,
+    decimal_of,
+    folder_held,
+    named_path,
+)
+from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
+from pipeline.progress import Progress
+
+if TYPE_CHECKING:
+    from pipeline.api.logs import Comparison, Driven, Identified
+    from pipeline.identification.workflow.setup import Setup
+    from pipeline.logs.quality.finding import Finding
+
+logger = logging.getLogger("legwatt")
+#: Findings that are no remark on the data, and what their owner wants to know.
+READ_OFF = ("elasticity", "play", "ripple", "cannot_tell")
+#: Remarks on the data that the terminal shows.
+SAID = 5
+
+
+def add_verb(add: AddVerb) -> None:
+    """Declare the verb."""
+    sub = add("gap", "find what the model lacks: from a measured log to a named effect", run_gap)
+    add_gap_options(sub)
+
+
+def add_gap_options(sub: argparse.ArgumentParser) -> None:
+    """Declare the options."""
+    sub.add_argument(
+        "items",
+        nargs="+",
+        metavar="[STEP] LOG",
+        help="logs (CSV or Parquet) to learn from; a step in front of them does that step only: "
+        + "; ".join(f"{name}: {text}" for name, text in STEPS.items()),
+    )
+    changes = "change a number for this run, as `walk` takes it"
+    add_machine_options(sub, "robot file, or URDF of a fixed robot", changes)
+    sub.add_argument(
+        "--holdout",
+        type=named_path,
+        nargs="+",
+        default=[],
+        metavar="LOG",
+        help="logs on which the result is tested; nothing is fitted to them",
+    )
+    sub.add_argument(
+        "--base",
+        choices=["fixed", "level", "measured"],
+        help="how the base stands; measured where the log has roll or pitch, else level or fixed "
+        "as the robot file says",
+    )
+    sub.add_argument(
+        "--gait-start",
+        type=float,
+        metavar="SECONDS",
+        help="time in the log at which a period of the gait begins: tells which feet "
+        "stand where the log has neither foot forces nor contacts; the lowest feet without it",
+    )
+    sub.add_argument(
+        "--alternative",
+        metavar="NAME",
+        help="actuator between joint and supply: ideal, rotor (default), reversible or "
+        "irreversible, or one of --actuators; a bare URDF has none by default",
+    )
+    sub.add_argument("--mapping", type=named_path, help="mapping file (TOML) for foreign columns")
+    sub.add_argument(
+        "--effort",
+        metavar="CHANNEL",
+        help="measured quantity that is compared: torque, current, voltage or "
+        "power; the first of them in the log by default",
+    )
+    sub.add_argument(
+        "--cutoff",
+        type=float,
+        metavar="HZ",
+        help="cut-off frequency of the low-pass filter; chosen from the noise by default",
+    )
+    sub.add_argument(
+        "--prove-last",
+        type=float,
+        metavar="SHARE",
+        help="test on this last share of every log instead of on blocks in between",
+    )
+    add_out_option(sub, DEFAULT_OUT)
+    add_verbose_option(sub)
+
+
+def options_of(given: argparse.Namespace) -> Options:
+    """What the command line asks for."""
+    first, *rest = given.items
+    # A log file that is called like a step is a log.
+    one = first in STEPS and not Path(first).is_file()
+    named = {f.name: getattr(given, f.name) for f in fields(Options) if hasattr(given, f.name)}
+    named |= {
+        "step": first if one else "all",
+        "logs": tuple(Path(item) for item in (rest if one else given.items)),
+        "holdout": tuple(given.holdout),
+        "changes": changes_of(given.set),
+        "decimal": decimal_of(given),
+    }
+    return Options(**named)
+
+
+def run_gap(given: argparse.Namespace) -> int:
+    """Compute what is asked for, write it, say what a person wants to know first.
+
+    Returns:
+        0 where the gap is down to noise, 1 where a part stays unexplained.
+    """
+    with folder_held(given), Progress("gap") as progress:
+        progress.step("loading")
+        from pipeline.api.logs import Comparison, Driven, Identified, analyse
+
+        options = options_of(given)
+        result = analyse(options, progress)
+        progress.step("writing")
+        result.save(options.out, decimal=options.decimal)
+        progress.close()
+        if isinstance(result, Identified):
+            _say_warnings(result.given, result.findings)
+            _say_answer(result, options.out)
+            logger.info("what took long: %s", progress.took())
+            return int(result.unexplained)
+        if isinstance(result, Driven):
+            return _say_errors(result)
+        if isinstance(result, Comparison):
+            _say_warnings(result.given, result.findings)
+            _say_where(result)
+        else:
+            _say_findings(result.findings)
+        return 0
+
+
+def _say_findings(findings: Sequence[Finding]) -> None:
+    odd = [finding for finding in findings if finding.verdict != "ok"]
+    told = [f for f in findings if f.check in READ_OFF]
+    for finding in (*odd, *told):
+        place = f" {finding.column}" if finding.column else ""
+        word = finding.check if finding in told else finding.verdict
+        print(f"{finding.log}{place}: {word.replace('_', ' ')}: {finding.detail}")
+    print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
+
+
+def _say_warnings(given: Setup, findings: Sequence[Finding]) -> None:
+    """What a reader of the answer should know about files and logs, the first few."""
+    warnings = [f for f in findings if f.verdict == "warning"]
+    lines = [*given.warnings]
+    lines += [f"{f.log}{' ' if f.column else ''}{f.column}: {f.detail}" for f in warnings]
+    for line in lines[:SAID]:
+        print(f"note: {line}")
+    if len(lines) > SAID:
+        print(f"note: {len(lines) - SAID} more remarks of this kind in quality.csv")
+
+
+def _say_where(result: Comparison) -> None:
+    from pipeline.identification.compare.circumstances import WHOLE
+
+    for row in [r for r in result.residuals.rows if r.by == WHOLE][:3]:
+        print(
+            f"{row.joint}: gap {row.gap:.3g} {row.unit}, {row.gap / row.noise_floor:.1f} times "
+            f"the noise floor, {row.share_of_total:.0%} of the whole"
+        )
+
+
+def _say_answer(result: Identified, out: Path) -> None:
+    from reports.pages.gap_report import answer, whose_motors
+    from reports.typeset import plain
+
+    for paragraph in (whose_motors(result.story), *answer(result.story, result.bodies)):
+        print(plain(paragraph))
+    print(f"written to {out}")
+
+
+def _say_errors(result: Driven) -> int:
+    """Position errors; 1 where the model file's effects bring positions no nearer."""
+    logs = len({drive.log.name for drive in result.drives})
+    errors = result.errors()
+    for model, error in errors:
+        print(f"{model}: position misses by {1e3 * error:.1f} mrad root mean square, {logs} logs")
+    return int(len(errors) > 1 and errors[-1][1] >= errors[0][1])

@@ -1,1 +1,0 @@
-"""The verb `gap`: options, what it writes, what it says."""

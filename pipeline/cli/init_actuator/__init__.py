@@ -1,1 +1,0 @@
-"""The verb `init-actuator`: a folder of actuator files from a data sheet."""

@@ -1,0 +1,179 @@
+"""Options that several verbs share, and what they ask for."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from actuators.errors import one_line
+from pipeline.errors import RobotFileError
+
+if TYPE_CHECKING:
+    from pipeline.simulation.settings import Settings
+
+OUT = Path("reports/out")
+#: Runs a verb and returns the exit code.
+Run = Callable[[argparse.Namespace], int]
+#: Adds a verb: its name, what it does, and what runs it.
+AddVerb = Callable[[str, str, Run], argparse.ArgumentParser]
+
+
+def named_path(text: str) -> Path:
+    """The path that an option names.
+
+    An empty one is what an unset variable of a shell leaves; taken for a path it would be the
+    folder the command runs in.
+
+    Raises:
+        argparse.ArgumentTypeError: There is no name in it.
+    """
+    if not text.strip():
+        raise argparse.ArgumentTypeError("expected a name, got an empty one")
+    if "\x00" in text:
+        raise argparse.ArgumentTypeError("no file can have this name")
+    return Path(text)
+
+
+def add_out_option(sub: argparse.ArgumentParser, default: Path = OUT) -> None:
+    """Folder, decimal sign, and how much is said."""
+    text = f"folder for what is written; {default}"
+    sub.add_argument("--out", type=named_path, default=default, help=text)
+    sub.add_argument(
+        "--decimal",
+        choices=["dot", "comma"],
+        default="dot",
+        help="comma: write copies for a decimal-comma spreadsheet beside the plain files",
+    )
+
+
+def add_verbose_option(sub: argparse.ArgumentParser, text: str = "say what is being done") -> None:
+    """How much is said."""
+    sub.add_argument("-v", "--verbose", action="store_true", help=text)
+
+
+def decimal_of(options: argparse.Namespace) -> str:
+    """The decimal sign that was asked for."""
+    return "," if options.decimal == "comma" else "."
+
+
+@contextmanager
+def folder_held(options: argparse.Namespace) -> Iterator[None]:
+    """Hold the folder of results from the start, and see that the model's folder is settled."""
+    from reports.folder import holding, settled
+
+    if getattr(options, "model", None):
+        settled(options.model.parent)
+    with holding(options.out):
+        yield
+
+
+def add_machine_options(sub: argparse.ArgumentParser, robot: str, changes: str) -> None:
+    """Robot, gait, effects, actuators, and numbers that differ.
+
+    Args:
+        sub: The verb's parser.
+        robot: What ``--robot`` may name, in words.
+        changes: What ``--set`` takes, in words.
+    """
+    text = f"{robot}; the model file's or the hexapod by default"
+    sub.add_argument("--robot", type=named_path, help=text)
+    text = "model file: include the effects that `gap` found"
+    sub.add_argument("--model", type=named_path, help=text)
+    sub.add_argument(
+        "--gait",
+        type=named_path,
+        metavar="FILE",
+        help="TOML with a table [gait] to walk instead of the robot file's",
+    )
+    sub.add_argument(
+        "--actuators",
+        type=named_path,
+        metavar="DIR",
+        help="folder of actuator files of your own; actuators/catalog by default",
+    )
+    sub.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help=changes)
+
+
+def add_walk_options(sub: argparse.ArgumentParser, samples: int) -> None:
+    """Machine, forces of the ground, regeneration, samples.
+
+    Args:
+        sub: The verb's parser.
+        samples: Per half period of the gait, by default.
+    """
+    add_machine_options(
+        sub,
+        "robot file",
+        "change a number for this run: NAME=VALUE in the unit the robot file writes, "
+        "COMPONENT.NAME=VALUE for an actuator, gait.KEY=VALUE ('gait.slope_forward=5 deg'), "
+        "standing.feet=LEG,LEG,LEG (standing.feet=lf,lr,rm), lists and tables of [gait] as TOML: "
+        """'gait.sets=[["lf", "rr"], ["rf", "lr"]]'""",
+    )
+    sub.add_argument(
+        "--quasi-static", action="store_true", help="leave out the links' inertial terms"
+    )
+    sub.add_argument(
+        "--regeneration",
+        default="none",
+        metavar="POLICY",
+        help="what becomes of electrical energy that motors return: none (it is lost), bus (other "
+        "motors use it at that instant), or the fraction that is used again, e.g. 0.5",
+    )
+    text = f"per half period of the gait; {samples}"
+    sub.add_argument("--samples", type=int, default=samples, help=text)
+    sub.add_argument(
+        "--forces",
+        default="least_tangential",
+        metavar="RULE",
+        help="how the ground's forces are chosen: least_tangential (the paper's rule), "
+        "least_torque (joint torques squared), least_power (of the actuator in --power-of)",
+    )
+    sub.add_argument("--power-of", metavar="ALTERNATIVE", help="actuator of --forces least_power")
+    sub.add_argument(
+        "--friction-coefficient",
+        type=float,
+        metavar="MU",
+        help="greatest tangential over normal force of a foot; gait.friction_coefficient, else no "
+        "limit, by default",
+    )
+
+
+def changes_of(texts: Iterable[str]) -> dict[str, str]:
+    """Keys and values of ``--set KEY=VALUE``; the last counts where a key comes twice.
+
+    Raises:
+        RobotFileError: One is something else.
+    """
+    changes = {}
+    for text in texts:
+        key, _, value = (part.strip() for part in text.partition("="))
+        if not key or not value:
+            raise RobotFileError(f"--set {one_line(text)}: expected KEY=VALUE")
+        changes[key] = value
+    return changes
+
+
+def settings_of(options: argparse.Namespace) -> Settings:
+    """The machine that is asked for, loaded, and how it walks."""
+    from pipeline.api.machine import load
+    from pipeline.simulation.ground_forces.force_choice import ForceChoice
+
+    machine = load(
+        options.robot,
+        model=options.model,
+        gait=options.gait,
+        actuators=options.actuators,
+        changes=changes_of(options.set),
+    )
+    return machine.walking(
+        samples=options.samples,
+        quasi_static=options.quasi_static,
+        regeneration=options.regeneration,
+        forces=ForceChoice(options.forces, options.power_of, options.friction_coefficient),
+        compare_forces=getattr(options, "compare_forces", False),
+        motion=getattr(options, "motion", None),
+        walks=options.verb != "stand",
+    )

@@ -1,0 +1,101 @@
+"""The verbs stand, walk, reports, view and diff: options in, one call, lines out."""
+
+from __future__ import annotations
+
+import argparse
+
+from pipeline.cli.options import (
+    OUT,
+    AddVerb,
+    add_out_option,
+    add_verbose_option,
+    add_walk_options,
+    decimal_of,
+    folder_held,
+    named_path,
+    settings_of,
+)
+from pipeline.progress import Progress
+
+
+def add_verbs(add: AddVerb) -> None:
+    """Declare the verbs."""
+    for verb, text in (
+        ("stand", "standing still: torques, currents, power of every alternative"),
+        ("walk", "one walking cycle: demand, stage energies, losses, limits"),
+        ("reports", "stand and walk, with all figures and a page, index.html"),
+    ):
+        sub = add(verb, text, run_reports)
+        add_walk_options(sub, samples=751)
+        text = "write walking_force_rules.csv: what each rule costs"
+        sub.add_argument("--compare-forces", action="store_true", help=text)
+        if verb == "walk":
+            sub.add_argument(
+                "--motion",
+                type=named_path,
+                metavar="FILE",
+                help="CSV to move by instead of the gait: time_s, JOINT__position_rad and, unless "
+                "the base is fixed, LEG__contact (0 or 1); base__x_m to base__yaw_rad where known",
+            )
+        add_out_option(sub)
+        add_verbose_option(sub)
+    sub = add("view", "play robot, gait, forces and torques in a browser, in 3D", run_view)
+    add_walk_options(sub, samples=201)
+    sub.add_argument("--host", default="127.0.0.1", help="address to listen on; this machine's own")
+    sub.add_argument("--port", type=_port, default=8080, help="port; the next free one if taken")
+
+
+def add_diff(add: AddVerb) -> None:
+    """Declare the verb diff."""
+    sub = add("diff", "lay two finished runs side by side on one page", run_diff)
+    kinds = "folder that stand, walk and reports wrote, or gap"
+    sub.add_argument("a", type=named_path, metavar="A", help=kinds)
+    sub.add_argument("b", type=named_path, metavar="B", help="another, of a run of the same kind")
+    add_out_option(sub, OUT / "diff")
+
+
+def run_reports(options: argparse.Namespace) -> int:
+    """Compute what the verb asks for and write it to the output folder."""
+    with folder_held(options), Progress(options.verb) as progress:
+        progress.step("loading")
+        from pipeline.api.reports import write
+
+        given = settings_of(options)
+        lines = write(given, options.verb, options.out, decimal_of(options), progress)
+        progress.close()
+        print(*lines, sep="\n")
+    return 0
+
+
+def _port(text: str) -> int:
+    if not (text.isdecimal() and 0 < int(text) < 65536):
+        raise argparse.ArgumentTypeError(f"'{text}' is no port; expected 1 to 65535")
+    return int(text)
+
+
+def run_view(options: argparse.Namespace) -> int:
+    """Serve the cycle until interrupted.
+
+    Raises:
+        ReportError: The package viser is not installed.
+    """
+    from pipeline.api.pictures.view import player, viser_module
+
+    viser_module()  # refused before anything is computed
+    shown = player(settings_of(options), host=options.host, port=options.port)
+    print(f"open {shown.address} in a browser; Ctrl-C ends it", flush=True)
+    try:
+        shown.play()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        shown.stop()
+    return 0
+
+
+def run_diff(options: argparse.Namespace) -> int:
+    """Compare two folders and write the page."""
+    from pipeline.api.diff.page import write_diff
+
+    print(*write_diff(options.a, options.b, options.out, decimal_of(options)), sep="\n")
+    return 0
