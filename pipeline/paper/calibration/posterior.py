@@ -22,7 +22,7 @@ likelihood with edges does not have, and it asks for many walkers at once.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import emcee
 import numpy as np
@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize.elementwise import find_root
 
+from actuators.chain import Chain
 from pipeline.paper.calibration.prior import Free
 from pipeline.paper.calibration.problem import Problem, Target
 from pipeline.paper.constants.motor_constants import KEYS
@@ -67,21 +68,26 @@ _SETTLING = 0.15  # of the steps, twice, before any is kept
 
 @dataclass(frozen=True)
 class _Sets:
-    """Walkers as sets of numbers: the demand of their robots, and numbers in SI by reference (W,).
+    """Walkers as sets of numbers.
 
-    The printed leg's demand is kept by itself: most targets need no other.
+    Attributes:
+        demand: Of their robots.
+        leg: The same of the printed leg alone: most targets need no other.
+        ideal: What that leg draws with the ideal actuator, (W,) [J].
+        values: Numbers in SI, by reference, (W,).
     """
 
     demand: Demand
     leg: Demand
+    ideal: Array
     values: dict[str, Array]
 
     def taken(self, which: NDArray[np.intp]) -> _Sets:
         values = {k: v[which] for k, v in self.values.items()}
-        return _Sets(self.demand.taken(which), self.leg.taken(which), values)
+        return _Sets(self.demand.taken(which), self.leg.taken(which), self.ideal[which], values)
 
     def with_number(self, key: str, value: Array) -> _Sets:
-        return _Sets(self.demand, self.leg, {**self.values, key: value})
+        return replace(self, values={**self.values, key: value})
 
 
 class Posterior:
@@ -143,10 +149,9 @@ class Posterior:
         for name, free in self.solved.items():
             kept = np.flatnonzero(np.isfinite(log))
             if kept.size:
-                own = sets.taken(kept)
-                goal, unit = self._goal(name, x[kept]), self._unit(name, own)
-                found, density = self._solved(name, free, own, goal * unit)
-                log[kept] += density + np.log(unit)
+                goal = self._goal(name, x[kept])
+                found, density = self._solved(name, free, sets.taken(kept), goal)
+                log[kept] += density
                 sets.values[free.key][kept] = found
         kept = np.flatnonzero(np.isfinite(log))
         if kept.size:
@@ -160,7 +165,9 @@ class Posterior:
         values |= dict(zip(KEYS, x[:, self.constants].T, strict=False))
         values |= {f.key: np.full(len(x), f.centre) for f in self.solved.values()}
         robots = np.clip(x[:, 0], 0, self.robots.count - 1).astype(np.intp)
-        return _Sets(self.robots.taken(robots), self.robots_leg.taken(robots), values)
+        leg = self.robots_leg.taken(robots)
+        ideal = drawn(leg, self._chain(leg, "ideal", values))
+        return _Sets(self.robots.taken(robots), leg, ideal, values)
 
     def _goal(self, name: str, x: Array) -> Array:
         """The value of a solved target that walkers ask for, (W,)."""
@@ -171,46 +178,37 @@ class Posterior:
         aim = x[:, self.aims.start + self.aimed.index(name)]
         return target.centre + target.half_width * aim
 
+    def _chain(self, demand: Demand, name: str, values: dict[str, Array]) -> Chain:
+        """An alternative with one number per set."""
+        return chain_at(demand, self.task.catalog, name, with_splits(values, self.task.ratio))
+
     def _outcome(self, sets: _Sets, name: str) -> Outcome:
-        values = with_splits(sets.values, self.task.ratio)
-        return outcome(sets.demand, chain_at(sets.demand, self.task.catalog, name, values))
+        return outcome(sets.demand, self._chain(sets.demand, name, sets.values))
 
-    def _drawn(self, sets: _Sets, name: str) -> Array:
-        """E_el(+) per cycle of the printed leg, (W,) [J]."""
-        values = with_splits(sets.values, self.task.ratio)
-        return drawn(sets.leg, chain_at(sets.leg, self.task.catalog, name, values))
-
-    def _unit(self, name: str, sets: _Sets) -> Array:
-        """What a solved target is a multiple of, (W,): the ideal actuator's energy, or 1."""
-        if name in (HELD, EXTRA):
-            return np.ones(sets.demand.count)
-        return self._drawn(sets, "ideal")
-
-    def _target(self, name: str, sets: _Sets) -> Array:
-        """A solved target in its `_unit`, (W,)."""
+    def target(self, name: str, sets: _Sets) -> Array:
+        """A solved target of each set, (W,)."""
         if name == EXTRA:
             return _extra(*(self._outcome(sets, alternative) for alternative in PAIR))
         if name == HELD:
-            values = with_splits(sets.values, self.task.ratio)
-            chain = chain_at(sets.demand, self.task.catalog, "reversible", values)
+            chain = self._chain(sets.demand, "reversible", sets.values)
             # The torque of joint 2 is negative: the upper end of what holds is the least.
             return printed_leg(chain.holding(sets.demand.standing).high)[:, 1]
-        return self._drawn(sets, name.removeprefix("walking_ratio_"))
+        chain = self._chain(sets.leg, name.removeprefix("walking_ratio_"), sets.values)
+        return drawn(sets.leg, chain) / sets.ideal
 
     def _solved(self, name: str, free: Free, sets: _Sets, goal: Array) -> tuple[Array, Array]:
         """The number that gives a target, and the log density it brings, (W,) each."""
-        count = goal.size
-        every = np.arange(count, dtype=np.float64)
+        every = np.arange(goal.size, dtype=np.float64)
 
         def missed(z: Array, which: Array) -> Array:
-            own = sets.taken(which.astype(np.intp))
-            at: Array = self._target(name, own.with_number(free.key, free.at(z)))
-            return at - goal[which.astype(np.intp)]
+            chosen = which.astype(np.intp)
+            at = self.target(name, sets.taken(chosen).with_number(free.key, free.at(z)))
+            return at - goal[chosen]
 
-        low, high = (np.full(count, end) for end in free.ends)
+        low, high = (np.full(goal.size, end) for end in free.ends)
         root = find_root(missed, (low, high), args=(every,), tolerances={"xatol": _CLOSE})
         good = np.flatnonzero(root.success)
-        log, value = np.full(count, -np.inf), np.full(count, free.centre)
+        log, value = np.full(goal.size, -np.inf), np.full(goal.size, free.centre)
         if good.size:
             z = root.x[good]
             step = np.where(z + _STEP > high[good], -_STEP, _STEP)  # towards the inside
@@ -232,7 +230,7 @@ class Posterior:
                 value = _extra(*(found[a] for a in PAIR))
             else:
                 own = found[name.removeprefix("walking_ratio_")].drawn[PUBLISHED_LEG]
-                value = own / found["ideal"].drawn[PUBLISHED_LEG]
+                value = own / sets.ideal
             good &= np.abs(value - target.centre) <= target.half_width
         return good
 

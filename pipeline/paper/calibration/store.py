@@ -51,12 +51,8 @@ VERDICTS = {
     FIXED: "one of all motor constants that give these tables",
 }
 #: The same as the reason of a number whose source is what the sets meet.
-_REASONS = {
-    "determined": "determined by them",
-    "narrowed": "narrowed by them",
-    "moved": "moved by them",
+_REASONS = {verdict: f"{verdict} by them" for verdict in VERDICTS} | {
     "against the prior": "driven out of the prior's 95 % by them",
-    "not determined": "not determined by them",
     FIXED: "no data sheet resolves what these tables leave",
 }
 _SOURCE = "nearest to the prior among all sets that meet the paper's figures"

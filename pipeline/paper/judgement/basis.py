@@ -53,36 +53,27 @@ class Basis:
     @property
     def word(self) -> str:
         """What to say of the actuators and numbers that differ; empty where none does."""
-        return "; ".join(part for part in (self._alternatives, self._numbers) if part)
-
-    @property
-    def _alternatives(self) -> str:
         parts = []
         if self.missing:
             parts.append(
-                f"the paper's {_quoted(self.missing)} {_is(self.missing)} not among the "
-                "alternatives as the paper builds them: what it prints of them or compares with "
-                "them is left out, and so is what rests on the calibration's sets"
+                f"the paper's {_quoted(self.missing)} {'is' if len(self.missing) == 1 else 'are'} "
+                "not among the alternatives as the paper builds them: what it prints of them or "
+                "compares with them is left out, and so is what rests on the calibration's sets"
             )
         if self.others:
             parts.append(
                 f"the paper says nothing of {_quoted(self.others)}: left out of what is held "
                 "against it"
             )
+        if self.changed:
+            more = len(self.changed) - _SHOWN
+            parts.append(
+                f"{', '.join(self.changed[:_SHOWN])}{f' and {more} more' if more > 0 else ''} "
+                f"{'differs' if len(self.changed) == 1 else 'differ'} from the numbers of the "
+                "calibration: what is compared with the paper was computed anew; what rests on the "
+                "calibration's sets (intervals, predictions, readings, sensitivities) is left out"
+            )
         return "; ".join(parts)
-
-    @property
-    def _numbers(self) -> str:
-        if not self.changed:
-            return ""
-        shown = ", ".join(self.changed[:_SHOWN])
-        more = len(self.changed) - _SHOWN
-        return (
-            f"{shown}{f' and {more} more' if more > 0 else ''} "
-            f"{'differs' if len(self.changed) == 1 else 'differ'} from the numbers of the "
-            "calibration: what is compared with the paper was computed anew; what rests on the "
-            "calibration's sets (intervals, predictions, readings, sensitivities) is left out"
-        )
 
 
 @dataclass(frozen=True)
@@ -143,7 +134,3 @@ def _alternatives_of(numbers: Mapping[str, Any]) -> list[str]:
 
 def _quoted(names: Sequence[str]) -> str:
     return ", ".join(f"'{name}'" for name in names)
-
-
-def _is(names: Sequence[str]) -> str:
-    return "is" if len(names) == 1 else "are"

@@ -275,20 +275,13 @@ def test_leave_one_out_is_complete_and_names_what_predicts(
         elif row.sets:  # too few for a quantile: most of these sets have no break-even at all
             assert row.name == EVEN
             assert np.isnan([row.median, *row.interval]).all()
+    own = Prediction("", "", "1", 10.0, 1.0, "", 0.0)
+    intervals = ((5.0, 8.9), (5.0, 9.0), (11.0, 12.0), (11.1, 12.0))
+    assert [replace(own, interval=i).inside for i in intervals] == [False, True, True, False]
     sheet = {row.name: row for row in found if "data sheet" in row.by}
     assert sheet["ideal_current_2"].inside
     assert sheet["ideal_current_2"].median == pytest.approx(-30.71 / 400 / 0.0302)
     assert sheet["ideal_voltage_2"].median == pytest.approx(-0.317 * 2.54)
-
-
-def test_a_prediction_is_inside_where_both_intervals_overlap() -> None:
-    def inside(low: float, high: float) -> bool | None:
-        return Prediction("", "", "1", 10.0, 1.0, "", 0.0, (low, high), 20).inside
-
-    assert [inside(*i) for i in ((5, 8.9), (5, 9), (11, 12), (11.1, 12))] == [
-        *(False, True),
-        *(True, False),
-    ]
 
 
 def test_sensitivities_are_complete(results: dict[str, Any]) -> None:
