@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from pipeline.motion.feet import Course, displaced, turned
+from pipeline.motion.feet import Course, along_ground, displaced
 from pipeline.motion.gait import Gait
 from pipeline.motion.ground import Ground
 from pipeline.motion.motion import Segment
@@ -43,17 +43,14 @@ def base_motion(gait: Gait, time: Array, shift: Course | None) -> BaseMotion:
     """
     n = time.size
     gone, angle = displaced(gait.twist, time)
-    place = np.zeros((n, 3))
-    place[:, :2] = gone
-    linear = np.zeros((n, 3))
-    linear[:, :2] = gait.twist[:2]
-    rate = np.zeros((n, 3))
+    linear, rate = np.tile([*gait.twist[:2], 0.0], (n, 1)), np.zeros((n, 3))
     spin = np.array([0.0, 0.0, gait.twist[2]])
     if shift is not None:
-        place[:, :2] += turned(angle, shift.position[:, :2])
+        gone = gone + along_ground(shift.position) * np.exp(1j * angle)
         linear = linear + shift.velocity + np.cross(spin, shift.position)
         # The components' own derivative: Pinocchio's acceleration, not the point's.
         rate = shift.acceleration + np.cross(spin, shift.velocity)
+    place = np.stack([gone.real, gone.imag, np.zeros(n)], axis=-1)
     velocity, acceleration = np.zeros((n, 6)), np.zeros((n, 6))
     velocity[:, :3], velocity[:, 3:] = linear @ gait.body, spin @ gait.body
     acceleration[:, :3] = rate @ gait.body
