@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipeline.api.init import robot_file_of
 from pipeline.dynamics.joint_demand import motion_demand
 from pipeline.dynamics.stability import stability_margins
 from pipeline.errors import GaitError
@@ -20,7 +21,14 @@ from pipeline.motion.sway import Sway, followed_ways
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.pipeline.motion.quadrupeds import QUADRUPEDS, quadruped
+
+QUADRUPEDS = ("solo12", "solo8", "anymal_c", "hyq", "a1", "go2", "b1", "laikago")
+CRAWL = {"name": "crawl", "period": "3 s", "stroke": "60 mm", "lift": "40 mm"}
+
+
+def quadruped(name: str, gait: Mapping[str, Any]) -> Robot:
+    """A published robot in the stance that `init` guesses."""
+    return load_robot(load_robot_file(robot_file_of(name)).with_gait(**gait))
 
 
 def walker(root: Path, name: str, gait: Mapping[str, Any]) -> Robot:
@@ -107,18 +115,17 @@ def test_the_path_is_periodic_and_its_rates_are_its_derivatives() -> None:
 
 
 @pytest.mark.parametrize("name", QUADRUPEDS)
-def test_every_published_quadruped_crawls_with_sway(name: str, tmp_path: Path) -> None:
-    gait = {"name": "crawl", "period": "3 s", "stroke": "60 mm", "lift": "40 mm"}
-    robot = quadruped(name, tmp_path, gait)
+def test_every_published_quadruped_crawls_with_sway(name: str) -> None:
+    robot = quadruped(name, CRAWL)
     motion = walking_motion(robot, samples=101)
     demand = motion_demand(robot, motion)  # which refuses feet that pull
     assert least_margin(robot, motion) > (0.004 if name == "solo8" else 0.0099)
     assert all(np.isfinite(part.torque).all() for part in demand.segments)
 
 
-def test_a_leg_of_two_joints_lets_the_body_sway_in_its_plane_only(tmp_path: Path) -> None:
+def test_a_leg_of_two_joints_lets_the_body_sway_in_its_plane_only() -> None:
     for name, ways in (("solo12", 2), ("solo8", 1)):
-        robot = quadruped(name, tmp_path, {"period": "3 s", "stroke": "60 mm", "lift": "40 mm"})
+        robot = quadruped(name, CRAWL)
         gait = gait_of(robot.spec)
         found = followed_ways(robot, gait, start_postures(robot, gait.neutral @ gait.body))
         assert found.shape == (2, ways)

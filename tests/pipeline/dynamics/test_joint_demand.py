@@ -1,4 +1,4 @@
-"""Any gait against the robot's mechanical energy, on slopes with the potential energy gained."""
+"""The demand of any gait against mechanical energy and momentum, and Pinocchio sample by sample."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
+from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.payload import with_payload
@@ -20,6 +20,8 @@ from pipeline.robot.robot_file import load_robot_file
 #: The cycloid's acceleration has no jump, so that sums over samples converge quickly.
 SMOOTH = {"transfer_path": "cycloid"}
 GAITS: dict[str, tuple[str, dict[str, Any]]] = {
+    "tripod": ("hexapod", {}),
+    "tripod, joints turned by 90 degrees": ("hexapod_axis90", {}),
     "ripple uphill with a payload": (
         "hexapod",
         {"name": "ripple", "slope_forward": "8 deg", "payload_mass": "6 kg", "payload_z": "12 cm"},
@@ -101,3 +103,42 @@ def test_ground_forces_and_their_moment_carry_the_robots_momentum(walked: Walked
             feet = contacts.position[n] @ (np.eye(3) if turn is None else turn[0]).T + q[:3]
             arm = feet - pin.centerOfMass(robot.model, data, q)
             np.testing.assert_allclose(np.cross(arm, force).sum(axis=0), rate.angular, atol=1e-8)
+
+
+def test_demand_agrees_with_a_loop_over_pinocchio(hexapod: Robot, walk: Motion) -> None:
+    """Batch RNEA minus the contact term against pin.rnea, frame Jacobians and the same forces."""
+    segment = walk.segments[0]
+    demand, contacts = segment_demand(hexapod, segment)
+    assert contacts is not None
+    data = hexapod.model.createData()
+    for n in range(0, segment.time.size, 150):
+        q, v, a = segment.configuration[n], segment.velocity[n], segment.acceleration[n]
+        tau = pin.rnea(hexapod.model, data, q, v, a).copy()
+        pin.computeJointJacobians(hexapod.model, data, q)
+        pin.updateFramePlacements(hexapod.model, data)
+        for i, leg in enumerate(hexapod.spec.legs):
+            jacobian = pin.getFrameJacobian(
+                hexapod.model,
+                data,
+                hexapod.model.getFrameId(leg.foot),
+                pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+            )
+            tau -= jacobian[:3].T @ contacts.force_world[n, i]
+        np.testing.assert_allclose(tau[:6], 0, atol=1e-9)  # the ground supplies the base's wrench
+        np.testing.assert_allclose(tau[hexapod.velocity_index], demand.torque[n], atol=1e-9)
+
+
+def test_quasi_static_is_the_limit_of_slow_walking(hexapod: Robot) -> None:
+    """At a hundredth of the speed full inverse dynamics comes down to gravity and contact."""
+    slow = load_robot(hexapod.spec.with_parameters({"gait_period": 300.0, "walking_speed": 0.0016}))
+    motion = walking_motion(slow, samples=101)
+    full = motion_demand(slow, motion)
+    static = motion_demand(hexapod, walking_motion(hexapod, samples=101), quasi_static=True)
+    for a, b in zip(full.segments, static.segments, strict=True):
+        np.testing.assert_allclose(a.torque, b.torque, atol=1e-3)
+
+
+def test_two_threads_give_the_same_torques(hexapod: Robot, walk: Motion) -> None:
+    one, _ = segment_demand(hexapod, walk.segments[0])
+    two, _ = segment_demand(hexapod, walk.segments[0], threads=2)
+    np.testing.assert_array_equal(one.torque, two.torque)
