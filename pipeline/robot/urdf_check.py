@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,6 +111,10 @@ class Body:
         return _name(self.links[0])
 
 
+def _note(subject: str, check: str, detail: str) -> Finding:
+    return Finding(subject, check, True, detail, note=True)
+
+
 def check_urdf(text: str, where: str) -> list[Finding]:
     """Check a URDF's bodies, joints and limits.
 
@@ -122,10 +126,13 @@ def check_urdf(text: str, where: str) -> list[Finding]:
         UrdfError: A fault of structure; one line with its place.
     """
     root = read_elements(text, where)
-    model = parse_urdf(text, where, floating=False)
-    bodies = merged_bodies(root, model)
+    bodies = merged_bodies(root, parse_urdf(text, where, floating=False))
     # Units first: they explain what comes after.
-    findings = [*_sizes(root, bodies, where), *_joints(root, where)]
+    findings = [*_lengths(root, where), *_sizes(root, bodies, where)]
+    for joint in root.findall("joint"):
+        if joint.get("type") != "fixed":
+            findings += _drive(joint)
+            findings += _limits(joint, where)
     for body in bodies:
         findings += _links(body, where)
         findings += _body(body)
@@ -201,103 +208,86 @@ def _excess(mass: float, moments: Array) -> tuple[float, str]:
     return 0.0, f"moments {shown}"
 
 
-def _links(body: Body, where: str) -> list[Finding]:
+def _links(body: Body, where: str) -> Iterator[Finding]:
     """What no merging mends, and what the merged body no longer shows."""
-    findings = []
     scale = float(np.abs(np.linalg.eigvalsh(body.inertia.inertia)).max())
     for link in body.links:
         mass, name = _mass(link, where), _name(link)
         if mass < 0:
-            findings.append(Finding(name, "mass positive", False, f"{mass:.6g} kg"))
+            yield Finding(name, "mass positive", False, f"{mass:.6g} kg")
             continue
         if len(body.links) > 1:
             excess, detail = _excess(mass, _moments(link, where))
-            if excess > MATERIAL * scale and excess > 0:
-                findings.append(Finding(name, "inertia possible", False, detail))
+            if excess > MATERIAL * scale:
+                yield Finding(name, "inertia possible", False, detail)
             elif excess > 0:
-                detail += f"; below {100 * MATERIAL:g} % of '{body.name}', which carries it"
-                findings.append(Finding(name, "inertia possible", True, detail, note=True))
+                small = f"; below {100 * MATERIAL:g} % of '{body.name}', which carries it"
+                yield _note(name, "inertia possible", detail + small)
         if mass > 0 and mass >= MATERIAL * body.inertia.mass:
-            findings += _centre_in_geometry(link, where)
-    return findings
+            yield from _centre_in_geometry(link, where)
 
 
-def _body(body: Body) -> list[Finding]:
+def _body(body: Body) -> Iterator[Finding]:
     """The inertia that the equations of motion see."""
     mass = float(body.inertia.mass)
-    findings = []
     held = [link for link in body.links[1:] if link.find("inertial") is not None]
     if held:
-        names = [
-            _name(link) + (" (0 kg)" if _mass(link, "") == 0 else "")
-            for link in (held[:_SHOWN] if len(held) > _SHOWN + 1 else held)
-        ]
+        shown = held[:_SHOWN] if len(held) > _SHOWN + 1 else held
+        names = [_name(x) + (" (0 kg)" if _mass(x, "") == 0 else "") for x in shown]
         more = f" and {len(held) - len(names)} more" if len(held) > len(names) else ""
         detail = f"with {', '.join(names)}{more}: one body of {mass:.6g} kg"
-        findings.append(Finding(body.name, MERGED, True, detail, note=True))
-    if mass < 0:
-        return findings  # reported for its link
+        yield _note(body.name, MERGED, detail)
     if mass == 0:
-        return [*findings, *_without_mass(body)]
-    findings.append(Finding(body.name, "mass positive", True, f"{mass:.6g} kg"))
+        yield _without_mass(body)
+    if mass <= 0:  # a negative one is its link's finding
+        return
+    yield Finding(body.name, "mass positive", True, f"{mass:.6g} kg")
     moments = np.linalg.eigvalsh(body.inertia.inertia)
     excess, detail = _excess(mass, moments)
     slight = 0 < excess <= TOLERABLE_EXCESS * float(np.abs(moments).max())
-    findings.append(Finding(body.name, "inertia possible", excess == 0, detail, tolerable=slight))
+    yield Finding(body.name, "inertia possible", excess == 0, detail, tolerable=slight)
     if excess == 0 and moments[2] <= mass * POINT**2 and body.joint:
         detail = f"{mass:.6g} kg without rotational inertia is computed as a point"
-        findings.append(Finding(body.name, "rotational inertia", True, detail, note=True))
-    return findings
+        yield _note(body.name, "rotational inertia", detail)
 
 
-def _without_mass(body: Body) -> list[Finding]:
+def _without_mass(body: Body) -> Finding:
     if not body.joint:
         detail = "0 kg: it stands still; with a floating base it needs mass"
-        return [Finding(body.name, "mass of the root", True, detail, note=True)]
+        return _note(body.name, "mass of the root", detail)
     if body.carries and all(reach < COMPOUND for reach in body.reaches):
         moments = np.linalg.eigvalsh(body.inertia.inertia)
         if moments.any():
-            return [Finding(body.name, "inertia possible", False, _excess(0.0, moments)[1])]
+            return Finding(body.name, "inertia possible", False, _excess(0.0, moments)[1])
         detail = "0 kg between joints at one place: computed as one compound joint"
-        return [Finding(body.name, "mass", True, detail, note=True)]
-    detail = (
-        "0 kg"
-        + ("" if body.carries else ", and so does all that hangs on it")
-        + f": '{body.joint}' moves it; give it an <inertial>, or make the joint fixed"
-    )
-    return [Finding(body.name, "mass positive", False, detail)]
+        return _note(body.name, "mass", detail)
+    beyond = "" if body.carries else ", and so does all that hangs on it"
+    remedy = f"'{body.joint}' moves it; give it an <inertial>, or make the joint fixed"
+    return Finding(body.name, "mass positive", False, f"0 kg{beyond}: {remedy}")
 
 
-def _centre_in_geometry(link: ET.Element, where: str) -> list[Finding]:
-    inertial, name = link.find("inertial"), _name(link)
-    if inertial is None:
-        return []
+def _centre_in_geometry(link: ET.Element, where: str) -> Iterator[Finding]:
+    """A shape for looks or contact is not the body: outside is odd, by its own size is wrong."""
+    inertial = link.find("inertial")
+    shapes = [*link.findall("visual"), *link.findall("collision")]
+    halves = [_half_size(shape, where) for shape in shapes]
+    if inertial is None or not shapes or any(half is None for half in halves):
+        return  # the extent of a mesh is not known without the mesh file
     centre, _ = place(inertial, where)
-    boxes = []
-    for shape in [*link.findall("visual"), *link.findall("collision")]:
-        half = _half_size(shape, where)
-        if half is None:
-            return []  # a mesh: its extent is not known without the mesh file
+    near, out = False, np.inf
+    for shape, half in zip(shapes, halves, strict=True):
+        assert half is not None
         at, rpy = place(shape, where)
-        boxes.append((at, pin.rpy.rpyToMatrix(rpy), half))
-    if not boxes:
-        return []
-    # A shape for looks or contact is not the body: outside is odd, out by its own size is wrong.
-    outs = [
-        float(np.linalg.norm(np.maximum(np.abs(turn.T @ (centre - at)) - half, 0.0)))
-        for at, turn, half in boxes
-    ]
-    # One that is large enough suffices: a small part beside it makes nothing worse.
-    near = any(
-        out <= GEOMETRY_MARGIN + float(np.linalg.norm(half))
-        for out, (_, _, half) in zip(outs, boxes, strict=True)
-    )
-    out = min(outs)
+        beside = np.abs(pin.rpy.rpyToMatrix(rpy).T @ (centre - at)) - half
+        own = float(np.linalg.norm(np.maximum(beside, 0.0)))
+        # One that is large enough suffices: a small part in addition makes nothing worse.
+        near |= own <= GEOMETRY_MARGIN + float(np.linalg.norm(half))
+        out = min(out, own)
     outside = out > GEOMETRY_MARGIN
     detail = "(" + ", ".join(f"{x:.4g}" for x in centre) + ") m"
     detail += f", {1e3 * out:.3g} mm outside" if outside else ""
     check = "centre of mass within the geometry"
-    return [Finding(name, check, near, detail, note=outside)]
+    yield Finding(_name(link), check, near, detail, note=outside)
 
 
 def _half_size(shape: ET.Element, where: str) -> Array | None:
@@ -315,59 +305,46 @@ def _half_size(shape: ET.Element, where: str) -> Array | None:
     return np.array([radius, radius, length / 2 + (radius if solid.tag == "capsule" else 0)])
 
 
-def _joints(root: ET.Element, where: str) -> list[Finding]:
-    findings = []
-    for joint in root.findall("joint"):
-        kind, name = joint.get("type", ""), _name(joint)
-        if kind == "fixed":
-            continue
-        if kind not in MOVING:
-            detail = f"type '{kind}': joints of one coordinate are computed; make it fixed"
-            findings.append(Finding(name, "one coordinate", False, detail))
-            continue
-        mimic = joint.find("mimic")
-        if mimic is not None:
-            detail = (
-                f"it mimics '{mimic.get('joint')}': a drive that moves several joints is not "
-                "computed; make it fixed, or remove <mimic> if it has a drive of its own"
-            )
-            findings.append(Finding(name, OWN_DRIVE, False, detail, tolerable=True))
-        findings += _limits(joint, kind, where)
-    return findings
+def _drive(joint: ET.Element) -> Iterator[Finding]:
+    """One coordinate, and a drive that moves nothing else."""
+    kind, mimic = joint.get("type", ""), joint.find("mimic")
+    if kind not in MOVING:
+        detail = f"type '{kind}': joints of one coordinate are computed; make it fixed"
+        yield Finding(_name(joint), "one coordinate", False, detail)
+    elif mimic is not None:
+        detail = (
+            f"it mimics '{mimic.get('joint')}': a drive that moves several joints is not "
+            "computed; make it fixed, or remove <mimic> if it has a drive of its own"
+        )
+        yield Finding(_name(joint), OWN_DRIVE, False, detail, tolerable=True)
 
 
-def _limits(joint: ET.Element, kind: str, where: str) -> list[Finding]:
-    name, limit = _name(joint), joint.find("limit")
+def _limits(joint: ET.Element, where: str) -> Iterator[Finding]:
+    name, kind, limit = _name(joint), joint.get("type"), joint.find("limit")
+    if kind not in MOVING:
+        return
     if limit is None:  # of a continuous joint, which needs none
-        return [Finding(name, "limits", True, "a continuous joint without limits")]
-    value = {
-        key: number(limit, key, where)
-        for key in ("lower", "upper", "effort", "velocity")
-        if limit.get(key) is not None
-    }
-    findings = []
+        yield Finding(name, "limits", True, "a continuous joint without limits")
+        return
     for key in ("effort", "velocity"):
-        detail = f"{value[key]:g}" + ("" if value[key] else " is taken for none")
-        findings.append(Finding(name, f"{key} limit", True, detail, note=value[key] == 0))
+        value = number(limit, key, where)
+        detail = f"{value:g}" + ("" if value else " is taken for none")
+        yield Finding(name, f"{key} limit", True, detail, note=value == 0)
     if kind == "continuous":
-        return findings
-    lower, upper = value.get("lower", 0.0), value.get("upper", 0.0)
-    detail = f"lower {lower:g}, upper {upper:g}"
-    if lower == upper:
+        return
+    lower, upper = number(limit, "lower", where), number(limit, "upper", where)
+    detail, none = f"lower {lower:g}, upper {upper:g}", lower == upper
+    if none:
         detail += ": no range, taken for no limit in a log; a leg cannot walk with it"
-    findings.append(
-        Finding(name, "lower limit below the upper", lower <= upper, detail, note=lower == upper)
-    )
+    yield Finding(name, "lower limit below the upper", lower <= upper, detail, note=none)
     if kind == "revolute":
-        findings.append(_in_radians(name, lower, upper))
-    return findings
+        yield _in_radians(name, lower, upper)
 
 
 def _in_radians(name: str, lower: float, upper: float) -> Finding:
     largest = max((lower, upper), key=abs)
     if abs(largest) > MOST_DEGREES:
-        detail = f"{largest:g} rad is as good as none"
-        return Finding(name, "limits in radians", True, detail, note=True)
+        return _note(name, "limits in radians", f"{largest:g} rad is as good as none")
     if abs(largest) > MOST_TURNS:
         detail = (
             f"{largest:g} rad are {abs(largest) / (2 * math.pi):.1f} turns; degrees? "
@@ -378,58 +355,57 @@ def _in_radians(name: str, lower: float, upper: float) -> Finding:
     return Finding(name, "limits in radians", True, f"{lower:g} to {upper:g} rad")
 
 
-def _sizes(root: ET.Element, bodies: Sequence[Body], where: str) -> list[Finding]:
-    """Lengths in metres, inertias and masses that fit them."""
-    findings = []
-    above = {ends(joint)[1]: joint for joint in root.findall("joint")}
-
-    def distance(link: str) -> float:
-        """From the root along the joints [m]."""
-        if link not in above:
-            return 0.0
-        return distance(ends(above[link])[0]) + float(np.linalg.norm(place(above[link], where)[0]))
-
-    away = {link: distance(link) for link in above}
-    for joint in above.values():
+def _lengths(root: ET.Element, where: str) -> Iterator[Finding]:
+    """Offsets of joints in metres."""
+    for joint in root.findall("joint"):
         xyz, _ = place(joint, where)
         if (offset := float(np.linalg.norm(xyz))) > LONGEST:
             written = " ".join(f"{x:g}" for x in xyz)
             detail = f"origin {written}: {offset:g} m from its parent; millimetres?"
-            findings.append(Finding(_name(joint), "lengths in metres", False, detail))
-    reach = furthest = max(away.values(), default=0.0)
+            yield Finding(_name(joint), "lengths in metres", False, detail)
+
+
+def _sizes(root: ET.Element, bodies: Sequence[Body], where: str) -> Iterator[Finding]:
+    """Inertias that fit the robot's size, and a mass that fits its volume."""
+    above = {ends(joint)[1]: joint for joint in root.findall("joint")}
+
+    def distance(link: str) -> float:
+        """From the root along the joints [m]."""
+        total = 0.0
+        while link in above:
+            total += float(np.linalg.norm(place(above[link], where)[0]))
+            link = ends(above[link])[0]
+        return total
+
+    reach = furthest = max(map(distance, above), default=0.0)
     for body in bodies:
-        mass = float(body.inertia.mass)
-        lever = float(np.linalg.norm(body.inertia.lever))
-        size = reach + lever
+        mass, lever = float(body.inertia.mass), float(np.linalg.norm(body.inertia.lever))
         if mass <= 0:
             continue
         radius = math.sqrt(max(0.0, float(np.linalg.eigvalsh(body.inertia.inertia)[2])) / mass)
-        furthest = max(furthest, away.get(body.name, 0.0) + lever + radius)
-        if size == 0 or not body.joint:
-            continue
-        detail = (
-            f"radius of gyration {radius:.3g} m, the longest chain of joints {reach:.3g} m; "
-            "inertia in kg*m^2, mass in kg, lengths in m?"
-        )
-        findings.append(
-            Finding(body.name, "inertia fits the size", radius <= GYRATION * size, detail)
-        )
+        furthest = max(furthest, distance(body.name) + lever + radius)
+        if reach + lever > 0 and body.joint:
+            detail = (
+                f"radius of gyration {radius:.3g} m, the longest chain of joints {reach:.3g} m; "
+                "inertia in kg*m^2, mass in kg, lengths in m?"
+            )
+            fits = radius <= GYRATION * (reach + lever)
+            yield Finding(body.name, "inertia fits the size", fits, detail)
     total = sum(float(body.inertia.mass) for body in bodies)
-    return [*findings, *_total_mass(root.get("name", "robot"), total, furthest)]
+    yield from _total_mass(root.get("name", "robot"), total, furthest)
 
 
-def _total_mass(name: str, total: float, size: float) -> list[Finding]:
+def _total_mass(name: str, total: float, size: float) -> Iterator[Finding]:
     """A robot's mass [kg] against what would fill a cube of its size [m]; none if usual."""
     volume = size * size * size  # where a power overflows
     if total <= 0 or size <= 0 or AIR * volume <= total <= HEAVY * volume:
-        return []
+        return
     heavy = total > HEAVY * volume
     filled = (STEEL if heavy else AIR) * volume
     detail = (
         f"{total:.6g} kg within {size:.3g} m of its root, where a cube of that edge full of "
         f"{'steel' if heavy else 'air'} weighs {filled:.3g} kg; "
-        + ("masses in g" if heavy else "masses in t, lengths in mm")
-        + "? A URDF takes kg and m"
+        f"masses in {'g' if heavy else 't, lengths in mm'}? A URDF takes kg and m"
     )
     possible = not heavy or total <= filled
-    return [Finding(name, "total mass", possible, detail, note=possible)]
+    yield Finding(name, "total mass", possible, detail, note=possible)
