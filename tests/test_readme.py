@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.logs.reading.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
-from pipeline.logs.reading.mapping_schema import ColumnTable, MappingTable
+from pipeline.logs.reading.mapping import ColumnTable, Mapping
 from pipeline.robot.robot_numbers import GAIT_SCHEMA
 from pipeline.robot.robot_tables import OwnLegTable, RobotTable
 from tests.pages import pages
@@ -68,7 +68,7 @@ def test_every_key_of_robot_and_mapping_files_is_described(root: Path) -> None:
     for key in (*GAIT_SCHEMA, *RobotTable.model_fields, *OwnLegTable.model_fields):
         assert f"`{key}`" in robot, key
     logs = (root / "pipeline/logs/README.md").read_text(encoding="utf-8")
-    fields = {**MappingTable.model_fields, **ColumnTable.model_fields}
+    fields = {**Mapping.model_fields, **ColumnTable.model_fields}
     for key in (field.alias or name for name, field in fields.items()):
         assert re.search(rf"\b{key}\b", logs), key
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from pipeline.logs.columns.explaining import FLOOR, Bodies
 from pipeline.logs.columns.findings import column_findings, copies
 from pipeline.logs.columns.hypotheses import Reading, as_named
 from pipeline.logs.columns.search import search
-from pipeline.logs.prepared.measurement import Measurement, unfiltered
+from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import Bodies as Edited
@@ -77,67 +77,59 @@ class AlongLogs:
         self._efforts: dict[tuple[float, bool], Array] = {}
         self._open = tuple(_open(model))
 
+    def _each(self, rough: bool) -> Iterator[tuple[Measurement, NDArray[np.intp]]]:
+        return zip(self._logs, self._rows[rough], strict=True)
+
     def effort(self, late: float, *, rough: bool) -> Array:
         """Efforts as logged, of columns taken to be late by some time [s], shape (N, J)."""
         key = (late, rough)
         if key not in self._efforts:
-            self._efforts[key] = np.concatenate(
-                [
-                    _later(m, late)[rows]
-                    for m, rows in zip(self._logs, self._rows[rough], strict=True)
-                ]
-            )
+            parts = [_later(m, late)[rows] for m, rows in self._each(rough)]
+            self._efforts[key] = np.concatenate(parts)
         return self._efforts[key]
 
     def mask(self, reading: Reading, *, rough: bool) -> Mask:
         """Rows that count, shape (N, J)."""
-        mask = np.concatenate(
-            [m.mask[rows] for m, rows in zip(self._logs, self._rows[rough], strict=True)]
-        )
+        mask = np.concatenate([m.mask[rows] for m, rows in self._each(rough)])
         if not reading.late.size:
             return mask
         return mask[:, reading.effort_of] & mask[:, reading.position_of]
 
     def bodies(self, reading: Reading, *, rough: bool) -> Bodies:
         """By the model; rough: on few rows, with the scale of its bodies alone open."""
-        ms = [
-            _read(m, rows, reading) for m, rows in zip(self._logs, self._rows[rough], strict=True)
-        ]
-        opened = () if rough else self._open
+        of, factor = reading.position_of, reading.position_factor
+        ms = []
+        for log, rows in self._each(rough):
+            m = log.at(rows)
+            q, v, a = (x[:, of] * factor for x in (m.q, m.v, m.a))
+            ms.append(replace(m, q=q + reading.zero, v=v, a=a))
         base, columns = [], []
         for m in ms:
             simulator = Simulator(m)
             now = simulator.predict(self._model)
             base.append(now.effort[..., 0])
-            changed = [
-                (simulator.predict(self._model.with_bodies(edited), now).effort - now.effort)[
-                    ..., 0
-                ]
-                / step
-                for edited, step, _, _ in opened
-            ]
-            columns.append(np.stack([base[-1]] if rough else changed))
-        spread = [_SCALE] if rough else [spread for _, _, spread, _ in opened]
-        least = [_LIGHTEST - 1.0] if rough else [least for _, _, _, least in opened]
-        rest = ms[0].rest_speed[reading.position_of] * np.abs(reading.position_factor)
+            changed = [base[-1]]
+            if not rough:
+                models = (self._model.with_bodies(o.edited) for o in self._open)
+                steps = (simulator.predict(model, now).effort - now.effort for model in models)
+                changed = [d[..., 0] / o.step for d, o in zip(steps, self._open, strict=True)]
+            columns.append(np.stack(changed))
+        opened = (_Open(self._model.bodies, 1.0, _SCALE, _LIGHTEST - 1.0),) if rough else self._open
+        least = np.array([o.least for o in opened])
+        carried = [o.spread == _CARRIED and o.least == 0.0 for o in opened]
+        known = all(not self._model.floating or legs_are_separate(self._model, m) for m in ms)
         return Bodies(
-            np.concatenate(base),
-            np.concatenate(columns, axis=1),
-            np.array(spread),
-            np.array(least),
-            np.array([True])
-            if rough
-            else np.array([least == _LIGHTEST - 1.0 for _, _, _, least in opened]),
-            np.concatenate([m.v for m in ms]),
-            np.concatenate([m.a for m in ms]),
-            rest,
-            np.flatnonzero([s == _CARRIED and low == 0.0 for _, _, s, low in opened]),
-            FLOOR if all(_ground_known(self._model, m) for m in ms) else _BY_RULE,
+            base=np.concatenate(base),
+            columns=np.concatenate(columns, axis=1),
+            spread=np.array([o.spread for o in opened]),
+            least=least,
+            relative=least == _LIGHTEST - 1.0,
+            v=np.concatenate([m.v for m in ms]),
+            a=np.concatenate([m.a for m in ms]),
+            rest=ms[0].rest_speed[of] * np.abs(factor),
+            ends=np.flatnonzero(carried),
+            floor=FLOOR if known else _BY_RULE,
         )
-
-
-def _ground_known(model: MachineModel, m: Measurement) -> bool:
-    return not model.floating or legs_are_separate(model, m)
 
 
 def _later(m: Measurement, late: float) -> Array:
@@ -149,38 +141,16 @@ def _later(m: Measurement, late: float) -> Array:
     return np.stack(columns, axis=1)
 
 
-def _read(m: Measurement, rows: NDArray[np.intp], r: Reading) -> Measurement:
-    """Some rows of a measurement, its positions read otherwise."""
+class _Open(NamedTuple):
+    """A change of bodies: edited, by which step, spread and least value in its units."""
 
-    def kept(x: Array | None) -> Array | None:
-        return None if x is None else x[rows]
-
-    of, factor = r.position_of, r.position_factor
-    return replace(
-        m,
-        time=m.time[rows],
-        q=m.q[rows][:, of] * factor + r.zero,
-        v=m.v[rows][:, of] * factor,
-        a=m.a[rows][:, of] * factor,
-        effort=m.effort[rows],
-        mask=m.mask[rows],
-        part=m.part[rows],
-        block=m.block[rows],
-        pieces=(slice(0, rows.size),),
-        lowpass=unfiltered,
-        kernel=None,
-        base_roll=kept(m.base_roll),
-        base_pitch=kept(m.base_pitch),
-        standing=None if m.standing is None else m.standing[rows],
-        foot_force=kept(m.foot_force),
-        open_winding=None if m.open_winding is None else m.open_winding[rows],
-        temperature=kept(m.temperature),
-        unsure=kept(m.unsure),
-    )
+    edited: Edited
+    step: float
+    spread: float
+    least: float
 
 
-def _open(model: MachineModel) -> Iterator[tuple[Edited, float, float, float]]:
-    """Bodies' changes: edited, by which step, spread and least value in its units."""
+def _open(model: MachineModel) -> Iterator[_Open]:
     rigid, bodies = model.rigid, model.bodies
     moving = {joint: rigid.getJointId(joint) for joint in model.joints}
     total = sum(rigid.inertias[i].mass for i in moving.values())
@@ -189,13 +159,14 @@ def _open(model: MachineModel) -> Iterator[tuple[Edited, float, float, float]]:
         body, change = rigid.inertias[i], bodies.body(joint)
         if body.mass > 0.0:
             scaled = replace(change, scale=change.scale * 1.1)
-            yield bodies.with_body(joint, scaled), 0.1, _SCALE, _LIGHTEST - 1.0
+            yield _Open(bodies.with_body(joint, scaled), 0.1, _SCALE, _LIGHTEST - 1.0)
             size = float(
                 np.sqrt(0.5 * np.trace(body.inertia) / body.mass + body.lever @ body.lever)
             )
             for axis in np.eye(3):
                 shift = tuple(np.add(change.shift, 0.01 * size * axis).tolist())
-                yield bodies.with_body(joint, replace(change, shift=shift)), 0.01, _SHIFT, -np.inf
+                edited = bodies.with_body(joint, replace(change, shift=shift))
+                yield _Open(edited, 0.01, _SHIFT, -np.inf)
         if i in set(rigid.parents[1:]) or total <= 0.0:
             continue
         unit = 0.1 * total
@@ -204,4 +175,4 @@ def _open(model: MachineModel) -> Iterator[tuple[Edited, float, float, float]]:
             carried[k] += unit * arm
             edit = replace(change, carried=tuple(carried.tolist()))
             spread, least = (_CARRIED, 0.0) if k == 0 else (_CARRIED * _OUT, -np.inf)
-            yield bodies.with_body(joint, edit), 0.1, spread, least
+            yield _Open(bodies.with_body(joint, edit), 0.1, spread, least)

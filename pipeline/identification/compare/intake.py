@@ -21,9 +21,10 @@ from pipeline.logs.prepared.settings import Settings, choose_settings
 from pipeline.logs.quality.cannot_tell import cannot_tell
 from pipeline.logs.quality.finding import Finding, refuse
 from pipeline.logs.quality.quality import judge
-from pipeline.logs.quality.unit_check import OF_LIMITS, column_name
+from pipeline.logs.quality.unit_check import OF_LIMITS
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.reading.mapping import Mapping as MappingFile
 from pipeline.logs.reading.read import read_log
 
@@ -155,8 +156,9 @@ def filter_findings(one: Prepared) -> list[Finding]:
     if cycle is not None:
         out.append(Finding(name, "", "period", cycle, "s", "ok", "the motion repeats"))
     if one.contact is not None:
-        detail = f"contact from {one.contact.source}; {len(one.stances)} stretches of one stance"
-        out.append(Finding(name, "", "contact", len(one.stances), "1", "ok", detail))
+        stances = len(one.pieces) + one.events.size
+        detail = f"contact from {one.contact.source}; {stances} stretches of one stance"
+        out.append(Finding(name, "", "contact", stances, "1", "ok", detail))
     out += _resolution(one)
     for j, joint in enumerate(one.joints):
         column = column_name(joint, one.channel)

@@ -20,7 +20,6 @@ from pipeline.logs.prepared.contact import Contact
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, UNUSED, Measurement
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.prepared.settings import Settings
 from pipeline.logs.prepared.stream import CHUNK_ROWS, Stream, Survey, prepared_chunks
 from pipeline.logs.quality.finding import VERDICTS, Finding, Quality
 from pipeline.logs.reading.log import Log
@@ -62,11 +61,6 @@ class LongLogs:
     rows: int = CHUNK_ROWS
     _kept: list[tuple[int, Simulator]] = field(default_factory=list)
     _findings: tuple[Finding, ...] = ()
-
-    @property
-    def settings(self) -> Settings:
-        """Grid and cut-off."""
-        return self.prepared[0].settings
 
     def span(self, log: int) -> tuple[float, float]:
         """First and last time of a log [s]."""
@@ -122,11 +116,9 @@ class LongLogs:
         self._kept = kept if size <= KEPT_BYTES else []
 
     def _chunks(self, k: int) -> Iterator[tuple[Quality, Prepared]]:
-        ready = self.prepared[k]
         chunks = prepared_chunks(
             self.streams[k],
-            self.settings,
-            ready.calibration,
+            self.prepared[k],
             rows=self.rows,
             largest=self.largest,
             contact=self.contact,

@@ -17,7 +17,7 @@ from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.quality.drift import Course, friction_drift
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.quality.skew import skew
-from pipeline.logs.quality.unit_check import column_name
+from pipeline.logs.reading.log_format import column_name
 from pipeline.simulation.predict import Prediction
 
 Array = NDArray[np.float64]

@@ -13,8 +13,7 @@ from pipeline.logs.prepared.measurement import Measurement, near_rest
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.signals.derivatives import LowPass
-from pipeline.logs.signals.noise import smoother_noise
-from pipeline.logs.signals.reversal import sign_unsure
+from pipeline.logs.signals.noise import sign_unsure, smoother_noise
 from pipeline.machine.machine import MachineModel
 
 Array = NDArray[np.float64]

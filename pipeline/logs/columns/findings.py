@@ -13,9 +13,10 @@ from pipeline.logs.columns.explaining import Bodies
 from pipeline.logs.columns.hypotheses import Hypothesis, Reading, as_named
 from pipeline.logs.columns.search import Mended
 from pipeline.logs.quality.finding import Finding
-from pipeline.logs.quality.unit_check import DEG, WRONG, column_name
+from pipeline.logs.quality.unit_check import DEG, WRONG
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.mapping import ColumnRule
+from pipeline.logs.reading.log_format import column_name
+from pipeline.logs.reading.plan import AS_NAMED
 
 Array = NDArray[np.float64]
 #: Check under which a suspicion stands that no fit may explain away.
@@ -205,9 +206,10 @@ def _line(
     """Column of the file and the keys of its rule, after a further factor, zero and delay."""
     factor, zero, late = change
     column, wanted = _file_column(log, source, quantity), column_name(target, quantity)
-    rule = log.rules[source, quantity][1] if log.rules else ColumnRule("", "")
+    rule = log.rules[source, quantity][1] if log.rules else AS_NAMED
     slope = rule.affine("rad" if quantity.endswith("position") else log.effort.unit)[0]
-    zero, scale, unit = rule.zero - zero / (factor * slope), rule.scale * factor, rule.unit
+    zero, unit = rule.zero - zero / (factor * slope), rule.unit
+    scale = factor * (-rule.scale if rule.flip else rule.scale)
     if unit is None and abs(abs(factor) * DEG - 1.0) < _ROUNDED and quantity.endswith("position"):
         scale, unit = scale * DEG, "deg"
     keys = {

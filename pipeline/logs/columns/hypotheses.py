@@ -96,57 +96,51 @@ CAUSES: Final = (
 )
 
 
-def _sized(cause: str, joints: tuple[int, ...], size: float, r: Reading) -> Hypothesis:
-    which = list(joints)
-    mended = {
-        "sign": lambda: r.at(which, effort_factor=-r.effort_factor[which]),
-        "scale": lambda: r.at(which, effort_factor=r.effort_factor[which] / size),
-        "late": lambda: r.at(which, late=r.late[which] + size),
-        "position_sign": lambda: r.at(which, position_factor=-r.position_factor[which]),
-        "position_scale": lambda: r.at(which, position_factor=r.position_factor[which] / size),
-        "position_zero": lambda: r.at(which, zero=r.zero[which] - size),
-        "exchanged": lambda: r.at(which, effort_of=r.effort_of[which[::-1]]),
-        "both_exchanged": lambda: r.at(
-            which, effort_of=r.effort_of[which[::-1]], position_of=r.position_of[which[::-1]]
-        ),
-    }
-    return Hypothesis(cause, joints, mended[cause](), size)
-
-
 _SIZES: Final = {"sign": (1.0,), "scale": FACTORS, "late": DELAYS}
 _POSITION_SIZES: Final = {"position_sign": (1.0,), "position_scale": RATIOS, "position_zero": ZEROS}
 
 
-def _together(
-    r: Reading, joints: Sequence[int], sizes: Mapping[str, tuple[float, ...]]
-) -> Iterator[Hypothesis]:
-    for cause, values in sizes.items():
-        if len(joints) > 1 and cause != "position_zero":
-            yield from (_sized(cause, tuple(joints), float(size), r) for size in values)
-
-
-def _alone(
-    r: Reading, joints: Sequence[int], sizes: Mapping[str, tuple[float, ...]]
-) -> Iterator[Hypothesis]:
-    for cause, values in sizes.items():
-        for j in joints:
-            yield from (_sized(cause, (j,), float(size), r) for size in values)
+def _sized(cause: str, joints: tuple[int, ...], size: float, r: Reading) -> Hypothesis:
+    which, other = list(joints), list(joints[::-1])
+    effort, position = r.effort_factor[which], r.position_factor[which]
+    changes: dict[str, dict[str, Array | Index]] = {
+        "sign": {"effort_factor": -effort},
+        "scale": {"effort_factor": effort / size},
+        "late": {"late": r.late[which] + size},
+        "exchanged": {"effort_of": r.effort_of[other]},
+        "both_exchanged": {"effort_of": r.effort_of[other], "position_of": r.position_of[other]},
+        "position_sign": {"position_factor": -position},
+        "position_scale": {"position_factor": position / size},
+        "position_zero": {"zero": r.zero[which] - size},
+    }
+    return Hypothesis(cause, joints, r.at(which, **changes[cause]), size)
 
 
 def of_efforts(r: Reading, live: Sequence[int], odd: Sequence[int]) -> Iterator[Hypothesis]:
     """About efforts alone, of joints that are compared; pairs with one that is explained badly."""
-    yield from _together(r, live, _SIZES)
-    # Bodies that give way to a wrong column leave the misfit at another joint.
-    yield from _alone(r, live, _SIZES)
-    for pair in combinations(live, 2):
-        if set(pair) & set(odd):
-            yield _sized("exchanged", pair, 1.0, r)
+    # Bodies that give way to a wrong column leave the misfit at another joint: each is tried.
+    return _tries(r, live, live, odd, _SIZES, "exchanged")
 
 
 def of_positions(r: Reading, live: Sequence[int], odd: Sequence[int]) -> Iterator[Hypothesis]:
     """About positions, too; of single ones where efforts are explained badly."""
-    yield from _together(r, live, _POSITION_SIZES)
-    yield from _alone(r, odd, _POSITION_SIZES)
+    return _tries(r, live, odd, odd, _POSITION_SIZES, "both_exchanged")
+
+
+def _tries(
+    r: Reading,
+    live: Sequence[int],
+    alone: Sequence[int],
+    odd: Sequence[int],
+    sizes: Mapping[str, Sequence[float]],
+    exchanged: str,
+) -> Iterator[Hypothesis]:
+    for cause, values in sizes.items():
+        if len(live) > 1 and cause != "position_zero":
+            yield from (_sized(cause, tuple(live), float(size), r) for size in values)
+    for cause, values in sizes.items():
+        for j in alone:
+            yield from (_sized(cause, (j,), float(size), r) for size in values)
     for pair in combinations(live, 2):
         if set(pair) & set(odd):
-            yield _sized("both_exchanged", pair, 1.0, r)
+            yield _sized(exchanged, pair, 1.0, r)

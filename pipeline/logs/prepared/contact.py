@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -45,21 +44,6 @@ class Contact:
     def rows(self, index: NDArray[np.intp]) -> Contact:
         """At other rows."""
         return replace(self, standing=self.standing[index])
-
-
-@dataclass(frozen=True)
-class Stance:
-    """A stretch in which the same feet stand.
-
-    Attributes:
-        rows: Slice of rows.
-        feet: Legs that stand; empty without contacts.
-        piece: Number of the gap-free piece it lies in.
-    """
-
-    rows: slice
-    feet: tuple[str, ...]
-    piece: int
 
 
 def log_contact(log: Log) -> Contact | None:
@@ -148,17 +132,10 @@ def find_contact(log: Log, robot: Robot, *, start: float | None = None) -> Conta
     return lowest_feet(robot, log.position, log.base_roll, log.base_pitch)
 
 
-def stances(contact: Contact | None, pieces: Sequence[slice]) -> tuple[Stance, ...]:
-    """Cut gap-free pieces at every change of stance."""
-    out = []
-    for number, piece in enumerate(pieces):
-        if contact is None:
-            out.append(Stance(piece, (), number))
-            continue
-        part = contact.standing[piece]
-        cuts = np.flatnonzero((part[1:] != part[:-1]).any(axis=1)) + 1
-        edges = [0, *cuts.tolist(), part.shape[0]]
-        for a, b in pairwise(edges):
-            feet = tuple(f for f, on in zip(contact.feet, part[a], strict=True) if on)
-            out.append(Stance(slice(piece.start + a, piece.start + b), feet, number))
-    return tuple(out)
+def changes_of_stance(contact: Contact | None, pieces: Sequence[slice]) -> NDArray[np.intp]:
+    """Rows at which other feet stand than in the row before, not across gaps, shape (E,)."""
+    if contact is None:
+        return np.empty(0, dtype=np.intp)
+    changed = (contact.standing[1:] != contact.standing[:-1]).any(axis=1)
+    changed[[piece.start - 1 for piece in pieces if piece.start > 0]] = False
+    return np.flatnonzero(changed) + 1

@@ -74,65 +74,53 @@ def cycle_noise(prepared: Prepared, cycle: float) -> Array | None:
     pairs = []
     for piece in prepared.pieces:
         time = prepared.time[piece]
-        later = time + cycle
-        inside = later <= time[-1]
-        if inside.sum() >= 50:
-            pairs.append((piece, later[inside]))
-    if not pairs:
-        return None
-    differences = []
-    for piece, later in pairs:
-        n = later.size
-        first = slice(piece.start, piece.start + n)
-        index = (later - prepared.time[piece.start]) / prepared.settings.dt
-        differences.append(_difference(prepared, first, prepared, piece, index))
-    return _noise(differences, np.nanstd(prepared.q, axis=0))
+        later = time[time + cycle <= time[-1]] + cycle
+        if later.size >= 50:
+            index = (later - time[0]) / prepared.settings.dt
+            pairs.append(_difference(prepared, piece.start, prepared, piece, index))
+    return _noise(pairs, prepared) if pairs else None
 
 
 def repeat_noise(first: Prepared, second: Prepared) -> Array | None:
-    """Noise from two logs of one motion that begin at the same instant; None if they do not.
+    """Noise from two logs of one motion that begin at the same instant, (J,); None if they do not.
 
-    Returns:
-        Standard deviation, shape (J,).
+    Standard deviations, as of `cycle_noise`.
     """
-    if len(first) < 50 or len(second) < 50 or first.settings.dt != second.settings.dt:
-        return None
     n = min(len(first), len(second))
-    if n < 0.9 * max(len(first), len(second)) or len(first.pieces) + len(second.pieces) > 2:
+    if n < max(50, 0.9 * max(len(first), len(second))) or first.settings.dt != second.settings.dt:
         return None
-    part = slice(0, n)
+    if len(first.pieces) + len(second.pieces) > 2:
+        return None
     index = np.arange(n, dtype=np.float64)
-    difference = _difference(first, part, second, slice(0, len(second)), index)
-    return _noise([difference], np.nanstd(first.q, axis=0))
+    return _noise([_difference(first, 0, second, slice(0, len(second)), index)], first)
 
 
 def _difference(
-    a: Prepared, rows: slice, b: Prepared, piece: slice, index: Array
+    a: Prepared, first: int, b: Prepared, piece: slice, index: Array
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Differences of position and effort between rows of one and fractional rows of another."""
+    rows = slice(first, first + index.size)
     k = np.clip(np.floor(index).astype(int), 0, piece.stop - piece.start - 2) + piece.start
     w = (index - (k - piece.start))[:, None]
     dq = (1 - w) * b.q[k] + w * b.q[k + 1] - a.q[rows]
     de = (1 - w) * b.effort[k] + w * b.effort[k + 1] - a.effort[rows]
-    ok = a.mask[rows] & b.mask[k] & b.mask[k + 1]
-    return dq, de, ok
+    return dq, de, a.mask[rows] & b.mask[k] & b.mask[k + 1]
 
 
-def _noise(parts: Sequence[tuple[Array, Array, NDArray[np.bool_]]], spread: Array) -> Array | None:
-    dq = np.concatenate([part[0] for part in parts])
-    de = np.concatenate([part[1] for part in parts])
-    ok = np.concatenate([part[2] for part in parts]) & np.isfinite(de)
+def _noise(
+    parts: Sequence[tuple[Array, Array, NDArray[np.bool_]]], prepared: Prepared
+) -> Array | None:
+    """Standard deviation of the effort where positions are the same, shape (J,)."""
+    dq, de, ok = (np.concatenate(part) for part in zip(*parts, strict=True))
+    spread = np.nanstd(prepared.q, axis=0)
     limit = SAME_MOTION * np.maximum(spread, 1e-3 * max(float(spread.max()), 1e-300))
     same = (np.abs(dq) <= 3 * limit).all(axis=1)
     if np.median(np.abs(dq) / limit) > 1 or same.sum() < 50:
         return None
-    ok &= same[:, None]
-    out = np.full(de.shape[1], np.nan)
-    for j in range(de.shape[1]):
-        kept = de[ok[:, j], j]
-        if kept.size >= 50:
-            out[j] = np.sqrt(np.mean(kept**2) / 2.0)
-    return out
+    kept = ok & np.isfinite(de) & same[:, None]
+    count = kept.sum(axis=0)
+    square = np.where(kept, de, 0.0) ** 2
+    return np.where(count >= 50, np.sqrt(square.sum(axis=0) / np.maximum(count, 1) / 2.0), np.nan)
 
 
 def with_repeated_noise(prepared: Sequence[Prepared]) -> list[Prepared]:
@@ -143,11 +131,8 @@ def with_repeated_noise(prepared: Sequence[Prepared]) -> list[Prepared]:
         estimates = [cycle_noise(one, cycle)] if cycle is not None else []
         estimates += [repeat_noise(one, b) for i, b in enumerate(prepared) if i != k]
         good = [e for e in estimates if e is not None]
-        if not good:
-            out.append(one)
-            continue
-        table = np.stack(good)
-        known = np.isfinite(table).any(axis=0)
-        best = np.where(known, np.min(np.where(np.isfinite(table), table, np.inf), axis=0), 0.0)
-        out.append(one.with_noise(np.where(known, best, one.noise), "repeats"))
+        if good:
+            best = np.fmin.reduce(good)
+            one = one.with_noise(np.where(np.isfinite(best), best, one.noise), "repeats")
+        out.append(one)
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
@@ -12,6 +12,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _SHORT = 300  # samples of a kernel up to which summing is quicker than transforming
+_PER_ROW: Final = (
+    *("time", "q", "v", "a", "effort", "mask", "part", "block", "base_roll", "base_pitch"),
+    *("standing", "foot_force", "open_winding", "temperature", "unsure"),
+)
 FIT, CHOOSE, PROVE, UNUSED = 0, 1, 2, -1
 
 
@@ -90,7 +94,7 @@ class Measurement:
             flows, and a voltage that is compared has no part from the speed.
         temperature: Of the motors' sensors, shape (N, J) [degC], or None.
         unsure: How unsure the sign of friction is, 0 to 1, shape (N, J); see
-            `pipeline.logs.signals.reversal`.
+            `pipeline.logs.signals.noise`.
         removed: What took rows from the comparison, and the share of all joints' rows it took; a
             row counts with the first that took it.
         sha256: Of the log.
@@ -126,6 +130,13 @@ class Measurement:
 
     def __len__(self) -> int:
         return self.time.size
+
+    def at(self, rows: NDArray[np.intp]) -> Measurement:
+        """Some of its rows, as one piece without a filter."""
+        kept = {name: getattr(self, name) for name in _PER_ROW}
+        kept = {name: None if x is None else x[rows] for name, x in kept.items()}
+        piece = (slice(0, rows.size),)
+        return replace(self, pieces=piece, lowpass=unfiltered, kernel=None, **kept)
 
     @property
     def rate(self) -> float:

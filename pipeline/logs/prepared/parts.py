@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from pipeline.logs.errors import PreparationError
 from pipeline.logs.prepared.cycles import period
+from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, UNUSED
 from pipeline.logs.prepared.prepare import Prepared
 
-Mask = NDArray[np.bool_]
-
-FIT, CHOOSE, PROVE, NONE = 0, 1, 2, -1
 NAMES: Final = ("fit", "choose", "prove")
 #: Guard between blocks per reach of the filter to one side: more than both sides together.
 GUARD: Final = 2.2
@@ -39,7 +37,7 @@ class Parts:
     """Which rows of which log belong to which part.
 
     Attributes:
-        part: Per log, shape (N,): `FIT`, `CHOOSE`, `PROVE` or `NONE` (guards).
+        part: Per log, shape (N,): `FIT`, `CHOOSE`, `PROVE` or `UNUSED` (guards).
         block: Per log, shape (N,): number of the block, unique over all logs; -1 in guards.
         guard: Between blocks [s].
         rule: How the parts were cut, in words.
@@ -51,19 +49,6 @@ class Parts:
     guard: float
     rule: str
     warning: str
-
-    def rows(self, log: int, part: int) -> Mask:
-        """Rows of one log in one part, shape (N,)."""
-        return np.asarray(self.part[log] == part)
-
-    def blocks(self, part: int) -> list[tuple[int, slice]]:
-        """Blocks of one part: log and rows."""
-        out = []
-        for k, (kind, number) in enumerate(zip(self.part, self.block, strict=True)):
-            for b in np.unique(number[(kind == part) & (number >= 0)]):
-                rows = np.flatnonzero(number == b)
-                out.append((k, slice(int(rows[0]), int(rows[-1]) + 1)))
-        return out
 
 
 def split(
@@ -90,33 +75,24 @@ def split(
     if prove_last is not None and not 0.05 <= prove_last <= 0.8:
         raise PreparationError(f"share to prove on is {prove_last:g}; expected 0.05 to 0.8")
     proving = set(range(len(prepared), len(every)))
-    rule, warning = "", ""
+    warning, last, pattern = "", 0.0, PATTERN_WITHOUT_PROVE
     if holdout:
         rule = "proved on the held-out logs"
     elif prove_last is not None:
-        rule = f"proved on the last {100 * prove_last:g} % of every log"
+        rule, last = f"proved on the last {100 * prove_last:g} % of every log", prove_last
     elif len(prepared) > 1:
         proving, rule = _held_out(prepared)
-    if not proving and prove_last is None:
-        rule = "proved on every fourth block of the log"
+    else:
+        rule, pattern = "proved on every fourth block of the log", PATTERN
         warning = _periodic_warning(prepared)
     part, block, count = [], [], 0
     for k, one in enumerate(every):
-        if k in proving:
-            kinds, numbers = _cut(one, guard, (PROVE,), 0.0)
-        elif proving:
-            kinds, numbers = _cut(one, guard, PATTERN_WITHOUT_PROVE, 0.0)
-        elif prove_last is not None:
-            kinds, numbers = _cut(one, guard, PATTERN_WITHOUT_PROVE, prove_last)
-        else:
-            kinds, numbers = _cut(one, guard, PATTERN, 0.0)
+        kinds, numbers = _cut(one, guard, *(((PROVE,), 0.0) if k in proving else (pattern, last)))
         block.append(np.where(numbers >= 0, numbers + count, -1).astype(np.int32))
         count += int(numbers.max(initial=-1)) + 1
         part.append(kinds)
     for number, name in enumerate(NAMES):
-        rows = sum(
-            int((kind == number)[one.core].sum()) for kind, one in zip(part, every, strict=True)
-        )
+        rows = sum(int((kind == number).sum()) for kind in part)
         if rows < 20:
             duration = sum(float(one.time[-1] - one.time[0]) for one in every)
             raise PreparationError(
@@ -135,29 +111,27 @@ def _held_out(prepared: Sequence[Prepared]) -> tuple[set[int], str]:
     was seen is fair, at the ends it is extrapolation.
     """
     conditions = [dict(one.log.condition) for one in prepared]
-    keys = sorted(set.intersection(*(set(c) for c in conditions)))
-    best: tuple[int, str, list[float | str]] | None = None
-    for key in keys:
+    best: tuple[str, list[float | str]] = ("", [""])
+    for key in sorted(set.intersection(*(set(c) for c in conditions))):
         values = sorted({c[key] for c in conditions}, key=lambda v: (isinstance(v, str), v))
-        if len(values) > 1 and (best is None or len(values) > best[0]):
-            best = (len(values), key, values)
-    if best is not None:
-        _, key, values = best
-        # With two values the larger one; with more the one in the middle.
-        left_out = values[len(values) // 2]
-        chosen = {k for k, c in enumerate(conditions) if c[key] == left_out}
-        return chosen, f"proved on the logs with {key} = {left_out}"
-    last = len(prepared) - 1
-    return {last}, f"proved on the log {prepared[last].log.name}"
+        if len(values) > len(best[1]):
+            best = key, values
+    key, values = best
+    if not key:
+        last = len(prepared) - 1
+        return {last}, f"proved on the log {prepared[last].log.name}"
+    # With two values the larger one; with more the one in the middle.
+    left_out = values[len(values) // 2]
+    chosen = {k for k, c in enumerate(conditions) if c[key] == left_out}
+    return chosen, f"proved on the logs with {key} = {left_out}"
 
 
 def _periodic_warning(prepared: Sequence[Prepared]) -> str:
-    cycles = [period(one) for one in prepared]
-    known = [c for c in cycles if c is not None]
-    if len(known) < len(cycles):
+    cycle = period(prepared[0])
+    if cycle is None:
         return ""
     return (
-        f"the log repeats one motion every {known[0]:.3g} s: held-out cycles of it prove nothing "
+        f"the log repeats one motion every {cycle:.3g} s: held-out cycles of it prove nothing "
         "about other motions; give a log of another motion, speed or load with --holdout"
     )
 
@@ -166,7 +140,7 @@ def _cut(
     one: Prepared, guard: float, pattern: Sequence[int], prove_last: float
 ) -> tuple[NDArray[np.int8], NDArray[np.int32]]:
     """Blocks of one log, with a guard wherever neighbours belong to different parts."""
-    part = np.full(len(one), NONE, dtype=np.int8)
+    part = np.full(len(one), UNUSED, dtype=np.int8)
     block = np.full(len(one), -1, dtype=np.int32)
     margin = int(np.ceil(guard / one.settings.dt))
     number = 0
@@ -195,7 +169,7 @@ def _cut(
             number += 1
     outside = np.ones(len(one), dtype=np.bool_)
     outside[one.core] = False
-    part[outside], block[outside] = NONE, -1
+    part[outside], block[outside] = UNUSED, -1
     return part, block
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-from typing import Any, Final
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs.prepared.contact import Contact, Stance, log_contact, stances
-from pipeline.logs.prepared.settings import Settings, choose_settings, finite
-from pipeline.logs.reading.log import Log
+from pipeline.logs.prepared.contact import Contact, changes_of_stance, log_contact
+from pipeline.logs.prepared.settings import Settings, choose_settings
+from pipeline.logs.reading.log import EFFORTS, Log
 from pipeline.logs.signals.derivatives import LowPass
 from pipeline.logs.signals.fusion import Fusion, fuse_by_noise, position_alone
 from pipeline.logs.signals.grid import GAP, Grid, busiest, fill_gaps, long_runs, uniform_grid
@@ -22,25 +22,10 @@ Mask = NDArray[np.bool_]
 
 #: Share of the kernel's weight that may fall on missing samples before the output is masked.
 TOLERATED_SHARE: Final = 0.05
-#: Rows from which the error of time stamps is told.
-STAMP_ROWS: Final = 50_000
-
-
-@dataclass(frozen=True, eq=False)
-class Calibration:
-    """What is estimated from a whole log and holds for its chunks.
-
-    Attributes:
-        noise: Standard deviation of the effort's noise within the bandwidth, shape (J,).
-        position_noise: Standard deviation of a position's noise before filtering, (J,) [rad].
-        fusion: How velocity columns enter.
-        stamp_error: Standard deviation of the time stamps' errors [s].
-    """
-
-    noise: Array
-    position_noise: Array
-    fusion: Fusion
-    stamp_error: float
+#: Rows from which the error of time stamps is estimated.
+_STAMPS: Final = slice(0, 50_000)
+#: Attributes of a log that are kept on the grid, where they are not compared.
+OTHER: Final = ("velocity", "motor_position", *EFFORTS, "goal_position", "temperature", "supply")
 
 
 @dataclass(frozen=True)
@@ -65,11 +50,10 @@ class Prepared:
         torque_off: Where the drive was switched off, shape (N, J), or None.
         noise: Standard deviation of the effort's noise within the bandwidth, shape (J,).
         noise_basis: ``"repeats"`` or ``"smoother"``.
-        position_noise: Standard deviation of the position's noise before filtering, (J,) [rad].
         settings: Grid and cut-off.
         pieces: Stretches without a gap, as slices of rows.
         contact: Which feet stand, or None.
-        stances: Stretches of one stance within one piece; one per piece without contacts.
+        events: Rows at which other feet stand than before, no gap between, shape (E,).
         foot_force: Filtered, shape (N, F, 3) [N], or None.
         base_roll: Filtered, shape (N,) [rad], or None.
         base_pitch: Filtered, shape (N,) [rad], or None.
@@ -99,11 +83,10 @@ class Prepared:
     torque_off: Mask | None
     noise: Array
     noise_basis: str
-    position_noise: Array
     settings: Settings
     pieces: tuple[slice, ...]
     contact: Contact | None
-    stances: tuple[Stance, ...]
+    events: NDArray[np.intp]
     foot_force: Array | None
     base_roll: Array | None
     base_pitch: Array | None
@@ -141,24 +124,15 @@ class Prepared:
 
     def lowpass(self, x: Array) -> Array:
         """Bring a series of this grid to the stated bandwidth, piece by piece; samples first."""
-        out = np.empty_like(x)
-        for piece in self.pieces:
-            out[piece] = self.settings.lowpass.smooth(x[piece])
-        return out
+        return self.settings.lowpass.smooth(x, self.pieces)
 
     def near_event(self) -> Mask:
         """Rows whose filter reaches across a change of stance, shape (N,)."""
         near = np.zeros(len(self), dtype=np.bool_)
         half = self.settings.lowpass.half
-        for before, after in zip(self.stances[:-1], self.stances[1:], strict=True):
-            if before.rows.stop == after.rows.start and before.piece == after.piece:
-                near[max(0, after.rows.start - half) : after.rows.start + half] = True
+        for row in self.events:
+            near[max(0, row - half) : row + half] = True
         return near
-
-    @property
-    def calibration(self) -> Calibration:
-        """What chunks of the same log take over."""
-        return Calibration(self.noise, self.position_noise, self.fusion, self.stamp_error)
 
     def unfiltered_effort(self) -> Array:
         """The compared effort on the grid at the log's full bandwidth, shape (N, J)."""
@@ -182,7 +156,7 @@ def prepare(
     contact: Contact | None = None,
     core: slice | None = None,
     origin: float | None = None,
-    known: Calibration | None = None,
+    known: Prepared | None = None,
 ) -> Prepared:
     """Bring a log to one grid and bandwidth.
 
@@ -194,103 +168,94 @@ def prepare(
         contact: Which feet stand at the log's rows; from its forces or contact columns by default.
         core: Rows of the log that count, for a chunk.
         origin: A time on the uniform grid [s], for a chunk; the first by default.
-        known: Noises and fusion of the whole log, for a chunk.
+        known: What stands for the whole log, for a chunk: noises and fusion are taken over.
 
     Raises:
         PreparationError: No joint moves, or the log is too short for the filter.
     """
-    position_ok, effort_ok = usable if usable is not None else finite(log)
-    settings = settings or choose_settings([log], [(position_ok, effort_ok)])
-    longest_gap = 1.0 / (4.0 * settings.cutoff)
-    grid = uniform_grid(log.time, settings.dt, origin, bridge=longest_gap)
+    usable = usable or log.finite
+    settings = settings or choose_settings([log], [usable])
     lowpass = settings.lowpass
-    chosen = log.effort
-    series = _filtered(log, grid, settings, (position_ok, effort_ok))
-    extras = _filtered_extras(log, grid, lowpass)
-    other = _other(log, grid, chosen.channel)
+    grid = uniform_grid(log.time, settings.dt, origin, bridge=settings.bridged)
+    q_raw, motion_ok = _on_grid(log, log.position, usable[0], grid, settings)
+    effort_raw, effort_ok = _on_grid(log, log.effort.values, usable[1], grid, settings)
+    q, v, a = lowpass.derivatives(q_raw, grid.pieces)
+    effort = lowpass.smooth(effort_raw, grid.pieces)
+    effort[grid.flags(long_runs(log.time, ~usable[1], settings.bridged))] = np.nan
+    other = _other(log, grid)
+    column = other.get("velocity")
     if known is None:
-        known = _calibrated(log, grid, settings, series, other)
-    _fuse(series.v, series.a, grid, other, known.fusion, lowpass, longest_gap)
+        stretches = busiest(q_raw, grid.pieces)
+        noise = smoother_noise(effort_raw, effort_ok, stretches, lowpass, in_band=True)
+        position_noise = smoother_noise(q_raw, motion_ok, stretches, lowpass, in_band=False)
+        fusion = _fusion(grid, column, (v, a), motion_ok, position_noise, lowpass)
+        late, error = stamp_error(log.time[_STAMPS], log.position[_STAMPS], GAP * settings.dt)
+        stamps = late if late > 4 * error else 0.0
+    else:
+        noise, fusion, stamps = known.noise, known.fusion, known.stamp_error
+    if column is not None:
+        _fuse(v, a, grid, column, fusion, settings)
     contact = contact or log_contact(log)
-    on_grid = contact.rows(grid.nearest) if contact is not None else None
+    standing = contact.rows(grid.nearest) if contact is not None else None
     return Prepared(
         log=log,
         time=grid.time,
-        q=series.q,
-        v=series.v,
-        a=series.a,
-        effort=series.effort,
-        channel=chosen.channel,
-        unit=chosen.unit,
-        mask=series.effort_ok & series.motion_ok.all(axis=1, keepdims=True),
-        motion_ok=series.motion_ok,
+        q=q,
+        v=v,
+        a=a,
+        effort=effort,
+        channel=log.effort.channel,
+        unit=log.effort.unit,
+        mask=effort_ok & motion_ok.all(axis=1, keepdims=True),
+        motion_ok=motion_ok,
         torque_off=None if log.torque_off is None else log.torque_off[grid.nearest],
-        noise=known.noise,
+        noise=noise,
         noise_basis="smoother",
-        position_noise=known.position_noise,
         settings=settings,
         pieces=grid.pieces,
-        contact=on_grid,
-        stances=stances(on_grid, grid.pieces),
-        foot_force=extras.pop("foot_force", None),
-        base_roll=extras.pop("base_roll", None),
-        base_pitch=extras.pop("base_pitch", None),
+        contact=standing,
+        events=changes_of_stance(standing, grid.pieces),
+        foot_force=_smoothed(log, log.foot_force, grid, lowpass),
+        base_roll=_smoothed(log, log.base_roll, grid, lowpass),
+        base_pitch=_smoothed(log, log.base_pitch, grid, lowpass),
         other=other,
-        fusion=known.fusion,
-        stamp_error=known.stamp_error,
+        fusion=fusion,
+        stamp_error=stamps,
         grid=grid,
-        usable=(position_ok, effort_ok),
+        usable=usable,
         log_contact=contact,
         core=_core(grid, core),
         row=grid.nearest,
     )
 
 
-@dataclass(frozen=True, eq=False)
-class _Series:
-    """Positions and efforts on the grid, before and after the filter, each (N, J)."""
-
-    q_raw: Array
-    effort_raw: Array
-    q: Array
-    v: Array
-    a: Array
-    effort: Array
-    motion_ok: Mask
-    effort_ok: Mask
+def _on_grid(
+    log: Log, values: Array, ok: Mask, grid: Grid, settings: Settings
+) -> tuple[Array, Mask]:
+    """Values on the grid, short holes bridged, and where the filter sees enough of them, (N, J)."""
+    missing = grid.flags(long_runs(log.time, ~ok, settings.bridged))
+    seen = settings.lowpass.share(missing, grid.pieces) <= TOLERATED_SHARE
+    return grid.resample(fill_gaps(log.time, values, ok)), seen
 
 
-def _filtered(log: Log, grid: Grid, settings: Settings, usable: tuple[Mask, Mask]) -> _Series:
-    """Bridge short holes, resample, filter, and mark what the filter sees too little of."""
-    lowpass, longest = settings.lowpass, 1.0 / (4.0 * settings.cutoff)
-    position_ok, effort_ok = usable
-    q_raw = grid.resample(fill_gaps(log.time, log.position, position_ok))
-    effort_raw = grid.resample(fill_gaps(log.time, log.effort.values, effort_ok))
-    no_motion = grid.flags(long_runs(log.time, ~position_ok, longest))
-    no_effort = grid.flags(long_runs(log.time, ~effort_ok, longest))
-    q, v, a, effort = (np.empty_like(q_raw) for _ in range(4))
-    motion_good, effort_good = np.empty_like(no_motion), np.empty_like(no_motion)
-    for piece in grid.pieces:
-        q[piece], v[piece], a[piece] = lowpass.derivatives(q_raw[piece])
-        effort[piece] = lowpass.smooth(effort_raw[piece])
-        motion_good[piece] = lowpass.share(no_motion[piece]) <= TOLERATED_SHARE
-        effort_good[piece] = lowpass.share(no_effort[piece]) <= TOLERATED_SHARE
-    effort[no_effort] = np.nan
-    return _Series(q_raw, effort_raw, q, v, a, effort, motion_good, effort_good)
+def _smoothed(log: Log, values: Array | None, grid: Grid, lowpass: LowPass) -> Array | None:
+    """What acts on the prediction and shares its bandwidth: foot forces and base angles."""
+    if values is None:
+        return None
+    flat = values.reshape(len(log), -1)
+    raw = grid.resample(fill_gaps(log.time, flat, np.isfinite(flat)))
+    return lowpass.smooth(raw, grid.pieces).reshape(-1, *values.shape[1:])
 
 
-def _calibrated(
-    log: Log, grid: Grid, settings: Settings, series: _Series, other: dict[str, Array]
-) -> Calibration:
-    """Noises, the say of velocity columns, and errors of time stamps."""
-    lowpass, stretches = settings.lowpass, busiest(series.q_raw, grid.pieces)
-    good = (series.effort_ok, series.motion_ok)
-    floor = smoother_noise(series.effort_raw, good[0], stretches, lowpass, in_band=True)
-    noise = smoother_noise(series.q_raw, good[1], stretches, lowpass, in_band=False)
-    fusion = _fusion(grid, other, (series.v, series.a), good[1], noise, lowpass)
-    rows = slice(0, STAMP_ROWS)
-    stamps, error = stamp_error(log.time[rows], log.position[rows], GAP * settings.dt)
-    return Calibration(floor, noise, fusion, stamps if stamps > 4 * error else 0.0)
+def _other(log: Log, grid: Grid) -> dict[str, Array]:
+    """Series that are not compared, on the grid and not filtered."""
+    out = {}
+    for name in OTHER:
+        values = getattr(log, name)
+        if values is not None and name != log.effort.channel:
+            flat = values.reshape(len(log), -1)
+            out[name] = grid.resample(flat).reshape(-1, *values.shape[1:])
+    return out
 
 
 def _core(grid: Grid, core: slice | None) -> slice:
@@ -304,14 +269,13 @@ def _core(grid: Grid, core: slice | None) -> slice:
 
 def _fusion(
     grid: Grid,
-    other: dict[str, Array],
+    column: Array | None,
     rates: tuple[Array, Array],
     ok: Mask,
     position_noise: Array,
     lowpass: LowPass,
 ) -> Fusion:
     """How the log's velocity columns are to be weighed, where it has some."""
-    column = other.get("velocity")
     if column is None:
         return position_alone(position_noise, lowpass)
     good = np.isfinite(column)
@@ -322,63 +286,14 @@ def _fusion(
 
 
 def _fuse(
-    v: Array,
-    a: Array,
-    grid: Grid,
-    other: dict[str, Array],
-    fusion: Fusion,
-    lowpass: LowPass,
-    longest_gap: float,
+    v: Array, a: Array, grid: Grid, column: Array, fusion: Fusion, settings: Settings
 ) -> None:
     """Average speeds and accelerations, in place, with what the velocity columns say."""
-    column = other.get("velocity")
-    if column is None:
-        return
-    missing = long_runs(grid.time, ~np.isfinite(column), longest_gap)
-    for j in np.flatnonzero(fusion.weight.any(axis=0)):
-        if not np.isfinite(column[:, j]).any():
-            continue
-        straight = fusion.aligned(grid.time, column[:, j], int(j))
-        for piece in grid.pieces:
-            speed, rate = lowpass.derivatives(straight[piece, None])[:2]
-            seen = lowpass.share(missing[piece, j, None])[:, 0] <= TOLERATED_SHARE
-            for into, reading, order in ((v, speed, 0), (a, rate, 1)):
-                w = np.where(seen, fusion.weight[order, j], 0.0)
-                into[piece, j] += w * (reading[:, 0] - into[piece, j])
-
-
-def _filtered_extras(log: Log, grid: Grid, lowpass: LowPass) -> dict[str, Any]:
-    """Foot forces and base angles: they act on the prediction and share its bandwidth."""
-    out: dict[str, Any] = {}
-    for name in ("foot_force", "base_roll", "base_pitch"):
-        values = getattr(log, name)
-        if values is None:
-            continue
-        flat = values.reshape(values.shape[0], -1)
-        raw = grid.resample(fill_gaps(log.time, flat, np.isfinite(flat)))
-        for piece in grid.pieces:
-            raw[piece] = lowpass.smooth(raw[piece])
-        out[name] = raw.reshape(raw.shape[0], *values.shape[1:])
-    return out
-
-
-def _other(log: Log, grid: Grid, channel: str) -> dict[str, Array]:
-    wanted = (
-        "velocity",
-        "motor_position",
-        "torque",
-        "current",
-        "voltage",
-        "power",
-        "goal_position",
-        "temperature",
-    )
-    out = {}
-    known = {f.name for f in fields(log)}
-    for name in (*wanted, "supply"):
-        values = getattr(log, name) if name in known else None
-        if values is None or name == channel:
-            continue
-        flat = values.reshape(values.shape[0], -1)
-        out[name] = grid.resample(flat).reshape(-1, *values.shape[1:])
-    return out
+    lowpass = settings.lowpass
+    missing = long_runs(grid.time, ~np.isfinite(column), settings.bridged)
+    for j in np.flatnonzero(fusion.weight.any(axis=0) & np.isfinite(column).any(axis=0)):
+        straight = fusion.aligned(grid.time, column[:, j], int(j))[:, None]
+        seen = lowpass.share(missing[:, [j]], grid.pieces)[:, 0] <= TOLERATED_SHARE
+        readings = lowpass.derivatives(straight, grid.pieces)[:2]
+        for into, reading, weight in zip((v, a), readings, fusion.weight[:, j], strict=True):
+            into[:, j] += np.where(seen, weight, 0.0) * (reading[:, 0] - into[:, j])

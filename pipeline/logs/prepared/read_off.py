@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.quality.finding import Finding, Findings
-from pipeline.logs.quality.unit_check import column_name
+from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.signals.derivatives import LowPass
 from pipeline.logs.signals.orders import Ripple, strongest_order
 from pipeline.logs.signals.two_sides import TwoSides, read_off
@@ -74,9 +74,7 @@ def ripples(one: Prepared) -> dict[str, Ripple]:
     cutoff = min(one.cutoff, _ABOVE)
     lowpass = LowPass(one.rate, cutoff)
     raw = one.unfiltered_effort()
-    rest = np.full_like(raw, np.nan)
-    for piece in one.pieces:
-        rest[piece] = raw[piece] - lowpass.smooth(raw[piece])
+    rest = raw - lowpass.smooth(raw, one.pieces)
     rest[~one.mask] = np.nan
     found = {
         joint: strongest_order(rest[:, j], one.q[:, j], one.v[:, j], one.rate)

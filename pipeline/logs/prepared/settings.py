@@ -45,6 +45,11 @@ class Settings:
         """The filter."""
         return LowPass(1.0 / self.dt, self.cutoff)
 
+    @property
+    def bridged(self) -> float:
+        """Time between good samples up to which values are interpolated [s]."""
+        return 1.0 / (4.0 * self.cutoff)
+
 
 def choose_settings(
     logs: Sequence[Log],
@@ -84,7 +89,7 @@ def choose_settings(
                 f"{smallest:.3g} to {LARGEST_SHARE * rate:.4g} Hz"
             )
         return Settings(dt, float(cutoff), "set by the user")
-    usable = usable or [finite(log) for log in logs]
+    usable = usable or [log.finite for log in logs]
     held = min(_held(log, good) for log, good in zip(logs, usable, strict=True))
     asked = []
     for log, (position_ok, _) in zip(logs, usable, strict=True):
@@ -106,11 +111,6 @@ def choose_settings(
     if value < per_joint[slowest]:
         reason = f"the slowest channel holds no more: one sample in {1e3 * OWN_SHARE / held:.3g} ms"
     return Settings(dt, value, reason, per_joint)
-
-
-def finite(log: Log) -> tuple[Mask, Mask]:
-    """Positions and efforts of a log that are numbers, each shape (N, J)."""
-    return np.isfinite(log.position), log.valid & np.isfinite(log.effort.values)
 
 
 def _held(log: Log, usable: tuple[Mask, Mask]) -> float:

@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.contact import Contact
 from pipeline.logs.prepared.informative import STRETCH, Scan, choose, scan
-from pipeline.logs.prepared.prepare import Calibration, Prepared, prepare
-from pipeline.logs.prepared.settings import Settings, choose_settings
+from pipeline.logs.prepared.prepare import Prepared, prepare
 from pipeline.logs.quality.finding import Quality
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.mapping import Mapping as MappingFile
 from pipeline.logs.reading.read import read_log, stream_log
-from pipeline.logs.reading.table_file import open_table, row_count, sha256
+from pipeline.logs.reading.table_file import TableFile, open_table, row_count, sha256
 
 Array = NDArray[np.float64]
 #: Refusals that concern a log as a whole and not a chunk of it.
@@ -31,11 +30,6 @@ FINE_IN_A_CHUNK: Final = ("rows", "constant", "empty")
 SURVEYED: Final = 6 * STRETCH
 #: Rows of a chunk: with 18 joints, voltages and foot forces about a quarter of a gigabyte.
 CHUNK_ROWS: Final = 50_000
-
-
-def as_read(log: Log) -> Log:
-    """No change."""
-    return log
 
 
 @dataclass(frozen=True)
@@ -52,12 +46,16 @@ class Stream:
     path: Path
     expected: Expected
     mapping: MappingFile | None = None
-    adjust: Callable[[Log], Log] = as_read
+    adjust: Callable[[Log], Log] = lambda log: log
+
+    @cached_property
+    def _table(self) -> TableFile:
+        return open_table(self.path, self.mapping.csv if self.mapping else None)
 
     @cached_property
     def rows(self) -> int:
         """Rows of the log."""
-        return row_count(open_table(self.path, self.mapping.dialect if self.mapping else None))
+        return row_count(self._table)
 
     @cached_property
     def whole(self) -> Log:
@@ -74,7 +72,7 @@ class Stream:
         Raises:
             GapError: As for `read_log`.
         """
-        if open_table(self.path, self.mapping.dialect if self.mapping else None).parquet:
+        if self._table.parquet:
             read = stream_log(self.path, self.expected, self.mapping, rows=rows, digest=self.digest)
             for piece in read:
                 yield self.adjust(piece)
@@ -152,41 +150,9 @@ def join_logs(*parts: Log) -> Log:
     return first.with_changes(**changes)
 
 
-def stream_prepared(
-    path: Path,
-    expected: Expected,
-    mapping: MappingFile | None = None,
-    *,
-    settings: Settings | None = None,
-    rows: int = CHUNK_ROWS,
-    largest: Mapping[str, Array] | None = None,
-) -> Iterator[tuple[Quality, Prepared]]:
-    """Prepare a long log chunk by chunk; see `prepared_chunks`.
-
-    Args:
-        path: CSV or Parquet.
-        expected: The robot's names and limits.
-        mapping: For foreign columns.
-        settings: Grid and cut-off; from a survey by default.
-        rows: Per chunk.
-        largest: As for `judge`.
-
-    Raises:
-        GapError: As for `read_log`, `judge` and `prepare`.
-    """
-    stream = Stream(path, expected, mapping)
-    seen = survey(stream).log
-    quality = judge(seen, expected, largest=largest)
-    quality.refuse()
-    settings = settings or choose_settings([seen], [quality.usable])
-    ready = prepare(seen, settings, usable=quality.usable)
-    yield from prepared_chunks(stream, settings, ready.calibration, rows=rows, largest=largest)
-
-
 def prepared_chunks(
     stream: Stream,
-    settings: Settings,
-    known: Calibration,
+    known: Prepared,
     *,
     rows: int = CHUNK_ROWS,
     largest: Mapping[str, Array] | None = None,
@@ -201,8 +167,7 @@ def prepared_chunks(
 
     Args:
         stream: The log.
-        settings: Grid and cut-off.
-        known: Noises and fusion of the whole log.
+        known: Its survey: grid, cut-off, noises and fusion hold for the chunks.
         rows: Per chunk.
         largest: As for `judge`.
         contact: How to tell which feet stand; by the log's own forces or columns by default.
@@ -210,34 +175,37 @@ def prepared_chunks(
     Raises:
         GapError: As for `read_log`, `judge` and `prepare`.
     """
+    settings = known.settings
     reach = 2 * settings.lowpass.half + 2
-    origin: float | None = None
-    kept: Log | None = None  # rows not yet given out, with the reach before them
-    before = 0  # rows at the start of `kept` that were given out already
-
-    def chunk(log: Log, core: slice, origin: float) -> tuple[Quality, Prepared]:
+    for log, core, origin in _overlapping(stream.pieces(rows), reach):
         quality = judge(log, stream.expected, largest=largest, whole=False)
         quality.refuse(overlooked=FINE_IN_A_CHUNK)
+        stands = contact(log) if contact else None
         ready = prepare(
             log,
             settings,
             usable=quality.usable,
-            contact=contact(log) if contact else None,
+            contact=stands,
             core=core,
             origin=origin,
             known=known,
         )
-        return quality, ready
+        yield quality, ready
 
-    for piece in stream.pieces(rows):
-        origin = float(piece.time[0]) if origin is None else origin
+
+def _overlapping(pieces: Iterator[Log], reach: int) -> Iterator[tuple[Log, slice, float]]:
+    """Chunks that share `reach` rows with their neighbours, rows that count, the first time."""
+    kept: Log | None = None  # rows not yet given out, with the reach before them
+    before, origin = 0, 0.0  # rows at the start of `kept` that were given out already
+    for piece in pieces:
+        origin = float(piece.time[0]) if kept is None else origin
         log = piece if kept is None else join_logs(kept, piece)
         last = len(log) - reach
         if last <= before:
             kept = log
             continue
-        yield chunk(log, slice(before, last), origin)
+        yield log, slice(before, last), origin
         start = max(0, last - reach)
         kept, before = log.rows(slice(start, None)), last - start
-    if kept is not None and before < len(kept) and origin is not None:
-        yield chunk(kept, slice(before, len(kept)), origin)
+    if kept is not None and before < len(kept):
+        yield kept, slice(before, len(kept)), origin

@@ -46,18 +46,11 @@ class Quality:
 
     Attributes:
         findings: In the order of the checks.
-        position_ok: Positions that may be used, shape (N, J).
-        effort_ok: Efforts that may be used, shape (N, J).
+        usable: Positions and efforts that may be used, each shape (N, J).
     """
 
     findings: tuple[Finding, ...]
-    position_ok: Mask
-    effort_ok: Mask
-
-    @property
-    def usable(self) -> tuple[Mask, Mask]:
-        """What `prepare` asks for."""
-        return self.position_ok, self.effort_ok
+    usable: tuple[Mask, Mask]
 
     def refuse(self, *, overlooked: Collection[str] = ()) -> None:
         """Refuse the log where a finding says so.
@@ -75,11 +68,7 @@ class Findings(list[Finding]):
     """A list of one log's findings that fills in its name."""
 
     def __init__(self, log: str) -> None:
-        """Begin.
-
-        Args:
-            log: Its name.
-        """
+        """Begin with the log's name."""
         super().__init__()
         self._log = log
 

@@ -7,6 +7,7 @@ from itertools import combinations
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from pipeline.logs.errors import LogContentError
@@ -42,38 +43,21 @@ def refuse_repeats(logs: Sequence[Log]) -> None:
 
 def shared_rows(short: Log, long: Log) -> int:
     """Rows of a log that lie in runs which another holds too, while a joint moves."""
-    tables = [np.hstack([log.position, log.effort.values]) for log in (short, long)]
-    tables = [np.nan_to_num(t, nan=np.inf) + 0.0 for t in tables]  # minus zero is zero
-    keys = [_hashed(t) for t in tables]
-    if not np.isin(keys[0], keys[1]).any():
+    keys = [_hashed(np.hstack([log.position, log.effort.values])) for log in (short, long)]
+    if min(map(len, keys)) < _RUN or not np.isin(keys[0], keys[1]).any():
         return 0
     moving = (np.diff(short.position, axis=0, prepend=short.position[:1]) != 0).any(axis=1)
-    known = [_runs(k) for k in keys]
-    same = np.isin(known[0], known[1])
+    runs = [_hashed(sliding_window_view(key.view(np.int64), _RUN)) for key in keys]
+    same = np.isin(runs[0], runs[1])
     # A machine at rest repeats itself.
     alive = np.convolve(moving, np.ones(_RUN), mode="valid") >= _RUN / 2
     inside = np.convolve(same & alive, np.ones(_RUN), mode="full") > 0
     return int(inside.sum())
 
 
-def _hashed(table: NDArray[np.float64]) -> NDArray[np.uint64]:
+def _hashed(table: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.uint64]:
     """A number per row (N,) that equal rows share and others hardly ever."""
-    bits = np.ascontiguousarray(table).view(np.uint64)
-    out = np.zeros(bits.shape[0], dtype=np.uint64)
-    with np.errstate(over="ignore"):
-        for column in bits.T:
-            out = (out ^ column) * np.uint64(0x9E3779B97F4A7C15)
-            out ^= out >> np.uint64(29)
-    return out
+    import pandas as pd
 
-
-def _runs(keys: NDArray[np.uint64]) -> NDArray[np.uint64]:
-    """A number per run of `_RUN` rows, (N - _RUN + 1,)."""
-    count = keys.size - _RUN + 1
-    if count < 1:
-        return np.zeros(0, dtype=np.uint64)
-    out = np.zeros(count, dtype=np.uint64)
-    with np.errstate(over="ignore"):
-        for k in range(_RUN):
-            out = out * np.uint64(0x100000001B3) + keys[k : k + count]
-    return out
+    hashes = pd.util.hash_pandas_object(pd.DataFrame(table), index=False)
+    return np.asarray(hashes, dtype=np.uint64)

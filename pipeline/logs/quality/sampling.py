@@ -1,14 +1,18 @@
-"""How a channel was sampled: rate, gaps, quantisation, held values, saturation, standstill."""
+"""How one channel was sampled: lattice, held, interpolated, frozen or saturated values, jumps.
+
+A median over a few rows follows ramps and steps exactly and passes over what lasts less than half
+of it. What lies further from it than noise and the channel's own pace explain is a glitch.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter, percentile_filter
 
-from pipeline.logs.signals.grid import GAP
+from pipeline.logs.signals.grid import runs_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -17,42 +21,28 @@ Mask = NDArray[np.bool_]
 LATTICE_ROWS: Final = 100_000
 #: Half-width of the window in which a channel's mean change per row is taken.
 WINDOW: Final = 20
+#: Rows of the median: what lasts up to five rows is passed over, two at the ends of a log.
+_MEDIAN: Final = 11
+#: Rows over which the usual change from row to row is taken.
+_NEAR: Final = 41
+#: Distance from the median in usual changes, and in rows at the channel's fastest pace.
+_CHANGES: Final = 12.0
+_ROWS: Final = 6.0
+#: Chance at which a live channel may look frozen somewhere in a log.
+_CHANCE: Final = 1e-6
+#: Rows that hold one value are looked at from this many on.
+_LEAST_RUN: Final = 20
 
 
-@dataclass(frozen=True)
-class Clock:
-    """Spacing of the rows.
-
-    Attributes:
-        dt: Median step [s].
-        jitter: Standard deviation of the steps inside pieces [s].
-        gaps: Number of steps longer than `GAP` usual ones.
-        longest: Longest step [s].
-    """
-
-    dt: float
-    jitter: float
-    gaps: int
-    longest: float
-
-
-def clock(time: Array) -> Clock:
-    """Judge the spacing of rows, shape (N,) [s]."""
-    step = np.diff(time)
-    dt = float(np.median(step))
-    inside = step <= GAP * dt
-    return Clock(dt, float(np.std(step[inside])), int((~inside).sum()), float(step.max()))
+def is_constant(x: Array) -> bool:
+    """Whether a series (N,) holds one number and nothing else but empty cells."""
+    if not np.isfinite(x[0]) or not np.isfinite(x[-1]):
+        x = x[np.isfinite(x)]
+    return x.size > 0 and not np.any(np.isfinite(x) & (x != x[0]))
 
 
 def quantum(x: Array) -> tuple[float, float]:
-    """Step of a quantised channel.
-
-    Args:
-        x: Shape (N,).
-
-    Returns:
-        Step and the share of values on its lattice; step 0 where none shows.
-    """
+    """Step of a quantised channel (N,) and the share of values on its lattice; zeros for none."""
     part = x[: LATTICE_ROWS + 1]
     part = part[np.isfinite(part)]
     values, counts = np.unique(part, return_counts=True)
@@ -71,26 +61,6 @@ def quantum(x: Array) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def new_values(time: Array, x: Array) -> float:
-    """How often a channel takes a new value, by the median over its changes [Hz].
-
-    A rounded channel of speed v and step d does v / d times a second, and its error is a sawtooth
-    of that frequency: a filter that lets it pass shows the steps, and no speed between them.
-
-    Args:
-        time: Shape (N,) [s].
-        x: Shape (N,).
-
-    Returns:
-        Infinite where it never changes.
-    """
-    changes = time[1:][np.diff(x) != 0]
-    if changes.size == 0:
-        return np.inf
-    apart = np.diff(changes) if changes.size > 1 else time[-1:] - time[:1]
-    return 1.0 / float(np.median(apart))
-
-
 def _lattice(values: Array) -> tuple[float, float]:
     """Usual spacing of sorted values and the share of spacings that are whole multiples."""
     gaps = np.diff(values)
@@ -99,74 +69,101 @@ def _lattice(values: Array) -> tuple[float, float]:
     return step, float(np.mean(np.abs(gaps / step - np.round(gaps / step)) < 0.05))
 
 
+def new_values(time: Array, x: Array) -> float:
+    """How often a channel takes a new value, by the median over its changes [Hz]; inf for never.
+
+    A rounded channel of speed v and step d does v / d times a second, and its error is a sawtooth
+    of that frequency: a filter that lets it pass shows the steps, and no speed between them.
+    """
+    changes = time[1:][np.diff(x) != 0]
+    if changes.size == 0:
+        return np.inf
+    apart = np.diff(changes) if changes.size > 1 else time[-1:] - time[:1]
+    return 1.0 / float(np.median(apart))
+
+
 def held(x: Array, step: float) -> tuple[float, Mask]:
-    """Repeats that quantisation does not explain: sample-and-hold.
+    """Share of rows that repeat and that no rounding to `step` explains, and the repeats, (N,).
 
     Where a channel changes by more than two of its quanta per row on average, every row should
     differ from the one before, but for those that rounding makes alike: no more rows than differ by
     one smallest step.
-
-    Args:
-        x: Shape (N,).
-        step: From `quantum`.
-
-    Returns:
-        Share of such rows that repeat, and the repeats themselves, shape (N,).
     """
-    n = x.size
-    repeats = np.zeros(n, dtype=np.bool_)
-    repeats[1:] = x[1:] == x[:-1]
-    if n <= 4 * WINDOW:
-        return 0.0, np.zeros(n, dtype=np.bool_)
-    change = np.abs(x[2 * WINDOW :] - x[: -2 * WINDOW]) / (2 * WINDOW)
-    change = np.pad(change, WINDOW, mode="edge")
-    change = np.nan_to_num(change)
-    fast = change > max(2.0 * step, 0.1 * float(np.quantile(change, 0.95)), 1e-12)
+    none = np.zeros(x.size, dtype=np.bool_)
+    if x.size <= 4 * WINDOW:
+        return 0.0, none
+    pace = np.abs(x[2 * WINDOW :] - x[: -2 * WINDOW]) / (2 * WINDOW)
+    pace = np.nan_to_num(np.pad(pace, WINDOW, mode="edge"))
+    fast = pace > max(2.0 * step, 0.1 * float(np.quantile(pace, 0.95)), 1e-12)
     if fast.sum() < 50:
-        return 0.0, np.zeros(n, dtype=np.bool_)
-    by_chance = _one_step(x, fast)
-    count = int(repeats[fast].sum())
-    if count <= 1.5 * by_chance + 4.0 * np.sqrt(count):
-        return 0.0, np.zeros(n, dtype=np.bool_)
-    return float(repeats[fast].mean()), repeats & fast
-
-
-def _one_step(x: Array, rows: Mask) -> int:
-    """How often a channel (N,) changes by the smallest step it knows, either way."""
+        return 0.0, none
     change = np.abs(np.diff(x, prepend=x[0]))
-    steps = change[rows & (change > 0)]
-    if steps.size == 0:
-        return 0
-    return int((steps < 1.5 * float(np.quantile(steps, 0.01))).sum())
+    repeats = np.concatenate([[False], x[1:] == x[:-1]]) & fast
+    steps = change[fast & (change > 0)]
+    by_chance = int((steps < 1.5 * float(np.quantile(steps, 0.01))).sum()) if steps.size else 0
+    count = int(repeats.sum())
+    if count <= 1.5 * by_chance + 4.0 * np.sqrt(count):
+        return 0.0, none
+    return float(repeats[fast].mean()), repeats
 
 
 def saturated(x: Array, moving: Mask, step: float) -> Mask:
-    """Rows at the channel's largest or smallest value where it sticks there while moving.
+    """Rows (N,) at a channel's largest or smallest value where it sticks there while moving.
 
     A peak passes through its neighbourhood; a limit collects rows at one value. Where the channel
-    is quantised, more must lie at the limit than just inside it; where it is not, no value comes
-    back by chance.
-
-    Args:
-        x: Shape (N,).
-        moving: Shape (N,).
-        step: From `quantum`.
-
-    Returns:
-        Shape (N,).
+    is quantised in steps, more must lie at the limit than just inside it; where it is not, no value
+    comes back by chance.
     """
     out = np.zeros(x.size, dtype=np.bool_)
     good = np.isfinite(x) & moving
     if good.sum() < 50:
         return out
-    low, high = float(x[good].min()), float(x[good].max())
-    for limit in (low, high):
-        at = good & (np.abs(x - limit) <= 0.5 * step)
-        inside = good & ~at & (np.abs(x - limit) < 4.5 * step)
+    for limit in (float(x[good].min()), float(x[good].max())):
+        away = np.abs(x - limit)
+        at = good & (away <= 0.5 * step)
+        inside = good & ~at & (away < 4.5 * step)
         runs = at[2:] & at[1:-1] & at[:-2]
         if at.sum() >= 20 and runs.any() and (step == 0 or at.sum() > 2 * inside.sum()):
             # Known to be a limit, it counts at standstill, too.
-            out |= np.abs(x - limit) <= 0.5 * step
+            out |= away <= 0.5 * step
+    return out
+
+
+def frozen(x: Array, moving: Mask) -> Mask:
+    """Rows of an effort (N,) that hold one value longer than chance allows while the joint moves.
+
+    A live channel repeats a value with some probability p from row to row (rounding, or a rate of
+    its own); n repeats in a row come by chance p^n times.
+    """
+    out = np.zeros(x.size, dtype=np.bool_)
+    if moving.sum() < 2 * _LEAST_RUN:
+        return out
+    starts, stops = runs_of(np.concatenate([[False], (x[1:] == x[:-1]) & moving[1:]]))
+    length = stops - starts
+    usual = length < max(_LEAST_RUN, int(np.quantile(length, 0.9)) if length.size else 0)
+    repeats = float(length[usual].sum()) / max(float(moving.sum() - length[~usual].sum()), 1.0)
+    p = min(max(repeats, 1.0 / x.size), 1.0 - 1e-9)
+    longest = max(_LEAST_RUN, int(np.ceil(np.log(_CHANCE / x.size) / np.log(p))))
+    for start, stop in zip(starts, stops, strict=True):
+        out[start:stop] = stop - start >= longest
+    return out
+
+
+def glitches(x: Array) -> Mask:
+    """Rows of a series (N,) that jump away and back; NaN rows are none."""
+    out = np.zeros(x.size, dtype=np.bool_)
+    good = np.flatnonzero(np.isfinite(x))
+    if good.size < 2 * _NEAR:
+        return out
+    y = x[good]
+    away = np.abs(y - median_filter(y, _MEDIAN, mode="mirror"))
+    # Most channels have none: the local pace is computed where something stands out at all.
+    pace = np.abs(y[_MEDIAN + 1 :] - y[: -_MEDIAN - 1]).max() / (_MEDIAN + 1)
+    least = _ROWS * pace
+    if (away > least).any():
+        change = np.abs(np.diff(y, prepend=y[0]))
+        usual = percentile_filter(change, 75, _NEAR, mode="mirror")
+        out[good] = away > least + _CHANGES * usual
     return out
 
 
@@ -174,15 +171,17 @@ def standstill(position: Array, dt: float) -> Mask:
     """Rows in which a joint moves at less than 1 % of its usual top speed.
 
     Args:
-        position: Shape (N, J) [rad].
+        position: Shape (N, J) [rad]; empty cells take the last value before them.
         dt: [s].
 
     Returns:
         Shape (N, J).
     """
+    known = np.where(np.isfinite(position), np.arange(position.shape[0])[:, None], 0)
+    last = np.maximum.accumulate(known, axis=0)
+    position = np.nan_to_num(np.take_along_axis(position, last, axis=0))
     w = max(1, min(WINDOW, position.shape[0] // 8))
     speed = np.abs(position[2 * w :] - position[: -2 * w]) / (2 * w * dt)
     speed = np.nan_to_num(np.pad(speed, ((w, w), (0, 0)), mode="edge"))
     # A short excursion still counts as motion, a single jump does not.
-    top = np.quantile(speed, 0.98, axis=0)
-    return np.asarray(speed <= 0.01 * top)
+    return np.asarray(speed <= 0.01 * np.quantile(speed, 0.98, axis=0))

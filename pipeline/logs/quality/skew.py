@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import correlate
 
 Array = NDArray[np.float64]
 
@@ -48,10 +49,9 @@ def skew(x: Array, y: Array, dt: float, *, longest: float) -> Skew | None:
     sx, sy = float(np.sqrt((x0**2).sum())), float(np.sqrt((y0**2).sum()))
     if sx <= 1e-12 * x.size or sy <= 1e-12 * x.size:
         return None
-    size = 1 << int(np.ceil(np.log2(x.size + 2 * reach)))
-    product = np.fft.irfft(np.fft.rfft(x0, size) * np.conj(np.fft.rfft(y0, size)), size)
-    lags = np.arange(-reach, reach + 1)
-    k = int(lags[np.argmax(np.abs(product[lags]))])
+    product = correlate(x0, y0, method="fft")  # at lag k stands k + N - 1
+    product = product[x.size - 1 - reach : x.size + reach]
+    k = int(np.argmax(np.abs(product))) - reach
     # Where a neighbour is missing the rate of y is meaningless.
     rated = good.copy()
     rated[1:] &= np.isfinite(y[:-1])
@@ -75,5 +75,5 @@ def skew(x: Array, y: Array, dt: float, *, longest: float) -> Skew | None:
         k = int(np.clip(k + np.clip(round(fine / dt), -reach, reach), -reach, reach))
     rest = a[both] - columns @ solution
     spread = float(np.sqrt((rest**2).mean() / max((columns[:, 1] ** 2).sum(), 1e-300)))
-    correlation = float(product[k]) / (sx * sy)
+    correlation = float(product[k + reach]) / (sx * sy)
     return Skew(k * dt + float(np.clip(fine, -dt, dt)), spread / abs(factor), factor, correlation)

@@ -1,4 +1,7 @@
-"""Columns that are wrong by a factor that limits or other columns betray."""
+"""Columns that limits or other columns betray: wrong units and signs, delays, idle feet.
+
+None of it needs a model of the robot but its limits and its mass.
+"""
 
 from __future__ import annotations
 
@@ -9,25 +12,16 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs.quality.finding import Finding
+from pipeline.logs.quality.finding import Findings
 from pipeline.logs.quality.skew import Skew, skew
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.log_format import column_name
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 DEG: Final = 180.0 / math.pi
-_SUFFIX: Final = {
-    "position": "position_rad",
-    "motor_position": "motor_position_rad",
-    "velocity": "velocity_rad_s",
-    "torque": "torque_Nm",
-    "current": "current_A",
-    "voltage": "voltage_V",
-    "power": "power_W",
-    "goal_position": "goal_position_rad",
-}
 #: Factors by which each channel is commonly wrong, and what the numbers then are.
 WRONG: Final[Mapping[str, Mapping[float, str]]] = {
     "velocity": {DEG: "deg/s", 30.0 / math.pi: "rpm", 1e3: "mrad/s"},
@@ -42,173 +36,175 @@ NEAR: Final = 0.25
 _LEAST_TRAVEL: Final = 0.05
 #: Checks of positions that the search for wrong columns can say more about.
 OF_LIMITS: Final = ("share_outside_limits", "speed")
-#: Rows of velocity and position that are compared.
+#: Rows of two channels that are compared.
 _COMPARED_ROWS: Final = 50_000
+#: Rows to either side over which a position's rate is taken.
+_REACH: Final = 3
+#: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
+_WEIGHT: Final = 0.1
+#: Correlation from which the shift between two channels means something.
+_ALIKE: Final = {"velocity": 0.7, "torque": 0.9}
 
 
-def column_name(joint: str, quantity: str) -> str:
-    """Header of a channel in the log format."""
-    return f"{joint}__{_SUFFIX[quantity]}"
-
-
-def position_units(log: Log, expected: Expected, ok: Mask) -> list[Finding]:
-    """Positions against the limits of the joints.
-
-    Args:
-        log: The log.
-        expected: Limits.
-        ok: Positions that may be used, shape (N, J).
-    """
-    out = []
-    quantity = "motor_position" if log.position_source == "motor" else "position"
+def position_units(log: Log, expected: Expected, ok: Mask, found: Findings) -> None:
+    """Positions against the limits of the joints; `ok` are those that count, shape (N, J)."""
     for j, joint in enumerate(log.joints):
         q = log.position[ok[:, j], j]
         if q.size == 0:
             continue
-        column = column_name(joint, quantity)
+        column = column_name(joint, log.position_quantity)
         low, high = float(expected.lower[j]), float(expected.upper[j])
         span = f"runs from {q.min():.4g} to {q.max():.4g} rad"
         if not (math.isfinite(low) and math.isfinite(high)):
             if np.ptp(q) > 8 * math.pi:
                 detail = f"{span} on a joint without limits; degrees? else several turns"
-                out.append(_finding(log, column, "range", np.ptp(q), "rad", "warning", detail))
+                found.note(column, "range", np.ptp(q), "rad", "warning", detail)
             continue
         margin = 0.05 * (high - low)
         outside = float(np.mean((q < low - margin) | (q > high + margin)))
         if outside == 0.0:
             continue
-        limits = f"the joint's limits are {low:.4g} to {high:.4g} rad"
-        turned = q / DEG
+        turned, verdict = q / DEG, "refused"
         fits = turned.min() >= low - margin and turned.max() <= high + margin
         if fits and outside > 0.2 and np.ptp(turned) > _LEAST_TRAVEL:
-            detail = (
-                f"{span}, {limits}: looks like degrees, or a motor's angle; in a mapping file: "
-                f'unit = "deg", or scale = 1 over the gear ratio'
+            why = (
+                "looks like degrees, or a motor's angle; in a mapping file: "
+                'unit = "deg", or scale = 1 over the gear ratio'
             )
-            verdict = "refused"
         elif outside > 0.5:
-            detail = (
-                f"{span}, {limits}: another zero or sign, a motor's angle, another joint's column "
+            why = (
+                "another zero or sign, a motor's angle, another joint's column "
                 "or the log of another robot; set zero, flip, scale or as in a mapping file"
             )
-            verdict = "refused"
         else:
-            detail = f"{span}, {limits}: {100 * outside:.1f} % of the rows lie outside"
-            verdict = "warning"
-        out.append(_finding(log, column, "share_outside_limits", outside, "1", verdict, detail))
-    return out
+            why, verdict = f"{100 * outside:.1f} % of the rows lie outside", "warning"
+        detail = f"{span}, the joint's limits are {low:.4g} to {high:.4g} rad: {why}"
+        found.note(column, "share_outside_limits", outside, "1", verdict, detail)
 
 
-def velocity_units(log: Log, expected: Expected, ok: Mask, dt: float) -> list[Finding]:
-    """Measured velocities against the positions' rate: factor, sign and skew; speed limits."""
-    out: list[Finding] = []
+def velocity_units(log: Log, expected: Expected, ok: Mask, dt: float, found: Findings) -> None:
+    """Rates of positions against speed limits and against velocities: factor, sign and skew."""
     rows = slice(0, min(len(log), _COMPARED_ROWS))
     time = log.time[rows]
-    w = 3
     for j, joint in enumerate(log.joints):
         q = np.where(ok[rows, j], log.position[rows, j], np.nan)
-        if q.size < 100:
-            continue
-        rate = np.full(q.size, np.nan)
+        rate, w = np.full(q.size, np.nan), _REACH
         rate[w:-w] = (q[2 * w :] - q[: -2 * w]) / (time[2 * w :] - time[: -2 * w])
-        out += _speed_limit(log, expected, j, rate)
+        _speed_limit(log, float(expected.velocity_limit[j]), j, rate, found)
         if log.velocity is None:
             continue
         seen = skew(log.velocity[rows, j], rate, dt, longest=0.25)
-        if seen is None or abs(seen.correlation) < 0.7:
+        if seen is None or abs(seen.correlation) < _ALIKE["velocity"]:
             continue
-        out += _velocity_findings(log, column_name(joint, "velocity"), seen, dt)
-    return out
+        column = column_name(joint, "velocity")
+        verdict, detail = _factor(seen.factor)
+        found.note(column, "factor", seen.factor, "1", verdict, detail)
+        _note_lag(found, column, "skew", seen, dt, "the rate of the position")
 
 
-def _speed_limit(log: Log, expected: Expected, j: int, rate: Array) -> list[Finding]:
+def _speed_limit(log: Log, limit: float, j: int, rate: Array, found: Findings) -> None:
     top = float(np.nanquantile(np.abs(rate), 0.99)) if np.isfinite(rate).any() else 0.0
-    limit = float(expected.velocity_limit[j])
     if not math.isfinite(limit) or top <= 3.0 * limit:
-        return []
-    quantity = "motor_position" if log.position_source == "motor" else "position"
+        return
     detail = f"moves at {top:.4g} rad/s, the joint's limit is {limit:.4g}: " + (
         "looks like degrees, or time not in seconds"
         if top / DEG <= 1.2 * limit
         else "wrong unit of position or time, or the log of another robot"
     )
-    column = column_name(log.joints[j], quantity)
-    return [_finding(log, column, "speed", top, "rad/s", "refused", detail)]
+    column = column_name(log.joints[j], log.position_quantity)
+    found.note(column, "speed", top, "rad/s", "refused", detail)
 
 
-def _velocity_findings(log: Log, column: str, seen: Skew, dt: float) -> list[Finding]:
-    out = []
-    wrong = nearest(abs(seen.factor), WRONG["velocity"])
-    inverse = abs(seen.factor) * DEG
-    if wrong is not None:
-        detail = (
-            f"is {abs(seen.factor):.4g} times the rate of the position: looks like {wrong}; give "
-            "its unit in a mapping file"
+def _factor(factor: float) -> tuple[str, str]:
+    """Verdict on a velocity that is a factor times the position's rate, and why."""
+    size = abs(factor)
+    unit = next(
+        (u for f, u in WRONG["velocity"].items() if f / (1 + NEAR) < size < f * (1 + NEAR)), None
+    )
+    if unit is not None:
+        detail = f"is {size:.4g} times the rate of the position: looks like {unit}; give "
+        return "refused", f"{detail}its unit in a mapping file"
+    if abs(size * DEG - 1) < NEAR:
+        detail = f"is 1/{1 / size:.4g} of the rate of the position: the position looks "
+        return "refused", f"{detail}like degrees; give its unit in a mapping file"
+    if factor < 0:
+        return (
+            "refused",
+            "runs against the rate of the position: flip one of them in a mapping file",
         )
-        out.append(_finding(log, column, "factor", seen.factor, "1", "refused", detail))
-    elif abs(inverse - 1) < NEAR:
-        detail = (
-            f"is 1/{1 / abs(seen.factor):.4g} of the rate of the position: the position looks "
-            "like degrees; give its unit in a mapping file"
-        )
-        out.append(_finding(log, column, "factor", seen.factor, "1", "refused", detail))
-    elif seen.factor < 0:
-        detail = "runs against the rate of the position: flip one of them in a mapping file"
-        out.append(_finding(log, column, "factor", seen.factor, "1", "refused", detail))
-    else:
-        off = abs(seen.factor - 1) > 0.1
-        detail = f"{seen.factor:.4g} times the rate of the position"
-        verdict = "warning" if off else "ok"
-        out.append(_finding(log, column, "factor", seen.factor, "1", verdict, detail))
+    verdict = "warning" if abs(factor - 1) > 0.1 else "ok"
+    return verdict, f"{factor:.4g} times the rate of the position"
+
+
+def _note_lag(found: Findings, column: str, check: str, seen: Skew, dt: float, of: str) -> None:
     late = abs(seen.lag) > max(0.25 * dt, 4 * seen.lag_error)
-    word = "behind" if seen.lag > 0 else "ahead of"
-    detail = f"{1e3 * abs(seen.lag):.3g} ms {word} the rate of the position"
-    out.append(_finding(log, column, "skew", seen.lag, "s", "warning" if late else "ok", detail))
-    return out
+    detail = f"{1e3 * abs(seen.lag):.3g} ms {'behind' if seen.lag > 0 else 'ahead of'} {of}"
+    found.note(column, check, seen.lag, "s", "warning" if late else "ok", detail)
 
 
-def effort_units(log: Log, largest: Mapping[str, Array]) -> list[Finding]:
-    """Efforts against the largest the drive can give.
-
-    Args:
-        log: The log.
-        largest: Channel to its largest plausible magnitude per joint, shape (J,).
-    """
-    out = []
-    for channel in log.channels:
-        limit = largest.get(channel)
-        if limit is None:
-            continue
-        values = np.abs(getattr(log, channel))
+def effort_units(log: Log, largest: Mapping[str, Array], found: Findings) -> None:
+    """Efforts against the largest the drive can give, by channel and joint."""
+    for channel in (c for c in log.channels if c in largest):
         for j, joint in enumerate(log.joints):
-            seen = values[np.isfinite(values[:, j]), j]
-            if not np.isfinite(limit[j]) or seen.size == 0:
+            values, limit = np.abs(getattr(log, channel)[:, j]), largest[channel][j]
+            values = values[np.isfinite(values)]
+            if not np.isfinite(limit) or values.size == 0:
                 continue
-            top = float(np.quantile(seen, 0.99))
-            if top <= 5.0 * limit[j]:
+            top = float(np.quantile(values, 0.99))
+            if top <= 5.0 * limit:
                 continue
-            unit = next(
-                (u for f, u in WRONG[channel].items() if f > 1 and top / f <= limit[j]), None
-            )
-            detail = f"reaches {top:.4g}, the drive's limit is {limit[j]:.4g}: " + (
+            unit = next((u for f, u in WRONG[channel].items() if f > 1 and top / f <= limit), None)
+            detail = f"reaches {top:.4g}, the drive's limit is {limit:.4g}: " + (
                 f"looks like {unit}; give its unit in a mapping file"
                 if unit
                 else "the log of another robot, or a wrong unit"
             )
-            column = column_name(joint, channel)
-            out.append(_finding(log, column, "magnitude", top, "1", "refused", detail))
-    return out
+            found.note(column_name(joint, channel), "magnitude", top, "1", "refused", detail)
 
 
-def nearest(factor: float, table: Mapping[float, str], near: float = 1 + NEAR) -> str | None:
-    """Name of the wrong unit whose factor lies within `near` times, or None."""
-    for wrong, unit in table.items():
-        if wrong / near < factor < wrong * near:
-            return unit
-    return None
+def torque_on_time(log: Log, dt: float, found: Findings) -> None:
+    """Shift between the torque and the current of the same motor."""
+    if log.torque is None or log.current is None:
+        return
+    rows = slice(0, _COMPARED_ROWS)
+    for j, joint in enumerate(log.joints):
+        seen = skew(log.torque[rows, j], log.current[rows, j], dt, longest=0.1)
+        if seen is not None and abs(seen.correlation) >= _ALIKE["torque"]:
+            column = column_name(joint, "torque")
+            _note_lag(found, column, "late", seen, dt, "the current of the same motor")
 
 
-def _finding(
-    log: Log, column: str, check: str, value: float, unit: str, verdict: str, detail: str
-) -> Finding:
-    return Finding(log.name, column, check, float(value), unit, verdict, detail)
+def feet_carry(log: Log, weight: float | None, found: Findings) -> None:
+    """What the feet's sensors measure; vertical forces, on average, against the weight [N].
+
+    Over a log in which the robot neither climbs nor falls, the mean of their sum is its weight.
+    """
+    if log.foot_force is None:
+        return
+    force = log.foot_force
+    absent = [axis for k, axis in enumerate("xy") if not np.isfinite(force[..., k]).any()]
+    detail = "forces in three directions: taken as the ground's; they tell contact too"
+    if absent:
+        detail = (
+            f"no force_{' and no force_'.join(absent)} at every foot: the others tell contact and "
+            "loads, the rest is computed as the least tangential forces, so that feet that squeeze "
+            "the ground cannot be told"
+        )
+    verdict = "warning" if absent else "ok"
+    found.note("", "foot_forces", len(log.feet), "1", verdict, detail)
+    if weight is None or weight <= 0:
+        return
+    share = float(np.mean(np.nansum(force[..., 2], axis=1))) / weight
+    detail = f"on average the feet carry {share:.3g} of the robot's weight of {weight:.4g} N"
+    if abs(share - 1.0) <= _WEIGHT:
+        found.note("", "feet_carry", share, "1", "ok", detail)
+        return
+    top = np.nanmax(np.abs(force[..., 2]), axis=0, initial=0.0)
+    idle = [foot for foot, most in zip(log.feet, top, strict=True) if most < 0.02 * weight]
+    if share < 0:
+        why = "their sign is turned: forces are those of the ground on the robot"
+    elif idle:
+        why = f"{', '.join(idle)} never {'carry' if len(idle) > 1 else 'carries'} anything"
+    else:
+        why = "wrong unit, a load that the model lacks, or the robot hangs or leans on something"
+    found.note("", "feet_carry", share, "1", "warning", f"{detail}: {why}")

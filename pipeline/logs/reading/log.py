@@ -14,7 +14,7 @@ from actuators.errors import closest
 from pipeline.logs.errors import LogContentError
 
 if TYPE_CHECKING:
-    from pipeline.logs.reading.mapping import ColumnRule
+    from pipeline.logs.reading.mapping import ColumnTable
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -123,7 +123,7 @@ class Log:
     derived: Mapping[str, str] = field(default_factory=dict)
     sha256: str = ""
     source: Path = Path()
-    rules: Mapping[tuple[str, str], tuple[str, ColumnRule]] = field(default_factory=dict)
+    rules: Mapping[tuple[str, str], tuple[str, ColumnTable]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         n, j = self.position.shape
@@ -144,6 +144,16 @@ class Log:
 
     def __len__(self) -> int:
         return self.time.size
+
+    @property
+    def finite(self) -> tuple[Mask, Mask]:
+        """Positions and efforts that are numbers, each shape (N, J)."""
+        return np.isfinite(self.position), self.valid & np.isfinite(self.effort.values)
+
+    @property
+    def position_quantity(self) -> str:
+        """Key of the position's columns in the log format."""
+        return "motor_position" if self.position_source == "motor" else "position"
 
     @property
     def channels(self) -> tuple[str, ...]:

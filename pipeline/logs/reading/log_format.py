@@ -23,6 +23,7 @@ JOINT_COLUMNS: Final = {
     "goal_position_rad": ("goal_position", "rad"),
     "temperature_degC": ("temperature", "degC"),
 }
+_SUFFIX: Final = {quantity: suffix for suffix, (quantity, _) in JOINT_COLUMNS.items()}
 FOOT_COLUMNS: Final = {
     "force_x_N": ("force_x", "N"),
     "force_y_N": ("force_y", "N"),
@@ -54,6 +55,11 @@ class Target:
     owner: str
     quantity: str
     unit: str
+
+
+def column_name(joint: str, quantity: str) -> str:
+    """Header of a joint's channel in the log format."""
+    return f"{joint}__{_SUFFIX[quantity]}"
 
 
 def parse_column(column: str, expected: Expected, where: str) -> Target | None:

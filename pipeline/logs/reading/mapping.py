@@ -56,111 +56,289 @@ from __future__ import annotations
 
 from collections.abc import Mapping as MappingType
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, Self
 
-from actuators.checked import checked
-from actuators.errors import closest, one_line
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Field,
+    PrivateAttr,
+    Strict,
+    model_validator,
+)
+
+from actuators.checked import Names, Number, Table, Text, checked, finite
+from actuators.errors import UnitError, closest, one_line
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, from_si, to_si
 from pipeline.logs.errors import MappingError
+from pipeline.logs.reading.log import EFFORTS
 from pipeline.logs.reading.log_format import BASE_COLUMNS, JOINT_COLUMNS
-from pipeline.logs.reading.mapping_schema import ColumnTable, Constants, MappingTable
-from pipeline.logs.reading.table_file import CsvDialect
+
+#: Beyond these a number is a slip, and some product of it overflows.
+LARGEST = 1e12
 
 
-@dataclass(frozen=True)
-class ColumnRule:
-    """How one column, or all that match a pattern, become a column of the log format.
+def _small(value: float) -> float:
+    if abs(value) > LARGEST:
+        raise ValueError(f"must be a finite number below {LARGEST:g}")
+    return value
 
-    Attributes:
-        pattern: Column of the file; one star stands for any text.
-        target: Column of the log format; a star takes the same text.
-        unit: Of the file; None for the log format's own.
-        zero: Subtracted, in the file's unit.
-        scale: Dimensionless factor, sign included.
-        late: By which the column comes late [s].
+
+def _not_zero(value: float) -> float:
+    if value == 0.0:
+        raise ValueError("must not be zero")
+    return value
+
+
+def _unit(expected: str | None, unit: str) -> str:
+    """A unit of the table, of one dimension where one is expected.
+
+    Raises:
+        ValueError: It is unknown or another's.
     """
+    try:
+        found = dimension(unit)
+    except UnitError as error:
+        raise ValueError(str(error)) from None
+    if expected is not None and found != expected:
+        raise ValueError(f"'{unit}' is a unit of {found}, expected {expected}")
+    return unit
 
-    pattern: str
-    target: str
-    unit: str | None = None
-    zero: float = 0.0
-    scale: float = 1.0
-    late: float = 0.0
 
-    def matched(self, column: str) -> str | None:
+def _channel(name: str) -> str:
+    if name not in EFFORTS:
+        raise ValueError(f"= '{one_line(name)}': {closest(name, list(EFFORTS))}")
+    return name
+
+
+def _text_or_number(value: object) -> str | float:
+    return value if isinstance(value, str) else _small(finite(value))
+
+
+def _one_star(name: str) -> str:
+    if name.count("*") > 1:
+        raise ValueError("at most one star in a pattern")
+    return name
+
+
+def _delimiter(text: str) -> str:
+    if text not in (",", ";", "\t", " ", "|"):
+        raise ValueError("must be one of , ; tab space |")
+    return text
+
+
+def _listed(value: object) -> object:
+    if not isinstance(value, list):
+        raise ValueError("must be written [[logs]] with two brackets")
+    return value
+
+
+Small = Annotated[Number, AfterValidator(_small)]
+Factor = Annotated[Small, AfterValidator(_not_zero)]
+AnyUnit = Annotated[str, AfterValidator(partial(_unit, None))]
+Pattern = Annotated[Text, AfterValidator(_one_star)]
+
+
+class QuantityTable(Table):
+    """A number with its unit."""
+
+    expected = "{value = ..., unit = ...}"
+    value: Small
+    unit: AnyUnit
+
+    @property
+    def si(self) -> float:
+        """The number in SI units."""
+        return to_si(self.value, self.unit)
+
+
+def _of(expected: str, quantity: QuantityTable) -> QuantityTable:
+    _unit(expected, quantity.unit)
+    return quantity
+
+
+def _positive(quantity: QuantityTable) -> QuantityTable:
+    if not quantity.si > 0:
+        raise ValueError("must be positive")
+    return quantity
+
+
+def _sampling(rate: QuantityTable) -> QuantityTable:
+    if not 0 < rate.si < 1e9:
+        raise ValueError("must be positive and below 1 GHz")
+    return rate
+
+
+Voltage = Annotated[
+    QuantityTable, AfterValidator(partial(_of, "voltage")), AfterValidator(_positive)
+]
+Rate = Annotated[
+    QuantityTable, AfterValidator(partial(_of, "frequency")), AfterValidator(_sampling)
+]
+
+
+class CsvTable(Table):
+    """How the file separates its columns and its decimals."""
+
+    delimiter: Annotated[str, AfterValidator(_delimiter)] = ","
+    decimal: Literal[".", ","] = "."
+
+    @model_validator(mode="after")
+    def _differ(self) -> Self:
+        if self.delimiter == self.decimal:
+            raise ValueError(f"delimiter and decimal are both '{self.decimal}'")
+        return self
+
+
+class TimeTable(Table):
+    """Where time comes from."""
+
+    column: str | None = None
+    unit: Annotated[str, AfterValidator(partial(_unit, "time"))] = "s"
+    sample_rate: Rate | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if self.sample_rate is not None and self.column is not None:
+            raise ValueError("give column or sample_rate, not both")
+        return self
+
+
+class ColumnTable(Table):
+    """How one column, or all that match a pattern, become columns of the log format."""
+
+    target: Pattern | None = Field(default=None, alias="as")
+    unit: AnyUnit | None = None
+    zero: Small = 0.0
+    scale: Factor = 1.0
+    flip: bool = False
+    late: Small = 0.0
+
+    def renamed(self, pattern: str, column: str) -> str | None:
         """The column of the log format a column of the file becomes, or None."""
-        if "*" not in self.pattern:
-            return self.target if column == self.pattern else None
-        head, tail = self.pattern.split("*", 1)
+        target = self.target or pattern
+        if "*" not in pattern:
+            return target if column == pattern else None
+        head, tail = pattern.split("*", 1)
         if len(column) < len(head) + len(tail) or not (
             column.startswith(head) and column.endswith(tail)
         ):
             return None
-        return self.target.replace("*", column[len(head) : len(column) - len(tail)])
+        return target.replace("*", column[len(head) : len(column) - len(tail)])
 
     def affine(self, target_unit: str) -> tuple[float, float]:
         """Factor and offset that bring the file's numbers into the log's unit."""
-        if self.unit in (None, "1", target_unit):
-            factor, offset = 1.0, 0.0
-        else:
+        factor, offset = 1.0, 0.0
+        if self.unit not in (None, "1", target_unit):
             offset = from_si(to_si(0.0, str(self.unit)), target_unit)
             factor = from_si(to_si(1.0, str(self.unit)), target_unit) - offset
-        return self.scale * factor, self.scale * (offset - factor * self.zero)
+        scale = -self.scale if self.flip else self.scale
+        return scale * factor, scale * (offset - factor * self.zero)
 
 
-@dataclass(frozen=True)
-class LogRule:
-    """What holds for the logs whose file name matches."""
+class ControllerTable(Table):
+    """The drive's controller."""
 
-    match: str
-    gain: float | None
-    condition: MappingType[str, float | str]
-    constants: MappingType[str, float]
+    gain_per_rad: Small | None = None
+    law: Literal["duty"] | None = None
+    torque_off_bridge: Literal["open", "shorted"] | None = None
+
+
+class SupplyTable(Table):
+    """The drive's supply."""
+
+    voltage: Voltage | None = None
+    column: str | None = None
+    unit: Annotated[str, AfterValidator(partial(_unit, "voltage"))] = "V"
+
+
+class KeepTable(Table):
+    """Columns that are kept and not interpreted."""
+
+    columns: Names = ()
+
+
+def _constants(table: dict[str, QuantityTable]) -> dict[str, QuantityTable]:
+    """A constant that stands for a column has that column's dimension."""
+    for name, quantity in table.items():
+        _, unit = (JOINT_COLUMNS | BASE_COLUMNS).get(name.rpartition("__")[2], ("", quantity.unit))
+        found, expected = dimension(quantity.unit), dimension(unit)
+        if found != expected:
+            raise ValueError(
+                f"'constants.{one_line(name)}.unit': '{quantity.unit}' is a unit of {found}, "
+                f"expected {expected}"
+            )
+    return table
+
+
+class LogTable(Table):
+    """What holds for some of the logs only."""
+
+    match: Text
+    gain_per_rad: Small | None = None
+    condition: dict[str, Annotated[str | float, BeforeValidator(_text_or_number)]] = Field(
+        default_factory=dict
+    )
+    constants: dict[str, QuantityTable] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _dimensions(self) -> Self:
+        _constants(self.constants)
+        return self
 
     def names(self, path: Path) -> bool:
         """Whether a log's file, with or without its ending, is one of those it holds for."""
         return any(fnmatchcase(name, self.match) for name in (path.stem, path.name))
 
 
-@dataclass(frozen=True)
-class Mapping:
-    """A mapping file after loading; see the module's text for its keys."""
+class Mapping(Table):
+    """The whole file."""
 
-    where: str = "mapping"
-    effort: str | None = None
-    locked: tuple[str, ...] = ()
-    dialect: CsvDialect = field(default_factory=CsvDialect)
-    time_column: str | None = None
-    time_unit: str = "s"
-    sample_rate: float | None = None
-    columns: tuple[ColumnRule, ...] = ()
-    joints: MappingType[str, str] = field(default_factory=dict)
-    torque_enabled: MappingType[str, str] = field(default_factory=dict)
-    gain: float | None = None
-    law: str | None = None
-    torque_off_bridge: str | None = None
-    supply_voltage: float | None = None
-    supply_column: str | None = None
-    supply_unit: str = "V"
-    constants: MappingType[str, float] = field(default_factory=dict)
-    keep: tuple[str, ...] = ()
-    logs: tuple[LogRule, ...] = ()
-    ratio: MappingType[str, float] = field(default_factory=dict)
+    effort: Annotated[str, AfterValidator(_channel)] | None = None
+    locked: Names = ()
+    csv: CsvTable = CsvTable()
+    time: TimeTable = TimeTable()
+    columns: dict[str, ColumnTable] = Field(default_factory=dict)
+    joints: dict[str, str] = Field(default_factory=dict)
+    torque_enabled: dict[str, str] = Field(default_factory=dict)
+    gear_ratio: dict[str, Factor] = Field(default_factory=dict)
+    controller: ControllerTable = ControllerTable()
+    supply: SupplyTable = SupplyTable()
+    constants: dict[str, QuantityTable] = Field(default_factory=dict)
+    keep: KeepTable = KeepTable()
+    logs: Annotated[tuple[LogTable, ...], Strict(False), BeforeValidator(_listed)] = ()
+    _where: str = PrivateAttr("mapping")
 
-    def rule_for(self, path: Path) -> LogRule:
+    @model_validator(mode="after")
+    def _stars(self) -> Self:
+        for name, column in self.columns.items():
+            _one_star(name)
+            if column.target is not None and "*" in column.target and "*" not in name:
+                raise ValueError(f"columns.{name}: as = '{column.target}' has a star, it has none")
+        _constants(self.constants)
+        return self
+
+    @property
+    def where(self) -> str:
+        """The file's name, for messages."""
+        return self._where
+
+    def rule_for(self, path: Path) -> LogTable:
         """What holds for one log: its file's name is matched against every `[[logs]]`."""
-        gain, constants = self.gain, dict(self.constants)
+        gain, constants = self.controller.gain_per_rad, dict(self.constants)
         condition: dict[str, float | str] = {}
         for rule in self.logs:
             if rule.names(path):
-                gain = rule.gain if rule.gain is not None else gain
+                gain = rule.gain_per_rad if rule.gain_per_rad is not None else gain
                 condition |= rule.condition
                 constants |= rule.constants
-        return LogRule(path.stem, gain, condition, constants)
+        return LogTable.model_construct(
+            match=path.stem, gain_per_rad=gain, condition=condition, constants=constants
+        )
 
     def refuse_unknown_logs(self, paths: Sequence[Path]) -> None:
         """Refuse a `[[logs]]` that names no log where one of the logs is named by none.
@@ -202,47 +380,6 @@ def parse_mapping(table: MappingType[str, Any], where: str) -> Mapping:
     Raises:
         MappingError: Unknown key or unit, or a value of the wrong kind; one line.
     """
-    read = checked(MappingTable, table, where, MappingError)
-    return Mapping(
-        where=where,
-        effort=read.effort,
-        locked=read.locked,
-        dialect=CsvDialect(read.csv.delimiter, read.csv.decimal),
-        time_column=read.time.column,
-        time_unit=read.time.unit,
-        sample_rate=read.time.sample_rate.si if read.time.sample_rate else None,
-        columns=tuple(_column(name, column) for name, column in read.columns.items()),
-        joints=read.joints,
-        torque_enabled=read.torque_enabled,
-        gain=read.controller.gain_per_rad,
-        law=read.controller.law,
-        torque_off_bridge=read.controller.torque_off_bridge,
-        supply_voltage=read.supply.voltage.si if read.supply.voltage else None,
-        supply_column=read.supply.column,
-        supply_unit=read.supply.unit,
-        constants=_constants(read.constants, where),
-        keep=read.keep.columns,
-        logs=tuple(
-            LogRule(log.match, log.gain_per_rad, log.condition, _constants(log.constants, where))
-            for log in read.logs
-        ),
-        ratio=read.gear_ratio,
-    )
-
-
-def _column(pattern: str, table: ColumnTable) -> ColumnRule:
-    scale = -table.scale if table.flip else table.scale
-    return ColumnRule(pattern, table.target or pattern, table.unit, table.zero, scale, table.late)
-
-
-def _constants(table: Constants, where: str) -> dict[str, float]:
-    """Constants in SI units; one that stands for a column has that column's dimension."""
-    for name, quantity in table.items():
-        _, unit = (JOINT_COLUMNS | BASE_COLUMNS).get(name.rpartition("__")[2], ("", quantity.unit))
-        found, expected = dimension(quantity.unit), dimension(unit)
-        if found != expected:
-            raise MappingError(
-                f"{where}: 'constants.{one_line(name)}.unit': '{quantity.unit}' is a unit of "
-                f"{found}, expected {expected}"
-            )
-    return {name: quantity.si for name, quantity in table.items()}
+    mapping = checked(Mapping, table, where, MappingError)
+    mapping._where = where
+    return mapping

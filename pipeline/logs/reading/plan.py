@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from actuators.errors import UnitError, closest, one_line
+from actuators.errors import closest, one_line
 from actuators.units import dimension
 from pipeline.logs.errors import GapError, LogFormatError, WrongRobotError
 from pipeline.logs.reading.expected import Expected
@@ -16,25 +16,16 @@ from pipeline.logs.reading.log_format import (
     JOINT_COLUMNS,
     TIME,
     Target,
+    column_name,
     misspelt,
     parse_column,
     suggest_column,
 )
-from pipeline.logs.reading.mapping import ColumnRule, LogRule, Mapping
+from pipeline.logs.reading.mapping import ColumnTable, LogTable, Mapping
 from pipeline.logs.reading.table_file import TableFile, open_table
 
 POSITIONS: Final = ("position", "motor_position")
-_IDENTITY: Final = ColumnRule("", "")
-
-
-@dataclass(frozen=True)
-class Source:
-    """A column of the file, the affine map that brings it into the log's unit, and its rule."""
-
-    column: str
-    factor: float
-    offset: float
-    rule: ColumnRule
+AS_NAMED: Final = ColumnTable()
 
 
 @dataclass(frozen=True)
@@ -46,7 +37,7 @@ class ReadingPlan:
         expected: The robot's names and limits.
         mapping: The mapping.
         rule: What holds for this log.
-        sources: Target to column.
+        sources: Target to column of the file and the mapping's rule for it.
         ignored: Columns that mean nothing to the log format.
         misspelt: Those among them that are nearly one of it, and that one.
     """
@@ -54,8 +45,8 @@ class ReadingPlan:
     table: TableFile
     expected: Expected
     mapping: Mapping
-    rule: LogRule
-    sources: dict[Target, Source]
+    rule: LogTable
+    sources: dict[Target, tuple[str, ColumnTable]]
     ignored: tuple[str, ...]
     misspelt: dict[str, str]
 
@@ -68,12 +59,30 @@ class ReadingPlan:
     @property
     def columns(self) -> list[str]:
         """Columns to read from the file."""
-        wanted = [source.column for source in self.sources.values()]
-        wanted += self.mapping.torque_enabled.values()
-        wanted += self.mapping.keep
-        if self.mapping.supply_column:
-            wanted.append(self.mapping.supply_column)
+        wanted = [column for column, _ in self.sources.values()]
+        wanted += [*self.mapping.torque_enabled.values(), *self.mapping.keep.columns]
+        wanted += [self.mapping.supply.column] if self.mapping.supply.column else []
         return list(dict.fromkeys(wanted))
+
+    @property
+    def derives_voltage(self) -> bool:
+        """Whether voltage follows from the servo's law, goals and supply."""
+        supply = self.mapping.supply
+        return (
+            self.mapping.controller.law == "duty"
+            and self.rule.gain_per_rad is not None
+            and (supply.column is not None or supply.voltage is not None)
+            and all(self.has(joint, "goal_position") for joint in self.expected.joints)
+        )
+
+    def has(self, owner: str, quantity: str) -> bool:
+        """Whether the file has a quantity of a joint."""
+        return any(t.owner == owner and t.quantity == quantity for t in self.sources)
+
+    def strangers(self, quantities: Sequence[str]) -> bool:
+        """Whether unused columns say one of these quantities of something that is no joint."""
+        suffixes = {s for s, (q, _) in JOINT_COLUMNS.items() if q in quantities}
+        return any(c.rpartition("__")[2] in suffixes for c in self.ignored)
 
 
 def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:
@@ -83,62 +92,108 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         GapError: Columns are missing, occur twice after mapping, or belong to another robot.
     """
     mapping = mapping or Mapping()
-    table = open_table(path, mapping.dialect)
-    sources: dict[Target, Source] = {}
+    table = open_table(path, mapping.csv)
+    sources: dict[Target, tuple[str, ColumnTable]] = {}
     ignored: dict[str, str] = {}
-    used_rules: set[ColumnRule] = set()
+    first: dict[str, tuple[str, str]] = {}  # pattern to the first column it matches, and its name
+    useful: set[str] = set()
     for column in table.header:
-        rule, name = _resolve(column, mapping)
-        used_rules.add(rule)
+        pattern, rule, own = _rule(column, mapping)
+        name = _robots(own, mapping)
+        first.setdefault(pattern, (column, name))
         target = parse_column(name, expected, table.where)
         if target is None:
-            if rule is not _IDENTITY and "*" not in rule.pattern:
-                raise GapError(
-                    f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', "
-                    f"which the log format does not know; "
-                    f"{closest(name, _known_columns(expected))}"
-                )
+            if pattern in mapping.columns and "*" not in pattern:
+                raise _unknown(column, name, expected, mapping)
             ignored[column] = name
             continue
         if target in sources:
             raise LogFormatError(
-                f"{table.where}: '{one_line(column)}' and '{one_line(sources[target].column)}' "
+                f"{table.where}: '{one_line(column)}' and '{one_line(sources[target][0])}' "
                 "both give the same channel; keep one"
             )
-        _check_unit(rule, target, mapping.where)
-        sources[target] = Source(column, *rule.affine(target.unit), rule)
-    useful = {_resolve(source.column, mapping)[0] for source in sources.values()}
-    for rule in mapping.columns:
-        if rule in used_rules and rule not in useful:
-            column = next(c for c in table.header if _resolve(c, mapping)[0] == rule)
-            name = _resolve(column, mapping)[1]
+        _check_unit(pattern, rule, target, mapping.where)
+        sources[target] = column, rule
+        useful.add(pattern)
+    for pattern in mapping.columns:
+        if pattern not in first:
             raise GapError(
-                f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', "
-                f"which the log format does not know; {closest(name, _known_columns(expected))}"
+                f"{mapping.where}: no column of {table.where} matches '{one_line(pattern)}'; "
+                f"{suggest_column(pattern, table.header)}"
             )
-        if rule not in used_rules:
-            raise GapError(
-                f"{mapping.where}: no column of {table.where} matches '{one_line(rule.pattern)}'; "
-                f"{suggest_column(rule.pattern, table.header)}"
-            )
+        if pattern not in useful:
+            raise _unknown(*first[pattern], expected, mapping)
     near = {
         column: meant
         for column, name in ignored.items()
-        if column not in mapping.keep and (meant := misspelt(name, expected))
+        if column not in mapping.keep.columns and (meant := misspelt(name, expected))
     }
-    plan = ReadingPlan(
-        table, expected, mapping, mapping.rule_for(path), sources, tuple(ignored), near
-    )
+    rule_of_log = mapping.rule_for(path)
+    plan = ReadingPlan(table, expected, mapping, rule_of_log, sources, tuple(ignored), near)
     _check_misspelt(plan)
     _check_names(plan)
-    _check_columns(plan)
+    _check_time(plan)
+    _check_positions(plan)
+    _check_efforts(plan)
     return plan
+
+
+def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
+    """Pattern and rule for a column, and its name in the log format, joints as the log has them."""
+    in_unit = ColumnTable(unit=mapping.time.unit)
+    if mapping.time.column == column:
+        return "", in_unit, TIME
+    found = "", AS_NAMED, column
+    for pattern, rule in mapping.columns.items():
+        name = rule.renamed(pattern, column)
+        # A rule for one column outranks a pattern.
+        if name is not None and (not found[0] or "*" not in pattern):
+            found = pattern, rule, name
+    if found[2] == TIME and not found[0]:
+        return "", in_unit, TIME
+    return found
+
+
+def _robots(name: str, mapping: Mapping) -> str:
+    """A column of the log format, its joint called as the robot calls it."""
+    owner, separator, quantity = name.rpartition("__")
+    return f"{mapping.joints.get(owner, owner)}{separator}{quantity}"
+
+
+def _unknown(column: str, name: str, expected: Expected, mapping: Mapping) -> GapError:
+    known = [TIME, *(f"{j}__{suffix}" for j in expected.joints for suffix in JOINT_COLUMNS)]
+    return GapError(
+        f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', which the log "
+        f"format does not know; {closest(name, known)}"
+    )
+
+
+def _check_unit(pattern: str, rule: ColumnTable, target: Target, where: str) -> None:
+    if rule.unit in (None, "1"):
+        return
+    found, wanted = dimension(str(rule.unit)), dimension(target.unit)
+    if found != wanted:
+        raise GapError(
+            f"{where}: columns '{one_line(pattern)}': '{rule.unit}' is a unit of {found}, "
+            f"{target.quantity} needs one of {wanted}"
+        )
+
+
+def _check_misspelt(plan: ReadingPlan) -> None:
+    """Refuse a slip of the pen that costs a channel: it would be left out without a word."""
+    for column, meant in plan.misspelt.items():
+        if parse_column(meant, plan.expected, plan.table.where) not in plan.sources:
+            raise LogFormatError(
+                f"{plan.table.where}: column '{one_line(column)}' is none of the log format and "
+                f"would be ignored; did you mean '{meant}'? Rename it, or list it under keep in a "
+                "mapping file"
+            )
 
 
 def _check_names(plan: ReadingPlan) -> None:
     """Refuse a name of the mapping that neither the file nor the robot has."""
     table, expected, mapping = plan.table, plan.expected, plan.mapping
-    owners = {_target(column, mapping)[1].rpartition("__")[0] for column in table.header} - {""}
+    owners = {_rule(column, mapping)[2].rpartition("__")[0] for column in table.header} - {""}
     for name in mapping.joints:
         if name not in owners:
             raise GapError(
@@ -154,18 +209,18 @@ def _check_names(plan: ReadingPlan) -> None:
                 f"you mean '{meant}'?"
             )
     for what, column in (
-        ("time", mapping.time_column),
+        ("time", mapping.time.column),
         *((f"torque_enabled.{j}", c) for j, c in mapping.torque_enabled.items()),
-        *(("keep", c) for c in mapping.keep),
-        ("supply", mapping.supply_column),
+        *(("keep", c) for c in mapping.keep.columns),
+        ("supply", mapping.supply.column),
     ):
         if column is not None and column not in table.header:
             raise GapError(
                 f"{mapping.where}: {what}: column '{one_line(column)}' is not in {table.where}; "
                 f"{suggest_column(column, table.header)}"
             )
-    named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values(), *mapping.ratio)
-    for joint in named:
+    named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values())
+    for joint in (*named, *mapping.gear_ratio):
         if joint not in expected.joints:
             raise GapError(
                 f"{mapping.where}: '{one_line(joint)}' is no joint of {expected.robot}; "
@@ -173,83 +228,25 @@ def _check_names(plan: ReadingPlan) -> None:
             )
 
 
-def _check_misspelt(plan: ReadingPlan) -> None:
-    """Refuse a slip of the pen that costs a channel: it would be left out without a word."""
-    for column, meant in plan.misspelt.items():
-        if parse_column(meant, plan.expected, plan.table.where) in plan.sources:
-            continue
+def _check_time(plan: ReadingPlan) -> None:
+    where, rate = plan.table.where, plan.mapping.time.sample_rate
+    has_time = plan.has("", "time")
+    if not has_time and rate is None:
         raise LogFormatError(
-            f"{plan.table.where}: column '{one_line(column)}' is none of the log format and would "
-            f"be ignored; did you mean '{meant}'? Rename it, or list it under keep in a mapping "
-            "file"
-        )
-
-
-def _known_columns(expected: Expected) -> list[str]:
-    return [TIME, *(f"{j}__{suffix}" for j in expected.joints for suffix in JOINT_COLUMNS)]
-
-
-def _resolve(column: str, mapping: Mapping) -> tuple[ColumnRule, str]:
-    """The rule for a column and its name in the log format."""
-    found, name = _target(column, mapping)
-    owner, separator, quantity = name.rpartition("__")
-    if separator and owner in mapping.joints:
-        name = f"{mapping.joints[owner]}__{quantity}"
-    return found, name
-
-
-def _target(column: str, mapping: Mapping) -> tuple[ColumnRule, str]:
-    """The same, its joint called as the log calls it."""
-    if mapping.time_column == column:
-        return ColumnRule(column, TIME, mapping.time_unit), TIME
-    found, name = _IDENTITY, column
-    for rule in mapping.columns:
-        target = rule.matched(column)
-        # A rule for one column outranks a pattern.
-        if target is not None and (found is _IDENTITY or "*" not in rule.pattern):
-            found, name = rule, target
-    if name == TIME and found is _IDENTITY and mapping.time_unit != "s":
-        found = ColumnRule(column, TIME, mapping.time_unit)
-    return found, name
-
-
-def _check_unit(rule: ColumnRule, target: Target, where: str) -> None:
-    if rule.unit in (None, "1"):
-        return
-    try:
-        found, wanted = dimension(str(rule.unit)), dimension(target.unit)
-    except UnitError as error:
-        raise GapError(f"{where}: {one_line(error)}") from None
-    if found != wanted:
-        raise GapError(
-            f"{where}: columns '{one_line(rule.pattern)}': '{rule.unit}' is a unit of {found}, "
-            f"{target.quantity} needs one of {wanted}"
-        )
-
-
-def _check_columns(plan: ReadingPlan) -> None:
-    table, mapping = plan.table, plan.mapping
-    where = table.where
-    have = {(t.owner, t.quantity) for t in plan.sources}
-    if ("", "time") not in have and mapping.sample_rate is None:
-        raise LogFormatError(
-            f"{where}: no column {TIME}; {suggest_column(TIME, table.header)}; or give "
+            f"{where}: no column {TIME}; {suggest_column(TIME, plan.table.header)}; or give "
             "sample_rate in a mapping file"
         )
-    if ("", "time") in have and mapping.sample_rate is not None:
+    if has_time and rate is not None:
         raise LogFormatError(
-            f"{mapping.where}: sample_rate is given and {where} has a column {TIME}; drop one"
+            f"{plan.mapping.where}: sample_rate is given and {where} has a column {TIME}; drop one"
         )
-    _check_positions(plan, have)
-    _check_efforts(plan, have)
 
 
-def _check_positions(plan: ReadingPlan, have: set[tuple[str, str]]) -> None:
+def _check_positions(plan: ReadingPlan) -> None:
     """At least one joint with a position, and none whose columns may hide under another name."""
-    table, expected = plan.table, plan.expected
-    where = table.where
-    sides = {j: {q for o, q in have if o == j and q in POSITIONS} for j in expected.joints}
-    if not any(sides.values()):
+    table, expected, where = plan.table, plan.expected, plan.table.where
+    without = [j for j in expected.joints if not any(plan.has(j, q) for q in POSITIONS)]
+    if len(without) == len(expected.joints):
         owners = {c.rpartition("__")[0] for c in table.header if "__position" in c}
         seen = one_line(", ".join(sorted(owners)) or ", ".join(table.header))
         raise WrongRobotError(
@@ -257,70 +254,39 @@ def _check_positions(plan: ReadingPlan, have: set[tuple[str, str]]) -> None:
             f"('{expected.joints[0]}', ...) has a position; the log of another robot? "
             f"It has: {seen}"
         )
-    for joint in expected.joints:
-        if sides[joint] or f"{joint}__position_rad" in plan.rule.constants:
+    for joint in without:
+        wanted = column_name(joint, "position")
+        if wanted in plan.rule.constants:
             continue
-        measured = [c for c in EFFORTS if (joint, c) in have]
-        if measured or _strangers(plan, POSITIONS):
-            wanted = f"{joint}__position_rad"
+        if any(plan.has(joint, c) for c in EFFORTS) or plan.strangers(POSITIONS):
             raise WrongRobotError(
                 f"{where}: joint '{joint}' has no column '{wanted}'; "
                 f"{suggest_column(wanted, table.header)}"
             )
 
 
-def _strangers(plan: ReadingPlan, quantities: Collection[str]) -> list[str]:
-    """Unused columns that say one of these quantities of something that is no joint."""
-    suffixes = {s for s, (q, _) in JOINT_COLUMNS.items() if q in quantities}
-    return [c for c in plan.ignored if c.rpartition("__")[2] in suffixes]
-
-
-def _check_efforts(plan: ReadingPlan, have: set[tuple[str, str]]) -> None:
+def _check_efforts(plan: ReadingPlan) -> None:
     """At least one effort channel, and each for all joints or none."""
-    where, joints, mapping = plan.table.where, plan.expected.joints, plan.mapping
-    found = [c for c in EFFORTS if any((j, c) in have for j in joints if j not in mapping.locked)]
+    where, mapping = plan.table.where, plan.mapping
+    open_ = [j for j in plan.expected.joints if j not in mapping.locked]
+    found = [c for c in EFFORTS if any(plan.has(j, c) for j in open_)]
     for channel in found:
-        for joint in joints:
-            if (
-                (joint, channel) in have
-                or joint in mapping.locked
-                or (joint, "position")
-                not in (have | {(j, "position") for j, q in have if q == "motor_position"})
-            ):
-                continue
-            if _strangers(plan, (channel,)):
-                column = next(
-                    f"{joint}__{s}" for s, (q, _) in JOINT_COLUMNS.items() if q == channel
-                )
+        for joint in open_:
+            moves = any(plan.has(joint, q) for q in POSITIONS)
+            if moves and not plan.has(joint, channel) and plan.strangers((channel,)):
+                column = column_name(joint, channel)
                 raise WrongRobotError(
                     f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; "
                     f"{suggest_column(column, plan.table.header)}; log it, or list the joint "
                     "under locked in a mapping file"
                 )
-    if not found and derives_voltage(plan, have):
+    if not found and plan.derives_voltage:
         found = ["voltage"]
     if not found:
-        columns = [
-            f"{joints[0]}__{suffix}"
-            for suffix, (name, _) in JOINT_COLUMNS.items()
-            if name in EFFORTS
-        ]
-        raise LogFormatError(
-            f"{where}: no effort channel; at least one of {', '.join(columns)} must be there"
-        )
+        columns = ", ".join(column_name(plan.expected.joints[0], c) for c in EFFORTS)
+        raise LogFormatError(f"{where}: no effort channel; at least one of {columns} must be there")
     if mapping.effort is not None and mapping.effort not in found:
         raise LogFormatError(
             f"{mapping.where}: effort = '{mapping.effort}' is not in {where}; "
             f"{closest(mapping.effort, found)}"
         )
-
-
-def derives_voltage(plan: ReadingPlan, have: set[tuple[str, str]]) -> bool:
-    """Whether voltage follows from the servo's law, goals and supply."""
-    mapping = plan.mapping
-    return (
-        mapping.law == "duty"
-        and plan.rule.gain is not None
-        and (mapping.supply_column is not None or mapping.supply_voltage is not None)
-        and all((joint, "goal_position") in have for joint in plan.expected.joints)
-    )

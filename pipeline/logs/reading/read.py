@@ -14,14 +14,15 @@ from actuators.units import from_si
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import EFFORTS, Log
-from pipeline.logs.reading.log_format import TIME, parse_column
-from pipeline.logs.reading.mapping import ColumnRule, Mapping
-from pipeline.logs.reading.plan import ReadingPlan, derives_voltage, plan_reading
+from pipeline.logs.reading.log_format import TIME, Target, column_name, parse_column
+from pipeline.logs.reading.mapping import ColumnTable, Mapping
+from pipeline.logs.reading.plan import ReadingPlan, plan_reading
 from pipeline.logs.reading.sides import sides_of
 from pipeline.logs.reading.table_file import read_columns, sha256, stream_columns
 
 Array = NDArray[np.float64]
 _LARGEST: Final = 1e9  # nothing a robot measures is larger in the log's units
+_TIME: Final = Target("time", "", "time", "s")
 
 
 def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> Log:
@@ -36,9 +37,7 @@ def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> 
         GapError: The file is unreadable, is not this robot's, or holds no usable measurement.
     """
     plan = plan_reading(path, expected, mapping)
-    data = read_columns(plan.table, plan.columns)
-    log = assemble(plan, data, first_row=0, digest=sha256(path))
-    return log
+    return _assemble(plan, read_columns(plan.table, plan.columns), 0, sha256(path))
 
 
 def stream_log(
@@ -64,7 +63,7 @@ def stream_log(
     plan = plan_reading(path, expected, mapping)
     first, last = 0, -np.inf
     for data in stream_columns(plan.table, plan.columns, rows):
-        log = assemble(plan, data, first_row=first, digest=digest)
+        log = _assemble(plan, data, first, digest)
         if log.time[0] <= last:
             raise LogContentError(
                 f"{plan.table.where}: row {first + 2}: time {log.time[0]:.9g} s does not follow "
@@ -74,133 +73,106 @@ def stream_log(
         yield log
 
 
-def assemble(plan: ReadingPlan, data: dict[str, Array], *, first_row: int, digest: str) -> Log:
-    """Put columns in their places.
-
-    Args:
-        plan: From `plan_reading`.
-        data: Column to numbers.
-        first_row: Of these numbers in the file, for messages and for the time without a column.
-        digest: SHA-256 of the file.
-
-    Raises:
-        LogContentError: Time does not run forward, or values that no robot measures.
-    """
+def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest: str) -> Log:
+    """Put columns, of which the first row is the file's `first_row`, in their places."""
     where, expected, mapping = plan.table.where, plan.expected, plan.mapping
-    n = next(iter(data.values())).size
-    arrays, force = _arrays(plan, data, n, first_row)
-    arrays["time"] = _time(plan, data, n, first_row)
-    fresh = _check_time(arrays["time"], where, first_row)
-    sides = sides_of(
-        arrays.pop("position", None),
-        arrays.pop("motor_position", None),
-        expected,
-        mapping.ratio,
-        where,
-    )
-    position, left_out = _stand_still(sides.position, arrays, plan)
-    arrays |= {"position": position, "motor_position": sides.motor}
-    unused = _feet(arrays, force, expected)
-    ignored = [s.column for t, s in plan.sources.items() if (t.owner, t.quantity) in unused]
-    _drive(plan, data, arrays, n)
+    columns = _in_si(plan, data, first_row)
+    time = columns[_TIME]
+    fresh = _check_time(time, where, first_row)
+    base: dict[str, Any] = {t.quantity: x for t, x in columns.items() if t.kind == "base"}
+    joints = {
+        quantity: _side_by_side(columns, quantity, expected.joints, time.size)
+        for quantity in {t.quantity for t in columns if t.kind == "joint"}
+    }
+    own, motor = joints.pop("position", None), joints.pop("motor_position", None)
+    sides = sides_of(own, motor, expected, mapping.gear_ratio, where)
+    derived = mapping.controller.law == "duty" and "goal_position" in joints
+    efforts = [joints[c] for c in EFFORTS if c in joints]
+    position, left_out = _stand_still(sides.position, efforts, derived, plan)
+    feet, unused = _feet(columns, expected.feet, time.size)
+    drive = _drive(plan, data, joints | {"position": position})
     log = Log(
         name=plan.table.path.stem,
+        time=time,
         joints=expected.joints,
+        position=position,
         position_source=sides.source,
+        motor_position=sides.motor,
         left_out=left_out,
-        remarks={f"{j}__motor_position_rad": text for j, text in sides.remarks.items()},
+        remarks={column_name(j, "motor_position"): text for j, text in sides.remarks.items()},
         repeated_times=int((~fresh).sum()),
-        gain=plan.rule.gain,
-        torque_off_bridge=mapping.torque_off_bridge,
-        constants=dict(plan.rule.constants),
+        gain=plan.rule.gain_per_rad,
+        torque_off_bridge=mapping.controller.torque_off_bridge,
+        constants={name: quantity.si for name, quantity in plan.rule.constants.items()},
         condition=dict(plan.rule.condition),
         locked=tuple(mapping.locked),
-        extra={column: data[column] for column in mapping.keep},
-        ignored=(*plan.ignored, *ignored),
+        extra={column: data[column] for column in mapping.keep.columns},
+        ignored=(*plan.ignored, *(c for t, (c, _) in plan.sources.items() if t in unused)),
         misspelt=dict(plan.misspelt),
         chosen_effort=mapping.effort,
         sha256=digest,
         source=plan.table.path,
-        rules={(t.owner, t.quantity): (s.column, s.rule) for t, s in plan.sources.items()},
-        **arrays,
+        rules={(t.owner, t.quantity): source for t, source in plan.sources.items()},
+        **base | joints | feet | drive,
     )
     return log if fresh.all() else log.rows(fresh)
 
 
-def _time(plan: ReadingPlan, data: dict[str, Array], n: int, first_row: int) -> Array:
-    """Of every row, (N,) [s]; in the file's order, whatever it is."""
-    if plan.mapping.sample_rate is not None:
-        return (first_row + np.arange(n)) / plan.mapping.sample_rate
-    source = next(s for target, s in plan.sources.items() if target.kind == "time")
-    return source.factor * data[source.column] + source.offset
-
-
-def _arrays(
-    plan: ReadingPlan, data: dict[str, Array], n: int, first_row: int
-) -> tuple[dict[str, Any], dict[tuple[str, str], Array]]:
-    """Attributes of the log by name, and forces and contacts by foot and quantity.
+def _in_si(plan: ReadingPlan, data: dict[str, Array], first_row: int) -> dict[Target, Array]:
+    """Every quantity of the file, and constants that stand for one, each (N,), in the log's unit.
 
     Raises:
         LogContentError: Values that no robot measures.
     """
-    where, expected, mapping = plan.table.where, plan.expected, plan.mapping
-    arrays: dict[str, Any] = {}
-    force: dict[tuple[str, str], Array] = {}
-    by_joint: dict[str, dict[str, Array]] = {}
-    time = _time(plan, data, n, first_row)
-    for target, source in plan.sources.items():
-        values = data[source.column]
-        _check_values(values, source.column, where, first_row)
-        if (source.factor, source.offset) != (1.0, 0.0):
-            values = source.factor * values + source.offset
-            _check_values(values, source.column, f"{where} through {mapping.where}", first_row)
-        if source.rule.late and target.kind != "time":
-            values = np.interp(time + source.rule.late, time, values, left=np.nan, right=np.nan)
-        if target.kind == "joint":
-            by_joint.setdefault(target.quantity, {})[target.owner] = values
-        elif target.kind == "foot":
-            force[target.owner, target.quantity] = values
-        else:
-            arrays[target.quantity] = values
-    for key, value in plan.rule.constants.items():
-        constant = parse_column(key, expected, mapping.where)
-        if constant is None or constant in plan.sources:
-            continue
-        column = np.full(n, from_si(value, constant.unit))
-        if constant.kind == "joint":
-            by_joint.setdefault(constant.quantity, {})[constant.owner] = column
-        elif constant.kind == "base":
-            arrays[constant.quantity] = column
-    for quantity, columns in by_joint.items():
-        block = np.full((n, len(expected.joints)), np.nan)
-        for j, joint in enumerate(expected.joints):
-            if joint in columns:
-                block[:, j] = columns[joint]
-        arrays[quantity] = block
-    return arrays, force
+    where, mapping = plan.table.where, plan.mapping
+    out: dict[Target, Array] = {}
+    n = next(iter(data.values())).size
+    if mapping.time.sample_rate is not None:
+        out[_TIME] = (first_row + np.arange(n)) / mapping.time.sample_rate.si
+    # Time first: columns that are late are read off at other times.
+    for target, (column, rule) in sorted(plan.sources.items(), key=lambda s: s[0] != _TIME):
+        values, (factor, offset) = data[column], rule.affine(target.unit)
+        _check_values(values, column, where, first_row)
+        if (factor, offset) != (1.0, 0.0):
+            values = factor * values + offset
+            _check_values(values, column, f"{where} through {mapping.where}", first_row)
+        if rule.late and target != _TIME:
+            at = out[_TIME] + rule.late
+            values = np.interp(at, out[_TIME], values, left=np.nan, right=np.nan)
+        out[target] = values
+    for key, quantity in plan.rule.constants.items():
+        constant = parse_column(key, plan.expected, mapping.where)
+        if constant is not None and constant.kind != "foot" and constant not in out:
+            out[constant] = np.full(n, from_si(quantity.si, constant.unit))
+    return out
+
+
+def _side_by_side(
+    columns: dict[Target, Array], quantity: str, joints: tuple[str, ...], n: int
+) -> Array:
+    """One quantity of all joints, shape (N, J); NaN where it was not measured."""
+    block = np.full((n, len(joints)), np.nan)
+    for target, values in columns.items():
+        if target.kind == "joint" and target.quantity == quantity:
+            block[:, joints.index(target.owner)] = values
+    return block
 
 
 def _stand_still(
-    position: Array, arrays: dict[str, Any], plan: ReadingPlan
+    position: Array, efforts: list[Array], derived: bool, plan: ReadingPlan
 ) -> tuple[Array, dict[str, str]]:
-    """Give joints that the log does not know a place to stand.
-
-    Returns:
-        Positions, shape (N, J), and joints that cannot be compared, with the reason.
-    """
-    expected, mapping = plan.expected, plan.mapping
-    out, why = position.copy(), {}
-    efforts = [arrays[c] for c in EFFORTS if c in arrays]
-    derived = mapping.law == "duty" and "goal_position" in arrays
+    """Positions (N, J), joints that the log does not know at a place; and what is left out, why."""
+    expected, out, why = plan.expected, position.copy(), {}
     for k, joint in enumerate(expected.joints):
-        compared = derived or any(np.isfinite(e[:, k]).any() for e in efforts)
-        if not compared and not np.isfinite(position[:, k]).any():
+        if derived or any(np.isfinite(e[:, k]).any() for e in efforts):
+            continue
+        if not np.isfinite(position[:, k]).any():
             out[:, k] = np.clip(0.0, expected.lower[k], expected.upper[k])
             why[joint] = (
                 f"nothing tells where it stood: taken as still at {out[0, k]:.4g} rad; a mapping "
                 f"file can state {joint}__position_rad under [constants]"
             )
-        elif not compared and joint not in mapping.locked:
+        elif joint not in plan.mapping.locked:
             why[joint] = "nothing tells its effort: its motion is used, it is not compared"
     return out, why
 
@@ -234,58 +206,57 @@ def _check_time(time: Array, where: str, first_row: int) -> NDArray[np.bool_]:
 
 
 def _feet(
-    arrays: dict[str, Any], force: dict[tuple[str, str], Array], expected: Expected
-) -> set[tuple[str, str]]:
-    """Foot forces and contacts, where every foot has them; what was not measured is NaN.
+    columns: dict[Target, Array], feet: tuple[str, ...], n: int
+) -> tuple[dict[str, Any], set[Target]]:
+    """Forces and contacts, where every foot has them (NaN where not measured), and what is unused.
 
-    Returns:
-        Leg and quantity of what cannot be used: some feet alone do not tell who carries the robot,
-        and lateral forces alone do not tell who stands.
+    Some feet alone do not tell who carries the robot, and lateral forces alone not who stands.
     """
-    feet = expected.feet
-    unused = set(force)
-    if feet and all((foot, "force_z") in force for foot in feet):
-        # Where lateral sensors are missing at some feet, those of the others fit no sum of forces.
-        axes = [axis for axis in "xyz" if all((foot, f"force_{axis}") in force for foot in feet)]
-        block = np.full((arrays["time"].size, len(feet), 3), np.nan)
-        for i, foot in enumerate(feet):
-            for axis in axes:
-                block[:, i, "xyz".index(axis)] = force[foot, f"force_{axis}"]
-        arrays["feet"], arrays["foot_force"] = feet, block
-        unused -= {(foot, f"force_{axis}") for foot in feet for axis in axes}
-    if feet and all((foot, "contact") in force for foot in feet):
-        arrays["feet"] = feet
-        arrays["contact"] = np.stack([force[foot, "contact"] > 0.5 for foot in feet], axis=1)
-        unused -= {(foot, "contact") for foot in feet}
-    return unused
+    by_quantity: dict[str, dict[str, Array]] = {}
+    for target, values in columns.items():
+        if target.kind == "foot":
+            by_quantity.setdefault(target.quantity, {})[target.owner] = values
+    # Where lateral sensors are missing at some feet, those of the others fit no sum of forces.
+    whole = {quantity: per for quantity, per in by_quantity.items() if len(per) == len(feet)}
+    if "force_z" not in whole:
+        whole = {quantity: per for quantity, per in whole.items() if quantity == "contact"}
+    unused = {t for t in columns if t.kind == "foot" and t.quantity not in whole}
+    out: dict[str, Any] = {"feet": feet} if whole else {}
+    if "contact" in whole:
+        out["contact"] = np.stack([whole["contact"][foot] > 0.5 for foot in feet], axis=1)
+    if "force_z" in whole:
+        none = dict.fromkeys(feet, np.full(n, np.nan))
+        axes = [whole.get(f"force_{axis}", none) for axis in "xyz"]
+        out["foot_force"] = np.stack([[per[foot] for foot in feet] for per in axes]).T
+        out["foot_force"] = np.ascontiguousarray(out["foot_force"])
+    return out, unused
 
 
-def _drive(plan: ReadingPlan, data: dict[str, Array], arrays: dict[str, Any], n: int) -> None:
-    """Supply, switched-off rows and the voltage of the servo's own law."""
-    mapping, joints = plan.mapping, plan.expected.joints
-    if mapping.supply_column:
-        rule = ColumnRule(mapping.supply_column, "", mapping.supply_unit)
-        factor, offset = rule.affine("V")
-        arrays["supply"] = factor * data[mapping.supply_column] + offset
-    elif mapping.supply_voltage is not None:
-        arrays["supply"] = np.full(n, mapping.supply_voltage)
+def _drive(plan: ReadingPlan, data: dict[str, Array], joints: dict[str, Array]) -> dict[str, Any]:
+    """Supply, switched-off rows, the voltage of the servo's own law, and rows that are valid."""
+    mapping, position, out = plan.mapping, joints["position"], dict[str, Any]()
+    supply, gain = mapping.supply, plan.rule.gain_per_rad or 0.0
+    if supply.column:
+        factor, offset = ColumnTable(unit=supply.unit).affine("V")
+        out["supply"] = factor * data[supply.column] + offset
+    elif supply.voltage is not None:
+        out["supply"] = np.full(position.shape[0], supply.voltage.si)
+    valid = np.isfinite(position)
     if mapping.torque_enabled:
-        off = np.zeros((n, len(joints)), dtype=np.bool_)
+        off = np.zeros(position.shape, dtype=np.bool_)
         for joint, column in mapping.torque_enabled.items():
-            off[:, joints.index(joint)] = ~(data[column] > 0.5)
-        arrays["torque_off"] = off
-    have = {(t.owner, t.quantity) for t in plan.sources}
-    if "voltage" not in arrays and derives_voltage(plan, have):
+            off[:, plan.expected.joints.index(joint)] = ~(data[column] > 0.5)
+        out["torque_off"] = off
+        valid &= ~off
+    if "voltage" not in joints and plan.derives_voltage:
         # U = U_supply * clip(k (goal - position), -1, 1): the servo's duty, averaged over its PWM.
-        duty = np.clip(plan.rule.gain * (arrays["goal_position"] - arrays["position"]), -1.0, 1.0)
-        arrays["voltage"] = arrays["supply"][:, None] * duty
-        if "torque_off" in arrays:
-            arrays["voltage"][arrays["torque_off"]] = np.nan
-        arrays["derived"] = {"voltage": "supply x clip(gain x (goal - position), -1, 1)"}
-    valid = np.isfinite(arrays["position"])
-    effort = mapping.effort or next((c for c in EFFORTS if c in arrays), None)
+        duty = np.clip(gain * (joints["goal_position"] - position), -1.0, 1.0)
+        out["voltage"] = out["supply"][:, None] * duty
+        if "torque_off" in out:
+            out["voltage"][out["torque_off"]] = np.nan
+        out["derived"] = {"voltage": "supply x clip(gain x (goal - position), -1, 1)"}
+    channels = joints | out
+    effort = mapping.effort or next((c for c in EFFORTS if c in channels), None)
     if effort is not None:
-        valid &= np.isfinite(arrays[effort])
-    if "torque_off" in arrays:
-        valid &= ~arrays["torque_off"]
-    arrays["valid"] = valid
+        valid &= np.isfinite(channels[effort])
+    return out | {"valid": valid}

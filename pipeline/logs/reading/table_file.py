@@ -7,6 +7,7 @@ import hashlib
 import io
 import re
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -16,18 +17,11 @@ from numpy.typing import NDArray
 
 from actuators.errors import one_line
 from pipeline.logs.errors import LogFormatError
+from pipeline.logs.reading.mapping import CsvTable
 
 Array = NDArray[np.float64]
 _HEADER_BYTES: Final = 1 << 20
 _DECIMAL_COMMA: Final = re.compile(r"^\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*$")
-
-
-@dataclass(frozen=True)
-class CsvDialect:
-    """How a CSV file is written: the log format's own is comma and dot."""
-
-    delimiter: str = ","
-    decimal: str = "."
 
 
 @dataclass(frozen=True)
@@ -44,7 +38,7 @@ class TableFile:
     path: Path
     header: tuple[str, ...]
     parquet: bool
-    dialect: CsvDialect
+    dialect: CsvTable
 
     @property
     def where(self) -> str:
@@ -58,7 +52,7 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def open_table(path: Path, dialect: CsvDialect | None = None) -> TableFile:
+def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
     """Open a CSV or Parquet file and read its header.
 
     Args:
@@ -68,8 +62,10 @@ def open_table(path: Path, dialect: CsvDialect | None = None) -> TableFile:
     Raises:
         LogFormatError: No such file, empty, wrong bytes, no header, names that occur twice.
     """
-    where = one_line(path.name)
-    dialect = dialect or CsvDialect()
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    where, dialect = one_line(path.name), dialect or CsvTable()
     try:
         with path.open("rb") as stream:
             head = stream.read(_HEADER_BYTES)
@@ -80,22 +76,24 @@ def open_table(path: Path, dialect: CsvDialect | None = None) -> TableFile:
         ) from None
     if not head.strip():
         raise LogFormatError(f"{where}: the file is empty; give a log as CSV or Parquet")
-    if head.startswith(b"PAR1"):
-        return TableFile(path, _checked(_parquet_header(path, where), where), True, dialect)
-    return TableFile(path, _checked(_csv_header(head, dialect, where), where), False, dialect)
+    parquet = head.startswith(b"PAR1")
+    if parquet:
+        try:
+            names = [str(name) for name in pq.read_schema(path).names]
+        except (pa.ArrowException, OSError, ValueError) as error:
+            reason = f"not a readable Parquet file ({one_line(error)})"
+            raise LogFormatError(f"{where}: {reason}") from None
+    else:
+        names = _csv_header(head, dialect, where)
+    for k, name in enumerate(names, start=1):
+        if name in names[: k - 1]:
+            raise LogFormatError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
+        if not name:
+            raise LogFormatError(f"{where}: column {k} has no name; give it one in line 1")
+    return TableFile(path, tuple(names), parquet, dialect)
 
 
-def _parquet_header(path: Path, where: str) -> list[str]:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        return [str(name) for name in pq.read_schema(path).names]
-    except (pa.ArrowException, OSError, ValueError) as error:
-        raise LogFormatError(f"{where}: not a readable Parquet file ({one_line(error)})") from None
-
-
-def _csv_header(head: bytes, dialect: CsvDialect, where: str) -> list[str]:
+def _csv_header(head: bytes, dialect: CsvTable, where: str) -> list[str]:
     if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:4096]:
         raise LogFormatError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
     line = head.lstrip(b"\xef\xbb\xbf").split(b"\n", 1)[0]
@@ -126,17 +124,6 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _checked(names: Sequence[str], where: str) -> tuple[str, ...]:
-    seen: set[str] = set()
-    for k, name in enumerate(names, start=1):
-        if name in seen:
-            raise LogFormatError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
-        if not name:
-            raise LogFormatError(f"{where}: column {k} has no name; give it one in line 1")
-        seen.add(name)
-    return tuple(names)
-
-
 def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
     """Read some columns whole.
 
@@ -150,23 +137,20 @@ def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
     Raises:
         LogFormatError: A cell is no number, rows are ragged, bytes are not UTF-8.
     """
-    import pyarrow as pa
+    import pyarrow.parquet as pq
 
-    where = table.where
-    trouble = (pa.ArrowException, OSError, ValueError, OverflowError)
-    try:
-        data = _read_parquet(table, columns) if table.parquet else _read_csv(table, columns)
-    except trouble as error:
+    with _reported(table):
         if table.parquet:
-            raise LogFormatError(_reason(error, table)) from None
-        try:
-            # Only a single thread counts rows, so that the message can say where.
-            data = _read_csv(table, columns, threads=False)
-        except trouble as located:
-            raise LogFormatError(_reason(located, table)) from None
+            data = pq.read_table(table.path, columns=list(columns))
+        else:
+            try:
+                data = _read_csv(table, columns, threads=True)
+            except _troubles():
+                # Only a single thread counts rows, so that the message can say where.
+                data = _read_csv(table, columns, threads=False)
     if data.num_rows == 0:
-        raise LogFormatError(f"{where}: a header and no rows; nothing was logged")
-    return {name: _numbers(data.column(name), name, where) for name in columns}
+        raise LogFormatError(f"{table.where}: a header and no rows; nothing was logged")
+    return {name: _numbers(data.column(name), name, table.where) for name in columns}
 
 
 def stream_columns(
@@ -182,14 +166,14 @@ def stream_columns(
 
     if not table.parquet:
         raise LogFormatError(f"{table.where}: streaming needs Parquet; convert the CSV first")
-    try:
-        # Without a memory map or pre-buffering, one row group at a time is in memory.
-        with pq.ParquetFile(table.path, memory_map=False, pre_buffer=False) as file:
-            for batch in file.iter_batches(batch_size=rows, columns=list(columns)):
-                whole = pa.table(batch)
-                yield {name: _numbers(whole.column(name), name, table.where) for name in columns}
-    except (pa.ArrowException, OSError) as error:
-        raise LogFormatError(_reason(error, table)) from None
+    # Without a memory map or pre-buffering, one row group at a time is in memory.
+    with (
+        _reported(table),
+        pq.ParquetFile(table.path, memory_map=False, pre_buffer=False) as file,
+    ):
+        for batch in file.iter_batches(batch_size=rows, columns=list(columns)):
+            whole = pa.table(batch)
+            yield {name: _numbers(whole.column(name), name, table.where) for name in columns}
 
 
 def row_count(table: TableFile) -> int:
@@ -198,30 +182,36 @@ def row_count(table: TableFile) -> int:
     Raises:
         LogFormatError: The footer cannot be read.
     """
-    import pyarrow as pa
     import pyarrow.parquet as pq
 
-    if not table.parquet:
-        with table.path.open("rb") as stream:
-            return max(
-                0, sum(part.count(b"\n") for part in iter(lambda: stream.read(1 << 22), b"")) - 1
-            )
+    if table.parquet:
+        with _reported(table):
+            return int(pq.read_metadata(table.path).num_rows)
+    with table.path.open("rb") as stream:
+        blocks = iter(lambda: stream.read(1 << 22), b"")
+        return max(0, sum(block.count(b"\n") for block in blocks) - 1)
+
+
+def _troubles() -> tuple[type[Exception], ...]:
+    import pyarrow as pa
+
+    return (pa.ArrowException, OSError, ValueError, OverflowError)
+
+
+@contextmanager
+def _reported(table: TableFile) -> Iterator[None]:
+    """What the reader meets, in one line."""
     try:
-        return int(pq.read_metadata(table.path).num_rows)
-    except (pa.ArrowException, OSError) as error:
+        yield
+    except _troubles() as error:
         raise LogFormatError(_reason(error, table)) from None
 
 
-def _read_parquet(table: TableFile, columns: Sequence[str]) -> Any:
-    import pyarrow.parquet as pq
-
-    return pq.read_table(table.path, columns=list(columns))
-
-
-def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool = True) -> Any:
+def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool) -> Any:
     import pyarrow as pa
     import pyarrow.csv as pc
 
+    kinds = {n: pa.string() if n.endswith("__contact") else pa.float64() for n in columns}
     return pc.read_csv(
         table.path,
         read_options=pc.ReadOptions(
@@ -230,10 +220,7 @@ def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool = True)
         parse_options=pc.ParseOptions(delimiter=table.dialect.delimiter),
         convert_options=pc.ConvertOptions(
             include_columns=list(columns),
-            column_types={
-                name: pa.string() if name.endswith("__contact") else pa.float64()
-                for name in columns
-            },
+            column_types=kinds,
             decimal_point=table.dialect.decimal,
             strings_can_be_null=True,
         ),

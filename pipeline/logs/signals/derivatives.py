@@ -17,6 +17,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import oaconvolve, welch
 
 from pipeline.logs.errors import PreparationError
 
@@ -28,6 +29,8 @@ HALF_LENGTH: Final = 2.0
 LARGEST_SHARE: Final = 0.25
 #: A joint whose spectrum nowhere exceeds its noise by this factor stands still.
 SEEN: Final = 30.0
+#: A series without a gap.
+WHOLE: Final = (slice(None),)
 
 
 @dataclass(frozen=True)
@@ -96,26 +99,27 @@ class LowPass:
         """Standard deviation of filtered white noise per standard deviation of the noise."""
         return float(np.sqrt((self.kernels[0] ** 2).sum()))
 
-    def smooth(self, x: Array) -> Array:
-        """Low-passed values, shape as `x` (samples first); ends are continued by point symmetry."""
-        return self._apply(x, (0,))[0]
-
-    def derivatives(self, x: Array) -> tuple[Array, Array, Array]:
-        """Low-passed value, first and second derivative, each of the shape of `x`."""
-        value, first, second = self._apply(x, (0, 1, 2))
-        return value, first, second
-
-    def share(self, flag: NDArray[np.bool_]) -> Array:
-        """Share of the kernel's weight that falls on flagged samples or beyond the ends.
+    def smooth(self, x: Array, pieces: Sequence[slice] = WHOLE) -> Array:
+        """Low-passed values, shape as `x` (samples first); ends are continued by point symmetry.
 
         Args:
-            flag: Shape (N, C).
-
-        Returns:
-            Shape (N, C), 0 to 1.
+            x: Shape (N, ...).
+            pieces: Stretches that follow one another and share no sample; all of it by default.
         """
+        return np.concatenate([self._apply(x[piece], (0,))[0] for piece in pieces])
+
+    def derivatives(self, x: Array, pieces: Sequence[slice] = WHOLE) -> tuple[Array, Array, Array]:
+        """Low-passed value, first and second derivative, each of the shape of `x`."""
+        parts = [self._apply(x[piece], (0, 1, 2)) for piece in pieces]
+        value, first, second = (np.concatenate(orders) for orders in zip(*parts, strict=True))
+        return value, first, second
+
+    def share(self, flag: NDArray[np.bool_], pieces: Sequence[slice] = WHOLE) -> Array:
+        """Share of the kernel's weight on flagged samples or beyond the ends, (N, C), 0 to 1."""
         weight = np.abs(self.kernels[0])
-        weight /= weight.sum()
+        return np.concatenate([self._share(flag[piece], weight / weight.sum()) for piece in pieces])
+
+    def _share(self, flag: NDArray[np.bool_], weight: Array) -> Array:
         n, half = flag.shape[0], self.half
         # Weight beyond the ends is the tail sum of the kernel.
         tail = np.concatenate([np.cumsum(weight[::-1])[:half][::-1], np.zeros(max(0, n - half))])
@@ -123,18 +127,18 @@ class LowPass:
         out = np.repeat(ends[:, None], flag.shape[1], axis=1)
         for c in np.flatnonzero(flag.any(axis=0)):
             padded = np.pad(flag[:, c].astype(np.float64), half)
-            out[:, c] += np.maximum(_convolve(padded, [weight])[0], 0.0)
+            out[:, c] += np.maximum(oaconvolve(padded, weight, mode="valid"), 0.0)
         return np.minimum(out, 1.0)
 
     def _apply(self, x: Array, orders: Sequence[int]) -> list[Array]:
+        """Derivatives of some orders, column by column in overlapping blocks."""
         flat = x.reshape(x.shape[0], -1)
-        kernels = [self.kernels[order] for order in orders]
-        outs = [np.empty_like(flat) for _ in orders]
+        kernels = np.stack([self.kernels[order] for order in orders])
+        out = np.empty((len(orders), *flat.shape))
         for c in range(flat.shape[1]):
-            column = np.ascontiguousarray(flat[:, c])
-            for out, y in zip(outs, _convolve(_extended(column, self.half), kernels), strict=True):
-                out[:, c] = y
-        return [out.reshape(x.shape) for out in outs]
+            column = _extended(np.ascontiguousarray(flat[:, c]), self.half)
+            out[:, :, c] = oaconvolve(column[None], kernels, mode="valid", axes=1)
+        return [one.reshape(x.shape) for one in out]
 
 
 def _extended(x: Array, half: int) -> Array:
@@ -147,22 +151,6 @@ def _extended(x: Array, half: int) -> Array:
     after = 2.0 * x[-1] - x[-2 : -reach - 2 : -1]
     y = np.concatenate([before, x, after])
     return np.pad(y, half - reach, mode="edge") if reach < half else y
-
-
-def _convolve(padded: Array, kernels: Sequence[Array]) -> Array:
-    """Convolve one column with several kernels of one odd length, in overlapping blocks.
-
-    Args:
-        padded: Shape (N + 2 half,).
-        kernels: Each of shape (2 half + 1,).
-
-    Returns:
-        Shape (kernels, N), aligned with the middle of the kernel.
-    """
-    from scipy.signal import oaconvolve
-
-    result: Array = oaconvolve(padded[None], np.stack(kernels), mode="valid", axes=1)
-    return result
 
 
 def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 0.0) -> Array:
@@ -182,8 +170,6 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
         Shape (C,) [Hz], at most `LARGEST_SHARE` of the rate; NaN for a column that never changes or
         shows nothing but noise.
     """
-    from scipy.signal import welch
-
     largest = LARGEST_SHARE * rate
     out = np.full(stretches[0].shape[1], np.nan)
     moves = np.any([np.ptp(x, axis=0) > 0 for x in stretches], axis=0)

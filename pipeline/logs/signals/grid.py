@@ -157,6 +157,12 @@ def busiest(x: Array, pieces: Sequence[slice]) -> list[slice]:
     return [parts[k] for k in best]
 
 
+def runs_of(flag: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """First rows, and rows after the last, of the stretches in which a flag (N,) is set."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flag.astype(np.int8), [0]])))
+    return edges[::2], edges[1::2]
+
+
 def long_runs(time: Array, bad: Mask, longest: float) -> Mask:
     """Bad samples except short runs that interpolation bridges, such as held repeats.
 
@@ -167,10 +173,7 @@ def long_runs(time: Array, bad: Mask, longest: float) -> Mask:
     """
     out = np.zeros_like(bad)
     for c in np.flatnonzero(bad.any(axis=0)):
-        padded = np.concatenate([[0], bad[:, c].astype(np.int8), [0]])
-        change = np.diff(padded)
-        starts, stops = np.flatnonzero(change > 0).tolist(), np.flatnonzero(change < 0).tolist()
-        for start, stop in zip(starts, stops, strict=True):
+        for start, stop in zip(*runs_of(bad[:, c]), strict=True):
             left, right = max(start - 1, 0), min(stop, time.size - 1)
             open_end = start == 0 or stop == time.size
             if open_end or time[right] - time[left] > longest:

@@ -11,6 +11,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.logs.signals.grid import runs_of
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -71,8 +73,8 @@ def interpolated(time: Array, x: Array) -> Mask:
     if straight.sum() < max(_STRAIGHT * moving.sum(), 10):
         return out
     # Samples between which lines were drawn come at one pace; steps of a rounded sensor do not.
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], straight.astype(np.int8), [0]])))
-    length = edges[1::2] - edges[::2]
+    starts, stops = runs_of(straight)
+    length = stops - starts
     usual = float(np.median(np.repeat(length, length)))
     if usual < 3 or length[np.abs(length - usual) <= 1].sum() < _PACE * straight.sum():
         return out

@@ -10,6 +10,9 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.mapping import load_mapping
+from pipeline.logs.reading.read import read_log
 from tests.pipeline.logs.made import motion
 
 Array = NDArray[np.float64]
@@ -57,6 +60,17 @@ def write(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return _write
+
+
+@pytest.fixture
+def read(two_joints: Expected, write: Callable[..., Path], tmp_path: Path) -> Callable[..., Log]:
+    """Read columns as a CSV file, with the text of a mapping file."""
+
+    def _read(columns: dict[str, Array], text: str = "", *, expected: Expected = two_joints) -> Log:
+        (tmp_path / "mapping.toml").write_text(text, encoding="utf-8")
+        return read_log(write(columns), expected, load_mapping(tmp_path / "mapping.toml"))
+
+    return _read
 
 
 def _cell(x: object) -> str:

@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.logs.prepared.prepare import Prepared, prepare
+from pipeline.logs.prepared.settings import Settings, choose_settings
+from pipeline.logs.prepared.stream import Stream, prepared_chunks, survey
+from pipeline.logs.quality.finding import Quality
+from pipeline.logs.quality.quality import judge
+from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.mapping import Mapping
 
 Array = NDArray[np.float64]
 
@@ -29,3 +39,21 @@ def made_log(q: Array, effort: Array, rate: float = 500.0, **more: object) -> Lo
     time = np.arange(n) / rate
     values = {"time": time, "position": q, "torque": effort} | more
     return Log(name="made", joints=names, position_source="joint", **values)  # type: ignore[arg-type]
+
+
+def stream_prepared(
+    path: Path,
+    expected: Expected,
+    mapping: Mapping | None = None,
+    *,
+    settings: Settings | None = None,
+    rows: int = 50_000,
+) -> Iterator[tuple[Quality, Prepared]]:
+    """A long log chunk by chunk, as identification does it for several."""
+    stream = Stream(path, expected, mapping)
+    seen = survey(stream).log
+    quality = judge(seen, expected)
+    quality.refuse()
+    settings = settings or choose_settings([seen], [quality.usable])
+    known = prepare(seen, settings, usable=quality.usable)
+    yield from prepared_chunks(stream, known, rows=rows)

@@ -15,16 +15,16 @@ from pipeline.identification.compare.intake import prepare_logs
 from pipeline.logs.errors import GapError, PreparationError
 from pipeline.logs.prepared.contact import log_contact, lowest_feet, scheduled_contact
 from pipeline.logs.prepared.cycles import cycle_noise, period, repeat_noise
-from pipeline.logs.prepared.parts import CHOOSE, FIT, PROVE, split
+from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE
+from pipeline.logs.prepared.parts import split
 from pipeline.logs.prepared.prepare import prepare
 from pipeline.logs.prepared.settings import Settings, choose_settings
-from pipeline.logs.prepared.stream import stream_prepared
 from pipeline.logs.reading.expected import Expected, expected_of_robot
 from pipeline.logs.reading.read import read_log
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
-from tests.pipeline.logs.made import made_log, motion
+from tests.pipeline.logs.made import made_log, motion, stream_prepared
 
 Array = NDArray[np.float64]
 RATE = 500.0
@@ -51,7 +51,8 @@ def test_noise_floor_from_the_smoother_is_that_of_the_noise() -> None:
     ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
     expected = 0.5 * ready.settings.lowpass.noise_gain
     assert ready.noise == pytest.approx([expected, expected], rel=0.15)
-    assert ready.position_noise == pytest.approx([1e-4, 1e-4], rel=0.15)
+    gain = np.linalg.norm(ready.settings.lowpass.kernels[1])
+    assert ready.fusion.noise[0] == pytest.approx(2 * [1e-4 * gain], rel=0.15)
 
 
 def test_same_filter_for_effort_and_prediction() -> None:
@@ -224,15 +225,15 @@ def test_parts_are_further_apart_than_the_filter_sees() -> None:
         nearest = np.abs(a - b[np.clip(np.searchsorted(b, a), 0, b.size - 1)]).min()
         before = np.abs(a - b[np.clip(np.searchsorted(b, a) - 1, 0, b.size - 1)]).min()
         assert min(nearest, before) / RATE > 2 * ready.memory
-    shares = [parts.rows(0, k).mean() for k in (FIT, CHOOSE, PROVE)]
+    shares = [(parts.part[0] == k).mean() for k in (FIT, CHOOSE, PROVE)]
     assert shares[0] > 0.3
     assert min(shares) > 0.1
-    assert len(parts.blocks(FIT)) >= 3
+    assert np.unique(parts.block[0][parts.part[0] == FIT]).size >= 3
     # An input changed in one part leaves the filtered values of the others untouched.
     changed = effort.copy()
-    changed[parts.rows(0, PROVE)] += 100.0
+    changed[(parts.part[0] == PROVE)] += 100.0
     again = prepare(made_log(q, changed, RATE), ready.settings)
-    others = parts.rows(0, FIT) | parts.rows(0, CHOOSE)
+    others = (parts.part[0] == FIT) | (parts.part[0] == CHOOSE)
     assert np.abs(again.effort - ready.effort)[others].max() < 1e-9
 
 
@@ -240,9 +241,9 @@ def test_the_last_share_proves() -> None:
     _, q, _, _, effort = noisy(10_000)
     ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
     parts = split([ready], prove_last=0.4)
-    assert parts.rows(0, PROVE)[6000:].all()
-    assert not parts.rows(0, PROVE)[:6000].any()
-    assert parts.rows(0, FIT).any()
+    assert (parts.part[0] == PROVE)[6000:].all()
+    assert not (parts.part[0] == PROVE)[:6000].any()
+    assert (parts.part[0] == FIT).any()
 
 
 def test_whole_logs_are_held_out_by_condition() -> None:
@@ -253,11 +254,11 @@ def test_whole_logs_are_held_out_by_condition() -> None:
         logs.append(prepare(made_log(q, effort, RATE, condition={"gain": gain}), settings))
     parts = split(logs)
     assert "gain = 200" in parts.rule
-    proving = [bool(parts.rows(k, PROVE).any()) for k in range(6)]
+    proving = [bool((parts.part[k] == PROVE).any()) for k in range(6)]
     assert proving == [False, False, True, True, False, False]
-    assert all(not parts.rows(k, FIT).any() for k in (2, 3))
+    assert all(not (parts.part[k] == FIT).any() for k in (2, 3))
     explicit = split(logs[:2], holdout=logs[2:3])
-    assert explicit.rows(2, PROVE).all()
+    assert (explicit.part[2] == PROVE).all()
 
 
 def test_too_little_data_for_three_parts() -> None:

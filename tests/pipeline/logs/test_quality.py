@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from actuators.units import to_si
 from pipeline.logs.errors import GapError
 from pipeline.logs.quality.finding import Quality
-from pipeline.logs.quality.glitches import glitches
 from pipeline.logs.quality.quality import judge
-from pipeline.logs.quality.sampling import held, new_values, quantum
+from pipeline.logs.quality.sampling import glitches, held, new_values, quantum
 from pipeline.logs.quality.skew import skew
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
@@ -49,8 +48,8 @@ def test_a_good_log_has_nothing_against_it(two_joints: Expected) -> None:
     quality = judge(made_log(q, e, velocity=v), two_joints)
     quality.refuse()
     assert {f.verdict for f in quality.findings} == {"ok"}
-    assert quality.position_ok.all()
-    assert quality.effort_ok.all()
+    assert quality.usable[0].all()
+    assert quality.usable[1].all()
 
 
 def test_ten_rows_are_refused(two_joints: Expected) -> None:
@@ -108,8 +107,8 @@ def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
     quality = judge(made_log(q, e), two_joints)
     quality.refuse()
     assert checks(quality, "warning") == {(column, check)}
-    assert quality.effort_ok[:, 0].mean() == pytest.approx(left, abs=0.02)
-    assert quality.effort_ok[:, 1].all()
+    assert quality.usable[1][:, 0].mean() == pytest.approx(left, abs=0.02)
+    assert quality.usable[1][:, 1].all()
 
 
 def test_a_log_without_a_live_effort_is_refused(two_joints: Expected) -> None:
@@ -122,8 +121,8 @@ def test_a_locked_joint_is_left_out_without_a_warning(two_joints: Expected) -> N
     q[:, 1] = 0.3
     quality = judge(made_log(q, e, locked=("b",)), two_joints)
     assert not checks(quality, "warning")
-    assert not quality.effort_ok[:, 1].any()
-    assert quality.effort_ok[:, 0].all()
+    assert not quality.usable[1][:, 1].any()
+    assert quality.usable[1][:, 0].all()
 
 
 def test_repeats_that_rounding_makes_by_chance_are_not_held_values(two_joints: Expected) -> None:
@@ -195,7 +194,7 @@ def test_sample_and_hold_is_found_and_bridged(two_joints: Expected, factor: int)
     assert ("a__position_rad", "held") in checks(quality, "masked")
     share = next(f.value for f in quality.findings if f.check == "held")
     assert share == pytest.approx(1 - 1 / factor, abs=0.02)
-    assert not quality.position_ok.all()
+    assert not quality.usable[0].all()
     assert ("a__torque_Nm", "held") not in checks(quality, "masked")
     both = judge(made_log(q[index], e[index]), two_joints)
     assert ("", "repeated_rows") in checks(both, "warning")
@@ -231,8 +230,8 @@ def test_saturation_is_masked(two_joints: Expected) -> None:
     clipped = np.clip(e, -4.0, 4.0)
     quality = judge(made_log(q, clipped), two_joints)
     assert ("a__torque_Nm", "saturated") in checks(quality, "masked")
-    assert not quality.effort_ok[np.abs(clipped) == 4.0].any()
-    assert quality.effort_ok[np.abs(clipped) < 4.0].all()
+    assert not quality.usable[1][np.abs(clipped) == 4.0].any()
+    assert quality.usable[1][np.abs(clipped) < 4.0].all()
 
 
 def test_gaps_and_jitter_are_told(two_joints: Expected) -> None:
@@ -287,8 +286,8 @@ def test_samples_that_jump_away_and_back_are_left_out(
     assert checks(quality, "warning") == {("a__position_rad", "glitches")}
     bad = np.zeros(len(q), dtype=np.bool_)
     bad[rows] = True
-    assert np.array_equal(~quality.position_ok[:, 0], bad)
-    assert quality.position_ok[:, 1].all()
+    assert np.array_equal(~quality.usable[0][:, 0], bad)
+    assert quality.usable[0][:, 1].all()
 
 
 def test_steps_ramps_and_noise_are_no_glitches() -> None:

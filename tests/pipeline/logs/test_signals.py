@@ -10,8 +10,8 @@ from pipeline.logs.prepared.prepare import prepare
 from pipeline.logs.prepared.read_off import ripples, signal_findings, two_sides
 from pipeline.logs.prepared.settings import Settings
 from pipeline.logs.signals.derivatives import LowPass
+from pipeline.logs.signals.noise import sign_unsure
 from pipeline.logs.signals.orders import strongest_order
-from pipeline.logs.signals.reversal import row_weights, sign_unsure
 from pipeline.logs.signals.spacing import interpolated, own_spacing
 from pipeline.logs.signals.stamps import stamp_error
 from pipeline.logs.signals.two_sides import read_off
@@ -141,9 +141,6 @@ def test_a_reversal_is_unsure_and_motion_is_not() -> None:
     assert 0.05 < unsure[turn] < 1.0
     noisier = sign_unsure(v, np.array([0.02]), np.array([0.0]), pieces, lowpass)[:, 0]
     assert noisier[turn] > 1.5 * unsure[turn]
-    weights = row_weights(np.array([0.1]), np.array([1.0]), unsure[:, None])[:, 0]
-    assert weights[turn] < 0.5 * weights.max()
-    assert weights[np.abs(v[:, 0]) > 0.8].min() > 0.99
 
 
 def ripple_log(size: float, order: float) -> tuple[Array, Array]:

@@ -18,7 +18,7 @@ import resource, sys
 from pathlib import Path
 import numpy as np
 from pipeline.logs.reading.expected import Expected
-from pipeline.logs.prepared.stream import stream_prepared
+from tests.pipeline.logs.made import stream_prepared
 wide = np.full(18, np.inf)
 expected = Expected("long", tuple(f"j{k}" for k in range(18)), -wide, wide, wide, wide)
 rows = sum(p.core.stop - p.core.start for _, p in stream_prepared(Path(sys.argv[1]), expected))
