@@ -14,7 +14,7 @@ LONGER = {
     "pipeline/blind/twin/simulator.py:Simulation.run": 148,
     "pipeline/blind/twin/trial.py:make_trial": 82,
     "pipeline/identification/selection/select.py:select": 68,
-    "pipeline/logs/prepared/prepare.py:prepare": 70,
+    "pipeline/logs/prepared/prepare.py:prepare": 69,
     "reports/pages/summary.py:_reproduction": 75,
 }
 

@@ -38,22 +38,16 @@ class Prepared:
 
     Attributes:
         log: What was read.
-        time: Uniform within every piece, shape (N,) [s].
         q: Position, shape (N, J) [rad].
         v: Velocity, shape (N, J) [rad/s].
         a: Acceleration, shape (N, J) [rad/s^2].
         effort: Shape (N, J), NaN where it was not measured.
-        channel: ``"torque"``, ``"current"``, ``"voltage"`` or ``"power"``.
-        unit: Of the effort.
         mask: Where the effort of a joint and the motion of all joints are good, shape (N, J).
         motion_ok: Where the motion of a joint is good, shape (N, J).
-        torque_off: Where the drive was switched off, shape (N, J), or None.
         noise: Standard deviation of the effort's noise within the bandwidth, shape (J,).
         noise_basis: ``"repeats"`` or ``"smoother"``.
         settings: Grid and cut-off.
-        pieces: Stretches without a gap, as slices of rows.
         contact: Which feet stand, or None.
-        events: Rows at which other feet stand than before, no gap between, shape (E,).
         foot_force: Filtered, shape (N, F, 3) [N], or None.
         base_roll: Filtered, shape (N,) [rad], or None.
         base_pitch: Filtered, shape (N,) [rad], or None.
@@ -67,26 +61,19 @@ class Prepared:
         usable: Positions and efforts of the log that are good, each (rows of the log, J).
         log_contact: Which feet stand, at the log's rows; or None.
         core: Rows that count; less than all only for a chunk of a longer log.
-        row: Nearest row of the log, shape (N,).
     """
 
     log: Log
-    time: Array
     q: Array
     v: Array
     a: Array
     effort: Array
-    channel: str
-    unit: str
     mask: Mask
     motion_ok: Mask
-    torque_off: Mask | None
     noise: Array
     noise_basis: str
     settings: Settings
-    pieces: tuple[slice, ...]
     contact: Contact | None
-    events: NDArray[np.intp]
     foot_force: Array | None
     base_roll: Array | None
     base_pitch: Array | None
@@ -97,10 +84,44 @@ class Prepared:
     usable: tuple[Mask, Mask]
     log_contact: Contact | None
     core: slice
-    row: NDArray[np.intp]
 
     def __len__(self) -> int:
         return self.time.size
+
+    @property
+    def time(self) -> Array:
+        """Uniform within every piece, shape (N,) [s]."""
+        return self.grid.time
+
+    @property
+    def pieces(self) -> tuple[slice, ...]:
+        """Stretches without a gap, as slices of rows."""
+        return self.grid.pieces
+
+    @property
+    def row(self) -> NDArray[np.intp]:
+        """Nearest row of the log, shape (N,)."""
+        return self.grid.nearest
+
+    @property
+    def channel(self) -> str:
+        """``"torque"``, ``"current"``, ``"voltage"`` or ``"power"``."""
+        return self.log.effort.channel
+
+    @property
+    def unit(self) -> str:
+        """Of the effort."""
+        return self.log.effort.unit
+
+    @property
+    def torque_off(self) -> Mask | None:
+        """Where the drive was switched off, shape (N, J), or None."""
+        return None if self.log.torque_off is None else self.log.torque_off[self.row]
+
+    @property
+    def events(self) -> NDArray[np.intp]:
+        """Rows at which other feet stand than before, no gap between, shape (E,)."""
+        return changes_of_stance(self.contact, self.pieces)
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -185,10 +206,8 @@ def prepare(
     other = _other(log, grid)
     column = other.get("velocity")
     if known is None:
-        stretches = busiest(q_raw, grid.pieces)
-        noise = smoother_noise(effort_raw, effort_ok, stretches, lowpass, in_band=True)
-        position_noise = smoother_noise(q_raw, motion_ok, stretches, lowpass, in_band=False)
-        fusion = _fusion(grid, column, (v, a), motion_ok, position_noise, lowpass)
+        raw = (q_raw, effort_raw)
+        noise, fusion = _noises(grid, raw, (v, a), (motion_ok, effort_ok), column, lowpass)
         late, error = stamp_error(log.time[_STAMPS], log.position[_STAMPS], GAP * settings.dt)
         stamps = late if late > 4 * error else 0.0
     else:
@@ -196,25 +215,18 @@ def prepare(
     if column is not None:
         _fuse(v, a, grid, column, fusion, settings)
     contact = contact or log_contact(log)
-    standing = contact.rows(grid.nearest) if contact is not None else None
     return Prepared(
         log=log,
-        time=grid.time,
         q=q,
         v=v,
         a=a,
         effort=effort,
-        channel=log.effort.channel,
-        unit=log.effort.unit,
         mask=effort_ok & motion_ok.all(axis=1, keepdims=True),
         motion_ok=motion_ok,
-        torque_off=None if log.torque_off is None else log.torque_off[grid.nearest],
         noise=noise,
         noise_basis="smoother",
         settings=settings,
-        pieces=grid.pieces,
-        contact=standing,
-        events=changes_of_stance(standing, grid.pieces),
+        contact=contact.rows(grid.nearest) if contact is not None else None,
         foot_force=_smoothed(log, log.foot_force, grid, lowpass),
         base_roll=_smoothed(log, log.base_roll, grid, lowpass),
         base_pitch=_smoothed(log, log.base_pitch, grid, lowpass),
@@ -225,7 +237,6 @@ def prepare(
         usable=usable,
         log_contact=contact,
         core=_core(grid, core),
-        row=grid.nearest,
     )
 
 
@@ -267,22 +278,25 @@ def _core(grid: Grid, core: slice | None) -> slice:
     return slice(int(np.argmax(inside)), n - int(np.argmax(inside[::-1])))
 
 
-def _fusion(
+def _noises(
     grid: Grid,
-    column: Array | None,
+    raw: tuple[Array, Array],
     rates: tuple[Array, Array],
-    ok: Mask,
-    position_noise: Array,
+    ok: tuple[Mask, Mask],
+    column: Array | None,
     lowpass: LowPass,
-) -> Fusion:
-    """How the log's velocity columns are to be weighed, where it has some."""
+) -> tuple[Array, Fusion]:
+    """Noise of the effort in the bandwidth, (J,), and how velocity columns are to be weighed."""
+    stretches = busiest(raw[0], grid.pieces)
+    effort = smoother_noise(raw[1], ok[1], stretches, lowpass, in_band=True)
+    position = smoother_noise(raw[0], ok[0], stretches, lowpass, in_band=False)
     if column is None:
-        return position_alone(position_noise, lowpass)
+        return effort, position_alone(position, lowpass)
     good = np.isfinite(column)
     filled = np.where(good, column, 0.0)
     noise = smoother_noise(filled, good, busiest(filled, grid.pieces), lowpass, in_band=False)
-    noises = (position_noise, noise)
-    return fuse_by_noise(grid.time, column, ok, rates, noises, grid.pieces, lowpass)
+    noises = (position, noise)
+    return effort, fuse_by_noise(grid.time, column, ok[0], rates, noises, grid.pieces, lowpass)
 
 
 def _fuse(

@@ -52,52 +52,59 @@ def test_a_good_log_has_nothing_against_it(two_joints: Expected) -> None:
     assert quality.usable[1].all()
 
 
-def test_ten_rows_are_refused(two_joints: Expected) -> None:
-    q, _, e = good()
-    assert "10 rows" in refused(made_log(q[:10], e[:10]), two_joints)
+def only(q: Array, joint: int, factor: float) -> Array:
+    return np.where(np.arange(2) == joint, factor, 1.0) * q
 
 
-def test_a_position_without_a_number_is_refused_and_the_column_named(
-    two_joints: Expected,
-) -> None:
-    q, _, e = good()
-    q[:] = np.nan
-    assert "a__position_rad" in refused(made_log(q, e), two_joints)
+DEG = 180 / np.pi
+REFUSED: dict[str, tuple[Callable[[Array, Array, Array], Log], str]] = {
+    "ten rows": (lambda q, v, e: made_log(q[:10], e[:10]), "10 rows"),
+    "no position": (lambda q, v, e: made_log(q * np.nan, e), "a__position_rad.*no number"),
+    "no effort": (lambda q, v, e: made_log(q, 0 * e + 1.5), "joint that moves has a live torque"),
+    "nothing moves": (lambda q, v, e: made_log(0 * q, 0 * e), "no joint moves"),
+    "degrees of one": (lambda q, v, e: made_log(only(q, 0, DEG), e), "a__position_rad.*degrees"),
+    "and the other": (lambda q, v, e: made_log(only(q, 1, DEG), e), "b__position_rad.*degrees"),
+    "deg/s": (
+        lambda q, v, e: made_log(q, e, velocity=only(v, 1, DEG)),
+        "b__velocity_rad_s.*deg/s",
+    ),
+    "rpm": (
+        lambda q, v, e: made_log(q, e, velocity=only(v, 1, 30 / np.pi)),
+        "b__velocity_rad_s.*rpm",
+    ),
+    "flipped velocity": (lambda q, v, e: made_log(q, e, velocity=-v), "flip"),
+    "mN*m": (lambda q, v, e: made_log(q, 1e3 * e), r"mN\*m"),
+    "mA": (lambda q, v, e: made_log(q, None, current=1e3 * e), "a__current_A.*mA"),
+    "another robot": (lambda q, v, e: made_log(q + 300.0, e), "another robot"),
+    "small motion": (  # is not taken for degrees
+        lambda q, v, e: made_log(0.5 * q + 3.5, e),
+        "rad: another zero.*set zero, flip, scale or as",
+    ),
+}
 
 
-def dead_effort(q: Array, e: Array) -> None:
-    e[:, 0] = 1.5
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_used_is_refused_in_one_line(two_joints: Expected, name: str) -> None:
+    make, says = REFUSED[name]
+    quality = judge(make(*good()), two_joints, largest={"current": np.array([60.0, 60.0])})
+    with pytest.raises(GapError, match=says) as error:
+        quality.refuse()
+    assert "\n" not in str(error.value)
 
 
-def empty_effort(q: Array, e: Array) -> None:
-    e[:, 0] = np.nan
+SILENT = [
+    (lambda q, e: e[:, :1].fill(1.5), "a__torque_Nm", "constant", 0.0),
+    (lambda q, e: e[:, :1].fill(np.nan), "a__torque_Nm", "empty", 0.0),
+    (lambda q, e: np.sign(e[:, 0], out=e[:, 0]), "a__torque_Nm", "nearly_dead", 0.0),
+    (lambda q, e: e[500:900, :1].fill(1.5), "a__torque_Nm", "frozen", 0.9),
+    (lambda q, e: q[:, :1].fill(0.3), "a__position_rad", "still", 1.0),
+]
 
 
-def nearly_dead_effort(q: Array, e: Array) -> None:
-    e[:, 0] = np.sign(e[:, 0])
-
-
-def frozen_effort(q: Array, e: Array) -> None:
-    e[500:900, 0] = e[500, 0]
-
-
-def still_joint(q: Array, e: Array) -> None:
-    q[:, 0] = 0.3
-
-
-@pytest.mark.parametrize(
-    ("spoil", "column", "check", "left"),
-    [
-        (dead_effort, "a__torque_Nm", "constant", 0.0),
-        (empty_effort, "a__torque_Nm", "empty", 0.0),
-        (nearly_dead_effort, "a__torque_Nm", "nearly_dead", 0.0),
-        (frozen_effort, "a__torque_Nm", "frozen", 0.9),
-        (still_joint, "a__position_rad", "still", 1.0),
-    ],
-)
+@pytest.mark.parametrize(("spoil", "column", "check", "left"), SILENT)
 def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
     two_joints: Expected,
-    spoil: Callable[[Array, Array], None],
+    spoil: Callable[[Array, Array], object],
     column: str,
     check: str,
     left: float,
@@ -109,11 +116,6 @@ def test_a_silent_joint_is_left_out_with_one_sentence_and_the_others_stay(
     assert checks(quality, "warning") == {(column, check)}
     assert quality.usable[1][:, 0].mean() == pytest.approx(left, abs=0.02)
     assert quality.usable[1][:, 1].all()
-
-
-def test_a_log_without_a_live_effort_is_refused(two_joints: Expected) -> None:
-    q, _, e = good()
-    assert "no joint that moves has a live torque" in refused(made_log(q, 0 * e + 1.5), two_joints)
 
 
 def test_a_locked_joint_is_left_out_without_a_warning(two_joints: Expected) -> None:
@@ -132,42 +134,6 @@ def test_repeats_that_rounding_makes_by_chance_are_not_held_values(two_joints: E
     assert not [f for f in judge(made_log(q, e), two_joints).findings if f.check == "held"]
 
 
-def test_a_log_in_which_nothing_moves_is_refused(two_joints: Expected) -> None:
-    q, _, e = good()
-    assert "no joint moves" in refused(made_log(0 * q, 0 * e), two_joints)
-
-
-@pytest.mark.parametrize("joint", [0, 1])
-def test_degrees_for_radians_name_the_column(two_joints: Expected, joint: int) -> None:
-    q, _, e = good()
-    q[:, joint] = np.degrees(q[:, joint])
-    message = refused(made_log(q, e), two_joints)
-    assert f"{'ab'[joint]}__position_rad" in message
-    assert "degrees" in message
-
-
-@pytest.mark.parametrize(("factor", "unit"), [(180 / np.pi, "deg/s"), (30 / np.pi, "rpm")])
-def test_wrong_velocity_units(two_joints: Expected, factor: float, unit: str) -> None:
-    q, v, e = good()
-    v[:, 1] *= factor
-    message = refused(made_log(q, e, velocity=v), two_joints)
-    assert "b__velocity_rad_s" in message
-    assert unit in message
-
-
-def test_flipped_velocity(two_joints: Expected) -> None:
-    q, v, e = good()
-    assert "flip" in refused(made_log(q, e, velocity=-v), two_joints)
-
-
-def test_milliamperes_and_millinewtonmetres(two_joints: Expected) -> None:
-    q, _, e = good()
-    assert "mN*m" in refused(made_log(q, 1e3 * e), two_joints)
-    log = made_log(q, None, current=1e3 * e)
-    with pytest.raises(GapError, match=r"a__current_A.*mA"):
-        judge(log, two_joints, largest={"current": np.array([60.0, 60.0])}).refuse()
-
-
 @pytest.mark.parametrize(
     ("factor", "name", "unit"),
     [(1e3, "milliseconds", "ms"), (1e6, "microseconds", "us"), (1e9, "nanoseconds", "ns")],
@@ -179,11 +145,6 @@ def test_time_in_another_unit_is_told_by_its_name(
     message = refused(made_log(q, e, rate=500 / factor), two_joints)
     assert f'time_s looks like {name}, write [time] unit = "{unit}" in a mapping file' in message
     assert to_si(factor, unit) == pytest.approx(1.0)
-
-
-def test_positions_of_another_robot(two_joints: Expected) -> None:
-    q, _, e = good()
-    assert "another robot" in refused(made_log(q + 300.0, e), two_joints)
 
 
 @pytest.mark.parametrize("factor", [2, 5])
@@ -264,15 +225,6 @@ def test_skew_of_a_fraction_of_a_row(lag: float) -> None:
     assert seen is not None
     assert seen.lag == pytest.approx(lag, abs=2e-5)
     assert seen.factor == pytest.approx(2.5, rel=1e-2)
-
-
-def test_a_small_motion_outside_of_the_limits_is_not_taken_for_degrees(
-    two_joints: Expected,
-) -> None:
-    q, _, e = good()
-    message = refused(made_log(0.5 * q + 3.5, e), two_joints)
-    assert "degrees" not in message
-    assert "set zero, flip, scale or as" in message
 
 
 @pytest.mark.parametrize(("at", "length"), [(0, 1), (1, 1), (3999, 1), (700, 1), (700, 4)])
