@@ -17,11 +17,11 @@ from actuators.loading.build import CATALOG
 from pipeline.paper.calibration import tasks
 from pipeline.paper.calibration.checkpoint import Checkpoint
 from pipeline.paper.calibration.prior import PRIOR_FILE, Prior
-from pipeline.paper.calibration.problem import Problem, fixed_before
+from pipeline.paper.calibration.problem import fixed_before
 from pipeline.paper.calibration.tasks import OUTPUTS, Point, Reading
 from pipeline.paper.constants.motor_constants import KEYS, friction_ranges
 from pipeline.paper.errors import CalibrationError
-from pipeline.paper.hexapod import MIDDLE_LEGS, ROBOT
+from pipeline.paper.hexapod import ROBOT
 from pipeline.paper.published import EXTRA, HELD, PUBLISHED_FILE, Published
 
 #: Given a title and a total, returns what is called per finished task.
@@ -113,7 +113,7 @@ def calibrate(robot: Path, effort: Effort, work: Path, progress: Progress) -> di
     """Run everything, going on where an earlier run stopped.
 
     Args:
-        robot: Robot file.
+        robot: Robot file of the paper's hexapod.
         effort: How much.
         work: Folder for finished tasks.
         progress: Given a title and a total, returns what is called per finished task.
@@ -125,7 +125,9 @@ def calibrate(robot: Path, effort: Effort, work: Path, progress: Progress) -> di
     Raises:
         CalibrationError: No admissible point at all.
     """
-    task = _checked_problem(robot)
+    task = tasks.base_problem(str(robot))
+    unmet = ", ".join(task.feasible.frictions.unmet)
+    logger.info("rotor friction leaves unmet: %s", unmet or "none")
     store = Checkpoint(work / "tasks.jsonl", input_hash(robot, effort))
     with ProcessPoolExecutor(effort.workers) as pool:
         run = _Run(str(robot), effort, store, pool, progress)
@@ -161,24 +163,6 @@ def calibrate(robot: Path, effort: Effort, work: Path, progress: Progress) -> di
         "sensitivity": sensitivity,
         "rotor_friction": [asdict(row) for row in friction_ranges(published)],
     }
-
-
-def _checked_problem(robot: Path) -> Problem:
-    """The problem of a robot file; bad input is an error here, before any process starts.
-
-    Raises:
-        CalibrationError: The robot is none that the paper's numbers can be of.
-    """
-    task = tasks.base_problem(str(robot))
-    missing = [leg for leg in MIDDLE_LEGS if leg not in {own.name for own in task.spec.legs}]
-    if missing or not task.spec.floating:
-        raise CalibrationError(
-            f"{robot.name}: the paper's numbers are those of a walking hexapod with the middle "
-            f"legs {' and '.join(MIDDLE_LEGS)}; this robot "
-            + (f"has no leg '{missing[0]}'" if missing else "is on a stand")
-        )
-    logger.info("rotor friction leaves unmet: %s", ", ".join(task.sliver.frictions.unmet) or "none")
-    return task
 
 
 def _posterior(

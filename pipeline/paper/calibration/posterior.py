@@ -125,7 +125,7 @@ class Posterior:
         out[:, 0] = rng.integers(self.robots.count, size=count)
         columns = [self.task.prior.free.index(f) for f in self.free]
         out[:, self.numbers] = [self.task.prior.draw(rng)[columns] for _ in range(count)]
-        out[:, self.constants] = self.task.sliver.draws(rng, count)
+        out[:, self.constants] = self.task.feasible.draws(rng, count)
         out[:, self.aims] = rng.uniform(-1, 1, (count, len(self.aimed)))
         return out
 
@@ -267,7 +267,7 @@ def _moves(
 
     def constants(x: Array, random: object) -> tuple[Array, Array]:
         q = x.copy()
-        q[:, posterior.constants] = posterior.task.sliver.draws(rng, len(x))
+        q[:, posterior.constants] = posterior.task.feasible.draws(rng, len(x))
         return q, np.zeros(len(x))
 
     def robot(x: Array, random: object) -> tuple[Array, Array]:

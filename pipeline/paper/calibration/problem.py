@@ -19,7 +19,7 @@ from actuators.loading.build import Catalog
 from actuators.units import from_si
 from pipeline.errors import PipelineError
 from pipeline.paper.calibration.prior import Prior
-from pipeline.paper.constants.motor_constants import Sliver, sliver
+from pipeline.paper.constants.motor_constants import FeasibleSet, feasible_set
 from pipeline.paper.constants.table_entries import entries
 from pipeline.paper.hexapod import (
     ROBOT,
@@ -82,7 +82,7 @@ class Problem:
         published: All printed values.
         standing_legs: How many middle legs Fig. 21 counts as loaded.
         without: Targets left out.
-        constants: The motor's three constants, by reference; the sliver's middle where None.
+        constants: The motor's three constants, by reference; the mean of all allowed where None.
         net: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
     """
 
@@ -124,13 +124,13 @@ class Problem:
         return tuple(rows)
 
     @cached_property
-    def sliver(self) -> Sliver:
+    def feasible(self) -> FeasibleSet:
         """Motor constants that the tables allow."""
-        return sliver(self.published)
+        return feasible_set(self.published)
 
     def numbers(self, z: Array) -> dict[str, float]:
         """Every number that is not in the paper, SI, by reference."""
-        constants = self.sliver.middle if self.constants is None else self.constants
+        constants = self.feasible.middle if self.constants is None else self.constants
         return self.prior.values(z) | dict(constants)
 
     def robot(self, z: Array) -> RobotPart:
@@ -237,7 +237,7 @@ class Problem:
         Values that contradict those by which the motor's constants were chosen are left out, and so
         are predictions, which would be none if they were asked for.
         """
-        spared = {*self.sliver.frictions.unmet}
+        spared = {*self.feasible.frictions.unmet}
         spared |= {p.id for p in self.published.values() if p.role == "prediction"}
         extra = next(t for t in self.targets if t.name == EXTRA)
         fits = abs(point.values[EXTRA] - extra.centre) <= extra.half_width

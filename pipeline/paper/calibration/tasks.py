@@ -242,7 +242,7 @@ def prior_point(robot: str, seed: int, draw: int) -> Point:
     rng = np.random.default_rng([seed, 1000, draw])
     path = PATHS[int(rng.integers(len(PATHS)))]
     task = problem(robot, path)
-    (constants,) = task.sliver.draws(rng, 1)[:, : len(KEYS)]
+    (constants,) = task.feasible.draws(rng, 1)[:, : len(KEYS)]
     z = task.prior.draw(rng).tolist()
     return point_of(robot, path, z, dict(zip(KEYS, map(float, constants), strict=True)))
 

@@ -1,8 +1,8 @@
 """The motor's three constants: all sets that give Tables IV to VI as printed, and draws from them.
 
-Torque constant, resistance and rotor friction have no prior here. The tables leave a sliver of them
-that no data sheet resolves, except for the entries that contradict one another: those that the best
-rotor friction leaves unmet.
+Torque constant, resistance and rotor friction have no prior here. The tables leave a set of them
+so narrow that no data sheet resolves it, except for the entries that contradict one another: those
+that the best rotor friction leaves unmet.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ KEYS = (TORQUE_CONSTANT, RESISTANCE, ROTOR_FRICTION)
 UNITS = {TORQUE_CONSTANT: "mN*m/A", RESISTANCE: "ohm", ROTOR_FRICTION: "mN*m"}
 #: Frictions tried around what Table V asks for: this far [N*m], in these steps.
 _REACH, _STEP = 1e-4, 2.5e-6
-_HAIR = 1e-9  # relative
+_ROUNDING = 1e-9  # relative
 _EMPTY = "no motor constants give the entries of Tables IV to VI"
 
 
@@ -104,8 +104,8 @@ def _least_unmet(listed: Sequence[Entry], friction: float, held: float) -> tuple
         [np.tile(products, ws.size) / (w := np.repeat(ws, products.size)), w],
     ]
     u, w = np.concatenate(pairs, axis=1)
-    # These points lie on the bounds: a hair of rounding must not decide.
-    good = meets(listed, friction, held, u, w, _HAIR)
+    # These points lie on the bounds: rounding must not decide.
+    good = meets(listed, friction, held, u, w, _ROUNDING)
     best = good[:, int(np.argmax(good.sum(axis=0)))]
     return tuple(e.id for e, ok in zip(listed, best, strict=True) if not ok)
 
@@ -125,7 +125,7 @@ def best_frictions(ranges: Sequence[Frictions], published: Mapping[str, Publishe
 
 
 @dataclass(frozen=True)
-class Sliver:
+class FeasibleSet:
     """All motor constants that give every entry as printed, but for those named.
 
     Attributes:
@@ -151,7 +151,7 @@ class Sliver:
             (count, 4), the torque in [N*m].
 
         Raises:
-            CalibrationError: Nothing was found, the sliver is empty.
+            CalibrationError: Nothing was found, the set is empty.
         """
         found = np.empty((0, 4))
         for _ in range(1000):
@@ -165,17 +165,17 @@ class Sliver:
         raise CalibrationError(_EMPTY)
 
 
-def sliver(published: Mapping[str, Published]) -> Sliver:
+def feasible_set(published: Mapping[str, Published]) -> FeasibleSet:
     """Motor constants that leave the fewest entries of Tables IV to VI unmet.
 
     Raises:
         CalibrationError: No friction, torque constant and resistance meets the others.
     """
-    return _sliver(tuple(published.values()))
+    return _feasible_set(tuple(published.values()))
 
 
 @cache
-def _sliver(rows: tuple[Published, ...]) -> Sliver:
+def _feasible_set(rows: tuple[Published, ...]) -> FeasibleSet:
     published = {row.id: row for row in rows}
     frictions = best_frictions(friction_ranges(published), published)
     listed = tuple(e for e in entries(published) if e.id not in frictions.unmet)
@@ -194,6 +194,6 @@ def _sliver(rows: tuple[Published, ...]) -> Sliver:
         if low >= high:
             raise CalibrationError(_EMPTY)
         ends.append((low, high))
-    found = Sliver(listed, frictions, held, ends[0], ends[1])
+    found = FeasibleSet(listed, frictions, held, ends[0], ends[1])
     means = found.draws(np.random.default_rng(0), 4000)[:, :3].mean(axis=0)
     return replace(found, middle=dict(zip(KEYS, map(float, means), strict=True)))

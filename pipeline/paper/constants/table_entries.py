@@ -108,7 +108,7 @@ def meets(
     held: Array | float,
     u: Array,
     w: Array,
-    hair: float = 0.0,
+    rounding: float = 0.0,
 ) -> NDArray[np.bool_]:
     """Whether each entry comes out as printed, shape (E, ...).
 
@@ -118,13 +118,13 @@ def meets(
         held: By the reversible actuator's motor at joint 2 [N*m].
         u: 1 / k [A/(N*m)].
         w: R / k [V/(N*m)].
-        hair: By which a value may miss a bound, relative to the upper one.
+        rounding: By which a value may miss a bound, relative to the upper one.
     """
     rows = []
     for e in listed:
         a, b = e.powers
         value = e.factor(friction, held) * u**a * w**b
-        rows.append((value >= e.low - hair * e.high) & (value <= e.high * (1 + hair)))
+        rows.append((value >= e.low - rounding * e.high) & (value <= e.high * (1 + rounding)))
     return np.stack(np.broadcast_arrays(*rows))
 
 

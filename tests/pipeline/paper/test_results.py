@@ -11,9 +11,9 @@ import pytest
 
 from actuators.loading.build import CATALOG, Catalog, load_catalog
 from actuators.units import from_si
+from pipeline.cli.calibrate import refuse_other_robot
 from pipeline.errors import PipelineError
 from pipeline.paper.calibration import tasks
-from pipeline.paper.calibration.calibrate import Effort, calibrate
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.calibration.problem import EXACT, Evaluation, extra_target
 from pipeline.paper.calibration.store import (
@@ -196,11 +196,14 @@ def test_saving_the_stored_results_changes_no_file(
     assert load_catalog(catalog) == load_catalog()
 
 
-def test_a_robot_without_middle_legs_is_refused_before_anything_is_computed(
-    root: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    ("robot", "message"), [("solo12", "has no leg 'lm'"), ("leg", "its base is fixed")]
+)
+def test_another_robot_is_refused_before_anything_is_computed(
+    root: Path, robot: str, message: str
 ) -> None:
-    with pytest.raises(CalibrationError, match="no leg 'lm'"):
-        calibrate(root / "urdf" / "solo12.toml", Effort(), tmp_path, lambda title, total: print)
+    with pytest.raises(CalibrationError, match=message):
+        refuse_other_robot(root / "urdf" / f"{robot}.toml")
 
 
 def test_missing_results_are_one_line(tmp_path: Path) -> None:
