@@ -58,7 +58,7 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
         live = int(np.isfinite(mended.before).sum())
         common = h.cause == "scale" and len(h.joints) == live and not what
         before, after = (_percent(x, h.joints) for x in (mended.before, mended.after))
-        of = channel if h.cause in _OF_EFFORTS else _position(log)
+        of = channel if h.cause in _OF_EFFORTS else log.position_quantity
         lines = "; ".join(_lines(log, last, h, joints))
         seen = (
             f"else every body is {size:.3g} times as heavy as the robot's file says"
@@ -168,7 +168,7 @@ def _together(steps: Sequence[tuple[Hypothesis, float]], joints: int) -> Reading
 
 def _lines(log: Log, r: Reading, h: Hypothesis, joints: Sequence[str]) -> list[str]:
     """Rules of a mapping file for the columns that one step is about."""
-    position = _position(log)
+    position = log.position_quantity
     efforts = h.cause in _OF_EFFORTS or h.cause == "both_exchanged"
     own = all(
         _file_column(log, joints[j], position) == column_name(joints[j], position) for j in h.joints
@@ -190,10 +190,6 @@ def _lines(log: Log, r: Reading, h: Hypothesis, joints: Sequence[str]) -> list[s
     if len(alike) == 1 and 1 < len(out) == len(joints) and all(c.endswith(ending) for c, _ in out):
         out = [(column_name("*", quantity), alike.pop())]
     return [f'columns."{column}" = {{{keys}}}' for column, keys in out]
-
-
-def _position(log: Log) -> str:
-    return "motor_position" if log.position_source == "motor" else "position"
 
 
 def _file_column(log: Log, joint: str, quantity: str) -> str:

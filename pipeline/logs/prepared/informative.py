@@ -37,14 +37,14 @@ class Scan:
 
     Attributes:
         first: First row of each stretch, shape (B,).
-        told: Shape (B, D), each at least zero; zero where nothing of a stretch can be compared.
+        information: Shape (B, D), at least zero; zero where nothing of a stretch can be compared.
         rows: Of the log.
         begin: Its first time [s].
         end: Its last time [s].
     """
 
     first: NDArray[np.intp]
-    told: Array
+    information: Array
     rows: int
     begin: float
     end: float
@@ -57,7 +57,7 @@ def scan(pieces: Iterable[Log]) -> Scan:
         pieces: Consecutive rows; stretches end with them.
     """
     first: list[int] = []
-    told: list[Array] = []
+    variances: list[Array] = []
     middle: list[float] = []
     rows, begin, end = 0, np.inf, -np.inf
     for piece in pieces:
@@ -66,11 +66,11 @@ def scan(pieces: Iterable[Log]) -> Scan:
             if part.stop - part.start < STRETCH // 2 and len(piece) > STRETCH:
                 continue
             first.append(rows + start)
-            told.append(_told(piece, part))
+            variances.append(_information(piece, part))
             middle.append(float(piece.time[(part.start + part.stop) // 2]))
         rows += len(piece)
         begin, end = min(begin, float(piece.time[0])), max(end, float(piece.time[-1]))
-    table = np.array(told)
+    table = np.array(variances)
     table /= np.maximum(table.mean(axis=0), 1e-300)
     share = (np.array(middle) - begin) / max(end - begin, 1e-300)
     when = np.minimum((TIMES * share).astype(int), TIMES - 1)
@@ -78,7 +78,7 @@ def scan(pieces: Iterable[Log]) -> Scan:
     return Scan(np.array(first, dtype=np.intp), np.hstack([table, times]), rows, begin, end)
 
 
-def _told(piece: Log, part: slice) -> Array:
+def _information(piece: Log, part: slice) -> Array:
     """Variances of position, speed, change of speed and effort of every joint, (4 J,)."""
     q, effort = piece.position[part][::EVERY], piece.effort.values[part][::EVERY]
     good = piece.valid[part][::EVERY].all(axis=1) & np.isfinite(effort).all(axis=1)
@@ -98,15 +98,15 @@ def choose(found: Scan, count: int, among: NDArray[np.bool_] | None = None) -> N
         count: How many at most.
         among: Those that may be taken, shape (B,); all by default.
     """
-    open_ = found.told.sum(axis=1) > 0
+    open_ = found.information.sum(axis=1) > 0
     if among is not None:
         open_ &= among
-    known = np.full(found.told.shape[1], START)
+    known = np.full(found.information.shape[1], START)
     taken: list[int] = []
     for _ in range(min(count, int(open_.sum()))):
-        gain = np.log1p(found.told / known).sum(axis=1)
+        gain = np.log1p(found.information / known).sum(axis=1)
         best = int(np.argmax(np.where(open_, gain, -np.inf)))
         open_[best] = False
-        known = known + found.told[best]
+        known = known + found.information[best]
         taken.append(best)
     return np.sort(np.array(taken, dtype=np.intp))

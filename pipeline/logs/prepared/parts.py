@@ -75,7 +75,8 @@ def split(
     if prove_last is not None and not 0.05 <= prove_last <= 0.8:
         raise PreparationError(f"share to prove on is {prove_last:g}; expected 0.05 to 0.8")
     proving = set(range(len(prepared), len(every)))
-    warning, last, pattern = "", 0.0, PATTERN_WITHOUT_PROVE
+    warning, last = "", 0.0
+    pattern: tuple[int, ...] = PATTERN_WITHOUT_PROVE
     if holdout:
         rule = "proved on the held-out logs"
     elif prove_last is not None:

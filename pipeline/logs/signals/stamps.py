@@ -36,10 +36,10 @@ def stamp_error(time: Array, q: Array, gap: float) -> tuple[float, float]:
     if time.size < _LEAST_ROWS:
         return 0.0, 0.0
     with np.errstate(all="ignore"):  # numbers no clock shows leave no finite row
-        return _told_by_all(time, q, gap)
+        return _over_joints(time, q, gap)
 
 
-def _told_by_all(time: Array, q: Array, gap: float) -> tuple[float, float]:
+def _over_joints(time: Array, q: Array, gap: float) -> tuple[float, float]:
     weights = _lagrange(time)
     scatter = 1.0 + (weights**2).sum(axis=0)
     close = np.diff(time) <= gap
@@ -51,10 +51,10 @@ def _told_by_all(time: Array, q: Array, gap: float) -> tuple[float, float]:
         rest = (x[2:-2] - guess) ** 2 / scatter
         speed = ((x[3:-1] - x[1:-3]) / (time[3:-1] - time[1:-3])) ** 2
         good = inside & np.isfinite(rest) & np.isfinite(speed)
-        told = _slope(speed[good], rest[good])
-        if told is not None and told[1] > 0:
-            squares.append(told[0])
-            errors.append(told[1])
+        seen = _slope(speed[good], rest[good])
+        if seen is not None and seen[1] > 0:
+            squares.append(seen[0])
+            errors.append(seen[1])
     if not squares:
         return 0.0, 0.0
     # By the most certain one: variances of variances are small numbers.
