@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import re
+from collections.abc import Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
 
-from reports.page import cell_text
+from reports.page import (
+    Block,
+    FigureBlock,
+    Points,
+    Section,
+    TableBlock,
+    Text,
+    cell_text,
+    table_block,
+)
+from reports.table import Table
 
 TEMPLATES = Path(__file__).parent / "templates"
+_FIGURE = re.compile(r"!\[(.*)\]\((.+)\)( half)?")
 
 
 class Words:
@@ -31,8 +43,61 @@ class Words:
             paragraph: Name of the macro.
             arguments: Of the macro.
         """
+        return " ".join(self.text(paragraph, *arguments).split())
+
+    def text(self, macro: str, *arguments: Any) -> str:
+        """What a macro writes, with its line ends."""
         module = _environment().get_template(f"{self._template}.jinja").make_module(self._names)
-        return " ".join(getattr(module, paragraph)(*arguments).split())
+        return str(getattr(module, macro)(*arguments))
+
+
+class Shown:
+    """Tables that a template shows: `table` writes a line that `sections` reads."""
+
+    def __init__(self, tables: Mapping[str, Table]) -> None:
+        """Show none yet.
+
+        Args:
+            tables: Of the run, by name.
+        """
+        self.tables = tables
+        self.blocks: list[TableBlock] = []
+
+    def table(self, given: str | TableBlock, columns: Any = None, **more: Any) -> str:
+        """Show a table of the run, or one made for the page; see `table_block`."""
+        if isinstance(given, str):
+            given = table_block(self.tables[given], columns, **more)
+        self.blocks.append(given)
+        return f"\n\n[table {len(self.blocks) - 1}]\n\n"
+
+
+def sections(text: str, shown: Shown, folder: Path) -> tuple[Section, ...]:
+    """Sections of a page, from Markdown of headings, paragraphs, lists, figures and tables.
+
+    Args:
+        text: Parts are apart by empty lines; ``half`` after a figure puts two side by side.
+        shown: Its tables.
+        folder: Of the figures.
+    """
+    out: list[tuple[str, list[Block]]] = []
+    for part in filter(None, (part.strip() for part in re.split(r"\n[ \n]*\n", text))):
+        if part.startswith("## "):
+            out.append((part[3:], []))
+            continue
+        blocks = out[-1][1]
+        if part.startswith("- "):
+            items = re.split(r"\n- ", part[2:])
+            blocks.append(Points(tuple(" ".join(item.split()) for item in items)))
+        elif part.startswith("[table "):
+            blocks.append(shown.blocks[int(part[7:-1])])
+        elif _FIGURE.match(part):
+            figures = (
+                match.groups() for match in map(_FIGURE.fullmatch, part.splitlines()) if match
+            )
+            blocks += [FigureBlock(folder / f, text, half=bool(half)) for text, f, half in figures]
+        else:
+            blocks.append(Text(" ".join(part.split())))
+    return tuple(Section(heading, tuple(blocks)) for heading, blocks in out)
 
 
 @cache

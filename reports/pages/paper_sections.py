@@ -1,29 +1,17 @@
-"""Sections of the paper's page: section IV.A by sentences, and what the paper leaves out."""
+"""Tables of the paper's page: section IV.A by sentences, and what the paper leaves out."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
-from reports.page import Points, Section, TableBlock, Text
+from reports.page import TableBlock
 from reports.table import Table
 from reports.typeset import number_text, unit_text
 
 _TONES = {"yes": "good", "no": "bad", "in part": "bad"}
 
 
-def paper_sections(tables: Mapping[str, Table]) -> tuple[Section, ...]:
-    """Both sections, the second where there is something to show.
-
-    Args:
-        tables: Of a run that was held against the paper.
-    """
-    out = [_sentences(tables["conclusions"])]
-    if "omissions" in tables:
-        out.append(_omissions(tables["omissions"]))
-    return tuple(out)
-
-
-def _sentences(table: Table) -> Section:
+def sentences(table: Table) -> TableBlock:
     """A row for each sentence, its joints side by side."""
     c = table.columns
     own = [i for i in range(table.rows) if c["joint"][i]]
@@ -42,26 +30,13 @@ def _sentences(table: Table) -> Section:
         for (where, sentence, quantity, printed), at in places.items()
     )
     headers = ("sentence: ratio", *(f"joint {joint}" for joint in joints), "holds", "paper")
-    block = TableBlock(
+    return TableBlock(
         headers,
         rows,
         "Energies of the middle right leg, one walking cycle.",
         f"{table.name}.csv",
         _TONES,
         3,
-    )
-    return Section(
-        "Section IV.A, sentence by sentence",
-        (
-            Text(
-                "What section IV.A says of the energy through each stage of the actuators, as "
-                "ratios of the energies computed here. The paper gives no number to *much higher*; "
-                "here it is at least twice as high, at every joint that the sentence speaks of. "
-                "Friction that depends on speed alone (Eq. 4) takes the same from a rotor of any "
-                "inertia: what the inertia adds to E_m(+) comes back as E_m(−)."
-            ),
-            block,
-        ),
     )
 
 
@@ -75,7 +50,8 @@ def _verdict(holds: Sequence[bool]) -> str:
     return "yes" if all(holds) else "in part" if any(holds) else "no"
 
 
-def _omissions(table: Table) -> Section:
+def omissions(table: Table) -> tuple[TableBlock, tuple[str, ...]]:
+    """What the paper leaves out: a table, and each in words."""
     c = table.columns
     named = [f"ratio_{name}" for name in ("rotor", "reversible", "irreversible")]
     rows = tuple(
@@ -98,16 +74,4 @@ def _omissions(table: Table) -> Section:
         )
     )
     block = TableBlock(headers, rows, table.description, f"{table.name}.csv", digits=3)
-    return Section(
-        "What the paper leaves out",
-        (
-            Text(
-                "Effects that the paper does not count, each put in alone with the value stated; "
-                "sources and the changes of all ratios stand in the file. The break-even is the "
-                "share of time standing above which irreversible gears use less energy, the "
-                "ratios are those of walking."
-            ),
-            block,
-            Points(said),
-        ),
-    )
+    return block, said

@@ -8,25 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from actuators.loading.build import Catalog
 from pipeline.machine.motors import Motors
 from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
-from pipeline.robot.robot import Robot
 from pipeline.simulation.settings import Settings
 from reports.html import write_html
 from reports.markdown import write_markdown
-from reports.page import (
-    FigureBlock,
-    Number,
-    Page,
-    Points,
-    Section,
-    TableBlock,
-    Text,
-    table_block,
-)
+from reports.page import FigureBlock, Number, Page
 from reports.pages.gait_words import conditions, gait_and_conditions, pace
 from reports.pages.motor_words import (
     greatest_friction,
@@ -38,10 +27,9 @@ from reports.pages.motor_words import (
 from reports.pages.names import leg_words, names_text, short_titles, shown_leg
 from reports.table import Table
 from reports.typeset import number_text
+from reports.words import Shown, Words, sections
 
 FOOTER = "Every CSV has a .meta.json beside it: meanings, units, input hashes, versions."
-#: Actuators of so few stages that a picture of them is left to the folder.
-PLAIN = ("ideal", "rotor")
 #: Rows of a long table that a page shows.
 _ROWS = 24
 
@@ -73,22 +61,14 @@ def robot_page(
     robot, motors = given.robot, given.motors
     titles, friction = short_titles(given.catalog), given.forces.friction_coefficient
     whose, limits = motors_text(motors), limits_text(tables, titles, friction)
+    run, stable, over = Run(given, tables), _stability(tables["walking_stability"]), _over(tables)
     return Page(
         title=f"What it costs to actuate {robot.spec.name}, {gait_and_conditions(robot.spec)}",
         notices=limits if motors.stated else (whose, *limits),
         numbers=_numbers_first(given, motors, tables),
         picture=first_picture(out),
         answer=((whose,) if motors.stated else ()) + _answer(given, tables),
-        sections=(
-            *((Section("Notes", (Points(tuple(remarks)),)),) if remarks else ()),
-            gait_section(robot, out),
-            energy_section(given, tables, out),
-            actuators_section(given, out),
-            _demand(robot, tables, out),
-            _limits(given.catalog, tables, out),
-            _standing(tables),
-            _numbers(tables),
-        ),
+        sections=sections(SECTIONS.text("robot", run, remarks, stable, *over), run, out),
         files=files_of(tables),
         footer=FOOTER,
     )
@@ -207,128 +187,33 @@ def _stability(table: Table) -> str:
     )
 
 
-def energy_section(given: Settings, tables: Mapping[str, Table], out: Path) -> Section:
-    """What one cycle takes from the supply, by alternative, stage and joint."""
-    leg, walking = shown_leg(given.robot), tables["walking_energy"]
-    keep = [name in (leg, "robot") for name in walking.columns["leg"]]
-    return Section(
-        "What it costs",
-        (
-            Text(names_text(given)),
-            FigureBlock(out / "electrical_energy.svg", "Electrical energy of one cycle by joint."),
-            table_block(
-                walking, keep=keep, caption="Energy drawn from the supply in one walking cycle."
-            ),
-            table_block(tables["robot_energy"], caption="The whole robot, walking."),
-            *(
-                FigureBlock(out / f"stage_energy_{name}.svg", f"Stages of the {title}.")
-                for name, title in short_titles(given.catalog).items()
-                if name not in PLAIN
-            ),
-        ),
-    )
+class Run(Shown):
+    """What the sections of a run's page are about."""
+
+    def __init__(self, given: Settings, tables: Mapping[str, Table]) -> None:
+        """Collect it.
+
+        Args:
+            given: The run.
+            tables: All tables of the run.
+        """
+        super().__init__(tables)
+        robot, leg = given.robot, shown_leg(given.robot)
+        self.robot, self.leg = robot.spec.name, leg_words(leg)
+        self.names, self.titles = names_text(given), short_titles(given.catalog)
+        self.joints = next(entry.joints for entry in robot.spec.legs if entry.name == leg)
+        legs = tables["walking_energy"].columns["leg"]
+        self.rows_of_leg = [name in (leg, "robot") for name in legs]
 
 
-def actuators_section(given: Settings, out: Path) -> Section:
-    """What each alternative is built of."""
-    figures = tuple(
-        FigureBlock(out / f"actuator_chain_{name}.svg", f"Parts of the {title}.", half=True)
-        for name, title in short_titles(given.catalog).items()
-        if name != AS_BUILT  # of several alternatives, which have drawings of their own
-    )
-    words = (
-        "Every actuator from the motor's terminals to the joint: its elements with their numbers, "
-        "and between them the shafts whose energies, torques and speeds the tables name."
-    )
-    return Section("How the actuators are built", (Text(words), *figures))
+def _over(tables: Mapping[str, Table]) -> tuple[list[bool], int]:
+    """The worst rows of motors beyond their data sheet, none where all is well; of how many."""
+    c = tables["motor_limits"].columns
+    over = np.array(c["breach"], dtype=bool)
+    share = np.where(over, np.array(c["peak"], dtype=float) / np.array(c["limit"]), -np.inf)
+    first = np.argsort(-share, kind="stable")[: min(_ROWS, int(over.sum()))]
+    keep = np.isin(np.arange(over.size), first).tolist()
+    return (keep if any(keep) else []), int(over.sum())
 
 
-def _demand(robot: Robot, tables: Mapping[str, Table], out: Path) -> Section:
-    leg = shown_leg(robot)
-    joints = next(entry.joints for entry in robot.spec.legs if entry.name == leg)
-    blocks: list[Text | FigureBlock | TableBlock | Points] = [
-        Text(_stability(tables["walking_stability"])),
-        FigureBlock(out / "joint_torques.svg", "Torque of every joint, all legs."),
-        FigureBlock(out / "ground_forces.svg", "Ground forces of all feet, margin of stability."),
-        table_block(tables["walking_stability"], caption="Stability by set of standing feet."),
-    ]
-    if "quasi_static_torque" in tables:
-        blocks.append(
-            table_block(
-                tables["quasi_static_torque"],
-                caption="Largest torque of every joint, and what the links' inertia adds.",
-            )
-        )
-    blocks += [
-        FigureBlock(
-            out / f"joint_demand_{joint}.svg", f"Joint {k} of the {leg_words(leg)}: `{joint}`."
-        )
-        for k, joint in enumerate(joints, start=1)
-    ]
-    return Section("Torque, ground forces, stability", tuple(blocks))
-
-
-def _limits(catalog: Catalog, tables: Mapping[str, Table], out: Path) -> Section:
-    table = tables["motor_limits"]
-    over = np.array(table.columns["breach"], dtype=bool)
-    share = np.array(table.columns["peak"], dtype=float) / np.array(table.columns["limit"])
-    first = sorted(np.flatnonzero(over), key=lambda i: -share[i])[:_ROWS]
-    keep = np.isin(np.arange(table.rows), first)
-    shown: tuple[Text | TableBlock, ...]
-    if first:
-        shown = (
-            table_block(
-                table,
-                keep=keep.tolist(),
-                caption=f"Motors beyond their data sheet: {len(first)} of {int(over.sum())} rows.",
-            ),
-        )
-    else:
-        shown = (Text("No motor leaves its data sheet; `motor_limits.csv` has every peak."),)
-    return Section(
-        "Motors against their data sheets",
-        (
-            *shown,
-            *(
-                FigureBlock(out / f"motor_limits_{name}.svg", f"Motors of the {title}.")
-                for name, title in short_titles(catalog).items()
-            ),
-        ),
-    )
-
-
-def _standing(tables: Mapping[str, Table]) -> Section:
-    blocks = [table_block(tables["standing_energy"], caption="Standing still, by leg.")]
-    blocks.append(table_block(tables["standing_contacts"], caption="Feet and ground forces."))
-    return Section("Standing still", tuple(blocks))
-
-
-def gait_section(
-    robot: Robot, out: Path, more: Sequence[FigureBlock] = (), robot_words: str = ""
-) -> Section:
-    """The robot, its gait in motion and in one picture.
-
-    Args:
-        robot: The robot.
-        out: Folder of the pictures.
-        more: Pictures below those.
-        robot_words: Caption of the picture of the robot.
-    """
-    pictures = (
-        (
-            "gait_steps",
-            "The gait in motion: ground forces, torques, support; still in print.",
-        ),
-        ("robot", robot_words or f"{robot.spec.name}, standing."),
-        ("zero_pose", "Zero pose and positive directions."),
-        ("gait", "Foot paths, support polygons, footfall."),
-    )
-    shown = tuple(FigureBlock(out / f"{name}.svg", caption) for name, caption in pictures)
-    return Section("The robot and its gait", (*shown, *more))
-
-
-def _numbers(tables: Mapping[str, Table]) -> Section:
-    columns = ("group", "parameter", "value", "unit", "basis", "source")
-    shown = {c: "file" if c == "group" else c for c in columns}
-    block = table_block(tables["parameters"], shown, caption="Every number that went in.")
-    return Section("What went in", (block,))
+SECTIONS = Words("run", as_built=AS_BUILT)
