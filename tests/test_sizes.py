@@ -15,7 +15,6 @@ LONGER = {
     "pipeline/blind/twin/trial.py:make_trial": 82,
     "pipeline/identification/selection/select.py:select": 68,
     "pipeline/logs/prepared/prepare.py:prepare": 69,
-    "reports/pages/summary.py:_reproduction": 75,
 }
 
 
