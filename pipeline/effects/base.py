@@ -97,6 +97,9 @@ class Effect(ABC):
         contains: Effects that are special cases of this one at the same place.
         rescales: Whether what bodies do to a channel is multiplied by it.
         competes: Whether it is tried by itself; others are fitted together for a whole machine.
+        tolerances: Standard deviation by coordinate, where every machine and place has the same.
+        kinds_absorbed: Kinds of tolerances at its place that are this effect in small.
+        halved: Nonlinear parameter that is refined by factors; empty for none.
     """
 
     name: ClassVar[str]
@@ -110,6 +113,9 @@ class Effect(ABC):
     contains: ClassVar[tuple[str, ...]] = ()
     rescales: ClassVar[bool] = False
     competes: ClassVar[bool] = True
+    tolerances: ClassVar[Mapping[str, float]] = {}
+    kinds_absorbed: ClassVar[tuple[str, ...]] = ()
+    halved: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
         """Refuse a signature that nothing can be drawn against, where the effect is written."""
@@ -132,7 +138,9 @@ class Effect(ABC):
 
     def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
         """Shapes near one that did well; `factor` shrinks from round to round."""
-        return []
+        if not self.halved:
+            return []
+        return [{self.halved: shape[self.halved] * 2.0**e} for e in (-factor, factor)]
 
     @abstractmethod
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -156,7 +164,7 @@ class Effect(ABC):
         Empty where the effect is no tolerance of every machine. An estimate counts only where it
         exceeds `verdict.TOLERANCE_SIGMAS` of these.
         """
-        return {}
+        return dict(self.tolerances)
 
     def law(self, values: Values) -> str:
         """Which of its laws it is at some parameters, in words; empty where it has but one."""
@@ -167,8 +175,8 @@ class Effect(ABC):
         return ()
 
     def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """Tolerances (kind, place) that are this effect in small: they stand back where it is."""
-        return ()
+        """Tolerances (kind, place) that are this effect in small: they are left out where it is."""
+        return tuple((kind, place[0]) for kind in self.kinds_absorbed)
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Whether an estimate lies inside the bounds of what can be."""

@@ -25,6 +25,7 @@ class BaseTilt(Effect):
         Coordinate(axis, 1e-3, signed=True, required=False) for axis in ("roll", "pitch")
     )
     signature = "position"
+    tolerances: ClassVar = {"roll": TILT_TOLERANCE, "pitch": TILT_TOLERANCE}
     excitation = "holds links outstretched in several directions"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -35,7 +36,3 @@ class BaseTilt(Effect):
         """Tilt it further."""
         roll, pitch = model.bodies.tilt
         return model.with_bodies(replace(model.bodies, tilt=(roll + x["roll"], pitch + x["pitch"])))
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """What a spirit level leaves."""
-        return {"roll": TILT_TOLERANCE, "pitch": TILT_TOLERANCE}

@@ -27,6 +27,7 @@ class CenterOfMassOffset(Effect):
     )
     signature = "position"
     is_tolerance = True
+    kinds_absorbed: ClassVar = ("com_x", "com_y", "com_z")
     excitation = "holds the link in postures all around its axis"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -40,10 +41,6 @@ class CenterOfMassOffset(Effect):
         moved = tuple(s + x[axis] for s, axis in zip(body.shift, "xyz", strict=True))
         changed = replace(body, shift=(moved[0], moved[1], moved[2]))
         return model.with_bodies(model.bodies.with_body(joint, changed))
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """The centre's tolerances."""
-        return tuple((f"com_{axis}", place[0]) for axis in "xyz")
 
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
         """Three per cent of the lever."""

@@ -12,8 +12,6 @@ from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
 MASS_TOLERANCE = 0.03  # of the link's mass, one standard deviation [1]
-
-
 #: Where a payload is in the frame of its link's joint.
 AXES: Final = ("x", "y", "z")
 FARTHEST: Final = 10.0  # [m]
@@ -31,6 +29,7 @@ class LinkMass(Effect):
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("mass", 1e-2, signed=True),)
     signature = "position"
     is_tolerance = True
+    kinds_absorbed: ClassVar[tuple[str, ...]] = ("mass",)
     excitation = "holds and moves the link in clearly different postures"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -47,10 +46,6 @@ class LinkMass(Effect):
             return carrying(model, joint, (mass, far[0], far[1], far[2]))
         changed = replace(body, payload=body.payload + x["mass"])
         return model.with_bodies(model.bodies.with_body(joint, changed))
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """The link's own mass."""
-        return (("mass", place[0]),)
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """Something of the link is left, and the payload is no multiple of the robot."""
@@ -71,6 +66,7 @@ class PlacedPayload(LinkMass):
         Coordinate("mass", 1e-2),
         *(Coordinate(f"m{axis}", 1e-3, signed=True, required=False) for axis in AXES),
     )
+    kinds_absorbed: ClassVar[tuple[str, ...]] = ("mass", "com_x", "com_y", "com_z")
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Last links."""
@@ -89,10 +85,6 @@ class PlacedPayload(LinkMass):
         mass = x["mass"]
         far = {axis: x[f"m{axis}"] / mass if mass else 0.0 for axis in AXES}
         return {"mass": mass, **{axis: min(max(v, -1e6), 1e6) for axis, v in far.items()}}
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """The link's own mass and centre of mass."""
-        return (("mass", place[0]), *((f"com_{axis}", place[0]) for axis in AXES))
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """No multiple of the robot, and within reach."""

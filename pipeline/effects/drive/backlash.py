@@ -1,4 +1,4 @@
-"""Play between motor and joint."""
+"""Backlash between motor and joint."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
-#: Play of a gear that counts as free of it, one standard deviation [rad].
-PLAY_TOLERANCE = 1e-4
+#: Backlash of a gear that counts as free of it, one standard deviation [rad].
+BACKLASH_TOLERANCE = 1e-4
 _SHARES = (0.02, 0.1, 0.3, 1.0)  # of the joint's torque, at which a flank may be seated
 
 
@@ -20,7 +20,7 @@ class Backlash(Effect):
     """Motor and joint lie half the width apart, on the side of the flank that carries.
 
     The motor leads by width / 2 tanh(torque / crossing) + torque / stiffness: a describing
-    function of the play with seated flanks (Nordin and Gutman, Automatica 38, 2002, treat play
+    function of backlash with seated flanks (Nordin and Gutman, Automatica 38, 2002, treat backlash
     with elastic flanks). Below the crossing torque the joint floats between the flanks, where its
     place is not told by the torque alone; the flanks give, and their stiffness comes with the
     width.
@@ -37,6 +37,9 @@ class Backlash(Effect):
         Coordinate("compliance", 1e-6, required=False),
     )
     signature = "load"
+    kinds_absorbed: ClassVar = ("compliance",)
+    halved: ClassVar = "crossing"
+    tolerances: ClassVar = {"width": BACKLASH_TOLERANCE}
     excitation = "lets the torque change its sign often, slowly and fast"
     contains: ClassVar = ("joint_elasticity",)
 
@@ -44,10 +47,6 @@ class Backlash(Effect):
         """Crossing torques, as shares of what the joint's actuator gives on the whole."""
         scale = _torque_scale(model, m, place[0])
         return [{"crossing": share * scale} for share in _SHARES]
-
-    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
-        """Crossing torques to either side."""
-        return [{"crossing": shape["crossing"] * 2.0**e} for e in (-factor, factor)]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Widen what is there."""
@@ -59,14 +58,6 @@ class Backlash(Effect):
             crossing=shape["crossing"],
         )
         return model.with_actuator(changed)
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """What counts as rigid."""
-        return (("compliance", place[0]),)
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """What a gear without play has."""
-        return {"width": PLAY_TOLERANCE}
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Width, stiffness and crossing torque."""

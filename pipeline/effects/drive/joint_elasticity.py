@@ -25,6 +25,8 @@ class JointElasticity(Effect):
     signature = "torque rate"
     is_tolerance = True
     reaches: ClassVar = (1.0, 100.0, 600.0)
+    kinds_absorbed: ClassVar = ("compliance",)
+    tolerances: ClassVar = {"compliance": COMPLIANCE_TOLERANCE}
     excitation = "changes its torque fast: accelerates, brakes and steps hard"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -32,14 +34,6 @@ class JointElasticity(Effect):
         actuator = model.actuator(place[0])
         compliance = actuator.compliance + x["compliance"]
         return model.with_actuator(replace(actuator, compliance=compliance))
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """What counts as rigid."""
-        return (("compliance", place[0]),)
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """What a transmission that counts as rigid may wind up."""
-        return {"compliance": COMPLIANCE_TOLERANCE}
 
     def physical(self, x: Values, shape: Values) -> dict[str, float]:
         """Stiffness."""

@@ -29,6 +29,7 @@ class TorqueConstantError(Effect):
     signature = "load"
     is_tolerance = True
     rescales = True
+    kinds_absorbed: ClassVar = ("torque_constant",)
     excitation = "carries clearly different known loads"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -56,10 +57,6 @@ class TorqueConstantError(Effect):
         """How much more current, or less than nothing: how much more back-EMF."""
         relative = float(values["relative"])
         return {"more": -relative / (1.0 + relative) if relative < 0.0 else -relative}, {}
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """The constant's tolerance."""
-        return (("torque_constant", place[0]),)
 
     def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
         """Two per cent, or what the motor's file states where that is more."""

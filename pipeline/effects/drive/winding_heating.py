@@ -29,6 +29,7 @@ class WindingHeating(Effect):
         Coordinate("thermal_resistance", 0.5, required=False),
     )
     signature = "time"
+    halved: ClassVar = "time_constant"
     excitation = "works hard for several thermal time constants, then repeats its first motion"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -39,10 +40,6 @@ class WindingHeating(Effect):
         """Time constants that a log of this length can show."""
         length = float(m.time[-1] - m.time[0])
         return [{"time_constant": t} for t in _TIMES if t < 1.5 * length]
-
-    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
-        """Time constants to either side."""
-        return [{"time_constant": shape["time_constant"] * 2.0**e} for e in (-factor, factor)]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Give the motor a thermal node."""

@@ -70,6 +70,7 @@ class StribeckFriction(FrictionPreset):
         Coordinate("excess", 1e-2),
     )
     terms: ClassVar = {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"}
+    halved: ClassVar = "velocity"
     excitation = "slow passages through many speeds below the Stribeck speed"
     contains: ClassVar = ("coulomb_friction",)
 
@@ -84,10 +85,6 @@ class StribeckFriction(FrictionPreset):
         """Slow enough to be a Stribeck speed."""
         slow = shape["velocity"] < _LARGEST_STRIBECK_SPEED
         return slow and super().plausible(model, place, x, shape)
-
-    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
-        """Speeds to either side."""
-        return [{"velocity": shape["velocity"] * 2.0**e} for e in (-factor, factor)]
 
 
 class LoadDependentFriction(FrictionPreset):

@@ -42,6 +42,7 @@ class EffortGain(Effect):
     rescales = True
     #: Gains 1, 2, 5, 1/2 and 1/5: what a voltage makes of a wrong current is not linear in it.
     reaches: ClassVar = (1.0, 1000.0, 4000.0, -500.0, -800.0)
+    tolerances: ClassVar = {"more": GAIN_TOLERANCE}
     excitation = "carries clearly different known loads"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -84,10 +85,6 @@ class EffortGain(Effect):
     def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
         """How much more than once."""
         return {"more": float(values["gain"]) - 1.0}, {}
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """What a sensor's shunt, divider or strain gauge leaves."""
-        return {"more": GAIN_TOLERANCE}
 
 
 def column_of(place: Place) -> tuple[str, str]:

@@ -17,11 +17,8 @@ class EffortOffset(Effect):
     coordinates: ClassVar = (Coordinate("offset", 1e-3, signed=True),)
     signature = "time"
     is_tolerance = True
+    kinds_absorbed: ClassVar = ("effort_zero",)
     excitation = "stands still without load, then moves both ways"
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """The sensor's tolerance."""
-        return (("effort_zero", place[0]),)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Shift the sensor's zero."""

@@ -19,6 +19,8 @@ class PositionOffset(Effect):
     coordinates: ClassVar = (Coordinate("angle", 1e-3, signed=True),)
     signature = "position"
     is_tolerance = True
+    kinds_absorbed: ClassVar = ("encoder",)
+    tolerances: ClassVar = {"angle": ENCODER_TOLERANCE}
     excitation = "holds the link in postures all around its axis"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
@@ -26,11 +28,3 @@ class PositionOffset(Effect):
         actuator = model.actuator(place[0])
         offset = actuator.encoder_offset + x["angle"]
         return model.with_actuator(replace(actuator, encoder_offset=offset))
-
-    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
-        """The encoder's tolerance."""
-        return (("encoder", place[0]),)
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """What mounting leaves."""
-        return {"angle": ENCODER_TOLERANCE}

@@ -30,6 +30,7 @@ class TimeDelay(Effect):
     signature = "effort rate"
     is_tolerance = True
     reaches: ClassVar = (1.0, 20.0, 60.0, 150.0)
+    tolerances: ClassVar = {"delay": SKEW_TOLERANCE}
     excitation = "changes its torque fast: accelerates, brakes and reverses"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -49,7 +50,3 @@ class TimeDelay(Effect):
             for a in model.actuators
         )
         return replace(model, actuators=changed)
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """What sampling leaves of all channels."""
-        return {"delay": SKEW_TOLERANCE}

@@ -41,6 +41,9 @@ LAWS = {
     "inertia": "inertia: Γ + J dω/dt",
     "friction": "friction: Γ + (Γ₀ + μ |Γ| + c |ω|) sgn ω",
     "hypoid": "hypoid: Γ / n · (1 ± μ tan β₁) / (1 ± μ tan β₂), + where the motor drives",
+    "parallel_spring": "parallel spring: Γ + k (q − q₀)",
+    "holding_brake": "holding brake: holds up to its static torque at rest, Γ in motion",
+    "second_motor": "second motor: (1 − share) Γ",
 }
 #: Symbols of the laws' arguments; others are called as in the file.
 _SYMBOLS = {
@@ -65,7 +68,7 @@ class Part:
         law: Key of `LAWS`, or another law's name.
         numbers: Symbol with value and unit, in the order of the file.
         dissipates: Whether it turns energy into heat.
-        stores: Whether it holds kinetic energy.
+        stores: Whether it holds energy, kinetic or of a spring.
     """
 
     name: str
@@ -217,7 +220,8 @@ def _draw_block(axes: Axes, block: Sequence[Part], y: float) -> None:
         if part.dissipates:
             _mark(axes, y + 0.07, "heat", VERMILION)
         if part.stores:
-            _mark(axes, y + 0.07, "kinetic", GREEN, back=True)
+            word = "elastic" if part.law == "parallel_spring" else "kinetic"
+            _mark(axes, y + 0.07, word, GREEN, back=True)
         y += _LINE * max(len(names), len(numbers)) + 0.04
 
 

@@ -10,6 +10,7 @@ import pytest
 
 from pipeline.api.gap_figures import signature_variable
 from pipeline.effects.base import SIGNATURES, Effect
+from pipeline.effects.registry import effect_named
 from pipeline.logs.errors import EffectError
 
 LOG: Any = SimpleNamespace(
@@ -37,3 +38,27 @@ def test_every_signature_is_a_variable_of_its_own() -> None:
 def test_a_signature_that_nothing_draws_is_refused_where_the_effect_is_written() -> None:
     with pytest.raises(EffectError, match=r"Misread: no signature 'speed'; known: .*velocity"):
         type("Misread", (Effect,), {"signature": "speed"})
+
+
+@pytest.mark.parametrize(
+    ("name", "kinds"),
+    [
+        *((name, ("compliance",)) for name in ("backlash", "joint_elasticity")),
+        ("torque_constant_error", ("torque_constant",)),
+        ("effort_offset", ("effort_zero",)),
+        ("position_offset", ("encoder",)),
+        ("link_mass", ("mass",)),
+        ("center_of_mass_offset", ("com_x", "com_y", "com_z")),
+        ("coulomb_friction", ()),
+    ],
+)
+def test_tolerances_that_are_an_effect_in_small_are_left_out_at_its_place(
+    name: str, kinds: tuple[str, ...]
+) -> None:
+    assert effect_named(name).absorbs(("here",)) == tuple((kind, "here") for kind in kinds)
+
+
+def test_a_nonlinear_parameter_is_refined_by_factors() -> None:
+    near = effect_named("stribeck_friction").refined({"velocity": 0.1}, 1.0)
+    assert near == [{"velocity": 0.05}, {"velocity": 0.2}]
+    assert effect_named("coulomb_friction").refined({}, 1.0) == []
