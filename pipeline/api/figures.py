@@ -23,7 +23,7 @@ from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
 from reports.atomic import write_text
-from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_parts
+from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
 from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
@@ -277,7 +277,7 @@ def _actuators(given: Settings) -> Drawings:
     return {
         f"actuator_chain_{name}": partial(
             actuator_chain_figure,
-            chain_parts(given.catalog, name),
+            chain_sections(given.catalog, name),
             title=alternative.title,
             subtitle=subtitle,
         )

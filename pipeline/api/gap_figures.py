@@ -19,7 +19,7 @@ from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.predict import Prediction
 from reports.figures.gap.in_time import GapTrace, gap_time_figure
 from reports.figures.gap.signature import Signature, gap_signature_figure
-from reports.figures.gap.waterfall import GapStep, gap_waterfall_figure
+from reports.figures.gap.waterfall import gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
 from reports.figures.style import NARROW, WIDTH
@@ -73,10 +73,10 @@ def write_waterfall(
 ) -> None:
     """Draw `waterfall`: the gap of all joints, effect by effect; and a narrow one of few steps."""
     first, *rest = stages
-    steps = [GapStep(_words(stage.label), overall(stage.gap)) for stage in rest]
+    steps = [(_words(stage.label), overall(stage.gap)) for stage in rest]
     short = steps[:FEW]
     if len(steps) > FEW:
-        short.append(GapStep(f"{len(steps) - FEW} more effects", steps[-1].gap))
+        short.append((f"{len(steps) - FEW} more effects", steps[-1][1]))
     subtitle = "root mean square over all joints, on held-out data"
     for name, shown, width in (("waterfall", steps, WIDTH), ("waterfall_narrow", short, NARROW)):
         figure = gap_waterfall_figure(

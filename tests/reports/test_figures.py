@@ -21,7 +21,7 @@ from actuators.energy.energy import StageEnergy
 from actuators.loading.build import load_catalog
 from actuators.shaft import ShaftSeries
 from reports.errors import FigureError
-from reports.figures.energy.actuator_chain import Shaft, actuator_chain_figure, chain_parts
+from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
 from reports.figures.energy.joint_demand import joint_demand_figure
@@ -136,13 +136,12 @@ def test_stage_energies_of_all_alternatives_share_one_scale() -> None:
 def test_a_chain_is_drawn_from_the_terminals_to_the_joint(name: str) -> None:
     catalog = load_catalog()
     alternative = catalog.alternatives[name]
-    parts = chain_parts(catalog, name)
-    shafts = [part.stage for part in parts if isinstance(part, Shaft)]
-    assert shafts == [*alternative.stage_names][::-1]
-    drawn = [p.name for block in parts if isinstance(block, tuple) for p in block]
+    sections = chain_sections(catalog, name)
+    assert [section.stage for section in sections] == [*alternative.stage_names][::-1]
+    drawn = [part.name for section in sections for part in section.parts]
     elements = [e.name.replace("_", " ") for e in alternative.elements]
     assert drawn == ["motor", *elements[::-1]]
-    figure = actuator_chain_figure(parts, title=alternative.title, subtitle="s")
+    figure = actuator_chain_figure(sections, title=alternative.title, subtitle="s")
     heights = {}
     for text in figure.axes[0].texts:  # the vertical axis points down
         heights.setdefault(text.get_text().replace("\n", " "), text.get_position()[1])
@@ -161,10 +160,10 @@ def test_a_chain_is_drawn_from_the_terminals_to_the_joint(name: str) -> None:
 def test_a_chain_of_ones_own_is_drawn_with_its_own_names(root: Path) -> None:
     catalog = load_catalog(root / "tests/pipeline/data_files/xl330_actuators")
     for name in catalog.alternatives:
-        parts = chain_parts(catalog, name)
-        long = [replace(p, law="drag", numbers=("torque 4 mN·m",)) for p in parts[1]]
-        first = Shaft("input_100%", "far away " * 20)
-        figure = actuator_chain_figure([first, tuple(long), *parts[2:]], title="own " * 30)
+        first, *others = chain_sections(catalog, name)
+        parts = tuple(replace(p, law="drag", numbers=("torque 4 mN·m",)) for p in first.parts)
+        first = replace(first, stage="input_100%", where="far away " * 20, parts=parts)
+        figure = actuator_chain_figure([first, *others], title="own " * 30)
         figure.canvas.draw()  # the name of a stage is no formula
         assert max(t.get_window_extent().x1 for t in figure.axes[0].texts) <= figure.bbox.x1
         words = " ".join(texts(figure))
@@ -288,7 +287,7 @@ def test_strong_motors_are_drawn_in_newton_metres() -> None:
 def test_energy_per_minute_with_and_without_break_even() -> None:
     share = np.linspace(0, 1, 11)
     lines = [
-        EnergyLine("reversible", 100 - 90 * share, (95 - 90 * share, 105 - 90 * share)),
+        EnergyLine("reversible", 100 - 90 * share, np.array([95 - 90 * share, 105 - 90 * share])),
         EnergyLine("irreversible", 150 - 150 * share),
     ]
     mark = BreakEven(5 / 6, 25.0, (0.8, 0.86))

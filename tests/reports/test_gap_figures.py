@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +10,8 @@ import pytest
 from reports.errors import FigureError
 from reports.figures.gap.in_time import GapTrace, gap_time_figure
 from reports.figures.gap.signature import Signature, binned, gap_signature_figure
-from reports.figures.gap.waterfall import GapStep, gap_waterfall_figure
+from reports.figures.gap.waterfall import gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
-from reports.figures.save import save_figure
 from reports.figures.style import NARROW
 from reports.table import table_of
 from reports.tables.gap import FoundRow, deciding_motion
@@ -37,8 +35,6 @@ def test_gap_in_time_tells_what_is_left() -> None:
     assert "0.0200 with" in bottom.get_title(loc="left")
     gap = np.asarray(bottom.lines[2].get_ydata(), dtype=float)
     assert np.sqrt(np.nanmean(gap**2)) == pytest.approx(0.02, rel=0.2)
-    with pytest.raises(FigureError, match="1 to 3"):
-        gap_time_figure([], title="t")
 
 
 def test_measured_signal_stays_visible_where_it_is_not_compared() -> None:
@@ -69,22 +65,20 @@ def test_signature_means_are_those_of_the_bins() -> None:
 
 
 def test_waterfall_bars_join_up() -> None:
-    steps = [GapStep("friction at a", 0.6), GapStep("mass at b", 0.2)]
+    steps = [("friction at a", 0.6), ("mass at b", 0.2)]
     figure = gap_waterfall_figure(1.0, steps, 0.1, "A", title="t")
     bars = figure.axes[0].patches
     assert [round(b.get_width(), 6) for b in bars] == [1.0, 0.4, 0.4, 0.2]
     assert [round(b.get_x(), 6) for b in bars] == [0.0, 0.6, 0.2, 0.0]
-    with pytest.raises(FigureError, match="negative"):
-        gap_waterfall_figure(-1.0, steps, 0.1, "A", title="t")
 
 
 def test_narrow_waterfall_can_be_read_on_a_telephone() -> None:
     """Labels above the bars, nothing outside, letters of 9 pt on 4.6 in."""
-    steps = [GapStep(f"coulomb friction at rm_joint_{k}", 0.8 / k) for k in range(1, 5)]
+    steps = [(f"coulomb friction at rm_joint_{k}", 0.8 / k) for k in range(1, 5)]
     figure = gap_waterfall_figure(1.0, steps, 0.1, "A", title="t", subtitle="s", width=NARROW)
     assert geometry.outside(figure) == []
     assert geometry.overlapping(figure) == []
-    assert {s.label for s in steps} <= {text.get_text() for text in figure.axes[0].texts}
+    assert {label for label, _ in steps} <= {text.get_text() for text in figure.axes[0].texts}
     assert not figure.axes[0].get_yticklabels()[0].get_text()
 
 
@@ -94,8 +88,6 @@ def test_where_map_shows_every_known_cell() -> None:
         ["a", "b"], [WhereGroup("phase", ("support", "transfer"), table)], title="t"
     )
     assert sorted(text.get_text() for text in figure.axes[0].texts) == ["1.0", "30", "5.0"]
-    with pytest.raises(FigureError, match="shape"):
-        where_map_figure(["a"], [WhereGroup("x", ("y",), table)], title="t")
 
 
 def groups(rng: np.random.Generator, joints: int, bands: list[int]) -> list[WhereGroup]:
@@ -132,15 +124,6 @@ def test_words_of_the_gap_in_time_lie_on_nothing(joints: int) -> None:
     assert not geometry.outside(figure)
     assert not geometry.overlapping(figure)
     assert not geometry.crossed(figure)
-
-
-def test_the_same_figure_gives_the_same_bytes(tmp_path: Path) -> None:
-    for folder in ("one", "two"):
-        save_figure(gap_time_figure([trace()], title="t"), tmp_path / folder, "f")
-    for end in ("png", "svg"):
-        assert (tmp_path / "one" / f"f.{end}").read_bytes() == (
-            tmp_path / "two" / f"f.{end}"
-        ).read_bytes()
 
 
 def test_tables_have_the_promised_columns() -> None:

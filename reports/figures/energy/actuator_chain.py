@@ -9,7 +9,7 @@ of its own.
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -79,51 +79,52 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Shaft:
-    """A named stage between two blocks.
+class Section:
+    """A named stage and the elements between it and the next one towards the joint.
 
     Attributes:
         stage: Short name.
         where: In words.
+        parts: None after the joint, nor between two names of one shaft.
     """
 
     stage: str
     where: str
+    parts: tuple[Part, ...] = ()
+
+    @property
+    def height(self) -> float:
+        """Of shaft and block [in]."""
+        lines = sum(_LINE * max(map(len, _lines(part))) + 0.04 for part in self.parts)
+        return _GAP + (0.12 + lines if self.parts else 0.0)
 
 
-def chain_parts(catalog: Catalog, name: str) -> tuple[Shaft | tuple[Part, ...], ...]:
-    """An alternative as shafts and the blocks between them, from the supply to the joint.
+def chain_sections(catalog: Catalog, name: str) -> list[Section]:
+    """An alternative from the supply to the joint.
 
     Args:
         catalog: Components and alternatives.
         name: Of the alternative.
     """
     alternative, chain = catalog.alternatives[name], catalog.chain(name)
-    words = alternative.stage_names
-    motor = f"{alternative.motor}."
-    title = catalog.components[alternative.motor].title
-    numbers = (title, *_numbers(catalog, {n: motor + n for n in _MOTOR_NUMBERS}))
-    out: list[Shaft | tuple[Part, ...]] = [
-        Shaft(SUPPLY_STAGE, words[SUPPLY_STAGE]),
-        (Part("motor", "motor", numbers, dissipates=True, stores=False),),
-    ]
-    block: list[Part] = []
+    words, motor = alternative.stage_names, alternative.motor
+    numbers = _numbers(catalog, {n: f"{motor}.{n}" for n in _MOTOR_NUMBERS})
+    first = Part("motor", "motor", (catalog.components[motor].title, *numbers), True, False)
+    blocks: dict[str, list[Part]] = {SUPPLY_STAGE: [first]}
     for entry, element in reversed(list(zip(alternative.elements, chain.elements, strict=True))):
         if entry.stage:
-            out += [tuple(block)] if block else []
-            out.append(Shaft(entry.stage, words[entry.stage]))
-            block = []
+            blocks[entry.stage] = []
         law = type(element)
-        block.append(
-            Part(
-                entry.name.replace("_", " "),
-                entry.law,
-                _numbers(catalog, entry.arguments),
-                dissipates=law.loss is not Element.loss,
-                stores=law.stored is not Element.stored,
-            )
+        part = Part(
+            entry.name.replace("_", " "),
+            entry.law,
+            _numbers(catalog, entry.arguments),
+            dissipates=law.loss is not Element.loss,
+            stores=law.stored is not Element.stored,
         )
-    return (*out, tuple(block), Shaft(JOINT_STAGE, words[JOINT_STAGE]))
+        blocks[next(reversed(blocks))].append(part)
+    blocks[JOINT_STAGE] = []
+    return [Section(stage, words[stage], tuple(parts)) for stage, parts in blocks.items()]
 
 
 def _numbers(catalog: Catalog, references: Mapping[str, str]) -> tuple[str, ...]:
@@ -139,30 +140,23 @@ def _numbers(catalog: Catalog, references: Mapping[str, str]) -> tuple[str, ...]
 
 
 @house_style()
-def actuator_chain_figure(
-    parts: Sequence[Shaft | tuple[Part, ...]], *, title: str, subtitle: str = ""
-) -> Figure:
+def actuator_chain_figure(sections: Sequence[Section], *, title: str, subtitle: str = "") -> Figure:
     """Draw an actuator from the motor's terminals at the top to the joint at the bottom.
 
     Args:
-        parts: From `chain_parts`.
+        sections: From `chain_sections`.
         title: Names the alternative.
         subtitle: Second line.
     """
     heading = textwrap.wrap(title, _TITLE_CHARS)
-    laws = dict.fromkeys(p.law for block in parts if isinstance(block, tuple) for p in block)
     legend = [
         "down, blue: E(+), towards the joint; up: E(\N{MINUS SIGN}), back from it",
         "at the motor side of an element, Γ and ω being those at its joint side:",
-    ] + [
-        line
-        for law in laws
-        if law in LAWS
-        for line in textwrap.wrap(LAWS[law], _LEGEND_CHARS, subsequent_indent="    ")
     ]
-    top = _MARGIN + 0.2 * len(heading) + (0.22 if subtitle else 0.05)  # [in]
-    body = sum(_GAP if isinstance(part, Shaft) else _height(part) for part in parts)
-    height = top + body + _LINE * len(legend) + 0.22
+    for law in dict.fromkeys(part.law for section in sections for part in section.parts):
+        legend += textwrap.wrap(LAWS.get(law, ""), _LEGEND_CHARS, subsequent_indent="    ")
+    y = _MARGIN + 0.2 * len(heading) + (0.22 if subtitle else 0.05)  # [in]
+    height = y + sum(section.height for section in sections) + _LINE * len(legend) + 0.22
     figure = new_figure(height, width=_WIDTH, arranged=False)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_xlim(0.0, _WIDTH)
@@ -170,15 +164,12 @@ def actuator_chain_figure(
     axes.set_axis_off()
     look: dict[str, Any] = {"va": "top", "ha": "left"}
     axes.text(_MARGIN, _MARGIN, "\n".join(heading), fontsize=10.5, fontweight="bold", **look)
-    axes.text(_MARGIN, top - 0.19, subtitle, fontsize=8.5, color=QUIET, **look)
-    y = top
-    for part in parts:
-        if isinstance(part, Shaft):
-            _draw_shaft(axes, part, y)
-            y += _GAP
-        else:
-            _draw_block(axes, part, y)
-            y += _height(part)
+    axes.text(_MARGIN, y - 0.19, subtitle, fontsize=8.5, color=QUIET, **look)
+    for section in sections:
+        _draw_shaft(axes, section, y)
+        if section.parts:
+            _draw_block(axes, section, y + _GAP)
+        y += section.height
     for number, line in enumerate(legend):
         axes.text(_MARGIN, y + 0.12 + _LINE * number, line, fontsize=8.5, color=QUIET, **look)
     return figure
@@ -192,19 +183,14 @@ def _lines(part: Part) -> tuple[list[str], list[str]]:
     return textwrap.wrap(part.name, _NAME_CHARS), text
 
 
-def _height(block: Iterable[Part]) -> float:
-    """Of a block [in]."""
-    return 0.12 + sum(_LINE * max(map(len, _lines(part))) + 0.04 for part in block)
-
-
-def _draw_block(axes: Axes, block: Sequence[Part], y: float) -> None:
+def _draw_block(axes: Axes, section: Section, y: float) -> None:
     from matplotlib.patches import FancyBboxPatch
 
     axes.add_patch(
         FancyBboxPatch(
             (_MARGIN, y),
             _MARKS_AT - _MARGIN - 0.05,
-            _height(block),
+            section.height - _GAP,
             boxstyle="round,pad=0,rounding_size=0.05",
             facecolor=SHADE,
             edgecolor=QUIET,
@@ -212,7 +198,7 @@ def _draw_block(axes: Axes, block: Sequence[Part], y: float) -> None:
         )
     )
     y += 0.08
-    for part in block:
+    for part in section.parts:
         names, numbers = _lines(part)
         look: dict[str, Any] = {"va": "top", "ha": "left", "linespacing": 1.35}
         axes.text(_MARGIN + 0.08, y, "\n".join(names), fontsize=9, fontweight="bold", **look)
@@ -240,7 +226,7 @@ def _arrow(
     axes.plot(x, y, color=color, linewidth=1.5, marker=head, markersize=5, markevery=[-1])
 
 
-def _draw_shaft(axes: Axes, shaft: Shaft, y: float) -> None:
+def _draw_shaft(axes: Axes, shaft: Section, y: float) -> None:
     """Energy towards the joint and back, and what the shaft's variables are called."""
     ends = (y + 0.06, y + _GAP - 0.06)
     _arrow(axes, (0.55, 0.55), ends, FORWARD, "v")

@@ -63,7 +63,7 @@ def joint_torques_figure(
         _line(panels[-1], stretches, "torque", columns[joint], "", i, "--")
     if others:
         _label(panels[-1], "outside legs", [joint in sliding for joint in others])
-    _finish(figure, panels, stretches, list(legs), others)
+    _finish(figure, list(panels), stretches, list(legs), others)
     return figure
 
 

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 #: The prior's bands are wide and overlap, so they are fainter than those of figures left out.
 PRIOR_ALPHA, LEFT_OUT_ALPHA = 0.10, 0.28
-Band = tuple[Array, Array]
 _REACH = 4.0  # to either side of the crossing [%]
 
 
@@ -37,14 +36,14 @@ class EnergyLine:
     Attributes:
         name: Shown at the line.
         energy: At each share of standing, shape (N,) [J].
-        prior: Ends of what is known without any fit, shape (N,) each [J], or None.
-        left_out: Ends of what is known without this line's own figure, or None.
+        prior: Ends of what is known without any fit, shape (2, N) [J], or None.
+        left_out: Ends of what is known without this line's own figure, shape (2, N) [J], or None.
     """
 
     name: str
     energy: Array
-    prior: Band | None = None
-    left_out: Band | None = None
+    prior: Array | None = None
+    left_out: Array | None = None
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.errors import FigureError
 from reports.figures.style import (
     BLUE,
     ORANGE,
@@ -71,12 +70,7 @@ def gap_time_figure(
         title: Headline.
         subtitle: Second line.
         channel: Name of the compared channel.
-
-    Raises:
-        FigureError: No trace, or too many to read.
     """
-    if not 1 <= len(traces) <= 3:
-        raise FigureError(f"gap in time: {len(traces)} joints; give 1 to 3")
     figure = new_figure(5.2, title, subtitle)
     axes = figure.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.0))
     for k, trace in enumerate(traces):
@@ -88,15 +82,10 @@ def gap_time_figure(
 
 def _thinned(trace: GapTrace) -> GapTrace:
     every = max(1, int(np.ceil(trace.time.size / _MOST_POINTS)))
-    return replace(
-        trace,
-        time=trace.time[::every],
-        measured=trace.measured[::every],
-        compared=trace.compared[::every],
-        before=trace.before[::every],
-        after=trace.after[::every],
-        proves=None if trace.proves is None else trace.proves[::every],
-    )
+    arrays: dict[str, Any] = {
+        name: value[::every] for name, value in vars(trace).items() if isinstance(value, np.ndarray)
+    }
+    return replace(trace, **arrays)
 
 
 def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: bool) -> None:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
-from reports.errors import FigureError
 from reports.figures.style import (
     BLUE,
     GREEN,
@@ -30,23 +28,10 @@ if TYPE_CHECKING:
 _NOTHING = 0.003
 
 
-@dataclass(frozen=True)
-class GapStep:
-    """The gap once an effect is in the model.
-
-    Attributes:
-        label: The effect and its place.
-        gap: After it, in the figure's unit.
-    """
-
-    label: str
-    gap: float
-
-
 @house_style()
 def gap_waterfall_figure(
     before: float,
-    steps: Sequence[GapStep],
+    steps: Sequence[tuple[str, float]],
     noise_floor: float,
     unit: str,
     *,
@@ -58,25 +43,20 @@ def gap_waterfall_figure(
 
     Args:
         before: Gap of the model as it was.
-        steps: Effects in the order of acceptance.
+        steps: Effects in the order of acceptance, each with the gap after it.
         noise_floor: What no model can explain.
         unit: Of all.
         title: Headline.
         subtitle: Second line.
         width: [in]; labels stand above their bars where it is less than usual.
-
-    Raises:
-        FigureError: A negative gap.
     """
-    if min([before, noise_floor, *(s.gap for s in steps)]) < 0:
-        raise FigureError("waterfall: a gap is negative; give root mean squares")
-    labels = ["model as it was", *(s.label for s in steps), "what is left"]
+    labels = ["model as it was", *(label for label, _ in steps), "what is left"]
     narrow = width < WIDTH
     height = (0.54 if narrow else 0.42) * len(labels) + 1.5
     figure = new_figure(height, title, subtitle, width=width)
     ax = figure.subplots()
     thick = 0.42 if narrow else 0.62
-    gaps = [before, *(s.gap for s in steps)]
+    gaps = [before, *(gap for _, gap in steps)]
     last = len(labels) - 1
     _bars(ax, gaps, thick)
     beside = max(gaps[-1], noise_floor if gaps[-1] > 0.5 * noise_floor else 0.0)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from reports.errors import FigureError
 from reports.figures.style import INK, QUIET, WIDTH, house_style, new_figure
 
 if TYPE_CHECKING:
@@ -56,20 +55,9 @@ def where_map_figure(
         groups: Columns.
         title: Headline.
         subtitle: Second line.
-
-    Raises:
-        FigureError: No groups, or a group of another shape.
     """
     from matplotlib.colors import LogNorm
 
-    for group in groups:
-        if group.ratio.shape != (len(joints), len(group.bands)):
-            raise FigureError(
-                f"where-map: group '{group.title}' has shape {group.ratio.shape}; "
-                f"{(len(joints), len(group.bands))} is expected"
-            )
-    if not groups or not joints:
-        raise FigureError("where-map: no group or no joint; give at least 1")
     names = 0.15 + 0.076 * max(len(joint) for joint in joints)
     room = WIDTH - names - _BAR
     lines = _lines(groups, room)

@@ -57,7 +57,8 @@ def dimension(axes: Axes, start: Array, end: Array, offset: tuple[float, float],
     angle = (angle + 60) % 180 - 60  # readable from below or from the right
     middle = (a + b) / 2
     axes.text(
-        *middle,
+        middle[0],
+        middle[1],
         text,
         ha="center",
         va="center",

@@ -196,7 +196,7 @@ def _flat_arrows(
             _joint_arrow(axes, view, leg.joints[number], color, 0.083 * unit)
             axes.annotate(
                 f"{number + 1}",
-                view.project(leg.joints[number].position)[:2],
+                tuple(view.project(leg.joints[number].position)[:2]),
                 xytext=(0, 5),
                 textcoords="offset points",
                 ha="center",
