@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pipeline.errors import UnphysicalModelError
 from pipeline.robot.published import named_robot
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import RobotSpec, load_robot_file
+from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_check import MERGED, OWN_DRIVE, Finding, check_urdf
 from pipeline.robot.urdf_source import read_urdf
 
@@ -50,28 +50,25 @@ def check_file(path: Path) -> list[Finding]:
 def check_robot(robot: Robot) -> list[Finding]:
     """Check a loaded robot: its URDF, the stated mass, the symmetry of its legs."""
     spec = robot.spec
-    findings = [*check_urdf(robot.urdf, source_of(robot)), *_masses(robot)]
-    findings.append(
-        Finding(
-            spec.name,
-            "joints and feet found",
-            True,  # loading refuses a robot whose names do not resolve
-            f"{len(robot.joints)} joints, {len(spec.legs)} feet",
-        )
-    )
-    return findings + _sliding(robot) + _symmetry(robot, spec)
+    # Loading refuses a robot whose names do not resolve.
+    named = f"{len(robot.joints)} joints, {len(spec.legs)} feet"
+    return [
+        *check_urdf(robot.urdf, source_of(robot)),
+        *_masses(robot),
+        Finding(spec.name, "joints and feet found", True, named),
+        *_sliding(robot),
+        *_symmetry(robot),
+    ]
 
 
-def _sliding(robot: Robot) -> list[Finding]:
+def _sliding(robot: Robot) -> Iterator[Finding]:
     """Joints whose numbers are metres and newtons under headings for those that turn."""
     detail = (
         "it slides: metres and newtons, also in tables of one row a joint, under headings in rad "
         "and Nm; its actuator's ratio is turned radians per metre"
     )
-    return [
-        Finding(joint, "unit of the joint", True, detail, note=True)
-        for joint in robot.sliding_joints
-    ]
+    for joint in robot.sliding_joints:
+        yield Finding(joint, "unit of the joint", True, detail, note=True)
 
 
 def source_of(robot: Robot) -> str:
@@ -79,7 +76,7 @@ def source_of(robot: Robot) -> str:
     return str(robot.spec.path if robot.spec.build else robot.spec.urdf)
 
 
-def _masses(robot: Robot) -> list[Finding]:
+def _masses(robot: Robot) -> Iterator[Finding]:
     """What the bodies weigh against what the robot file states."""
     spec = robot.spec
     row = spec.parameters.parameter("total_mass")
@@ -92,13 +89,10 @@ def _masses(robot: Robot) -> list[Finding]:
     detail = f"links add up to {total:.8g} kg, stated {stated:.8g} kg, {by}"
     if not near:
         detail += f" ({100 * MASS_TOLERANCE:g} % or the stated interval allowed); correct one"
-    findings = [Finding(spec.name, "total mass", near, detail)]
-    base = robot.model.inertias[1 if robot.floating else 0].mass
+    yield Finding(spec.name, "total mass", near, detail)
     if robot.floating:
-        findings.append(
-            Finding(spec.base_link, "floating base has mass", base > 0, f"{base:.6g} kg")
-        )
-    return findings
+        base = robot.model.inertias[1].mass
+        yield Finding(spec.base_link, "floating base has mass", base > 0, f"{base:.6g} kg")
 
 
 def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...]:
@@ -132,13 +126,13 @@ def refuse_urdf(text: str, where: str) -> None:
 
 def tolerated(findings: Sequence[Finding]) -> tuple[str, ...]:
     """What failed and does not stop a comparison with a log, in words."""
-    out = []
-    for f in findings:
-        if not f.passed and f.tolerable:
-            mimics = "it mimics another joint: held still"
-            detail = mimics if f.check == OWN_DRIVE else f"{f.detail}: kept as stated"
-            out.append(f"{f.subject}: {f.check} fails ({detail})")
-    return tuple(out)
+    mimics = "it mimics another joint: held still"
+    return tuple(
+        f"{f.subject}: {f.check} fails "
+        f"({mimics if f.check == OWN_DRIVE else f'{f.detail}: kept as stated'})"
+        for f in findings
+        if not f.passed and f.tolerable
+    )
 
 
 def refused(
@@ -178,44 +172,32 @@ def together(findings: Iterable[Finding]) -> Iterator[tuple[str, Finding]]:
         yield ", ".join(shown) + more, group[0]
 
 
-def _symmetry(robot: Robot, spec: RobotSpec) -> list[Finding]:
+def _symmetry(robot: Robot) -> Iterator[Finding]:
     """A leg and its counterpart must be mirror images in masses, places and inertias.
 
     A robot none of whose hips has a counterpart, as in some stars, is made so, not by mistake.
     """
-    findings = []
-    data = robot.model.createData()
-    pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
-    feet = np.array([leg.neutral_foot for leg in spec.legs])
+    legs, check = robot.spec.legs, "mirror symmetry"
     if not any(near is not None for near in _counterparts(robot, robot.chains.offset[0]).values()):
         detail = "no hip is the mirror image of another; left and right are not compared"
-        return [Finding(spec.name, "mirror symmetry", True, detail, note=True)]
-    for i, near in _counterparts(robot, feet).items():
-        leg = spec.legs[i]
+        yield Finding(robot.spec.name, check, True, detail, note=True)
+        return
+    data = robot.model.createData()
+    pin.forwardKinematics(robot.model, data, pin.neutral(robot.model))
+    for i, near in _counterparts(robot, np.array([leg.neutral_foot for leg in legs])).items():
         if near is None:
-            detail = "no right leg with the mirrored foot"
-            findings.append(Finding(leg.name, "mirror symmetry", False, detail))
+            yield Finding(legs[i].name, check, False, "no right leg with the mirrored foot")
             continue
-        other = spec.legs[near]
-        subject = f"{leg.name}/{other.name}"
-        if len(leg.joints) != len(other.joints):
-            detail = f"{len(leg.joints)} joints against {len(other.joints)}"
-            findings.append(Finding(subject, "mirror symmetry", False, detail))
+        left, right, subject = legs[i], legs[near], f"{legs[i].name}/{legs[near].name}"
+        if len(left.joints) != len(right.joints):
+            detail = f"{len(left.joints)} joints against {len(right.joints)}"
+            yield Finding(subject, check, False, detail)
             continue
-        worst = max(
-            _mirror_difference(robot, data, a, b)
-            for a, b in zip(leg.joints, other.joints, strict=True)
+        worst = max(_mirror_difference(robot, data, i, near, k) for k in range(len(left.joints)))
+        yield Finding(
+            *(subject, check, worst <= SYMMETRY_FAULT, f"largest relative difference {worst:.2g}"),
+            note=SYMMETRY_TOLERANCE < worst <= SYMMETRY_FAULT,
         )
-        findings.append(
-            Finding(
-                subject,
-                "mirror symmetry",
-                worst <= SYMMETRY_FAULT,
-                f"largest relative difference {worst:.2g}",
-                note=SYMMETRY_TOLERANCE < worst <= SYMMETRY_FAULT,
-            )
-        )
-    return findings
 
 
 def _counterparts(robot: Robot, points: Array) -> dict[int, int | None]:
@@ -244,31 +226,36 @@ def _counterparts(robot: Robot, points: Array) -> dict[int, int | None]:
     return out
 
 
-def _mirror_difference(robot: Robot, data: pin.Data, left: str, right: str) -> float:
+def _mirror_difference(robot: Robot, data: pin.Data, left: int, right: int, k: int) -> float:
     """Largest relative difference of one body and its axis from the mirror image of another.
 
     In the base frame at the zero pose: which way a file turns its joint frames is its own matter.
+
+    Args:
+        robot: With legs.
+        data: After its forward kinematics.
+        left: Index of a leg.
+        right: Index of its counterpart.
+        k: Which of their joints.
     """
     flip = np.diag([1.0, -1.0, 1.0])
-    model = robot.model
-    i, j = model.getJointId(left), model.getJointId(right)
+    model, chains = robot.model, robot.chains
     base = data.oMi[1 if robot.floating else 0].inverse()
-    place_a, place_b = base * data.oMi[i], base * data.oMi[j]
-    a, b = place_a.act(model.inertias[i]), place_b.act(model.inertias[j])
-    scale_inertia = max(float(np.abs(b.inertia).max()), 1e-12)
-    legs = robot.spec.legs
-    axes, length = [], 0.0
-    for joint, place in ((left, place_a), (right, place_b)):
-        leg, k = next((n, m.joints.index(joint)) for n, m in enumerate(legs) if joint in m.joints)
-        axes.append(place.rotation @ robot.chains.axis[k, leg])
-        links = [*robot.chains.offset[1:, leg], robot.chains.foot[leg]]
-        length = sum(float(np.linalg.norm(link)) for link in links)
+    bodies, places, axes = [], [], []
+    for leg in (left, right):
+        index = model.getJointId(robot.spec.legs[leg].joints[k])
+        places.append(base * data.oMi[index])
+        bodies.append(places[-1].act(model.inertias[index]))
+        axes.append(places[-1].rotation @ chains.axis[k, leg])
+    (a, b), length = bodies, max(float(chains.reach[right]), 1e-6)
     # An axis is a pseudo-vector, and a joint may count either way.
     turn = min(float(np.abs(flip @ axes[0] - sign * axes[1]).max()) for sign in (1.0, -1.0))
+    moved = flip @ places[0].translation - places[1].translation
     return max(
         abs(a.mass - b.mass) / max(b.mass, 1e-12),
-        float(np.abs(flip @ a.lever - b.lever).max()) / max(length, 1e-6),
-        float(np.abs(flip @ a.inertia @ flip - b.inertia).max()) / scale_inertia,
-        float(np.abs(flip @ place_a.translation - place_b.translation).max()) / max(length, 1e-6),
+        float(np.abs(flip @ a.lever - b.lever).max()) / length,
+        float(np.abs(flip @ a.inertia @ flip - b.inertia).max())
+        / max(float(np.abs(b.inertia).max()), 1e-12),
+        float(np.abs(moved).max()) / length,
         turn,
     )

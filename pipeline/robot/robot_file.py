@@ -17,13 +17,7 @@ from actuators.units import si_unit
 from pipeline.errors import RobotFileError
 from pipeline.robot.published import SCHEME, published_names, urdf_path
 from pipeline.robot.robot_numbers import BUILD_SCHEMA, GAIT_NUMBERS, GAIT_SCHEMA, check_parameters
-from pipeline.robot.robot_tables import (
-    BuiltFileTable,
-    BuiltLegTable,
-    FileTable,
-    OwnFileTable,
-    OwnLegTable,
-)
+from pipeline.robot.robot_tables import BuiltLegTable, FileTable, OwnLegTable
 
 #: Of the project, from the folder it is run in.
 DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
@@ -181,8 +175,8 @@ def load_robot_file(path: Path) -> RobotSpec:
     table, sources = _extended(path, ())
     where = str(path)
     build = table["robot"].get("build") if isinstance(table.get("robot"), dict) else None
-    schema = OwnFileTable if build is None else BuiltFileTable
-    numbers = GAIT_SCHEMA | (BUILD_SCHEMA if build else {})
+    schema: type[FileTable[Any]] = FileTable[BuiltLegTable] if build else FileTable[OwnLegTable]
+    numbers = GAIT_SCHEMA | BUILD_SCHEMA if build else GAIT_SCHEMA
     _refuse_missing(schema, numbers, table, where)
     file = checked(schema, table, where, RobotFileError)
     parameters = parameters_from_table(
@@ -249,7 +243,7 @@ def merged_gait(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str,
 
 
 def _refuse_missing(
-    schema: type[FileTable], numbers: Mapping[str, str], table: Mapping[str, Any], where: str
+    schema: type[FileTable[Any]], numbers: Mapping[str, str], table: Mapping[str, Any], where: str
 ) -> None:
     """Name all keys that a file lacks, so that who writes one need not run it for each.
 
@@ -260,12 +254,12 @@ def _refuse_missing(
         return
     lacking = []
     try:
-        schema.model_validate({"robot": {}, "legs": {}, "parameters": {}} | table)
+        schema.model_validate({"robot": {}, "legs": {}, "parameters": {}, **table})
     except ValidationError as wrong:
         errors = wrong.errors(include_url=False, include_context=False)
         lacking = [".".join(map(str, e["loc"])) for e in errors if e["type"] == "missing"]
     if not table.get("legs"):
-        foot = "neutral_foot" if schema is OwnFileTable else "station"
+        foot = "neutral_foot" if numbers is GAIT_SCHEMA else "station"
         lacking.append(f"[legs.NAME] with joints, foot, side, {foot}")
     # A gait that states numbers of its own is asked for the rest when it walks.
     own = set(table.get("gait", {})) - {"transfer_path", "tripods"}

@@ -75,7 +75,7 @@ def check_parameters(parameters: ParameterSet, build: str | None, where: str) ->
             thousand, or a contradiction; all of them.
     """
     schema = GAIT_SCHEMA | BUILD_SCHEMA
-    wrong = []
+    wrong: list[str] = []
     for row in parameters.rows():
         if build or row.name in GAIT_SCHEMA:
             wrong += _sign(row)

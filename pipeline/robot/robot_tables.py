@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, ClassVar, Final, Literal, Self
+from typing import Annotated, Any, ClassVar, Final, Generic, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
 
@@ -116,26 +116,18 @@ class StandingTable(Table):
     feet: Names | None = None
 
 
-class FileTable(Table):
+_Leg = TypeVar("_Leg", bound=LegTable)
+
+
+class FileTable(Table, Generic[_Leg]):
     """A robot file; gait and actuators are read by the rooms that know them."""
 
     noun: ClassVar[str] = "table"
     robot: RobotTable
+    legs: dict[FileName, _Leg]
     held: dict[FileName, Number] = Field(default={})
     gait: dict[str, Any] = Field(default={})
     standing: StandingTable = StandingTable()
     assumed: dict[str, Text] = Field(default={})
     parameters: dict[str, Any]
     actuators: dict[str, Any] = Field(default={})
-
-
-class OwnFileTable(FileTable):
-    """With a URDF of the user's own."""
-
-    legs: dict[FileName, OwnLegTable]
-
-
-class BuiltFileTable(FileTable):
-    """With a URDF that is built from numbers."""
-
-    legs: dict[FileName, BuiltLegTable]
