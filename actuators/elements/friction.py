@@ -27,6 +27,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import erf
 
 from actuators.arrays import FloatArray, Scalars, require, require_non_negative
@@ -58,7 +59,7 @@ class FrictionLaw(Element):
         """Return the friction torque that no load changes, (N, J) [N*m]."""
 
     @abstractmethod
-    def share(self, velocity: FloatArray, drives: FloatArray) -> Scalars:
+    def share(self, velocity: FloatArray, drives: NDArray[np.bool_]) -> Scalars:
         """Return friction per transmitted torque, by who drives, (N, J)."""
 
     @abstractmethod
@@ -181,7 +182,7 @@ class Friction(FrictionLaw):
             torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
         return torque
 
-    def share(self, velocity: FloatArray, drives: FloatArray) -> Scalars:
+    def share(self, velocity: FloatArray, drives: NDArray[np.bool_]) -> Scalars:
         """Return the coefficient of the quadrant of power, (N, J)."""
         return self.load + np.where(drives, self.when_driving, self.when_driven)
 

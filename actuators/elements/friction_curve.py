@@ -7,6 +7,7 @@ straight lines, beyond the last one the last line goes on as long as it takes en
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuators.arrays import FloatArray, Scalars, require, require_non_negative
 from actuators.elements.friction import FrictionLaw
@@ -64,7 +65,7 @@ class FrictionCurve(FrictionLaw):
         # Towards standstill the asymmetry goes with the sense of motion, as dry friction does.
         return np.asarray(level * sense + skew * np.abs(sense) + self.viscous * velocity)
 
-    def share(self, velocity: FloatArray, drives: FloatArray) -> FloatArray:
+    def share(self, velocity: FloatArray, drives: NDArray[np.bool_]) -> FloatArray:
         """Return friction per transmitted torque, (N, J)."""
         return np.clip(self.at(self.shares, np.abs(velocity)), 0.0, _MOST_SHARE)
 
