@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from reports.atomic import write_text
 from reports.errors import ReportError
-from reports.page import Block, FigureBlock, Page, PairBlock, Points, TableBlock, Text, cell_text
+from reports.page import Block, FigureBlock, Page, Points, TableBlock, Text, cell_text
 from reports.typeset import prose
 
 if TYPE_CHECKING:
@@ -74,8 +74,6 @@ def _block(block: Block, folder: Path) -> dict[str, object]:
         return {"kind": "points", "it": block}
     if isinstance(block, TableBlock):
         return {"kind": "table", "it": block}
-    if isinstance(block, PairBlock):
-        return {"kind": "pair", "both": [_block(b, folder) for b in (block.first, block.second)]}
     return {
         "kind": "figure",
         "it": block,

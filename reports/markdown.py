@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from reports.atomic import write_text
-from reports.page import Block, FigureBlock, Page, PairBlock, Points, TableBlock, Text, cell_text
+from reports.page import Block, FigureBlock, Page, Points, TableBlock, Text, cell_text
 from reports.typeset import prose
 
 
@@ -44,12 +44,7 @@ def _block(block: Block, folder: Path) -> str:
     if isinstance(block, Text):
         return prose(block.text)
     if isinstance(block, Points):
-        return "\n".join(
-            f"{i}. {item}" if block.numbered else f"- {item}"
-            for i, item in enumerate(map(prose, block.items), 1)
-        )
-    if isinstance(block, PairBlock):
-        return "\n\n".join(_block(b, folder) for b in (block.first, block.second))
+        return "\n".join(f"- {item}" for item in map(prose, block.items))
     if isinstance(block, FigureBlock):
         picture = os.path.relpath(block.file, folder).replace(os.sep, "/")
         caption = prose(block.caption)

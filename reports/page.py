@@ -26,10 +26,9 @@ class Text:
 
 @dataclass(frozen=True)
 class Points:
-    """A list, numbered or not."""
+    """A list."""
 
     items: tuple[str, ...]
-    numbered: bool = False
 
 
 @dataclass(frozen=True)
@@ -94,15 +93,7 @@ class FigureBlock:
     half: bool = False
 
 
-@dataclass(frozen=True)
-class PairBlock:
-    """Two pictures side by side; one below the other where the page is narrow."""
-
-    first: FigureBlock
-    second: FigureBlock
-
-
-Block = Text | Points | TableBlock | FigureBlock | PairBlock
+Block = Text | Points | TableBlock | FigureBlock
 
 
 @dataclass(frozen=True)

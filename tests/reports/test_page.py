@@ -69,7 +69,7 @@ def page(tmp_path: Path) -> Page:
         ("**94 %** of the *time*, see `x < y`.",),
         (
             Section("One", (Text("A [file](t.csv) & <tag>."), table)),
-            Section("Two", (FigureBlock(picture, "A picture."), Points(("p", "q"), True))),
+            Section("Two", (FigureBlock(picture, "A picture."), Points(("p", "q")))),
             Section("Three", (Points(("r",)),)),
         ),
         {"t.csv": "the table"},
@@ -111,7 +111,7 @@ def test_markdown_tables_and_pictures(page: Page, tmp_path: Path) -> None:
     assert "| id | value [J] | verdict |\n| --- | ---: | --- |" in text
     assert "| a\\|b | \N{MINUS SIGN}1.235 | reproduced |" in text
     assert "![A picture.](figure.svg)" in text
-    assert "1. p\n2. q" in text
+    assert "- p\n- q" in text
     assert str(tmp_path) not in text
 
 

@@ -13,9 +13,9 @@ from reports.column import column
 from reports.errors import ReportError
 from reports.folder import staged
 from reports.html import write_html
-from reports.page import Block, FigureBlock, Page, PairBlock, Section, TableBlock, Text
-from reports.table import table_of
-from reports.typeset import unit_suffix, unit_text
+from reports.page import Block, FigureBlock, Page, Section, TableBlock, Text
+from reports.table import header_words, table_of
+from reports.typeset import unit_text
 from reports.writer import write_table
 
 #: Of the table and its files.
@@ -155,11 +155,9 @@ def page(both: Comparison, folder: Path) -> Page:
     last = *_same(same, "The same in both"), *_same(alone, f"No row in common, see `{NAME}.csv`")
     sections.append(Section("What came out", (*blocks, *last)))
     pairs = [
-        PairBlock(
-            FigureBlock(folder / "a" / name, f"A: {Path(name).stem.replace('_', ' ')}"),
-            FigureBlock(folder / "b" / name, "B"),
-        )
+        FigureBlock(folder / side / name, words, half=True)
         for name in both.figures
+        for side, words in (("a", f"A: {Path(name).stem.replace('_', ' ')}"), ("b", "B"))
     ]
     own = {x: [n for n, y in both.alone.items() if y == x] for x in "AB"}
     rest = [Text(f"In {x} alone: {', '.join(names)}.") for x, names in own.items() if names]
@@ -199,7 +197,8 @@ def _shown(both: Comparison, name: str) -> list[Pair]:
 def _block(both: Comparison, name: str, pairs: Sequence[Pair]) -> TableBlock:
     rows = tuple(
         (
-            f"{p.row}: {_words(p)}",
+            f"{p.row}: {header_words(p.quantity, p.unit)}"
+            + (f" [{unit_text(p.unit)}]" if _unit(p) else ""),
             *(x if x == x else None for x in (p.a, p.b, p.difference, p.ratio)),
         )
         for p in pairs
@@ -210,10 +209,3 @@ def _block(both: Comparison, name: str, pairs: Sequence[Pair]) -> TableBlock:
     caption = f"`{name}`: {which} of {shared} numbers that both have"
     caption += f"; {len(every) - shared} stand in one run alone." if len(every) > shared else "."
     return TableBlock(("what", "A", "B", "B − A", "B / A"), rows, caption, f"{NAME}.csv")
-
-
-def _words(pair: Pair) -> str:
-    """The words of a column's header, with the unit in brackets."""
-    suffix = unit_suffix(pair.unit)
-    words = pair.quantity.removesuffix(f"_{suffix}") if suffix else pair.quantity
-    return words.replace("_", " ") + (f" [{unit_text(pair.unit)}]" if _unit(pair) else "")
