@@ -95,9 +95,9 @@ def servo_input(log: Log) -> ServoInput:
     """
     goal, supply, gain = log.goal_position, log.supply, log.gain
     if goal is None or supply is None or gain is None:
-        named = {"goal positions": goal, "a supply voltage": supply}
-        named["the controller's gain_per_rad"] = gain
-        missing = " and ".join(name for name, value in named.items() if value is None)
+        names = ("goal positions", "a supply voltage", "the controller's gain_per_rad")
+        pairs = zip(names, (goal, supply, gain), strict=True)
+        missing = " and ".join(name for name, value in pairs if value is None)
         raise LogContentError(
             f"{log.name}: a forward simulation needs {missing}; name them in the mapping file"
         )

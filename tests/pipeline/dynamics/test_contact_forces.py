@@ -74,42 +74,6 @@ def test_no_other_distribution_has_less_tangential_force(feet: np.ndarray) -> No
         np.testing.assert_allclose(ours[:, :2].ravel(), least, atol=1e-9)
 
 
-def test_feet_that_would_pull_are_released() -> None:
-    """Weight over a corner of six feet: no normal force is negative, the wrench is met."""
-    weight = np.array([0.0, 0.0, 400.0])
-    point = np.array([0.26, 0.2, 0.0])
-    wrench = np.concatenate([weight, np.cross(point, weight)])
-    force = least_tangential_forces(wrench[None], SIX[None])[0]
-    assert force[:, 2].min() >= 0
-    np.testing.assert_allclose(wrench_of(SIX, force), wrench, atol=1e-9)
-
-
-def test_of_forces_that_meet_the_wrench_normals_have_the_least_squares() -> None:
-    """Where all feet press: the null space of what the ground leaves open adds to the sum."""
-    rng = np.random.default_rng(8)
-    for feet in (SIX, SIX[:4], SIX + [[0.1, -0.05, 0.0]]):
-        force = least_tangential_forces(random_wrench(feet, rng)[None], feet[None])[0]
-        assert force[:, 2].min() > 0
-        lift = np.vstack([np.ones(len(feet)), feet[:, 1], feet[:, 0]])
-        np.testing.assert_allclose(null_space(lift).T @ force[:, 2], 0.0, atol=1e-9)
-
-
-def test_released_feet_bear_nothing_and_the_rest_share_anew() -> None:
-    """Weight beyond the inner row of a tilted load: the far corner is let go first."""
-    weight = np.array([0.0, 0.0, 400.0])
-    for x, y in ((0.26, 0.2), (-0.26, 0.2), (0.26, -0.25), (-0.2, -0.25)):
-        wrench = np.concatenate([weight, np.cross([x, y, 0.0], weight)])
-        force = least_tangential_forces(wrench[None], SIX[None])[0]
-        np.testing.assert_allclose(wrench_of(SIX, force), wrench, atol=1e-9)
-        kept = force[:, 2] > 0
-        assert 3 <= kept.sum() < 6
-        assert not force[~kept, 2].any()
-        near = np.argmin(np.hypot(SIX[:, 0] - x, SIX[:, 1] - y))
-        assert force[:, 2].argmax() == near
-        lift = np.vstack([np.ones(kept.sum()), SIX[kept, 1], SIX[kept, 0]])
-        np.testing.assert_allclose(null_space(lift).T @ force[kept, 2], 0.0, atol=1e-9)
-
-
 def test_weight_beside_the_feet_leaves_one_that_would_pull() -> None:
     """It is for the caller to refuse; the wrench is met all the same."""
     wrench = weight_over([0.35, 0.1, 0.0])
