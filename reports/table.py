@@ -179,7 +179,7 @@ def wide_series(
         TableError: Shapes that do not fit, or headers that clash.
     """
     labels = labels or {}
-    columns: dict[str, Column] = {"time_s": time} | {h: v for h, (v, _) in labels.items()}
+    columns: dict[str, Column] = {"time_s": time, **{h: v for h, (v, _) in labels.items()}}
     meanings: dict[str, Meaning] = {
         "time_s": ("time; where it repeats, the left limit then the right limit", "s")
     }

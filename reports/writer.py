@@ -100,7 +100,7 @@ def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
             column = column.str.replace(_NUMBER, rf"\1{decimal}\2", regex=True)
         columns[header] = column
 
-    def shortest(value: float) -> str:
+    def shortest(value: Any) -> str:
         return repr(float(value)).removesuffix(".0").replace(".", decimal)
 
     separator = ";" if decimal == "," else ","

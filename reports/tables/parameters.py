@@ -42,6 +42,7 @@ def parameters(groups: Iterable[tuple[str, Iterable[Parameter]]]) -> Table:
     for owner, entries in groups:
         for p in entries:
             ends = [None, None] if p.interval is None else [from_si(x, p.unit) for x in p.interval]
+            low, high = ends
             given = (owner, p.name, p.value_as_written, p.unit, p.basis, p.source)
-            rows.append(InputRow(*given, *ends, p.reason))
+            rows.append(InputRow(*given, low, high, p.reason))
     return table_of(InputRow, rows, exact=True)

@@ -80,5 +80,8 @@ def standing_contacts(contacts: ContactForces) -> Table:
         contacts.friction_needed[0],
         strict=True,
     )
-    rows = [Foot(leg, *point, *force, needed) for leg, point, force, needed in places]
+    rows = [
+        Foot(leg, *(float(x) for x in (*point, *force, needed)))
+        for leg, point, force, needed in places
+    ]
     return table_of(Foot, rows)

@@ -146,8 +146,8 @@ def foot_tracking(legs: Sequence[FootTracking]) -> Table:
     """One row for each leg, and one more for each further direction that it lacks."""
     rows = []
     for leg in legs:
-        for direction in leg.cannot_move or ((None, None, None),):
-            head = (leg.leg, leg.joints, leg.directions, *direction)
+        for x, y, z in leg.cannot_move or ((None, None, None),):
+            head = (leg.leg, leg.joints, leg.directions, x, y, z)
             apart = (leg.deviation, leg.deviation_time)
             rows.append(TrackingRow(*head, *apart, leg.least_singular_value, leg.singular_time))
     return table_of(TrackingRow, rows)
