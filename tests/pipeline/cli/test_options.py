@@ -25,11 +25,12 @@ from tests.command_line import Command, exit_code, rows_of, sidecar_of, stand_an
 ROBOT = Path(__file__).parents[3] / "urdf" / "hexapod.toml"
 SPEC = load_robot_file(ROBOT)
 CATALOG = load_catalog()
+MACHINE = lw.load(ROBOT)
 NUMBERS = [*SPEC.parameters, *(f"{component}.{p.name}" for component, p in CATALOG.rows())]
 
 
 def with_changes(*changes: str) -> Settings:
-    return lw.load(ROBOT, changes=changes_of(changes)).ready
+    return MACHINE.with_values(changes_of(changes)).ready
 
 
 def outcome(change: str) -> tuple[Settings | None, str]:

@@ -1,0 +1,160 @@
+"""A loaded machine is changed without reading its files again, and asked often."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pipeline as lw
+from actuators.errors import ActuatorError
+from actuators.loading.build import CATALOG
+from pipeline.errors import PipelineError, RobotFileError
+from pipeline.logs.errors import GapError
+
+ROOT = Path(__file__).parents[3]
+KEY = "harmonic_drive.viscous"
+
+
+@pytest.fixture(scope="module")
+def opened() -> list[str]:
+    """Names of the files that this process opens, from now on."""
+    names: list[str] = []
+
+    def note(event: str, arguments: tuple[object, ...]) -> None:
+        if event == "open":
+            names.append(str(arguments[0]))
+
+    sys.addaudithook(note)  # stays: Python takes none away
+    return names
+
+
+@pytest.fixture(scope="module")
+def machine() -> lw.Machine:
+    return lw.load(ROOT / "urdf" / "hexapod.toml")
+
+
+@pytest.fixture(scope="module")
+def demand(machine: lw.Machine) -> lw.Demand:
+    return lw.demand(machine, samples=51)
+
+
+def total(machine: lw.Machine, demand: lw.Demand) -> float:
+    return float(lw.energy(machine, demand, "reversible")["reversible"].sum())
+
+
+def test_a_search_of_ten_thousand_energies_reads_no_file(
+    machine: lw.Machine, demand: lw.Demand, opened: list[str]
+) -> None:
+    better = machine.with_values({KEY: 1.0})
+    assert total(better, demand) < total(machine, demand)
+    opened.clear()
+    for _ in range(5000):
+        for one in (machine, better):
+            lw.energy(one, demand, "ideal")
+    for value in np.linspace(1.0, 20.0, 20):
+        lw.energy(machine.with_values({KEY: value}), demand)
+    machine.with_values({"gait.slope_forward": "3 deg", "standing.feet": ["lf", "lr", "rm"]})
+    assert opened == []
+    machine.path.read_text(encoding="utf-8")
+    assert opened == [str(machine.path)]
+
+
+def test_an_energy_is_the_one_of_the_walk(machine: lw.Machine, demand: lw.Demand) -> None:
+    walk = lw.walk(machine, samples=51)
+    frame = walk.energy.frame().set_index(["alternative", "leg"])["electrical_J"]
+    for name, joules in lw.energy(machine, demand).items():
+        assert joules.shape == (18,)
+        assert joules.sum() == pytest.approx(frame[name, "robot"], rel=1e-12)
+    shared = lw.energy(machine, demand, "rotor", regeneration="bus")["rotor"]
+    assert shared.shape == (1,)
+    assert shared.sum() < lw.energy(machine, demand, "rotor")["rotor"].sum()
+    assert list(demand.frame().columns) == list(walk.demand.frame().columns)
+
+
+def test_values_add_up_and_are_those_that_load_takes(machine: lw.Machine) -> None:
+    values = {"gait.slope_forward": "1 deg", KEY: 1.0, "hip_spacing": 300}
+    changed = machine
+    for name, value in values.items():
+        changed = changed.with_values({name: value})
+    loaded = lw.load(machine.path, changes=values)
+    assert changed.changes == loaded.changes == values
+    assert machine.changes == {}
+    one, other = (lw.demand(m, samples=51).series for m in (changed, loaded))
+    np.testing.assert_array_equal(one.torque, other.torque)
+    again = changed.with_values({KEY: 1.0})
+    assert again.ready.robot is changed.ready.robot
+    assert machine.with_values({"gait.lift": "60 mm"}).ready.bare.model is machine.ready.bare.model
+    with pytest.raises(PipelineError, match="did you mean 'hip_spacing'"):
+        machine.with_values({"hip_spacin": 1})
+
+
+def test_actuators_of_another_folder(
+    machine: lw.Machine, demand: lw.Demand, tmp_path: Path
+) -> None:
+    folder = shutil.copytree(CATALOG, tmp_path / "ours")
+    ours = machine.with_actuators(folder)
+    assert ours.ready.robot is machine.ready.robot
+    assert total(ours, demand) == total(machine, demand)
+    changed = lw.load(machine.path, actuators=folder, changes={KEY: 1.0})
+    assert total(ours.with_values({KEY: 1.0}), demand) == total(changed, demand)
+    with pytest.raises(ActuatorError, match="no such file"):
+        machine.with_actuators(tmp_path / "nowhere")
+
+
+def test_an_effect_is_that_of_a_model_file(
+    machine: lw.Machine, demand: lw.Demand, tmp_path: Path
+) -> None:
+    stiff = machine.with_effect(
+        "coulomb_friction", "rm_joint_1", {"torque": 2.0}, alternative="reversible"
+    )
+    more = total(stiff, demand) - total(machine, demand)
+    assert more > 0.1
+    both = stiff.with_effect("coulomb_friction", ["lm_joint_1"], {"torque": 2.0})
+    assert total(both, demand) == pytest.approx(total(machine, demand) + 2 * more, rel=1e-6)
+    read = lw.load(model=both.save(tmp_path / "model.toml"))
+    assert read.model is not None
+    assert [e.values for e in read.model.edits] == [{"torque": 2.0}] * 2
+    assert not read.model.changed
+    assert total(read, demand) == total(both, demand)
+
+
+@pytest.mark.parametrize(
+    ("effect", "place", "values"),
+    [
+        ("coulomb_frictoin", "rm_joint_1", {}),
+        ("coulomb_friction", "rm_joint_9", {"torque": 1.0}),
+        ("coulomb_friction", "rm_joint_1", {"torq": 1.0}),
+        ("coulomb_friction", "rm_joint_1", {"torque": -1.0}),
+    ],
+)
+def test_an_effect_that_cannot_be(
+    machine: lw.Machine, effect: str, place: str, values: dict[str, float]
+) -> None:
+    with pytest.raises(GapError) as error:
+        machine.with_effect(effect, place, values)
+    assert "\n" not in str(error.value)
+
+
+def test_a_bare_urdf_has_no_actuators_to_ask(demand: lw.Demand) -> None:
+    bare = lw.load(ROOT / "urdf" / "leg.urdf")
+    with pytest.raises(RobotFileError, match="has no actuators"):
+        lw.energy(bare, demand)
+    with pytest.raises(RobotFileError, match="on a stand"):
+        lw.demand(bare)
+
+
+def test_every_table_is_called_by_its_name(machine: lw.Machine) -> None:
+    results = (
+        lw.walk(machine, "rotor", samples=51, compare_forces=True),
+        lw.stand(machine, "rotor"),
+    )
+    for result in results:
+        assert {name: table.name for name, table in result.tables.items()} == {
+            name: name for name in result.tables
+        }
+        first = next(iter(result.tables))
+        assert result.table(first) is result.table(first)
