@@ -37,6 +37,7 @@ UNITS: Final[Mapping[str, Mapping[str, float]]] = {
     "density": {"kg/m^3": 1.0, "g/cm^3": 1e3},
     "power": {"W": 1.0, "mW": 1e-3},
     "energy": {"J": 1.0, "mJ": 1e-3, "Wh": 3600.0},
+    "specific energy": {"J/kg": 1.0, "Wh/kg": 3600.0},
     "current": {"A": 1.0, "mA": 1e-3},
     "voltage": {"V": 1.0, "mV": 1e-3},
     "resistance": {"ohm": 1.0, "mohm": 1e-3},

@@ -105,19 +105,20 @@ def option(name: str) -> str:
     return "--" + name.replace("_", "-")
 
 
-def read_entry(name: str, words: str) -> Number:
+def read_entry(name: str, words: str, entries: Mapping[str, Entry] = ENTRIES) -> Number:
     """One number of a sheet, or the factor of a choice.
 
     Args:
         name: Of `ENTRIES`.
         words: Number and unit, `LOW to HIGH UNIT` for what no sheet prints, or a choice.
+        entries: Those that there are.
 
     Raises:
         DataSheetError: No such entry, no number of its dimension, or one that cannot be.
     """
-    if name not in ENTRIES:
-        raise DataSheetError(f"no entry '{one_line(name)}': {closest(name, list(ENTRIES))}")
-    entry, words = ENTRIES[name], one_line(words)
+    if name not in entries:
+        raise DataSheetError(f"no entry '{one_line(name)}': {closest(name, list(entries))}")
+    entry, words = entries[name], one_line(words)
     if entry.choices:
         if words not in entry.choices:
             raise DataSheetError(f"{option(name)} '{words}': {closest(words, list(entry.choices))}")

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 
-from pipeline.cli import gap, robots, studies, walking
+from pipeline.cli import components, gap, robots, studies, walking
 from pipeline.cli.options import Run
 from pipeline.errors import PipelineError, StanceError
 
@@ -46,6 +46,7 @@ def parser() -> argparse.ArgumentParser:
         return sub
 
     robots.add_verbs(add)
+    components.add_verb(add)
     walking.add_verbs(add)
     gap.add_verb(add)
     studies.add_verbs(add)

@@ -1,0 +1,122 @@
+"""The verb `components`: parts that can be bought, listed, filtered and checked."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+from actuators.errors import CatalogError, DataSheetError, closest
+from actuators.loading.data_sheet import Number, read_entry
+from actuators.loading.parts import KINDS, PARTS, Part, load_parts, odd
+from pipeline.cli.options import AddVerb, named_path
+
+#: Columns of a list, by kind; a part without such an entry leaves its place empty.
+_SHOWN: Final[Mapping[str, Sequence[str]]] = {
+    "motor": ("supply_voltage", "torque_constant", "resistance", "continuous_current", "mass"),
+    "driver": ("most_voltage", "continuous_current", "idle_power", "mass"),
+    "brake": ("holding_torque", "release_power", "mass"),
+    "battery": ("specific_energy", "energy", "mass"),
+}
+_OF_GEARS: Final = ("gear_ratio", "gear_continuous_torque", "gear_efficiency", "gear_load", "mass")
+
+
+def add_verb(add: AddVerb) -> None:
+    """Declare the verb: names, kind, bounds and folder."""
+    sub = add("components", "parts that can be bought: list, filter, check", run_components)
+    sub.description = (
+        "List parts that can be bought, with what their data sheets print; with names, all of "
+        "each. `a to b` is not printed: a range of the part's class. Exit code 1: a part's "
+        "numbers contradict each other."
+    )
+    sub.add_argument("names", nargs="*", metavar="NAME", help="parts to show in full")
+    sub.add_argument("--kind", choices=[*KINDS], help="of this kind only")
+    for word, text in (("least", "at least"), ("most", "at most")):
+        sub.add_argument(
+            f"--{word}",
+            action="append",
+            default=[],
+            metavar="ENTRY=NUMBER",
+            help=f"only parts with {text} so much, such as 'mass=0.5 kg'",
+        )
+    sub.add_argument(
+        "--parts", type=named_path, default=PARTS, help="folder with KIND/NAME.toml of your own"
+    )
+
+
+def run_components(options: argparse.Namespace) -> int:
+    """List, filter, check.
+
+    Returns:
+        The exit code: 1 where a part contradicts itself.
+
+    Raises:
+        CatalogError: The folder cannot be used, or has no part of a name.
+        DataSheetError: A file or a bound cannot be read.
+    """
+    parts = load_parts(options.parts)
+    for name in options.names:
+        if name not in parts:
+            raise CatalogError(f"no part '{name}': {closest(name, [*parts])}")
+    chosen = [parts[name] for name in options.names] or [
+        p for p in parts.values() if options.kind in (None, p.kind) and _within(p, options)
+    ]
+    if not chosen:
+        raise CatalogError("no part is left: widen --kind, --least or --most")
+    if options.names:
+        print(_full(chosen))
+    else:
+        for kind in dict.fromkeys(p.kind for p in chosen):
+            print(_list([p for p in chosen if p.kind == kind]))
+    wrong = [f"{p.kind}/{p.name}.toml: {line}" for p in chosen for line in odd(p)]
+    print(f"{len(chosen)} of {len(parts)} parts; {len(wrong)} contradictions")
+    print(*wrong, sep="\n", end="\n" if wrong else "")
+    return int(bool(wrong))
+
+
+def _within(part: Part, options: argparse.Namespace) -> bool:
+    """Whether a part keeps all bounds; one that does not print an entry does not."""
+    for texts, sign in ((options.least, 1.0), (options.most, -1.0)):
+        for text in texts:
+            name, _, written = text.partition("=")
+            kinds = [kind for kind, entries in KINDS.items() if name in entries]
+            if not kinds or not written:
+                known = sorted({n for entries in KINDS.values() for n in entries})
+                hint = closest(name, known) if written else "expected ENTRY=NUMBER UNIT"
+                raise DataSheetError(f"'{text}': {hint}")
+            bound = read_entry(name, written, KINDS[kinds[0]]).value
+            own = part.printed.get(name)
+            if own is None or sign * (own.value - bound) < 0.0:
+                return False
+    return True
+
+
+def _list(parts: Sequence[Part]) -> str:
+    shown = _SHOWN.get(parts[0].kind, _OF_GEARS)
+    rows = [("name", *shown, "what it is")]
+    rows += [(p.name, *(_words(p, name) for name in shown), p.title) for p in parts]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]) - 1)]
+    lines = [
+        "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[-1]])
+        for row in rows
+    ]
+    return f"{parts[0].kind}\n" + "\n".join(lines) + "\n"
+
+
+def _words(part: Part, name: str) -> str:
+    return part.words.get(name, "")
+
+
+def _full(parts: Sequence[Part]) -> str:
+    out = []
+    for p in parts:
+        out.append(f"{p.name} ({p.kind}): {p.title}\n  {p.basis}: {p.source}")
+        out += [f"  note: {p.note}"] * bool(p.note)
+        for name, text in p.words.items():
+            entry = KINDS[p.kind][name]
+            out.append(f"  {name} = {text}{_si(p.printed[name])}  {entry.words}")
+    return "\n".join(out) + "\n"
+
+
+def _si(number: Number) -> str:
+    return "  (range)" if number.low < number.high else ""

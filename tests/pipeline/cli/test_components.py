@@ -1,0 +1,54 @@
+"""`components` as a user calls it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.actuators.test_parts import TEXT
+from tests.command_line import exit_code
+
+
+def test_listed_filtered_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
+    assert exit_code(["components"]) == 0
+    every = capsys.readouterr().out
+    assert exit_code(["components", "--kind", "motor", "--most", "mass=0.2 kg"]) == 0
+    few = capsys.readouterr().out
+    assert "maxon_148867" in every
+    assert "maxon_148867" not in few
+    assert 0 < few.count("\n") < every.count("\n") / 3
+    assert exit_code(["components", "maxon_148867"]) == 0
+    shown = capsys.readouterr().out
+    assert "torque_constant = 0.0302 N*m/A" in shown
+    assert "coulomb_share = 0.8 to 1  (range)" in shown
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["maxon_14886"], "no part 'maxon_14886': did you mean 'maxon_148867'"),
+        (["--most", "mas=1 kg"], "did you mean 'mass'"),
+        (["--most", "mass=1"], "'1' has no unit"),
+        (["--most", "mass"], "expected ENTRY=NUMBER UNIT"),
+        (["--least", "mass=900 kg"], "no part is left"),
+        (["--parts", "nowhere"], "nowhere: no such folder"),
+    ],
+)
+def test_refused_in_one_line(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], says: str
+) -> None:
+    assert exit_code(["components", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert says in said
+    assert said.count("\n") == 1
+
+
+def test_a_contradiction_of_ones_own_part_is_a_finding(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "motor").mkdir()
+    path = tmp_path / "motor" / "own.toml"
+    path.write_text(TEXT.replace("318 rpm/V", "100 rpm/V"), "utf-8")
+    assert exit_code(["components", "--parts", str(tmp_path)]) == 1
+    assert "motor/own.toml: --torque-constant" in capsys.readouterr().out
