@@ -20,10 +20,8 @@ from pipeline.paper.judgement.sensitivity import Index
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
-from reports.page import TableBlock
-from reports.pages.paper_sections import paper_sections
-from reports.pages.summary import measure_next
-from reports.pages.summary_words import first_paragraph
+from reports.pages import paper_sections
+from reports.pages.summary_words import first_paragraph, measure_next
 from reports.table import table_of
 from reports.tables import judgement as tables
 
@@ -158,16 +156,13 @@ def test_the_first_paragraph_names_what_is_fitted_predicted_contradicted_and_wha
 
 def test_the_page_lays_out_section_iv_a_and_what_is_left_out(shipped: Judged) -> None:
     judgement = shipped.judgement
-    conclusions = table_of(tables.ConclusionRow, judgement.conclusions)
-    found = [conclusions, tables.omissions(judgement.omissions)]
-    sentences, left_out = paper_sections({table.name: table for table in found})
-    rows = next(block for block in sentences.blocks if isinstance(block, TableBlock))
+    rows = paper_sections.sentences(table_of(tables.ConclusionRow, judgement.conclusions))
     assert rows.headers == ("sentence: ratio", "joint 1", "joint 2", "joint 3", "holds", "paper")
     assert len(rows.rows) == 10
     assert [row[4] for row in rows.rows].count("no") == 2
-    rows = next(block for block in left_out.blocks if isinstance(block, TableBlock))
+    rows, said = paper_sections.omissions(tables.omissions(judgement.omissions))
     assert rows.rows[0][1:3] == (pytest.approx(0.94, abs=1e-4), 0.0)
-    assert len(rows.rows) == len(judgement.omissions)
+    assert len(rows.rows) == len(said) == len(judgement.omissions)
     assert any(str(row[0]).endswith("0.672 W") for row in rows.rows)
 
 
