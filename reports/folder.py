@@ -192,7 +192,7 @@ def staged(
     Raises:
         OutputError: `out` cannot be written.
     """
-    with holding(out):
+    with holding(out), output_errors(out):
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=out))
         try:
             with output_errors(out, folder):

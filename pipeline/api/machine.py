@@ -62,7 +62,11 @@ class Machine:
         Raises:
             PipelineError: The robot stands on a fixed base, or an option is out of range.
         """
-        fixed = self.loaded is None or not self.loaded.robot.floating
+        if self.loaded is None:
+            raise RobotFileError(
+                f"{self.path}: a URDF says nothing of legs and gait; give a robot file"
+            )
+        fixed = not self.loaded.robot.floating
         if fixed and options.get("motion") is None:
             raise RobotFileError(
                 f"{self.path}: a robot on a stand neither stands nor walks; "

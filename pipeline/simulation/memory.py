@@ -10,7 +10,7 @@ from pipeline.errors import GaitError
 #: Peak of `walk`, measured over samples: per sample, segment and joint, and the same again for
 #: every actuator, a fifth more than was seen [bytes].
 PER_SAMPLE = 200
-PER_ALTERNATIVE = 300
+PER_ALTERNATIVE = 400
 SEGMENTS = 2
 #: Limits a container may set, and what of them is in use.
 _CGROUPS = (

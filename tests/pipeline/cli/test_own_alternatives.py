@@ -116,6 +116,6 @@ def test_standing_is_held_against_the_data_sheets_as_walking_is(
     assert "true" in _column(out / "standing_limits.csv", "breach")
     assert main(["stand", "--out", str(out)]) == 0
     first, *rest = capsys.readouterr().out.splitlines()
-    assert first.startswith("Whose motors: none are stated")
+    assert first.startswith("Whose motors: as stated for this robot")
     assert not any(line.startswith("Beyond") for line in rest)
     assert "true" not in _column(out / "standing_limits.csv", "breach")

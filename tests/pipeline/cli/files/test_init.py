@@ -55,11 +55,15 @@ def test_what_init_cannot_do_leaves_nothing(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_check_knows_published_robots_by_name(capsys: pytest.CaptureFixture[str]) -> None:
+def test_published_robots_are_known_by_name(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["check", "solo8"]) == 0
     assert "solo8: 62 of 62 checks passed" in capsys.readouterr().out
-    assert main(["walk", "--robot", "solo8"]) == 2
-    assert "`python -m pipeline init solo8` writes one" in capsys.readouterr().err
+    walk = ["walk", "--samples", "51", "--out", str(tmp_path), "--robot"]
+    assert main([*walk, "solo8"]) == 0
+    assert main([*walk, "solo21"]) == 2
+    assert capsys.readouterr().err == "solo21: no such file; name a robot file (TOML)\n"
 
 
 def test_python_loads_a_published_robot_by_name(tmp_path: Path) -> None:
@@ -68,7 +72,7 @@ def test_python_loads_a_published_robot_by_name(tmp_path: Path) -> None:
     assert named.path.name == "solo12.toml"
     made = lw.init("solo12", tmp_path / "solo12.toml")
     assert named.path.read_bytes() == made.path.read_bytes()
-    with pytest.raises(RobotFileError, match="solo21: no such robot file"):
+    with pytest.raises(RobotFileError, match="solo21: no such file; name a robot file"):
         lw.load("solo21")
 
 
