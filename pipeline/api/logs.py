@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,16 @@ from pipeline.logs.quality.finding import Finding
 from pipeline.progress import Progress
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.table import Table
+
+#: What every result of logs begins with: verb, tables, sidecar, inputs, machine, findings.
+_Common = tuple[
+    str,
+    dict[str, Table],
+    Callable[[], dict[str, Any]],
+    tuple[Path, ...],
+    Setup,
+    Sequence[Finding],
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,7 +308,7 @@ def analyse(
     refuse_own_urdf(given, options.out)
     step = options.step
 
-    def common(tables: Sequence[Table], findings: Sequence[Finding]) -> tuple[Any, ...]:
+    def common(tables: Sequence[Table], findings: Sequence[Finding]) -> _Common:
         verb = "gap" if step == "all" else f"gap {step}"
         inputs = tuple(inputs_of(options, given))
         return verb, by_name(tables), lambda: metadata(options, given), inputs, given, findings

@@ -100,7 +100,8 @@ def _breaches(table: Table, titles: Mapping[str, str]) -> list[str]:
         over.setdefault(str(c["quantity"][i]), []).append(i)
     said = []
     for quantity, rows in over.items():
-        worst = max(rows, key=lambda i: c["peak"][i] / c["limit"][i])
+        # Of alternatives that are alike the first, whatever their last digits are.
+        worst = max(rows, key=lambda i: round(c["peak"][i] / c["limit"][i], 9))
         name, count = str(c["alternative"][worst]), len({c["alternative"][i] for i in rows})
         every = len(set(c["alternative"]))
         others = f", {count} of {every} alternatives" if every > 1 else ""

@@ -84,8 +84,8 @@ def test_a_stopped_run_goes_on_and_judges(
     def fake_ask(folder: str, robot: str, out: str) -> dict[str, Any]:
         asked.append(Path(folder).name)
         if len(asked) == 2:
-            while not (tmp_path / "blind" / "answers.jsonl").exists():
-                time.sleep(0.01)  # the first answer is written by the process that asks
+            while '"result"' not in (tmp_path / "blind" / "answers.jsonl").read_text("utf-8"):
+                time.sleep(0.01)  # the first answer is written by the thread that waits
             raise KeyboardInterrupt
         _write_answer(Path(out), "")
         return {"code": 0, "seconds": 1.0, "message": ""}
