@@ -143,7 +143,7 @@ def test_a_bare_urdf_has_no_actuators_to_ask(demand: lw.Demand) -> None:
     bare = lw.load(ROOT / "urdf" / "leg.urdf")
     with pytest.raises(RobotFileError, match="has no actuators"):
         lw.energy(bare, demand)
-    with pytest.raises(RobotFileError, match="on a stand"):
+    with pytest.raises(RobotFileError, match="says nothing of legs and gait"):
         lw.demand(bare)
 
 
