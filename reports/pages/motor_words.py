@@ -101,7 +101,7 @@ def _breaches(table: Table, titles: Mapping[str, str]) -> list[str]:
     said = []
     for quantity, rows in over.items():
         # Of alternatives that are alike the first, whatever their last digits are.
-        worst = max(rows, key=lambda i: round(c["peak"][i] / c["limit"][i], 9))
+        worst = max(rows, key=lambda i: round(float(c["peak"][i] / c["limit"][i]), 9))
         name, count = str(c["alternative"][worst]), len({c["alternative"][i] for i in rows})
         every = len(set(c["alternative"]))
         others = f", {count} of {every} alternatives" if every > 1 else ""
