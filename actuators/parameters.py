@@ -17,8 +17,6 @@ from actuators.units import dimension, from_si, si_unit, to_si
 
 BASES: Final = ("published", "datasheet", "derived", "calibrated", "identified", "assumed")
 UNCERTAIN_BASES: Final = ("calibrated", "identified", "assumed")
-#: Without these a number cannot be judged.
-REQUIRED_KEYS: Final = ("value", "unit", "basis", "source")
 #: SI values beyond this overflow somewhere between here and the energies.
 LARGEST: Final = 1e9
 _SIGMAS_95: Final = 1.96

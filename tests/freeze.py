@@ -129,12 +129,13 @@ def keep(source: Path, target: Path) -> None:
 def freeze(target: Path, only: str) -> None:
     """Run everything, keep everything."""
     os.chdir(ROOT)
+    target.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as temporary:
         scratch = Path(temporary)
         for name, command in runs():
             if only not in name:
                 continue
-            (target / name).mkdir(parents=True, exist_ok=True)
+            (target / name).mkdir(exist_ok=True)
             (made := scratch / name).mkdir()
             said = run([word.replace("OUT", str(made / "run")) for word in command])
             (target / name / "printed.txt").write_text(said, "utf-8")

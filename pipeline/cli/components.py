@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from actuators.errors import CatalogError, DataSheetError, closest
-from actuators.loading.data_sheet import Number, read_entry
+from actuators.loading.data_sheet import read_entry
 from actuators.loading.parts import KINDS, PARTS, Part, load_parts, odd
 from pipeline.cli.options import AddVerb, named_path
 
@@ -58,8 +58,13 @@ def run_components(options: argparse.Namespace) -> int:
     for name in options.names:
         if name not in parts:
             raise CatalogError(f"no part '{name}': {closest(name, [*parts])}")
+    bounds = [
+        (name, number, sign)
+        for texts, sign in ((options.least, 1.0), (options.most, -1.0))
+        for name, number in map(_bound, texts)
+    ]
     chosen = [parts[name] for name in options.names] or [
-        p for p in parts.values() if options.kind in (None, p.kind) and _within(p, options)
+        p for p in parts.values() if options.kind in (None, p.kind) and _within(p, bounds)
     ]
     if not chosen:
         raise CatalogError("no part is left: widen --kind, --least or --most")
@@ -74,27 +79,28 @@ def run_components(options: argparse.Namespace) -> int:
     return int(bool(wrong))
 
 
-def _within(part: Part, options: argparse.Namespace) -> bool:
+def _bound(text: str) -> tuple[str, float]:
+    """An entry and its bound, SI."""
+    name, _, written = text.partition("=")
+    entries = {n: entry for kind in KINDS.values() for n, entry in kind.items()}
+    if name not in entries or not written:
+        hint = closest(name, sorted(entries)) if written else "expected ENTRY=NUMBER UNIT"
+        raise DataSheetError(f"'{text}': {hint}")
+    return name, read_entry(name, written, entries).value
+
+
+def _within(part: Part, bounds: Sequence[tuple[str, float, float]]) -> bool:
     """Whether a part keeps all bounds; one that does not print an entry does not."""
-    for texts, sign in ((options.least, 1.0), (options.most, -1.0)):
-        for text in texts:
-            name, _, written = text.partition("=")
-            kinds = [kind for kind, entries in KINDS.items() if name in entries]
-            if not kinds or not written:
-                known = sorted({n for entries in KINDS.values() for n in entries})
-                hint = closest(name, known) if written else "expected ENTRY=NUMBER UNIT"
-                raise DataSheetError(f"'{text}': {hint}")
-            bound = read_entry(name, written, KINDS[kinds[0]]).value
-            own = part.printed.get(name)
-            if own is None or sign * (own.value - bound) < 0.0:
-                return False
-    return True
+    return all(
+        name in part.printed and sign * (part.printed[name].value - bound) >= 0.0
+        for name, bound, sign in bounds
+    )
 
 
 def _list(parts: Sequence[Part]) -> str:
     shown = _SHOWN.get(parts[0].kind, _OF_GEARS)
     rows = [("name", *shown, "what it is")]
-    rows += [(p.name, *(_words(p, name) for name in shown), p.title) for p in parts]
+    rows += [(p.name, *(p.words.get(name, "") for name in shown), p.title) for p in parts]
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]) - 1)]
     lines = [
         "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[-1]])
@@ -103,20 +109,12 @@ def _list(parts: Sequence[Part]) -> str:
     return f"{parts[0].kind}\n" + "\n".join(lines) + "\n"
 
 
-def _words(part: Part, name: str) -> str:
-    return part.words.get(name, "")
-
-
 def _full(parts: Sequence[Part]) -> str:
     out = []
     for p in parts:
         out.append(f"{p.name} ({p.kind}): {p.title}\n  {p.basis}: {p.source}")
         out += [f"  note: {p.note}"] * bool(p.note)
         for name, text in p.words.items():
-            entry = KINDS[p.kind][name]
-            out.append(f"  {name} = {text}{_si(p.printed[name])}  {entry.words}")
+            range_ = "  (range)" if name in p.filled else ""
+            out.append(f"  {name} = {text}{range_}  {KINDS[p.kind][name].words}")
     return "\n".join(out) + "\n"
-
-
-def _si(number: Number) -> str:
-    return "  (range)" if number.low < number.high else ""

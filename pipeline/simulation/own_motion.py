@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from actuators.errors import closest
+from actuators.errors import closest, one_line
 from pipeline.errors import GaitError, InvalidMotionError
 from pipeline.motion.base_motion import base_quaternions, one_sign
 from pipeline.motion.gait import body_rotation, gait_table
@@ -66,8 +66,13 @@ def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
         return _motion(source, robot)
     try:
         table = pd.read_csv(source, comment="#")
-    except (OSError, ValueError) as error:
-        raise InvalidMotionError(f"{source}: no CSV that can be read: {error}") from None
+    except OSError as error:
+        raise InvalidMotionError(f"{source}: no CSV that can be read: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise InvalidMotionError(f"{source}: no CSV that can be read: it is not UTF-8") from None
+    except ValueError as error:
+        why = one_line(error).removeprefix("Error tokenizing data. C error: ")
+        raise InvalidMotionError(f"{source}: no CSV that can be read: {why}") from None
     try:
         return _motion(table, robot)
     except InvalidMotionError as error:

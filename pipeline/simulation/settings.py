@@ -166,6 +166,8 @@ class Settings:
                 f"--samples {samples}: at least {LEAST_SAMPLES} samples per half period are needed "
                 "for energies within 1 %"
             )
+        if motion is not None and samples != SAMPLES:
+            raise GaitError(f"--samples {samples}: a motion of its own has the samples of its file")
         if walks and motion is None:
             refuse_beyond_memory(samples, len(self.robot.joints), len(self.catalog.alternatives))
         spec = self.robot.spec

@@ -203,7 +203,7 @@ def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
                 tables["where"],
                 shown,
                 keep=whole,
-                caption="Measured less predicted before anything is added, all compared rows, the "
+                caption="Measured minus predicted before anything is added, all compared rows, the "
                 "largest part of the gap above the noise first.",
                 digits=3,
             ),

@@ -21,12 +21,12 @@ class ForwardRow:
 
     table: ClassVar = "forward"
     about: ClassVar = (
-        "Measured less simulated position; nothing but the first instant is taken from the log."
+        "Measured minus simulated position; nothing but the first instant is taken from the log."
     )
     model: str = column("what the model has that the one of the rows before has not")
     log: str = column("name of the log; all: of all logs together")
     joint: str = column("name of the joint")
-    position_rms_rad: float = column("root mean square of measured less simulated position", "rad")
+    position_rms_rad: float = column("root mean square of measured minus simulated position", "rad")
     position_mean_abs_rad: float = column("mean of its magnitude", "rad")
     position_largest_rad: float = column("largest magnitude", "rad")
     rows: int = column("rows compared", "1")

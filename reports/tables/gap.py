@@ -36,7 +36,7 @@ class WhereRow:
     """Where model and machine disagree."""
 
     table: ClassVar = "where"
-    about: ClassVar = "Measured less predicted, by joint and circumstance; ranked."
+    about: ClassVar = "Measured minus predicted, by joint and circumstance; ranked."
     rank: int = declared("1 is the largest part of the gap above the noise floor", "1")
     joint: str = declared("name of the joint")
     by: str = declared("what the rows are sorted by")

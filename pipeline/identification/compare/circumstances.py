@@ -61,7 +61,7 @@ class Where:
 
 
 def gap_of(m: Measurement, prediction: Prediction, channel: int = 0) -> Array:
-    """Measured less predicted effort at the log's bandwidth, NaN where masked, shape (N, J)."""
+    """Measured minus predicted effort at the log's bandwidth, NaN where masked, shape (N, J)."""
     rest = m.effort[..., channel] - m.lowpass(prediction.effort[..., channel])
     return np.where(m.mask, rest, np.nan)
 

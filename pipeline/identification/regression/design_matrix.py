@@ -185,7 +185,7 @@ def _edit(
 
 
 def residual(bench: Bench, prediction: Prediction, sigma: Array) -> dict[int, Array]:
-    """Measured less predicted effort, whitened, of every joint."""
+    """Measured minus predicted effort, whitened, of every joint."""
     m = bench.measurement
     predicted = m.smooth(prediction.effort)
     rows = bench.rows

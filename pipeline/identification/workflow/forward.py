@@ -41,7 +41,7 @@ class Drive:
 
     @property
     def miss(self) -> Array:
-        """Measured less simulated position, shape (N, J) [rad]; NaN where it was not measured."""
+        """Measured minus simulated position, shape (N, J) [rad]; NaN where it was not measured."""
         return self.log.position - self.rollout.position
 
 

@@ -33,7 +33,7 @@ class Course:
 
     Attributes:
         time: Shape (N,) [s].
-        rest: Measured less simulated effort, shape (N,).
+        rest: Measured minus simulated effort, shape (N,).
         simulated: Effort, shape (N,).
         q: Position [rad].
         v: Velocity [rad/s].

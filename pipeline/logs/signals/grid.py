@@ -41,11 +41,6 @@ class Grid:
     left: NDArray[np.intp] | None = None
     share: Array | None = None
 
-    @property
-    def resampled(self) -> bool:
-        """Whether values are interpolated."""
-        return self.left is not None
-
     def resample(self, values: Array) -> Array:
         """Values on the grid by linear interpolation, shape (M, C); NaN stays NaN."""
         if self.left is None or self.share is None:

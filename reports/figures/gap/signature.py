@@ -38,7 +38,7 @@ class Signature:
     Attributes:
         variable: Name with unit, for the axis.
         x: Shape (N,).
-        before: Measured less predicted without the effect, shape (N,).
+        before: Measured minus predicted without the effect, shape (N,).
         after: The same with it, shape (N,).
         noise_floor: Standard deviation of the noise.
         unit: Of the gap.
