@@ -14,9 +14,12 @@ import numpy as np
 import pinocchio as pin
 
 from actuators.errors import one_line
+from actuators.loading.build import CATALOG, load_catalog
 from pipeline.dynamics.gait_check import check_gait
 from pipeline.dynamics.stability import support_margin
 from pipeline.errors import PipelineError, RobotFileError
+from pipeline.machine.motors import Motors, motors_of
+from pipeline.machine.own_actuators import actuator_folder, own_actuators
 from pipeline.robot.check import Finding, check_robot
 from pipeline.robot.guess.guess import Guess, guess_robot
 from pipeline.robot.guess.pace import shorter
@@ -38,12 +41,14 @@ class Init:
         picture: Of the stance; its SVG lies beside it.
         guess: What was found, with reasons.
         findings: What `check` says of it.
+        motors: Which drive its joints: the robot's own where they are known, else assumed ones.
     """
 
     path: Path
     picture: Path
     guess: Guess
     findings: tuple[Finding, ...]
+    motors: Motors
 
 
 def init(
@@ -78,7 +83,7 @@ def init(
             raise type(error)(str(error).replace(str(temporary), str(path))) from None
         findings = (*check_robot(robot), *walked)
     picture = _draw(robot, path)
-    return Init(path, picture, guess, findings)
+    return Init(path, picture, guess, findings, _motors(path, guess.mass))
 
 
 @cache
@@ -119,6 +124,15 @@ def _walked(guess: Guess, path: Path, temporary: Path) -> tuple[Guess, Robot, li
     assert first is not None
     temporary.write_text(robot_text(first[0], path), encoding="utf-8")
     return first
+
+
+def _motors(path: Path, mass: float) -> Motors:
+    """Whose motors the file's joints have."""
+    spec = load_robot_file(path)
+    catalog = load_catalog(actuator_folder(spec) or CATALOG)
+    own = own_actuators(spec, catalog)
+    catalog = own.catalog(catalog)
+    return motors_of(catalog, own, own.every(catalog), spec.joints, mass, stated=False)
 
 
 def _draw(robot: Robot, path: Path) -> Path:

@@ -14,6 +14,7 @@ from pipeline.effects.model_file import Edit, EditParameter, ModelFile, new_mode
 from pipeline.effects.registry import effect_named
 from pipeline.errors import RobotFileError
 from pipeline.logs.errors import EffectError
+from pipeline.machine.own_actuators import without_folder
 from pipeline.robot.published import published_names
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Files, Settings, read_files, settings
@@ -93,8 +94,9 @@ class Machine:
         Raises:
             ActuatorError: A file of the folder cannot be used.
         """
-        path = Path(folder)
-        return self._of(replace(self.files, catalog=load_catalog(path), actuators=path))
+        path, spec = Path(folder), self.files.spec
+        files = replace(self.files, catalog=load_catalog(path), actuators=path)
+        return self._of(replace(files, spec=spec and without_folder(spec)))
 
     def with_effect(
         self,

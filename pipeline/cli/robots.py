@@ -65,9 +65,12 @@ def run_init(options: argparse.Namespace) -> int:
         The exit code: 1 where `check` fails or no stroke was found.
     """
     from pipeline.api.init import init
+    from reports.pages.motor_words import motors_text
+    from reports.typeset import plain
 
     done = init(options.source, options.out, feet=options.foot, base=options.base)
     guess, stance, pace = done.guess, done.guess.stance, done.guess.pace
+    print(plain(motors_text(done.motors)))
     print(f"{done.path}: {len(guess.limbs)} legs, {guess.mass:.4g} kg, base '{guess.base_link}'")
     for limb, (x, y, z) in zip(guess.limbs, stance.feet, strict=True):
         side = "left" if y >= 0 else "right"

@@ -1,7 +1,8 @@
 """Joints with actuators of their own: the robot file's table `[actuators]`.
 
     [actuators]
-    folder = "our_actuators"            # actuator files, from the robot file; the catalogue's else
+    folder = "our_actuators"            # actuator files, from the robot file; the catalogue's else;
+                                        # "known:solo12" is a folder of urdf/actuators
     alternative = "reversible"          # how the machine is built, where it is one of them
     source = "..."                      # who says that these are its motors
 
@@ -42,6 +43,7 @@ from actuators.units import dimension
 from pipeline.errors import RobotFileError
 from pipeline.machine.drivetrains import Actuators, Drivetrains
 from pipeline.machine.joint import JointModel, joints_of
+from pipeline.robot.guess.motors import KNOWN_SCHEME, known_folder
 from pipeline.robot.robot_file import RobotSpec
 
 #: The alternative of a machine whose joints are built as different ones.
@@ -172,10 +174,21 @@ def actuator_folder(spec: RobotSpec) -> Path | None:
     folder = _written(spec).folder
     if folder is None:
         return None
+    if folder.startswith(KNOWN_SCHEME):
+        return known_folder(folder, f"{spec.path}: actuators.folder")
     path = spec.path.parent / folder
     if not path.is_dir():
         raise RobotFileError(f"{spec.path}: actuators.folder: no folder '{one_line(path)}'")
     return path
+
+
+def without_folder(spec: RobotSpec) -> RobotSpec:
+    """The robot without its actuators where another folder is taken for theirs.
+
+    Alternatives and numbers of ``[actuators]`` are of the folder that the table names; a table that
+    names none speaks of whichever folder is taken, and stays.
+    """
+    return replace(spec, actuator_table={}) if _written(spec).folder is not None else spec
 
 
 def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:

@@ -15,7 +15,12 @@ from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.drivetrains import Actuators
 from pipeline.machine.motors import Motors, motors_of
-from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
+from pipeline.machine.own_actuators import (
+    OwnActuators,
+    actuator_folder,
+    own_actuators,
+    without_folder,
+)
 from pipeline.motion.gait import gait_table
 from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.motion import Motion
@@ -87,6 +92,8 @@ def read_files(
     spec = None
     if path.suffix.lower() != ".urdf":
         spec = spec_with_gait(path, gait)
+        if actuators:
+            spec = without_folder(spec)
         actuators = actuators or actuator_folder(spec)
     elif not path.is_file():
         raise RobotFileError(f"{path}: no such robot file; name a robot file or URDF")

@@ -15,6 +15,7 @@ from pipeline.errors import RobotFileError
 from pipeline.robot.check import refused
 from pipeline.robot.guess.frame import refuse_turned
 from pipeline.robot.guess.limbs import Limb, find_limbs
+from pipeline.robot.guess.motors import KnownMotors, known_motors, names_of
 from pipeline.robot.guess.pace import Pace, find_pace
 from pipeline.robot.guess.source import Source, source_of, standing_pose
 from pipeline.robot.guess.stance import Margin, Stance, Standing
@@ -40,6 +41,7 @@ class Guess:
         stance: Where it stands.
         pace: How it walks; None where no stroke was found.
         mass: Of all links [kg].
+        motors: Of the joints; None where nobody knows them.
     """
 
     source: Source
@@ -49,6 +51,7 @@ class Guess:
     stance: Stance
     pace: Pace | None
     mass: float
+    motors: KnownMotors | None = None
 
 
 def guess_robot(
@@ -101,7 +104,8 @@ def guess_robot(
         pace = find_pace(chains, stance, standing.limits)
     else:
         stance, pace = _searched(standing)
-    return Guess(source, root, limbs, held, stance, pace, mass)
+    motors = known_motors(names_of(source.name, source.text), of_legs)
+    return Guess(source, root, limbs, held, stance, pace, mass, motors)
 
 
 def _refuse_stuck(model: pin.Model, joints: Sequence[str], where: str) -> None:

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import tomlkit
 from numpy.typing import NDArray
 
 from pipeline.robot.guess.guess import Guess
@@ -62,7 +63,14 @@ def robot_text(guess: Guess, out: Path) -> str:
     lines += ["", "[assumed]"]
     lines += [f"{_text(key)} = {_text(reason)}" for key, reason in assumed.items()]
     lines += _parameters(guess)
-    return "\n".join(lines) + "\n"
+    text = "\n".join(lines) + "\n"
+    return text + _motors(guess) if guess.motors else text
+
+
+def _motors(guess: Guess) -> str:
+    """The joints' actuators, as the project knows them."""
+    assert guess.motors is not None
+    return "\n" + tomlkit.dumps({"actuators": dict(guess.motors.table)})
 
 
 def _gait(guess: Guess) -> list[str]:

@@ -1,0 +1,88 @@
+"""Robots whose motors are known: a folder of actuator files for each, found by the robot's name."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+from pydantic import Strict
+
+from actuators.checked import Names, Table, Text, checked
+from actuators.errors import closest, one_line
+from pipeline.errors import RobotFileError
+from pipeline.robot.robot_file import read_toml
+
+#: Folders of actuator files of robots, and the table that says whose they are.
+KNOWN: Final = Path(__file__).resolve().parents[3] / "urdf" / "actuators"
+TABLE: Final = KNOWN / "known.toml"
+#: How a robot file names such a folder: ``known:solo12``.
+KNOWN_SCHEME: Final = "known:"
+
+
+class _Known(Table):
+    """An entry of the table; what it has beyond names is written into robot files."""
+
+    robots: Names
+    joints: Names
+    alternative: Text
+    source: Text
+    joint: Annotated[tuple[dict[str, Any], ...], Strict(False)] = ()
+
+
+@dataclass(frozen=True)
+class KnownMotors:
+    """Motors of a known robot.
+
+    Attributes:
+        name: Of the folder.
+        table: ``[actuators]`` of its robot file.
+    """
+
+    name: str
+    table: Mapping[str, Any]
+
+
+def known_motors(names: Sequence[str], joints: Sequence[str]) -> KnownMotors | None:
+    """The motors of a robot; None where nobody knows them.
+
+    Args:
+        names: By which the robot may be known.
+        joints: Of its legs; all must be among those whose motors are known, and all of those there.
+
+    Raises:
+        RobotFileError: The table cannot be used.
+    """
+    for name, entry in read_toml(TABLE).items():
+        known = checked(_Known, entry, f"{TABLE.name}: {name}", RobotFileError)
+        each = [[fnmatchcase(joint, pattern) for joint in joints] for pattern in known.joints]
+        whole = all(map(any, each)) and all(map(any, zip(*each, strict=True)))
+        if whole and not set(names).isdisjoint(known.robots):
+            table = {key: entry[key] for key in ("alternative", "source", "joint") if key in entry}
+            return KnownMotors(name, {"folder": KNOWN_SCHEME + name, **table})
+    return None
+
+
+def names_of(name: str, urdf: str) -> tuple[str, str]:
+    """The names of a robot: by which it was asked for, and the URDF's own."""
+    return name, ET.fromstring(urdf.encode()).get("name", "")
+
+
+def known_folder(folder: str, where: str) -> Path:
+    """The folder of actuator files that ``known:NAME`` means.
+
+    Args:
+        folder: As written.
+        where: File and key, for messages.
+
+    Raises:
+        RobotFileError: There is none of that name.
+    """
+    name = folder.removeprefix(KNOWN_SCHEME)
+    known = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
+    if name not in known:
+        raise RobotFileError(f"{where}: no known robot '{one_line(name)}'; {closest(name, known)}")
+    return KNOWN / name

@@ -1,0 +1,91 @@
+"""Robots come with their own motors where these are public, and no other robot gets them."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+import pipeline as lw
+from actuators.loading.build import load_catalog
+from pipeline.cli.main import main
+from pipeline.errors import RobotFileError
+from pipeline.machine.own_actuators import actuator_folder
+from pipeline.robot.guess.motors import KNOWN, TABLE, known_motors
+from pipeline.robot.robot_file import load_robot_file, read_toml
+
+SOLO = [f"{leg}_{joint}" for leg in ("FL", "FR", "HL", "HR") for joint in ("HAA", "HFE", "KFE")]
+
+
+def test_a_robot_is_known_by_its_name_and_all_of_its_joints() -> None:
+    found = known_motors(("solo12",), SOLO)
+    assert found is not None
+    assert found.table["folder"] == "known:solo12"
+    assert found.table["source"]
+    assert known_motors(("mine", "solo"), SOLO) is not None  # by the URDF's own name
+    assert known_motors(("mine", "yours"), SOLO) is None
+    assert known_motors(("solo12",), [*SOLO, "arm"]) is None
+    assert known_motors(("solo12",), [j for j in SOLO if not j.endswith("HAA")]) is None  # Solo8
+
+
+def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_from() -> None:
+    folders = sorted(path.name for path in KNOWN.iterdir() if path.is_dir())
+    table = read_toml(TABLE)
+    assert sorted(table) == folders
+    for name in folders:
+        catalog = load_catalog(KNOWN / name)
+        assert set(catalog.alternatives) == {"ideal", table[name]["alternative"]}
+        for _, number in catalog.rows():
+            assert number.basis in ("published", "datasheet", "derived", "identified", "assumed")
+            assert number.source
+
+
+def test_go2s_calf_turns_its_motor_faster_by_the_quotient_of_the_urdfs_limits() -> None:
+    motors = lw.load("go2").ready.motors
+    assert motors.stated
+    assert motors.ratio == (6.33, pytest.approx(6.33 * 45.43 / 23.7, rel=1e-3))
+
+
+def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constant() -> None:
+    """Closed form: joule heat is sum (tau / n - friction)^2 R / k^2, within what friction holds."""
+    machine = lw.load("solo12")
+    standing = lw.stand(machine, actuator="solo12").result
+    torque = standing.demand.torque[0]
+    motor = machine.ready.catalog.components["motor"].parameters
+    per_watt = motor["resistance"] / (9 * motor["torque_constant"]) ** 2  # [W/(N*m)^2]
+    most = per_watt * float((torque**2).sum())
+    power = float(standing.holding["solo12"].power.sum())
+    assert 0.5 * most < power < most
+    assert math.isclose(per_watt, 6.89, rel_tol=1e-3)
+
+
+def test_init_says_first_whose_motors_they_are(
+    tmp_path: Path, sketched: None, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["init", "solo12", "--out", str(tmp_path / "solo12.toml")]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("Whose motors: as stated for this robot, T-Motor Antigravity 4004")
+    assert main(["init", "a1", "--out", str(tmp_path / "a1.toml")]) == 0
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first.startswith("Whose motors: none are stated for this robot; assumed at every joint")
+    assert "maxon RE 40" in first
+    assert "400:1" in first
+
+
+def test_another_folder_takes_the_place_of_the_known_one(root: Path) -> None:
+    folder = root / "tests" / "pipeline" / "data_files" / "xl330_actuators"
+    by_option = lw.load("solo12", actuators=folder)
+    assert by_option.ready.own.usual == ""
+    assert (
+        by_option.ready.catalog.alternatives
+        == lw.load("solo12").with_actuators(folder).ready.catalog.alternatives
+    )
+
+
+def test_a_misspelt_known_robot_is_one_line(root: Path, tmp_path: Path) -> None:
+    text = (root / "urdf" / "solo12.toml").read_text("utf-8")
+    path = tmp_path / "solo12.toml"
+    path.write_text(text.replace("known:solo12", "known:solo21"), encoding="utf-8")
+    with pytest.raises(RobotFileError, match="no known robot 'solo21'; did you mean 'solo12'"):
+        actuator_folder(load_robot_file(path))
