@@ -27,6 +27,7 @@ _BEGUN: Final[dict[str, dict[str, float]]] = {
     },
     "gap": {
         "loading": 0.0,
+        "reading foreign files": 0.05,
         "reading and judging the logs": 0.1,
         "simulating the logs' motion": 0.2,
         "driving the model by its servos": 0.3,

@@ -8,7 +8,7 @@ from typing import Any
 
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
-from pipeline.logs.reading.table_file import sha256
+from pipeline.logs.formats.convert import sha256
 
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 

@@ -30,6 +30,7 @@ from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
 from pipeline.identification.workflow.story import Story, Told, tell
 from pipeline.identification.workflow.validate import check
+from pipeline.logs.formats.convert import plain
 from pipeline.logs.quality.finding import Finding
 from pipeline.progress import Progress
 from pipeline.simulation.found_bodies import FoundBodies
@@ -304,6 +305,10 @@ def analyse(
     """
     progress = progress or Progress()
     check_options(options, known)
+    progress.step("reading foreign files")
+    logs = (*options.logs, *options.holdout)
+    for k, path in enumerate(logs):
+        plain(path, lambda share, k=k: progress.done((k + share) / len(logs)))  # type: ignore[misc]
     given = setup(options, known)
     refuse_own_urdf(given, options.out)
     step = options.step

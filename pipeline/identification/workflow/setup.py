@@ -19,6 +19,7 @@ from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.mimics import mimics_in, refuse_moved
 from pipeline.identification.workflow.options import Options
 from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
+from pipeline.logs.formats.convert import is_log, sha256
 from pipeline.logs.prepared.contact import Contact, find_contact
 from pipeline.logs.prepared.parts import Parts, split
 from pipeline.logs.prepared.prepare import Prepared
@@ -29,7 +30,6 @@ from pipeline.logs.reading.expected import Expected, expected_of_model, expected
 from pipeline.logs.reading.log import EFFORTS, Log
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.logs.reading.plan import plan_reading
-from pipeline.logs.reading.table_file import sha256
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.motors import Motors, motors_of
@@ -388,9 +388,9 @@ def check_options(options: Options, known: ModelFile | None = None) -> None:
     if not options.logs:
         raise LogContentError(f"gap {options.step}: no log given; name a CSV or Parquet file")
     for path in (*options.logs, *options.holdout):
-        if path.is_dir():
+        if path.is_dir() and not is_log(path):
             raise LogContentError(f"{path}: is a folder; name its CSV or Parquet files")
-        if not path.is_file():
+        if not is_log(path):
             raise LogContentError(f"{path}: no such log; name a CSV or Parquet file")
     _refuse_twice((*options.logs, *options.holdout))
     for file, what, error in (

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.logs.errors import LogContentError
+from pipeline.logs.formats.convert import sha256
 from pipeline.logs.prepared.contact import Contact
 from pipeline.logs.prepared.informative import STRETCH, Scan, choose, scan
 from pipeline.logs.prepared.prepare import Prepared, prepare
@@ -21,7 +22,7 @@ from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.mapping import Mapping as MappingFile
 from pipeline.logs.reading.read import read_log, stream_log
-from pipeline.logs.reading.table_file import TableFile, open_table, row_count, sha256
+from pipeline.logs.reading.table_file import TableFile, open_table, row_count
 
 Array = NDArray[np.float64]
 #: Refusals that concern a log as a whole and not a chunk of it.

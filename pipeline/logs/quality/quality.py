@@ -280,6 +280,8 @@ def _as_read(log: Log, found: Findings) -> None:
     """What reading saw: sides of gears, repeated times, headers that were not used."""
     for column, remark in log.remarks.items():
         found.note(column, "side", 1, "1", "warning", remark)
+    for remark in log.told:
+        found.note("", "file", 1, "1", "warning", remark)
     if log.repeated_times:
         detail = f"{log.repeated_times} rows with the time of the row before were dropped"
         found.note("time_s", "repeated_times", log.repeated_times, "1", "warning", detail)

@@ -81,6 +81,7 @@ class Log:
         left_out: Joints that cannot be compared, and why.
         remarks: Columns about which a reader should know something, and that.
         repeated_times: Rows that were dropped because their time stood in the row before.
+        told: What a reader should know of the file as a whole.
         derived: Channels that were computed from others by the mapping, with the formula.
         sha256: Of the file.
         source: The file's name.
@@ -120,6 +121,7 @@ class Log:
     left_out: Mapping[str, str] = field(default_factory=dict)
     remarks: Mapping[str, str] = field(default_factory=dict)
     repeated_times: int = 0
+    told: tuple[str, ...] = ()
     derived: Mapping[str, str] = field(default_factory=dict)
     sha256: str = ""
     source: Path = Path()

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from actuators.errors import one_line
 from actuators.units import from_si
 from pipeline.logs.errors import LogContentError
+from pipeline.logs.formats.convert import sha256
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import EFFORTS, Log
 from pipeline.logs.reading.log_format import TIME, Target, column_name, parse_column
 from pipeline.logs.reading.mapping import ColumnTable, Mapping
 from pipeline.logs.reading.plan import ReadingPlan, plan_reading
 from pipeline.logs.reading.sides import sides_of
-from pipeline.logs.reading.table_file import read_columns, sha256, stream_columns
+from pipeline.logs.reading.table_file import read_columns, stream_columns
 
 Array = NDArray[np.float64]
 _LARGEST: Final = 1e9  # nothing a robot measures is larger in the log's units
@@ -101,6 +102,7 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
         left_out=left_out,
         remarks={column_name(j, "motor_position"): text for j, text in sides.remarks.items()},
         repeated_times=int((~fresh).sum()),
+        told=plan.table.remarks,
         gain=plan.rule.gain_per_rad,
         torque_off_bridge=mapping.controller.torque_off_bridge,
         constants={name: quantity.si for name, quantity in plan.rule.constants.items()},

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import hashlib
 import io
 import re
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 
 from actuators.errors import one_line
 from pipeline.logs.errors import LogFormatError
+from pipeline.logs.formats.convert import plain
 from pipeline.logs.reading.mapping import CsvTable
 
 Array = NDArray[np.float64]
@@ -29,16 +29,20 @@ class TableFile:
     """A file of columns whose header has been read.
 
     Attributes:
-        path: The file.
+        path: The file, or the folder of a bag.
         header: Column names, unique.
-        parquet: Whether it is Parquet; else CSV.
+        parquet: Whether its data are Parquet; else CSV.
         dialect: Of a CSV file.
+        data: What is read: the file, or what was made of it where it is neither CSV nor Parquet.
+        remarks: What a reader should know of how that was made.
     """
 
     path: Path
     header: tuple[str, ...]
     parquet: bool
     dialect: CsvTable
+    data: Path
+    remarks: tuple[str, ...] = ()
 
     @property
     def where(self) -> str:
@@ -46,17 +50,11 @@ class TableFile:
         return one_line(self.path.name)
 
 
-def sha256(path: Path) -> str:
-    """SHA-256 of a file's bytes, in hexadecimal."""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
 def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
-    """Open a CSV or Parquet file and read its header.
+    """Open a file of columns and read its header.
 
     Args:
-        path: The file; Parquet is recognised by its first bytes, not by its name.
+        path: CSV, Parquet, or what becomes such a table; kinds are told by their first bytes.
         dialect: Of a CSV file; the log format's own by default.
 
     Raises:
@@ -67,19 +65,20 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
 
     where, dialect = one_line(path.name), dialect or CsvTable()
     try:
-        with path.open("rb") as stream:
+        made = plain(path)
+        with made.path.open("rb") as stream:
             head = stream.read(_HEADER_BYTES)
     except OSError as error:
         raise LogFormatError(
             f"{one_line(path)}: cannot be read ({error.strerror or 'no such file'}); give a log "
-            "as CSV or Parquet"
+            "as CSV, Parquet or bag"
         ) from None
     if not head.strip():
         raise LogFormatError(f"{where}: the file is empty; give a log as CSV or Parquet")
     parquet = head.startswith(b"PAR1")
     if parquet:
         try:
-            names = [str(name) for name in pq.read_schema(path).names]
+            names = [str(name) for name in pq.read_schema(made.path).names]
         except (pa.ArrowException, OSError, ValueError) as error:
             reason = f"not a readable Parquet file ({one_line(error)})"
             raise LogFormatError(f"{where}: {reason}") from None
@@ -90,7 +89,7 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
             raise LogFormatError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
         if not name:
             raise LogFormatError(f"{where}: column {k} has no name; give it one in line 1")
-    return TableFile(path, tuple(names), parquet, dialect)
+    return TableFile(path, tuple(names), parquet, dialect, made.path, made.remarks)
 
 
 def _csv_header(head: bytes, dialect: CsvTable, where: str) -> list[str]:
@@ -141,7 +140,7 @@ def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
 
     with _reported(table):
         if table.parquet:
-            data = pq.read_table(table.path, columns=list(columns))
+            data = pq.read_table(table.data, columns=list(columns))
         else:
             try:
                 data = _read_csv(table, columns, threads=True)
@@ -169,7 +168,7 @@ def stream_columns(
     # Without a memory map or pre-buffering, one row group at a time is in memory.
     with (
         _reported(table),
-        pq.ParquetFile(table.path, memory_map=False, pre_buffer=False) as file,
+        pq.ParquetFile(table.data, memory_map=False, pre_buffer=False) as file,
     ):
         for batch in file.iter_batches(batch_size=rows, columns=list(columns)):
             whole = pa.table(batch)
@@ -186,8 +185,8 @@ def row_count(table: TableFile) -> int:
 
     if table.parquet:
         with _reported(table):
-            return int(pq.read_metadata(table.path).num_rows)
-    with table.path.open("rb") as stream:
+            return int(pq.read_metadata(table.data).num_rows)
+    with table.data.open("rb") as stream:
         blocks = iter(lambda: stream.read(1 << 22), b"")
         return max(0, sum(block.count(b"\n") for block in blocks) - 1)
 
@@ -213,7 +212,7 @@ def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool) -> Any
 
     kinds = {n: pa.string() if n.endswith("__contact") else pa.float64() for n in columns}
     return pc.read_csv(
-        table.path,
+        table.data,
         read_options=pc.ReadOptions(
             column_names=list(table.header), skip_rows=1, use_threads=threads
         ),
