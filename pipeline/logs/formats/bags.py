@@ -32,7 +32,7 @@ _DYNAMIC_TYPES: Final = {
     "control_msgs/InterfaceValue[] interface_values\n",
 }
 _BATCH: Final = 2048  # messages of one length that are read together
-_NEEDS: Final = (
+NEEDS: Final = (
     "reading bags, MATLAB 7.3 and HDF5 files needs the extra 'bags': pip install -e '.[bags]'"
 )
 
@@ -77,7 +77,7 @@ def read_bag(path: Path, spool: Spool, done: Callable[[float], None]) -> None:
         from rosbags.rosbag2 import ReaderError as ReaderError2
         from rosbags.serde import SerdeError
     except ImportError:
-        raise LogFormatError(f"{one_line(path.name)}: {_NEEDS}") from None
+        raise LogFormatError(f"{one_line(path.name)}: {NEEDS}") from None
     where = one_line(path.name)
     try:
         with ExitStack() as stack:

@@ -9,11 +9,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any, Final
 
 from actuators.errors import one_line
 from pipeline.logs.errors import LogFormatError
+from pipeline.logs.formats.arrays import read_arrays
 from pipeline.logs.formats.bags import SUFFIXES, read_bag
 from pipeline.logs.formats.spool import Spool
 
@@ -23,6 +24,10 @@ _BEGINNINGS: Final = {
     b"\x89MCAP0\r\n": ".mcap",
     b"SQLite format 3\x00": ".db3",
     b"#ROSBAG V2.0": ".bag",
+    b"MATLAB 5.0 MAT": ".mat",
+    b"MATLAB 7.3 MAT": ".mat",
+    b"\x89HDF\r\n\x1a\n": ".h5",
+    b"PK\x03\x04": ".npz",
     b"\x1f\x8b": ".gz",
     b"\x28\xb5\x2f\xfd": ".zst",
 }
@@ -84,9 +89,7 @@ def plain(path: Path, done: Done = lambda share: None) -> Plain:
     facts = [(file.stat().st_size, file.stat().st_mtime_ns) for file in files]
     key = (path.resolve(), *facts)
     if key not in _MADE:
-        target = Path(_folder().name) / f"{len(_MADE)}"
-        target.mkdir()
-        _MADE[key] = _converted(path, ending, target, done)
+        _MADE[key] = _converted(path, ending, Path(mkdtemp(dir=_folder().name)), done)
     return _MADE[key]
 
 
@@ -104,7 +107,8 @@ def _ending(path: Path) -> str:
     """By its content, the ending that a foreign file should have; empty for CSV and Parquet."""
     with path.open("rb") as stream:
         head = stream.read(16)
-    return next((end for start, end in _BEGINNINGS.items() if head.startswith(start)), "")
+    known = (end for start, end in _BEGINNINGS.items() if head.startswith(start))
+    return next(known, ".mat" if path.suffix == ".mat" else "")  # MATLAB 4 begins with no mark
 
 
 def _converted(path: Path, ending: str, target: Path, done: Done) -> Plain:
@@ -112,11 +116,13 @@ def _converted(path: Path, ending: str, target: Path, done: Done) -> Plain:
         inner = target / (path.stem if path.suffix == ending else path.name)
         _unpack(path, ending, inner)
         return plain(inner, done)
+    out = target / "table.parquet"
+    if ending in (".mat", ".h5", ".npz"):
+        return Plain(out, tuple(read_arrays(path, ending, out)))
     if path.is_file() and path.suffix != ending:  # rosbags goes by endings
         link = target / f"{path.name}{ending}"
         link.symlink_to(path.resolve())
         path = link
-    out = target / "table.parquet"
     with Spool(target) as spool:
         read_bag(path, spool, done)
         return Plain(out, tuple(spool.write(out)))

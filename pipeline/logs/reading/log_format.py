@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Final
 
@@ -38,6 +39,8 @@ _UNIT_SUFFIXES: Final = frozenset(
     {"", "degrees", "radians", "Ncm", "nm"}
     | {unit.replace("*", "").replace("/", "_").replace("^", "") for unit in known_units()}
 )
+#: How PlotJuggler calls a joint's numbers, e.g. `/joint_states/hip/position`.
+_PLOTTED: Final = re.compile(r"/?(?:.*/)?joint_states/(.+)/(position|velocity|effort)")
 
 
 @dataclass(frozen=True)
@@ -97,6 +100,16 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
             if quantity.startswith(attribute) and written in _UNIT_SUFFIXES:
                 raise LogFormatError(_unit_message(column, f"{owner}__{known}", where))
     return None
+
+
+def plotted(column: str) -> str:
+    """The name in the log format of a column that PlotJuggler wrote; others stay as they are."""
+    if column == "__time":
+        return TIME
+    found = _PLOTTED.fullmatch(column)
+    if found is None:
+        return column
+    return column_name(found[1], found[2].replace("effort", "torque"))
 
 
 def misspelt(column: str, expected: Expected) -> str:

@@ -19,6 +19,7 @@ from pipeline.logs.reading.log_format import (
     column_name,
     misspelt,
     parse_column,
+    plotted,
     suggest_column,
 )
 from pipeline.logs.reading.mapping import ColumnTable, LogTable, Mapping
@@ -99,6 +100,8 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
     useful: set[str] = set()
     for column in table.header:
         pattern, rule, own = _rule(column, mapping)
+        if not pattern and own == column and plotted(column) not in table.header:
+            own = plotted(column)
         name = _robots(own, mapping)
         first.setdefault(pattern, (column, name))
         target = parse_column(name, expected, table.where)
@@ -112,6 +115,7 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
                 f"{table.where}: '{one_line(column)}' and '{one_line(sources[target][0])}' "
                 "both give the same channel; keep one"
             )
+        rule = _in_unit(rule, table, column, own, target)
         _check_unit(pattern, rule, target, mapping.where)
         sources[target] = column, rule
         useful.add(pattern)
@@ -152,6 +156,25 @@ def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
     if found[2] == TIME and not found[0]:
         return "", in_unit, TIME
     return found
+
+
+def _in_unit(
+    rule: ColumnTable, table: TableFile, column: str, name: str, target: Target
+) -> ColumnTable:
+    """The rule with the unit that the file's own row of units states, where the rule has none.
+
+    Raises:
+        LogFormatError: The column's name says another unit than the row.
+    """
+    stated = table.head.units.get(column)
+    if stated is None or rule.unit is not None or dimension(stated) != dimension(target.unit):
+        return rule
+    if column == name and stated != target.unit:
+        raise LogFormatError(
+            f"{table.where}: column '{one_line(column)}' is in '{stated}' by the row of units, and "
+            "in another by its name; rename it, or give its unit in a mapping file"
+        )
+    return rule.model_copy(update={"unit": stated})
 
 
 def _robots(name: str, mapping: Mapping) -> str:

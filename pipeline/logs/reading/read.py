@@ -15,7 +15,7 @@ from pipeline.logs.errors import LogContentError
 from pipeline.logs.formats.convert import sha256
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import EFFORTS, Log
-from pipeline.logs.reading.log_format import TIME, Target, column_name, parse_column
+from pipeline.logs.reading.log_format import Target, column_name, parse_column
 from pipeline.logs.reading.mapping import ColumnTable, Mapping
 from pipeline.logs.reading.plan import ReadingPlan, plan_reading
 from pipeline.logs.reading.sides import sides_of
@@ -134,10 +134,12 @@ def _in_si(plan: ReadingPlan, data: dict[str, Array], first_row: int) -> dict[Ta
     # Time first: columns that are late are read off at other times.
     for target, (column, rule) in sorted(plan.sources.items(), key=lambda s: s[0] != _TIME):
         values, (factor, offset) = data[column], rule.affine(target.unit)
-        _check_values(values, column, where, first_row)
+        if target != _TIME:
+            _check_values(values, column, where, first_row)
         if (factor, offset) != (1.0, 0.0):
             values = factor * values + offset
-            _check_values(values, column, f"{where} through {mapping.where}", first_row)
+            if target != _TIME:
+                _check_values(values, column, f"{where} through {mapping.where}", first_row)
         if rule.late and target != _TIME:
             at = out[_TIME] + rule.late
             values = np.interp(at, out[_TIME], values, left=np.nan, right=np.nan)
@@ -181,7 +183,7 @@ def _stand_still(
 
 def _check_values(values: Array, column: str, where: str, first_row: int) -> None:
     bad = np.abs(values) > _LARGEST  # infinities too; NaN is an empty cell
-    if column != TIME and bad.any():
+    if bad.any():
         row = int(np.argmax(bad))
         raise LogContentError(
             f"{where}: row {first_row + row + 2}, column '{one_line(column)}' holds "

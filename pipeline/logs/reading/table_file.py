@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -17,6 +15,7 @@ from numpy.typing import NDArray
 from actuators.errors import one_line
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.formats.convert import plain
+from pipeline.logs.reading.csv_head import CsvHead, read_head
 from pipeline.logs.reading.mapping import CsvTable
 
 Array = NDArray[np.float64]
@@ -31,6 +30,7 @@ class TableFile:
     Attributes:
         path: The file, or the folder of a bag.
         header: Column names, unique.
+        head: What else stands above the numbers of a CSV file.
         parquet: Whether its data are Parquet; else CSV.
         dialect: Of a CSV file.
         data: What is read: the file, or what was made of it where it is neither CSV nor Parquet.
@@ -39,6 +39,7 @@ class TableFile:
 
     path: Path
     header: tuple[str, ...]
+    head: CsvHead
     parquet: bool
     dialect: CsvTable
     data: Path
@@ -79,48 +80,19 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
     if parquet:
         try:
             names = [str(name) for name in pq.read_schema(made.path).names]
+            csv_head = CsvHead(tuple(names))
         except (pa.ArrowException, OSError, ValueError) as error:
             reason = f"not a readable Parquet file ({one_line(error)})"
             raise LogFormatError(f"{where}: {reason}") from None
     else:
-        names = _csv_header(head, dialect, where)
+        csv_head = read_head(head, dialect, where)
+        names = list(csv_head.names)
     for k, name in enumerate(names, start=1):
         if name in names[: k - 1]:
             raise LogFormatError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
         if not name:
             raise LogFormatError(f"{where}: column {k} has no name; give it one in line 1")
-    return TableFile(path, tuple(names), parquet, dialect, made.path, made.remarks)
-
-
-def _csv_header(head: bytes, dialect: CsvTable, where: str) -> list[str]:
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff") or b"\x00" in head[:4096]:
-        raise LogFormatError(f"{where}: not UTF-8 text; save the log as CSV in UTF-8 or as Parquet")
-    line = head.lstrip(b"\xef\xbb\xbf").split(b"\n", 1)[0]
-    try:
-        text = line.decode("utf-8").rstrip("\r")
-        names = next(csv.reader(io.StringIO(text), delimiter=dialect.delimiter, strict=True), [])
-    except (UnicodeDecodeError, csv.Error):
-        raise LogFormatError(
-            f"{where}: line 1 is no header of column names in UTF-8; save the log as CSV in UTF-8"
-        ) from None
-    if len(names) == 1 and dialect.delimiter == ",":
-        for other in (";", "\t"):
-            if other in names[0]:
-                raise LogFormatError(
-                    f"{where}: columns are separated by {other!r}, expected commas; export it with "
-                    "commas and decimal dots, or give [csv] delimiter and decimal in a mapping file"
-                )
-    if names and all(_is_number(name) for name in names):
-        raise LogFormatError(f"{where}: line 1 holds numbers; expected a header of column names")
-    return [name.strip() for name in names]
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return TableFile(path, tuple(names), csv_head, parquet, dialect, made.path, made.remarks)
 
 
 def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
@@ -188,7 +160,7 @@ def row_count(table: TableFile) -> int:
             return int(pq.read_metadata(table.data).num_rows)
     with table.data.open("rb") as stream:
         blocks = iter(lambda: stream.read(1 << 22), b"")
-        return max(0, sum(block.count(b"\n") for block in blocks) - 1)
+        return max(0, sum(block.count(b"\n") for block in blocks) - table.head.skip)
 
 
 def _troubles() -> tuple[type[Exception], ...]:
@@ -211,12 +183,17 @@ def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool) -> Any
     import pyarrow.csv as pc
 
     kinds = {n: pa.string() if n.endswith("__contact") else pa.float64() for n in columns}
+    for name, first in table.head.stamps.items():
+        kinds[name] = pa.timestamp("ns", None if _without_zone(first) else "UTC")
     return pc.read_csv(
         table.data,
         read_options=pc.ReadOptions(
-            column_names=list(table.header), skip_rows=1, use_threads=threads
+            column_names=list(table.header), skip_rows=table.head.skip, use_threads=threads
         ),
-        parse_options=pc.ParseOptions(delimiter=table.dialect.delimiter),
+        parse_options=pc.ParseOptions(
+            delimiter=table.dialect.delimiter,
+            invalid_row_handler=lambda row: "skip" if row.text.startswith("#") else "error",
+        ),
         convert_options=pc.ConvertOptions(
             include_columns=list(columns),
             column_types=kinds,
@@ -239,6 +216,8 @@ def _numbers(column: Any, name: str, where: str) -> Array:
             column = pc.cast(lower, pa.float64())
         elif pa.types.is_null(kind):
             return np.full(len(column), np.nan)
+        elif pa.types.is_timestamp(kind):
+            return _seconds(column)
         elif pa.types.is_boolean(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind):
             column = pc.cast(column, pa.float64(), safe=False)
         else:
@@ -250,6 +229,21 @@ def _numbers(column: Any, name: str, where: str) -> Array:
         raise LogFormatError(
             f"{where}: column '{one_line(name)}': {one_line(error)}; expected numbers"
         ) from None
+
+
+def _without_zone(stamp: str) -> bool:
+    """Whether a date and time names no time zone."""
+    return re.search(r"(Z|[+-]\d\d:?\d\d)$", stamp[10:]) is None
+
+
+def _seconds(column: Any) -> Array:
+    """Dates and times as seconds since 1970 of the clock they name; empty cells are NaN."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    whole = pc.cast(pc.cast(column, pa.timestamp("ns")), pa.int64())
+    seconds = np.array(pc.fill_null(whole, 0).to_numpy(), dtype=np.int64) * 1e-9
+    return np.where(np.asarray(pc.is_null(whole).to_numpy()), np.nan, seconds)
 
 
 def _reason(error: Exception, table: TableFile) -> str:

@@ -1,0 +1,191 @@
+"""Files as other tools write them: arrays, compressed text, dates, rows of units."""
+
+from __future__ import annotations
+
+import gzip
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.logs.errors import GapError
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.mapping import Mapping, parse_mapping
+from pipeline.logs.reading.read import read_log
+
+Array = NDArray[np.float64]
+Columns = dict[str, Array]
+NAMED = {
+    "time": {"column": "robot/t"},
+    "columns": {
+        "robot/q[*]": {"as": "*__position_rad"},
+        "robot/tau[*]": {"as": "*__torque_Nm"},
+    },
+    "joints": {"0": "a", "1": "b"},
+}
+
+
+def blocks(columns: Columns) -> dict[str, Array]:
+    """The columns as a time vector and matrices of both joints."""
+    q, tau = (
+        np.stack([columns[f"{j}__{end}"] for j in "ab"], axis=1)
+        for end in ("position_rad", "torque_Nm")
+    )
+    return {"t": columns["time_s"], "q": q, "tau": tau}
+
+
+def agrees(log: Log, columns: Columns) -> None:
+    assert np.allclose(log.time - log.time[0], columns["time_s"], atol=1e-6)
+    assert log.torque is not None
+    for j, joint in enumerate("ab"):
+        assert np.allclose(log.position[:, j], columns[f"{joint}__position_rad"], atol=1e-12)
+        assert np.allclose(log.torque[:, j], columns[f"{joint}__torque_Nm"], atol=1e-12)
+
+
+def save_npz(path: Path, arrays: dict[str, Array]) -> None:
+    np.savez(path, **{f"robot/{k}": v for k, v in arrays.items()})
+
+
+def save_mat(path: Path, arrays: dict[str, Array]) -> None:
+    from scipy.io import savemat
+
+    savemat(path, {"robot": arrays, "gain": 3.0})
+
+
+def save_h5(path: Path, arrays: dict[str, Array]) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        for name, array in arrays.items():
+            file[f"robot/{name}"] = array
+
+
+def save_mat73(path: Path, arrays: dict[str, Array]) -> None:
+    """As MATLAB does: HDF5 behind 512 bytes of its own, matrices transposed."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        group = file.create_group("robot")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, array in arrays.items():
+            data = group.create_dataset(name, data=np.atleast_2d(array.T))
+            data.attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124))
+        file.write(b"\x00\x02IM")
+
+
+@pytest.mark.parametrize(
+    ("name", "save"),
+    [
+        ("log.npz", save_npz),
+        ("log.mat", save_mat),
+        ("log.h5", save_h5),
+        ("log73.mat", save_mat73),
+    ],
+)
+def test_arrays_are_columns(
+    name: str,
+    save: Callable[[Path, dict[str, Array]], None],
+    columns: Columns,
+    two_joints: Expected,
+    tmp_path: Path,
+) -> None:
+    save(tmp_path / name, blocks(columns))
+    agrees(read_log(tmp_path / name, two_joints, parse_mapping(NAMED, "mapping")), columns)
+
+
+class _Trap:
+    """Writes a file when it is unpickled."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __reduce__(self) -> tuple[object, tuple[Path]]:
+        return Path.touch, (self.path,)
+
+
+def test_nothing_is_unpickled(columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
+    trap = np.array([_Trap(tmp_path / "sprung")], dtype=object)
+    pickle.loads(pickle.dumps(trap))  # the trap works
+    (tmp_path / "sprung").unlink()
+    np.savez(tmp_path / "log.npz", allow_pickle=True, trap=trap, **columns)  # type: ignore[arg-type]
+    with pytest.raises(GapError, match="log.npz: its arrays cannot be read"):
+        read_log(tmp_path / "log.npz", two_joints)
+    assert not (tmp_path / "sprung").exists()
+
+
+def text_of(columns: Columns, header: str, *above: str, below: str = "") -> str:
+    rows = (",".join(repr(float(x)) for x in row) for row in zip(*columns.values(), strict=True))
+    return "\n".join([*above, header, *([below] if below else []), *rows]) + "\n"
+
+
+@pytest.mark.parametrize("comment", [(), ("# robot: two", "#", "# rate 500 Hz")])
+def test_compressed_text_with_remarks(
+    comment: tuple[str, ...], columns: Columns, two_joints: Expected, tmp_path: Path
+) -> None:
+    path = tmp_path / "log.csv.gz"
+    lines = text_of(columns, ",".join(columns), *comment).splitlines()
+    lines.insert(700, "# the operator leaned on it")
+    path.write_bytes(gzip.compress("\n".join(lines).encode()))
+    agrees(read_log(path, two_joints), columns)
+    path.write_bytes(path.read_bytes()[:2000])
+    with pytest.raises(GapError, match="compressed content is damaged"):
+        read_log(path, two_joints)
+
+
+def test_a_header_that_is_itself_a_remark(
+    columns: Columns, two_joints: Expected, tmp_path: Path
+) -> None:
+    (tmp_path / "log.csv").write_text(text_of(columns, "# " + ",".join(columns)))
+    agrees(read_log(tmp_path / "log.csv", two_joints), columns)
+
+
+def test_a_row_of_units_counts(columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    other = {"t": 1e3 * columns["time_s"]}
+    for j in "ab":
+        other[f"q_{j}"] = np.degrees(columns[f"{j}__position_rad"])
+        other[f"tau_{j}"] = 1e3 * columns[f"{j}__torque_Nm"]
+    path.write_text(text_of(other, ",".join(other), below="ms,[deg],mNm,°,mN*m"), encoding="utf-8")
+    mapping = {
+        "time": {"column": "t", "unit": "ms"},
+        "columns": {"q_*": {"as": "*__position_rad"}, "tau_*": {"as": "*__torque_Nm"}},
+    }
+    agrees(read_log(path, two_joints, parse_mapping(mapping, "mapping")), columns)
+    wrong = ",".join(["s", "deg", "rad/s", "Nm", "rad", "rad/s", "Nm"])
+    path.write_text(text_of(columns, ",".join(columns), below=wrong))
+    with pytest.raises(GapError, match="'deg' by the row of units"):
+        read_log(path, two_joints)
+
+
+@pytest.mark.parametrize("zone", ["", "Z", "+02:00"])
+def test_dates_and_times(zone: str, columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
+    start = np.datetime64("2026-03-01T23:59:58.5", "ns")
+    stamps = start + np.round(columns["time_s"] * 1e9).astype("timedelta64[ns]")
+    rows = zip(*[v for k, v in columns.items() if k != "time_s"], strict=True)
+    lines = [
+        ",".join([f"{t}{zone}", *(repr(float(x)) for x in row)])
+        for t, row in zip(stamps, rows, strict=True)
+    ]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([",".join(columns), *lines]) + "\n")
+    agrees(read_log(path, two_joints), columns)
+
+
+def test_the_names_of_plotjuggler(columns: Columns, two_joints: Expected, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    quantity = {"position_rad": "position", "velocity_rad_s": "velocity", "torque_Nm": "effort"}
+    named = {
+        f"/joint_states/{joint}/{quantity[end]}": v
+        for k, v in columns.items()
+        for joint, _, end in [k.partition("__")]
+        if k != "time_s"
+    }
+    named = {"__time": 1.7e9 + columns["time_s"]} | named
+    path.write_text(text_of(named, ",".join(named)))
+    agrees(read_log(path, two_joints, Mapping()), columns)
