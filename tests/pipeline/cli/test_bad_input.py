@@ -1,13 +1,19 @@
-"""Unusable input: one line that names the place and the remedy, exit 2, nothing half-written."""
+"""Unusable input: one line that names the place and the remedy, exit 2, nothing half-written.
+
+Every row is a trial that once ended in a traceback, in a number that was quietly wrong, or in a
+message without a place.
+"""
 
 from __future__ import annotations
 
+import os
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tests.command_line import Command, exit_code, rows_of
+from tests.command_line import Command, exit_code
 from tests.pipeline.cli.robots import changed, edited_robot, own_robot
 
 #: what is wrong: pattern in the hexapod's robot file, replacement, message
@@ -28,7 +34,6 @@ ROBOT_FILES = {
     ),
     "sets of no legs": (r"^tripods = .*?$", "tripods = 2", r"gait.tripods: must be two lists"),
     "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
-    "unknown leg": (r'feet = \["lf"', 'feet = ["fl"', r"standing.feet: leg 'fl' is not known"),
     "unknown path": (
         r'path = "\w+"',
         'path = "cubical"',
@@ -41,18 +46,48 @@ ROBOT_FILES = {
     ),
     "no source": (r'source = "Table I"', 'source = ""', r"'body_length': no source"),
     "unknown basis": (r'"published"', '"publishd"', r"unknown basis.*did you mean 'published'"),
-    "NaN": (r"value = 40$", "value = nan", r"'total_mass.value' must be a finite number"),
     "text for a number": (r"value = 40$", 'value = "40"', r"'total_mass.value' must be a number"),
     "negative mass": (r"value = 40$", "value = -40", r"total_mass = -40 kg must be positive"),
-    "negative link mass": (
-        r"(\[parameters\.tibia_mass\]\nvalue = )[\d.]+(.*?interval = \[)[\d.]+",
-        r"\g<1>-0.5\g<2>-1",
-        r"tibia_mass = -0.5 kg must be positive",
-    ),
     "negative period": (r"value = 3$", "value = -3", r"gait_period = -3 s must be positive"),
-    "zero period": (r"value = 3$", "value = 0", r"gait_period = 0 s must be positive"),
     "contradicting gait": (r"value = 3$", "value = 4", r"foot_stroke is 0.24 m; change one"),
     "one set of legs": (r', \["rf", "rr", "lm"\]', "", r"must part the legs .* in two sets"),
+    "stroke in metres": (
+        r"(foot_stroke\]\nvalue = )240",
+        r"\g<1>0.24",
+        r"foot_stroke = 0.24 mm is shorter than in any walking robot; is 0.24 m meant\?",
+    ),
+    "stroke of 240 m": (
+        r'(foot_stroke\]\nvalue = 240\nunit = )"mm"',
+        r'\1"m"',
+        r"foot_stroke = 240 m is longer than in any walking robot; is 240 mm meant\?",
+    ),
+    "lift in metres": (r"(foot_lift\]\nvalue = )75", r"\g<1>0.075", r"is 0.075 m meant\?"),
+    "gravity in cm/s^2": (
+        r"(gravity\]\nvalue = )[\d.]+(.*?interval = \[)[\d., ]+",
+        r"\g<1>981\g<2>980, 982",
+        r"gravity is beyond any planet; check its unit",
+    ),
+    "mass in grams": (r"value = 40$", "value = 40000", r"in 15.\d litres, denser than any metal"),
+    "limits in degrees": (
+        r'(joint_2_upper\]\nvalue = )80\nunit = "deg"(.*?)interval = \[45, 100\]',
+        r'\g<1>115\nunit = "rad"\2interval = [100, 120]',
+        r"robot.toml: parameters.joint_2_upper = 115 rad is more than a turn; is 115 deg meant\?",
+    ),
+    "half an interval": (r"interval = \[80, 200\]", "interval = [80]", r"must be \[low, high\]"),
+    "leg with a slash": (r"^\[legs\.lf\]", '[legs."a/b"]', r"'legs.a/b': a name holds '/'"),
+    "leg without a name": (r"^\[legs\.lf\]", '[legs.""]', r"a name is empty"),
+    "joint with a comma": (r'"lf_joint_2"', '"a,b"', r"'legs.lf.joints 2': a name holds ','"),
+    "joint of two legs": (r'"lf_joint_2"', '"lm_joint_2"', r"'lm_joint_2' belongs to two legs"),
+    "several missing": (
+        r'^urdf = .*?^base_link = [^\n]*$|^transfer_path = "\w+"$',
+        "",
+        r"missing: robot.urdf, robot.base_link; see urdf/hexapod.toml",
+    ),
+    "half a number": (
+        r'(total_mass\]\nvalue = 40\n)unit = "kg"\nbasis = "published"\n',
+        r"\1",
+        r"parameters: 'total_mass': missing keys 'unit', 'basis'",
+    ),
 }
 #: the same, where the robot file names a URDF of the user's own
 OWN_FILES = {
@@ -74,11 +109,180 @@ OWN_FILES = {
     "unknown foot": (r'"rm_foot_link"', '"rm_fot_link"', r"did you mean 'rm_foot_link'"),
     "no place for a foot": (r"^neutral_foot = .*?$", "", r"missing: legs.\w\w.neutral_foot; see"),
     "a leg left out": (r"^\[legs\.rm\].*?(?=^\[)", "", r"leg 'rm' is not known"),
+    "feet in millimetres": (
+        r"neutral_foot = \[[^\]]*\]",
+        "neutral_foot = [270, 260, -295]",
+        r"'legs.lf.neutral_foot': has 270 at place 1; it is written in metres, are these milli",
+    ),
+    "feet of many digits": (
+        r"neutral_foot = \[[^\]]*\]",
+        f"neutral_foot = [{10**400}, 0.26, -0.29]",
+        r"'legs.lf.neutral_foot' must be a finite number",
+    ),
+    "posture in degrees": (
+        r"(neutral_foot = \[[^\]]*\])",
+        r"\1\nstart_posture = [0, 45, -90]",
+        r"start_posture': has 45 at place 2; it is written in radians, are these degrees \(0.7854",
+    ),
+    "the knee the other way": (
+        r"(neutral_foot = \[[^\]]*\])",
+        r"\1\nstart_posture = [0, -1.0, 3.0]",
+        r"start_posture lies on another branch: .*choose the knee's branch: legs.lf: \[0.00, 0.25",
+    ),
+    "another base": (
+        r'base_link = "base_link"',
+        'base_link = "trunk"',
+        r"base_link = 'trunk', the root of own.urdf is 'base_link'",
+    ),
+}
+#: pattern in a URDF of the user's own, replacement, message
+URDFS = {
+    "another mass": (
+        r'(<link name="base_link">.*?<mass value=)"[^"]*"',
+        r'\1"5.6"',
+        r"total mass fails \(links add up to 21\.\d+ kg, stated 40 kg, 46 % apart",
+    ),
+    "degrees": (
+        r'(<joint name="lf_joint_2".*?lower=")[^"]*(" upper=")[^"]*',
+        r"\1-115\g<2>115",
+        r"own.urdf: lf_joint_2: limits in radians fails \(-115 rad are 18.3 turns; degrees\?",
+    ),
+    "a mimic": (
+        r'(<joint name="lf_joint_2"[^>]*>)',
+        r'\1<mimic joint="lf_joint_1"/>',
+        r"lf_joint_2\b.* mimics 'lf_joint_1'",
+    ),
+    "millimetres": (
+        r'(<joint name="lf_joint_2".*?<origin xyz=)"[^"]*"',
+        r'\1"0 180 0"',
+        r"lf_joint_2: lengths in metres fails \(origin 0 180 0: 180 m from its parent; millimetres",
+    ),
+    "inertia in kg*mm^2": (
+        r'(<link name="lf_tibia_link">.*?ixx=)"[^"]*"(.*?iyy=)"[^"]*"',
+        r'\1"3000"\2"3000"',
+        r"lf_tibia_link: inertia fits the size fails \(radius of gyration [\d.]+ m, the longest",
+    ),
+    "thigh without inertia": (
+        r'(<link name="lf_femur_link">\s*)<inertial>.*?</inertial>',
+        r"\1",
+        r"lf_femur_link: mass positive fails \(0 kg: 'lf_joint_2' moves it; give it an <inertial>",
+    ),
+    "link twice": (
+        r'<link name="lf_femur_link">',
+        '<link name="lf_hip_link">',
+        r"own.urdf: line 50: <link name='lf_hip_link'>: the name is taken by line 27; rename one",
+    ),
+    "joint twice": (
+        r'<joint name="lf_joint_2"',
+        '<joint name="lf_joint_1"',
+        r"line 43: <joint name='lf_joint_1'>: the name is taken by line 20",
+    ),
+    "no parent": (
+        r'<parent link="base_link" />',
+        "",
+        r"line 20: <joint name='lf_joint_1'>: has no <parent link=...>",
+    ),
+    "unknown child": (
+        r'<child link="lf_femur_link" />',
+        '<child link="lf_fmur_link" />',
+        r"line 43: <joint name='lf_joint_2'>: child 'lf_fmur_link' is no link; did you mean 'lf_",
+    ),
+    "a circle": (
+        r'<parent link="base_link" />',
+        '<parent link="lf_tibia_link" />',
+        r"line 27: <link name='lf_hip_link'>: the joints above it run in a circle",
+    ),
+    "two roots": (
+        r"</robot>",
+        '<link name="lost"/></robot>',
+        r"<link name='lost'>: hangs on no joint, and neither does 'base_link'",
+    ),
+    "unknown type": (r'type="revolute"', 'type="revolut"', r"'revolut'; did you mean 'revolute'"),
+    "no axis": (r'<axis xyz="[^"]*"', '<axis xyz="0 0 0"', r"line 20: .*'0 0 0' has no direction"),
+    "half an axis": (
+        r'<axis xyz="[^"]*"',
+        '<axis xyz="0 1"',
+        r"line 24: <axis>: xyz = '0 1', expected 3 finite numbers",
+    ),
+    "decimal comma": (
+        r'mass value="(\d+)\.(\d+)"',
+        r'mass value="\1,\2"',
+        r"line 7: <mass>: value = '[\d,]+', expected a finite number; write decimal dots \(link 'b",
+    ),
+    "underscores": (r'mass value="[^"]*"', 'mass value="2_4.0"', r"value = '2_4.0', expected a fi"),
+    "no mass": (
+        r'<mass value="[^"]*" />',
+        "",
+        r"line 4: <link name='base_link'>: .* without <mass",
+    ),
+    "five moments": (r' iyz="0"', "", r"line 4: .*<inertia> without iyz \[kg\*m\^2\]"),
+    "a macro": (
+        r'<link name="lf_femur_link">',
+        '<xacro:leg name="x"/><link name="lf_femur_link">',
+        r"line 50: <xacro:leg name='x'>: a macro; expand the file first",
+    ),
+    "an entity": (
+        r"<robot",
+        '<!DOCTYPE r [<!ENTITY a "b">]><robot',
+        r"entity 'a' is declared; write the text itself",
+    ),
+    "a mesh of no file": (r'<box size="[^"]*" />', "<mesh />", r"line 13: <mesh> without filename"),
+    "a broken tag": (r"</inertial>", "</inertia>", r"line 9: malformed XML: mismatched tag at col"),
+    "another joint that moves": (
+        r"</robot>",
+        '<link name="head"/><joint name="neck" type="continuous"><parent link="base_link"/>'
+        '<child link="head"/></joint></robot>',
+        r"joint 'neck' of the URDF belongs to no leg",
+    ),
+    "negative mass": (
+        r'(<link name="lf_femur_link">.*?<mass value=")',
+        r"\1-",
+        r"lf_femur_link: mass positive fails",
+    ),
+    "negative moment": (
+        r'ixx="[^"]*"',
+        'ixx="-0.1"',
+        r"inertia possible fails \(moments .*none may be negative",
+    ),
+    "moment beyond the others": (
+        r'ixx="[^"]*"',
+        'ixx="9"',
+        r"inertia possible fails \(moments .*may not exceed the sum",
+    ),
+    "no limit": (r"<limit[^>]*/>", "", r"own.urdf: line \d+: <joint name='\w+'>: .* needs <limit>"),
+}
+#: what the robot file holds, as a change of the hexapod's bytes, and the message
+BYTES = {
+    "nothing": (lambda t: b"", r"missing: robot.name, robot.urdf, .*parameters.gravity \[m/s\^2\]"),
+    "UTF-16": (lambda t: t.encode("utf-16"), r"is UTF-16 text; save it as UTF-8"),
+    "Latin-1": (
+        lambda t: t.replace("[robot]", "# caf\xe9\n[robot]").encode("latin-1"),
+        r"line 5: byte 0xe9 is not UTF-8",
+    ),
+    "a picture": (lambda t: b"\x89PNG\r\n\x1a\n" + bytes(range(256)), r"line 1: byte 0x89 is not"),
+    "zeros": (lambda t: b"\0" * 100, r"malformed TOML"),
+    "brackets": (lambda t: b"a=" + b"[" * 100_000, r"malformed TOML: tables are nested too deeply"),
+    "digits": (lambda t: b"a=" + b"9" * 10_000, r"malformed TOML: a number has thousands of dig"),
+    "42 MB": (lambda t: b"#" * 42_000_000, r"has 42 MB, expected at most"),
+    "a list of robots": (
+        lambda t: t.replace("[robot]", "[[robot]]").encode(),
+        r"'robot' must be a table",
+    ),
+    "itself": (lambda t: b'extends = "robot.toml"', r"extends itself"),
+    "a parent of no name": (lambda t: b'extends = ""', r"is a folder, a file is expected"),
+    "a parent of no file": (lambda t: b'extends = "a\\u0000b"', r"no file can have this name"),
+}
+#: what the URDF file holds instead
+URDF_BYTES = {
+    "nothing": (b"", r"own.urdf: the file is empty"),
+    "a mesh": (b"solid x\nfacet normal 0 0 1", r"line 1: not XML; a URDF is expected"),
+    "SDF": (b"<sdf/>", r"the root element is <sdf>, expected <robot> \(SDF\); convert it"),
+    "no links": (b'<robot name="x"/>', r"no <link>"),
+    "bytes": (bytes(range(128, 256)), r"line 1: byte 0x80 is not UTF-8 text; .*own.toml names it"),
 }
 #: what is wrong: value of --set, message
 CHANGES = {
     "no value": ("femur_mass", r"expected KEY=VALUE"),
-    "empty key": ("=1", r"expected KEY=VALUE"),
     "unknown key": ("femur_mas=1", r"no such number; did you mean 'femur_mass'"),
     "unlike any key": ("colour=1", r"no such number; parameters.csv of any run lists all names"),
     "unknown component key": (
@@ -88,12 +292,9 @@ CHANGES = {
     "not a number": ("femur_mass=heavy", r"femur_mass=heavy: expected a number"),
     "number with unit": ("femur_mass=1 kg", r"expected a number in kg, without the unit"),
     "NaN": ("femur_mass=nan", r"femur_mass=nan: expected a finite number"),
-    "infinite": ("gait_period=1e999", r"expected a finite number"),
     "negative mass": ("femur_mass=-1", r"femur_mass = -1 kg must be positive"),
-    "negative period": ("gait_period=-3", r"gait_period = -3 s must be positive"),
     "outside the link": ("tibia_com=1.2", r"tibia_com = 1.2 lies outside the link"),
     "no trunk left": ("femur_mass=6", r"leave -[\d.]+ kg for the trunk; lower the link masses"),
-    "unknown path": ("gait.transfer_path=cubik", r"did you mean 'cubic'"),
     "negative friction": ("harmonic_drive.load=-0.1", r"outside its bounds \[0, 0.5\]"),
     "ratios apart": ("harmonic_drive.ratio=90", r"'requirement.ratio' asks for 400"),
     "radians for degrees": ("joint_1_axis_angle=1e5", r"= 100000 deg is more than a turn; check"),
@@ -104,36 +305,30 @@ CHANGES = {
     "beyond the joints": ("joint_1_range=5", r"'\w+_joint_1' would have to reach .* deg at t ="),
     "knee too short": ("tibia_length=100", r"mm beyond its reach; shorten the stroke"),
 }
+#: options, message
 OPTIONS = {
     "zero samples": (["--samples", "0"], r"--samples 0: at least 51"),
-    "negative samples": (["--samples", "-5"], r"--samples -5: at least 51"),
     "NaN samples": (["--samples", "nan"], r"argument --samples: invalid int value: 'nan'"),
-    "too few samples": (["--samples", "20"], r"--samples 20: at least 51"),
     "regeneration": (["--regeneration", "bsu"], r"expected none, bus or a fraction"),
     "negative regeneration": (["--regeneration=-0.1"], r"expected none, bus or a fraction"),
-    "NaN regeneration": (["--regeneration", "nan"], r"expected none, bus or a fraction"),
     "decimal": (["--decimal", "point"], r"argument --decimal: invalid choice: 'point'"),
     "unknown option": (["--sampels", "9"], r"unrecognized arguments: --sampels"),
     "stroke out of reach": (
         ["--set", "foot_stroke=900", "--set", "gait_period=11.25", "--set", "hip_spacing=1000"],
         r"leg '\w\w' at t = .* mm beyond its reach; shorten the stroke",
     ),
+    "no folder": (["--out", ""], r"argument --out: expected a name, got an empty one"),
+    "no model": (["--model", ""], r"argument --model: expected a name, got an empty one"),
+    "a folder for a model": (["--model", "."], r"\.: is a folder, a file is expected"),
+    "no actuators": (["--actuators", "/nowhere"], r"/nowhere/alternatives.toml: no such file"),
+    "samples without end": (
+        ["--samples", "100000000"],
+        r"18 joints and 4 actuators need about 6480 GB of memory \(64.8 kB per sample\), .* GB are "
+        r"free; at most \d+ samples fit",
+    ),
+    "metres": (["--set", "hip_spacing=0.28"], r"hip_spacing = 0.28 mm .* is 0.28 m meant\?"),
 }
-
-
-def refused(
-    capsys: pytest.CaptureFixture[str], out: Path, code: int, message: str, expected: int = 2
-) -> None:
-    printed = capsys.readouterr()
-    assert code == expected, printed.err
-    assert printed.out == ""
-    assert printed.err.endswith("\n")
-    assert printed.err.count("\n") == 1, printed.err
-    assert "Traceback" not in printed.err
-    assert re.search(message, printed.err), printed.err
-    assert not out.exists()
-
-
+#: values of --set, exit code, message
 GAITS = {
     "too few feet": (["gait.duty_factor=0.4"], 2, r"only 0 feet stand .*raise gait.duty_factor"),
     "always in the air": (["gait.duty_factor=0"], 2, r"--set gait.duty_factor=0: .* 0 it never"),
@@ -169,98 +364,141 @@ GAITS = {
         r"no sway of the body keeps a margin of 90.0 mm; .* is attainable: lower",
     ),
     "tips on the slope": (["gait.slope_forward=25 deg"], 1, r"the robot tips at t = "),
-    "tips under the load": (
-        ["gait.payload_mass=80 kg", "gait.payload_y=300 mm"],
-        1,
-        r"the robot tips at t = ",
-    ),
     "stands on two feet": (["standing.feet=lf,rf"], 2, r"stands on 2 feet"),
-    "stands on no such foot": (["standing.feet=lf,rf,xx"], 2, r"leg 'xx' is not known"),
+    "stands in one line": (["standing.feet=lf,lm,lr"], 1, r"tips: .* the feet stand in one line"),
+    "hips less than the stroke apart": (
+        ["hip_spacing=200"],
+        1,
+        r"tips at t = 0 s .* leg 'lf' would have to pull with \d+\.\d N, static margin -17\.\d mm",
+    ),
+}
+#: what `--robot` names, message
+ROBOTS = {
+    "nowhere": ("nowhere.toml", r"nowhere.toml: no such file; name a robot file \(TOML\)"),
+    "a folder": (".", r"is a folder"),
+    "a URDF": ("hexapod.urdf", r"a URDF says nothing of legs and gait; give a robot file"),
+    "on a stand": ("leg.toml", r"a robot on a stand neither stands nor walks; give one with a flo"),
+    "a device": ("/dev/zero", r"is no regular file"),
+    "a pipe": ("pipe.toml", r"is no regular file"),
+    "a loop of links": ("loop.toml", r"cannot be read \("),
+}
+#: whole commands, message
+COMMANDS = {
+    "no verb": ([], r"--help"),
+    "no such verb": (["wlak"], r"--help"),
+    "a word too many": (["walk", "extra"], r"--help"),
+    "a robot too few": (["check"], r"--help"),
+    "a folder for a log": (["gap", "."], r"is a folder; name its CSV or Parquet files"),
+    "calibrate on a stand": (
+        ["calibrate", "--robot", "urdf/leg.toml"],
+        r"its base is fixed, so it",
+    ),
+    "calibrate a variant": (
+        ["calibrate", "--robot", "urdf/hexapod_axis90.toml"],
+        r"the result is written into this file, which do",
+    ),
+    "calibrate a URDF": (["calibrate", "--robot", "urdf/leg.urdf"], r"a URDF says nothing of legs"),
+    "no process": (["calibrate", "--workers", "0"], r"--workers 0: at least one process"),
+    "a negative seed": (["calibrate", "--seed", "-1"], r"--seed -1: expected zero or a positive"),
+}
+TABLES: dict[str, dict[str, Any]] = {
+    "robot": ROBOT_FILES,
+    "own": OWN_FILES,
+    "urdf": URDFS,
+    "bytes": BYTES,
+    "urdf bytes": URDF_BYTES,
+    "set": CHANGES,
+    "option": OPTIONS,
+    "gait": GAITS,
+    "file": ROBOTS,
+    "command": COMMANDS,
 }
 
 
-@pytest.mark.parametrize("what", GAITS)
-def test_gait(
-    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], what: str
+def prepared(root: Path, folder: Path, kind: str, given: list[Any]) -> list[str]:
+    """The words of a command that a row makes, its files written into a folder."""
+    sets = [
+        word for change in (given[0] if kind == "gait" else given) for word in ("--set", change)
+    ]
+    own, hexapod = folder / "own.toml", root / "urdf" / "hexapod.toml"
+    if kind in ("own", "urdf", "urdf bytes"):
+        own_robot(root, folder, *(given if kind == "urdf" else ("</robot>", "</robot>")))
+    match kind:
+        case "robot":
+            return ["walk", "--robot", str(edited_robot(root, folder, *given))]
+        case "own":
+            own.write_text(changed(own.read_text("utf-8"), *given), "utf-8")
+        case "urdf bytes":
+            (folder / "own.urdf").write_bytes(given[0])
+        case "bytes":
+            own = folder / "robot.toml"
+            own.write_bytes(given[0](hexapod.read_text("utf-8")))
+        case "set":
+            return ["walk", *sets]
+        case "gait":
+            return ["stand" if given[0][0].startswith("standing") else "walk", *sets]
+        case "option":
+            return ["walk", *given[0]]
+        case "command":
+            return list(given[0])
+        case "file":
+            os.mkfifo(folder / "pipe.toml")
+            (folder / "loop.toml").symlink_to(folder / "loop.toml")
+            here = folder / given[0]
+            own = here if given[0] in ("pipe.toml", "loop.toml") else root / "urdf" / given[0]
+    return ["walk", "--robot", str(own)]
+
+
+def refused(
+    capsys: pytest.CaptureFixture[str], out: Path, code: int, message: str, expected: int = 2
 ) -> None:
-    changes, expected, message = GAITS[what]
-    options = [word for change in changes for word in ("--set", change)]
-    verb = "stand" if changes[0].startswith("standing") else "walk"
-    code = command(verb, tmp_path / "out", "--samples", "51", *options)
-    refused(capsys, tmp_path / "out", code, message, expected)
-
-
-@pytest.mark.parametrize("what", ROBOT_FILES)
-def test_robot_file(
-    root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], what: str
-) -> None:
-    pattern, replacement, message = ROBOT_FILES[what]
-    robot = edited_robot(root, tmp_path, pattern, replacement)
-    code = command("walk", tmp_path / "out", robot=robot)
-    refused(capsys, tmp_path / "out", code, message)
-
-
-@pytest.mark.parametrize("what", OWN_FILES)
-def test_robot_file_with_an_own_urdf(
-    root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], what: str
-) -> None:
-    pattern, replacement, message = OWN_FILES[what]
-    robot = own_robot(root, tmp_path, "</robot>", "</robot>")
-    robot.write_text(changed(robot.read_text(encoding="utf-8"), pattern, replacement), "utf-8")
-    code = command("walk", tmp_path / "out", robot=robot)
-    refused(capsys, tmp_path / "out", code, message)
-
-
-@pytest.mark.parametrize("what", CHANGES)
-def test_change(
-    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], what: str
-) -> None:
-    change, message = CHANGES[what]
-    code = command("walk", tmp_path / "out", "--set", change)
-    refused(capsys, tmp_path / "out", code, message)
-
-
-@pytest.mark.parametrize("what", OPTIONS)
-def test_option(
-    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], what: str
-) -> None:
-    more, message = OPTIONS[what]
-    code = command("walk", tmp_path / "out", *more)
-    refused(capsys, tmp_path / "out", code, message)
+    printed = capsys.readouterr()
+    assert code == expected, printed.err
+    assert printed.out == ""
+    assert printed.err.endswith("\n")
+    assert printed.err.count("\n") == 1, printed.err
+    assert "Traceback" not in printed.err
+    assert re.search(message, printed.err), printed.err
+    assert not out.exists()
 
 
 @pytest.mark.parametrize(
-    ("pattern", "replacement", "message"),
-    [
-        (
-            r'(<link name="lf_femur_link">.*?<mass value=")',
-            r"\1-",
-            r"lf_femur_link: mass positive fails",
-        ),
-        (r'ixx="[^"]*"', 'ixx="-0.1"', r"inertia possible fails \(moments .*none may be negative"),
-        (r'ixx="[^"]*"', 'ixx="9"', r"inertia possible fails \(moments .*may not exceed the sum"),
-        (
-            r'ixx="[^"]*"',
-            'ixx="nan"',
-            r"line \d+: <inertia>: ixx = 'nan', expected a finite number",
-        ),
-        (r"<limit[^>]*/>", "", r"own.urdf: line \d+: <joint name='\w+'>: .* needs <limit>"),
-        (r"</robot>", "", r"own.urdf: line \d+: malformed XML"),
-        (r'<joint name="rm_joint_2"', '<joint name="rm_knee"', r"'rm_joint_2' is not in the URDF"),
-    ],
+    ("kind", "what"), [(k, what) for k, rows in TABLES.items() for what in rows]
 )
-def test_urdf_of_ones_own(
+def test_bad_input(
     root: Path,
     tmp_path: Path,
-    command: Command,
+    monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
-    pattern: str,
-    replacement: str,
-    message: str,
+    kind: str,
+    what: str,
 ) -> None:
-    robot = own_robot(root, tmp_path, pattern, replacement)
-    code = command("walk", tmp_path / "out", robot=robot)
+    monkeypatch.chdir(root)
+    *given, message = TABLES[kind][what]
+    expected = given.pop() if kind == "gait" else 2
+    words = prepared(root, tmp_path, kind, given)
+    if words and "--out" not in words and words[0] in ("walk", "stand", "gap"):
+        words += ["--out", str(tmp_path / "out")]
+    refused(capsys, tmp_path / "out", exit_code(words), message, expected)
+
+
+@pytest.mark.parametrize("what", ["another mass", "no parent", "no mass"])
+def test_gap_refuses_a_urdf_alike(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    log = str(root / "pipeline/identification/demo/walk.parquet")
+    *given, message = URDFS[what]
+    robot = prepared(root, tmp_path, "urdf", given)[1:]
+    code = exit_code(["gap", "read", log, *robot, "--out", str(tmp_path / "out")])
     refused(capsys, tmp_path / "out", code, message)
+
+
+@pytest.mark.parametrize("what", ["no folder", "samples without end"])
+def test_reports_refuses_options_alike(
+    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], what: str
+) -> None:
+    more, message = OPTIONS[what]
+    refused(capsys, tmp_path / "out", command("reports", tmp_path / "out", *more), message)
 
 
 def test_a_mass_that_the_urdf_does_not_take(
@@ -271,22 +509,6 @@ def test_a_mass_that_the_urdf_does_not_take(
     refused(capsys, tmp_path / "out", code, r"bodies .* are those of own.urdf.*gait.payload_mass")
 
 
-@pytest.mark.parametrize(
-    ("robot", "message"),
-    [
-        ("nowhere.toml", r"nowhere.toml: no such file; name a robot file \(TOML\)"),
-        (".", r"is a folder"),
-        ("hexapod.urdf", r"a URDF says nothing of legs and gait; give a robot file"),
-        ("leg.toml", r"a robot on a stand neither stands nor walks; give one with a floating base"),
-    ],
-)
-def test_robot_that_is_none(
-    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str], robot: str, message: str
-) -> None:
-    code = command("walk", tmp_path / "out", robot=robot)
-    refused(capsys, tmp_path / "out", code, message)
-
-
 def test_missing_urdf(
     root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -294,35 +516,6 @@ def test_missing_urdf(
     (tmp_path / "own.urdf").unlink()
     code = command("walk", tmp_path / "out", robot=robot)
     refused(capsys, tmp_path / "out", code, r"own.urdf: no such file; .*own.toml names it")
-
-
-def test_a_robot_that_tips_is_a_finding(
-    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Hips less than the stroke apart: exit 1, with instant, foot, force and margin."""
-    code = command("walk", tmp_path / "out", "--set", "hip_spacing=200")
-    message = (
-        r"tips at t = 0 s .* leg 'lf' would have to pull with \d+\.\d N, static margin -17\.\d mm"
-    )
-    refused(capsys, tmp_path / "out", code, message, expected=1)
-
-
-def test_feet_in_one_line_are_a_finding(
-    root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
-) -> None:
-    robot = edited_robot(
-        root, tmp_path, r'feet = \["lf", "lr", "rm"\]', 'feet = ["lf", "lm", "lr"]'
-    )
-    code = command("stand", tmp_path / "out", robot=robot)
-    refused(capsys, tmp_path / "out", code, r"tips: .* the feet stand in one line", expected=1)
-
-
-def test_two_feet_are_refused(
-    root: Path, tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
-) -> None:
-    robot = edited_robot(root, tmp_path, r'feet = \["lf", "lr", "rm"\]', 'feet = ["lf", "rm"]')
-    code = command("stand", tmp_path / "out", robot=robot)
-    refused(capsys, tmp_path / "out", code, r"stands on 2 feet; .* at least 3")
 
 
 @pytest.mark.parametrize("place", ["a file", "below a file", "no folder", "no file"])
@@ -353,26 +546,3 @@ def test_a_folder_in_the_way_of_a_table(
     assert command("stand", tmp_path) == 2
     assert "standing.csv: is a folder, a file was to be written" in capsys.readouterr().err
     assert {p.name for p in tmp_path.iterdir()} == {"standing.csv"}
-
-
-def test_own_urdf_walks_like_the_built_one(
-    root: Path, tmp_path: Path, command: Command, out: Path
-) -> None:
-    """The robot of the refusals above is sound before it is spoilt, and gives the same numbers."""
-    assert command("stand", tmp_path, robot=own_robot(root, tmp_path, "</robot>", "</robot>")) == 0
-    for own, built in zip(
-        rows_of(tmp_path / "standing.csv"), rows_of(out / "standing.csv"), strict=True
-    ):
-        for column, value in built.items():
-            if column in ("alternative", "joint"):
-                assert own[column] == value
-            else:
-                assert float(own[column]) == pytest.approx(float(value), rel=1e-6, abs=1e-9)
-
-
-@pytest.mark.parametrize("arguments", [[], ["wlak"], ["walk", "extra"], ["check"]])
-def test_grammar(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert exit_code(arguments) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "--help" in error
