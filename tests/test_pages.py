@@ -202,7 +202,7 @@ def test_options_and_targets_in_the_text_exist(page: Path) -> None:
 
 def test_there_is_a_how_to_for_everything_that_people_add() -> None:
     said = " ".join(own[0].heading for own in HOW_TOS)
-    for thing in ("effect", "element", "alternative", "robot", "gait", "table"):
+    for thing in ("effect", "element", "alternative", "robot", "gait", "table", "figure"):
         assert thing in said, thing
 
 
