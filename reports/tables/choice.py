@@ -1,0 +1,144 @@
+"""Rows of the tables that `choose` writes: answer, front, ten best, day, unknowns, break-even."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from reports.column import column
+
+
+@dataclass(frozen=True)
+class AnswerRow:
+    """What to build at one group of joints; the last row is the robot."""
+
+    table: ClassVar = "answer"
+    about: ClassVar = "Least expected power over the day within every limit, group by group."
+    group: str = column("joints that are built alike, or the robot")
+    joints: int = column("how many", "1")
+    motor: str = column("part")
+    gear: str = column("part; empty for none or the motor's own")
+    ratio: float | None = column("turns of the motor per turn of the joint", "1")
+    brake: str = column("part; empty for none")
+    power_W: float = column("mean over the day, recomputed in full", "W")
+    energy_Wh_per_day: float = column("out of the supply in a day of the mission", "W*h")
+    battery_h: float | None = column("hours on one charge; robot only", "h")
+    actuator_mass_kg: float = column("motors, gears and brakes of the group", "kg")
+    chance_best: float | None = column("share of the draws in which nothing is better", "1")
+    power_low_W: float = column("exceeded in 95 % of the draws", "W")
+    power_high_W: float = column("exceeded in 5 % of the draws", "W")
+    regret_W: float = column("expected power above the best of each draw", "W")
+    searched_power_W: float = column("what the search took it for, before the recomputation", "W")
+    not_printed: str = column("entries of its parts that no sheet prints")
+
+
+@dataclass(frozen=True)
+class FrontRow:
+    """One robot that none beats in energy and mass together."""
+
+    table: ClassVar = "front"
+    point: int = column("from the least energy to the least mass", "1")
+    power_W: float = column("mean over the day", "W")
+    energy_Wh_per_day: float = column("out of the supply in a day", "W*h")
+    battery_h: float | None = column("hours on one charge", "h")
+    actuator_mass_kg: float = column("all actuators", "kg")
+    design: str = column("group: motor + gear + brake, by group")
+
+
+@dataclass(frozen=True)
+class BestRow:
+    """One of the ten best of a group, with why it is not the first."""
+
+    table: ClassVar = "ten_best"
+    group: str = column("joints that are built alike")
+    rank: int = column("by expected power over the day", "1")
+    motor: str = column("part")
+    gear: str = column("part; empty for none or the motor's own")
+    ratio: float = column("turns of the motor per turn of the joint", "1")
+    brake: str = column("part; empty for none")
+    power_W: float = column("expected over the draws", "W")
+    nominal_power_W: float = column("with every range at its middle", "W")
+    more_than_best_W: float = column("above the first", "W")
+    actuator_mass_kg: float = column("of the group", "kg")
+    chance_best: float = column("share of the draws in which nothing is better", "1")
+    nearest_limit: str = column("the limit that is nearest")
+    limit_use: float = column("share of it that is used", "1")
+    lost_by: str = column("where most of what it takes above the first goes")
+    not_printed: str = column("entries of its parts that no sheet prints")
+
+
+@dataclass(frozen=True)
+class ExcludedRow:
+    """How many designs of a group a limit forbids."""
+
+    table: ClassVar = "excluded"
+    group: str = column("joints that are built alike")
+    limit: str = column("what is exceeded")
+    removed: int = column("designs that exceed it", "1")
+    by_it_alone: int = column("designs that exceed nothing else", "1")
+    designs: int = column("all", "1")
+    left: int = column("within every limit", "1")
+
+
+@dataclass(frozen=True)
+class DayRow:
+    """One mode of the day at one group of joints, with the answer's actuators."""
+
+    table: ClassVar = "day"
+    mode: str = column("of the mission")
+    group: str = column("joints that are built alike, or the robot")
+    hours: float = column("in a day", "h")
+    power_W: float = column("mean in the mode, out of the supply", "W")
+    energy_Wh: float = column("in a day", "W*h")
+    share_of_day: float = column("of the day's energy", "1")
+    mechanical_W: float = column("to the joints, net", "W")
+    winding_W: float = column("heat of the windings", "W")
+    friction_W: float = column("heat of gears and rotors", "W")
+    brakes_W: float = column("coils of the brakes", "W")
+    returned_W: float = column("flows back and is lost", "W")
+    idle_W: float = column("drivers, and for the robot the hotel load", "W")
+    cost_of_transport: float | None = column("power over weight times speed; robot only", "1")
+    rms_current_A: float | None = column("of the worst joint", "A")
+    continuous_current_A: float | None = column("limit of it", "A")
+    peak_current_A: float | None = column("of the worst joint", "A")
+    most_current_A: float | None = column("limit of it", "A")
+    speed_rad_s: float | None = column("of the motor", "rad/s")
+    most_speed_rad_s: float | None = column("limit of it", "rad/s")
+    voltage_V: float | None = column("at the motor", "V")
+    most_voltage_V: float | None = column("limit of it", "V")
+    gear_rms_Nm: float | None = column("at the gear's output, of the worst joint", "N*m")
+    gear_continuous_Nm: float | None = column("limit of it", "N*m")
+    gear_peak_Nm: float | None = column("at the gear's output", "N*m")
+    gear_most_Nm: float | None = column("limit of it", "N*m")
+
+
+@dataclass(frozen=True)
+class UnknownRow:
+    """One number that no sheet prints, and what knowing it would be worth."""
+
+    table: ClassVar = "unknowns"
+    about: ClassVar = "Ranked by the expected regret that knowing the one number removes."
+    group: str = column("joints that are built alike")
+    part: str = column("whose sheet does not print it")
+    entry: str = column("the number")
+    low: float = column("lower end of its range", "see unit")
+    high: float = column("upper end", "see unit")
+    unit: str = column("of the range")
+    worth_W: float = column("expected regret that knowing it removes", "W")
+    moves_W: float = column("power of the best design from one end to the other", "W")
+
+
+@dataclass(frozen=True)
+class BreakEvenRow:
+    """Two candidates at one share of standing, one speed and one idle power."""
+
+    table: ClassVar = "break_even"
+    standing_share: float = column("of the time; the rest is walked", "1")
+    speed_m_s: float = column("of walking", "m/s")
+    idle_W: float = column("of one driver that is on", "W")
+    first: str = column("candidate")
+    second: str = column("candidate")
+    first_W: float = column("mean power", "W")
+    second_W: float = column("mean power", "W")
+    better: str = column("which takes less")
+    break_even: float | None = column("share of standing at which both take the same", "1")
