@@ -118,7 +118,7 @@ def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
                 data = _read_csv(table, columns, threads=True)
             except _troubles():
                 # Only a single thread counts rows, so that the message can say where.
-                data = _read_csv(table, columns, threads=False)
+                data = _read_csv(table, columns, threads=False, remarks=_remarked(table.data))
     if data.num_rows == 0:
         raise LogFormatError(f"{table.where}: a header and no rows; nothing was logged")
     return {name: _numbers(data.column(name), name, table.where) for name in columns}
@@ -178,7 +178,9 @@ def _reported(table: TableFile) -> Iterator[None]:
         raise LogFormatError(_reason(error, table)) from None
 
 
-def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool) -> Any:
+def _read_csv(
+    table: TableFile, columns: Sequence[str], *, threads: bool, remarks: bool = False
+) -> Any:
     import pyarrow as pa
     import pyarrow.csv as pc
 
@@ -192,7 +194,7 @@ def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool) -> Any
         ),
         parse_options=pc.ParseOptions(
             delimiter=table.dialect.delimiter,
-            invalid_row_handler=lambda row: "skip" if row.text.startswith("#") else "error",
+            invalid_row_handler=_without_remarks if remarks else None,
         ),
         convert_options=pc.ConvertOptions(
             include_columns=list(columns),
@@ -201,6 +203,16 @@ def _read_csv(table: TableFile, columns: Sequence[str], *, threads: bool) -> Any
             strings_can_be_null=True,
         ),
     )
+
+
+def _remarked(path: Path) -> bool:
+    """Whether a line below the first begins with a remark's sign."""
+    with path.open("rb") as stream:
+        return any(line.startswith(b"#") for line in stream)
+
+
+def _without_remarks(row: Any) -> str:
+    return "skip" if row.text.startswith("#") else "error"
 
 
 def _numbers(column: Any, name: str, where: str) -> Array:
