@@ -12,11 +12,15 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib.metadata import version
+from pathlib import Path
 
 from pipeline.cli import components, gap, robots, studies, walking
+from pipeline.cli.exchange.mapping import add_mapping
 from pipeline.cli.options import Run
 from pipeline.errors import PipelineError, StanceError
 
+#: Verbs of two words, each with options of its own.
+TWO_WORDS = ("gap mapping", "gap export")
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 
@@ -49,6 +53,7 @@ def parser() -> argparse.ArgumentParser:
     components.add_verb(add)
     walking.add_verbs(add)
     gap.add_verb(add)
+    add_mapping(add)
     studies.add_verbs(add)
     walking.add_diff(add)
     studies.add_calibrate(add)
@@ -64,7 +69,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    options = parser().parse_args(arguments)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    # A log file that is called like a verb's second word is a log.
+    if " ".join(words[:2]) in TWO_WORDS and not Path(words[1]).is_file():
+        words[:2] = [" ".join(words[:2])]
+    options = parser().parse_args(words)
     level = logging.INFO if getattr(options, "verbose", False) else logging.WARNING
     logging.basicConfig(level=level, format="%(message)s")
     from actuators.errors import ActuatorError

@@ -1,0 +1,147 @@
+"""What a column's name says: the quantity, the joint it belongs to, the unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from actuators.units import dimension
+from pipeline.logs.reading.csv_head import unit_spelt
+from pipeline.logs.reading.log_format import JOINT_COLUMNS
+
+#: Words of a name and what they say; a word of several letters may begin a longer one.
+_WORDS: Final = {
+    "position": ("position", "pos", "q", "angle", "enc", "encoder", "theta", "phi", "jointpos"),
+    "velocity": ("velocity", "vel", "dq", "qd", "qdot", "speed", "omega", "thetadot", "w"),
+    "torque": ("torque", "tau", "effort", "trq", "tq", "moment"),
+    "current": ("current", "cur", "curr", "i", "iq", "amps"),
+    "voltage": ("voltage", "volt", "u"),
+    "power": ("power", "pwr"),
+    "temperature": ("temperature", "temp"),
+}
+_GOALS: Final = {
+    *("goal", "target", "cmd", "command", "commanded", "desired", "des", "d"),
+    *("ref", "reference", "setpoint", "sp"),
+}
+#: Words of columns that hold no measurement.
+_STATES: Final = {"enabled", "enable", "status", "error", "mode", "on", "off", "raw", "flag"}
+_MOTOR: Final = frozenset(("motor", "rotor"))
+_SUPPLY: Final = frozenset(("supply", "battery", "bus", "vbat", "bat", "rail"))
+#: Words that say nothing about which joint it is.
+_EMPTY: Final = {
+    *("joint", "joints", "state", "states", "actual", "act", "measured", "meas", "present"),
+    *("axis", "servo", "robot", "data", "leg"),
+}
+#: Units at the end of a name, where they fit its quantity: `tau_a` is of a joint `a`.
+_ENDS: Final = {
+    *("rad", "deg", "degrees", "radians", "nm", "mnm", "ncm", "a", "ma", "v", "mv", "w", "mw"),
+    *("rpm", "rads", "degs", "degc", "c", "ms", "us", "ns", "s"),
+}
+_KEYWORD: Final = {word: quantity for quantity, words in _WORDS.items() for word in words}
+
+
+@dataclass(frozen=True)
+class Named:
+    """What a column's name says.
+
+    Attributes:
+        column: The name.
+        quantity: Of the log format; ``"supply"`` for a supply's voltage; empty where unknown.
+        joint: What is left of the name; empty where nothing is.
+        unit: Stated by the name or a row of units; empty where none is.
+        motor: Whether the name speaks of a motor.
+    """
+
+    column: str
+    quantity: str
+    joint: str
+    unit: str
+    motor: bool
+
+
+def words_of(name: str) -> list[str]:
+    """Words of a name in lower case: letters and digits apart, camel case split."""
+    parts = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)
+    return [part.lower() for part in parts]
+
+
+def read_name(column: str, unit: str) -> Named:
+    """Read a name.
+
+    Args:
+        column: The name.
+        unit: Of a row of units; empty where there is none.
+    """
+    bracket = re.search(r"[\[(]([^\[\]()]*[^\d\[\]()][^\[\]()]*)[\])]\s*$", column)
+    spelt = unit_spelt(bracket[1]) if bracket else ""
+    if bracket and spelt:
+        return _read(column, column[: bracket.start()], unit or spelt)
+    parts = column.split("_")
+    for k in (2, 1):  # the name's end: _rad_s before _s
+        if not unit and len(parts) > k and "".join(parts[-k:]).lower() in _ENDS:
+            inside = _read(column, "_".join(parts[:-k]), unit_spelt("/".join(parts[-k:])))
+            if inside.unit and inside.quantity:
+                return inside
+    return _read(column, column, unit)
+
+
+def _read(column: str, text: str, unit: str) -> Named:
+    """Read a name without its unit."""
+    words = words_of(text)
+    goal = next((w for w in words if w in _GOALS and (w != "d" or "q" in words)), "")
+    found = next((w for w in words if w in _KEYWORD), "")
+    quantity, motor = _KEYWORD.get(found, ""), bool(_MOTOR & {*words})
+    rest = [w for w in words if w not in {found, goal} | _EMPTY | _MOTOR]
+    if _STATES & {*words}:
+        quantity = ""
+    elif goal:
+        quantity = {"": "goal_position", "position": "goal_position"}.get(quantity, "")
+    elif _SUPPLY & {*words} and quantity in ("voltage", "") and dimension(unit or "V") == "voltage":
+        quantity = "supply"
+    elif motor and quantity == "position":
+        quantity = "motor_position"
+    if quantity not in ("", "supply") and unit and not _fits(quantity, unit):
+        quantity = ""
+    return Named(column, quantity, "_".join(rest), unit, motor)
+
+
+def _fits(quantity: str, unit: str) -> bool:
+    own = next(u for q, u in JOINT_COLUMNS.values() if q == quantity)
+    return dimension(own) == dimension(unit)
+
+
+def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str], str]:
+    """Which of the log's names is which joint of the robot, and by what that was decided.
+
+    Args:
+        owners: Names in the log, in the order of its columns.
+        joints: Of the robot, in its order.
+
+    Returns:
+        Name to joint, for those that can be told, and why; a guess by order is said to be one.
+    """
+    plain = _plain(joints)
+    told = {
+        owner: joints[plain.index(key)]
+        for owner, key in zip(owners, _plain(owners), strict=True)
+        if plain.count(key) == 1
+    }
+    if len(told) == len(owners) and len({*told.values()}) == len(told):
+        return told, "by name"
+    if len(owners) == len(joints):
+        ordered = sorted(owners, key=lambda o: [(w.isdigit(), w.zfill(8)) for w in words_of(o)])
+        in_order = ordered if all(w.isdigit() for o in owners for w in words_of(o)) else owners
+        return dict(zip(in_order, joints, strict=True)), "by order, a guess"
+    known = [owner for owner in told if [*told.values()].count(told[owner]) == 1]
+    numbered = [*owners] != known and all(owner.isdigit() for owner in owners)
+    return ({} if numbered else {owner: told[owner] for owner in known}), "by name"
+
+
+def _plain(names: Sequence[str]) -> list[str]:
+    """Names without the words that say nothing and without what all begin with."""
+    rows = [[w for w in words_of(name) if w not in _EMPTY | _MOTOR] for name in names]
+    while len(rows) > 1 and all(len(r) > 1 for r in rows) and len({r[0] for r in rows}) == 1:
+        rows = [r[1:] for r in rows]
+    return ["".join(str(int(w)) if w.isdigit() else w for w in row) for row in rows]

@@ -1,0 +1,236 @@
+"""The first mapping file as text: one line per column, its reason behind it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.errors import one_line
+from pipeline.logs.errors import GapError, LogFormatError
+from pipeline.logs.first_mapping.guess import Guess, guesses
+from pipeline.logs.first_mapping.names import read_name, words_of
+from pipeline.logs.first_mapping.numbers import clock_units
+from pipeline.logs.formats.arrays import TIMES
+from pipeline.logs.reading.csv_head import unit_spelt
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log_format import (
+    JOINT_COLUMNS,
+    TIME,
+    column_name,
+    parse_column,
+    plotted,
+)
+from pipeline.logs.reading.mapping import CsvTable
+from pipeline.logs.reading.table_file import (
+    TableFile,
+    open_table,
+    read_columns,
+    stream_columns,
+)
+
+Array = NDArray[np.float64]
+_DIALECTS: Final = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))
+_SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_ROWS: Final = 100_000  # that are looked at
+
+
+@dataclass(frozen=True)
+class FirstMapping:
+    """A mapping file, and what became of the columns.
+
+    Attributes:
+        text: TOML.
+        mapped: Columns that count.
+        open: Columns that are remarks until somebody decides.
+        unused: Columns that say nothing.
+    """
+
+    text: str
+    mapped: tuple[str, ...]
+    open: tuple[str, ...]
+    unused: tuple[str, ...]
+
+
+def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
+    """Write a first mapping file for a log.
+
+    Args:
+        path: The log.
+        expected: Names and limits of the robot, where one is given.
+
+    Raises:
+        GapError: The file is no table of numbers.
+    """
+    table, data = _numbers(path)
+    own = {c for c in table.header if _known(c, expected, table.where)}
+    clock, time, head = _clock(table, data, own)
+    units = table.head.units
+    foreign = [c for c in table.header if c in data and c not in own | {clock} and "*" not in c]
+    named = [read_name(c, units.get(c, "")) for c in foreign]
+    found, ratios, by = guesses(named, data, time, expected)
+    lines, mapped, open_ = _lines(found, own)
+    supply = next((n for n in named if n.quantity == "supply"), None)
+    said = {g.column for g in found} | own | {clock} | ({supply.column} if supply else set())
+    unused = tuple(c for c in table.header if c not in said)
+    text = [
+        f"# A first mapping of {table.where}: every line is a guess, with its reason behind it.",
+        "# Remarks in front of a column are other readings of it; put the right one in its place.",
+        "# Signs and zeros are the joint's in the file as here; `gap` itself names those that are",
+        "# not, with the line that mends them (flip = true, zero = ...).",
+        f"# Joints are told {by}." if lines else "# Its columns are those of the log format.",
+    ]
+    if table.dialect != CsvTable():
+        told = table.dialect
+        text += ["", "[csv]", f"delimiter = {json.dumps(told.delimiter)}"]
+        text += [f"decimal = {json.dumps(told.decimal)}"]
+    text += [*head, *(["", "[columns]", *lines] if lines else [])]
+    if ratios:
+        text += ["", "[gear_ratio]  # motor turns per joint turn, by the motion"]
+        text += [f"{json.dumps(joint)} = {ratio:.6g}" for joint, ratio in ratios.items()]
+    if supply:
+        unit = supply.unit or "V"
+        text += ["", "[supply]", f"column = {json.dumps(supply.column)}", f'unit = "{unit}"']
+    text += _gains(found, own)
+    if unused:
+        text += ["", "# Not used: " + json.dumps(list(unused), ensure_ascii=False)[1:-1]]
+    return FirstMapping("\n".join(text) + "\n", mapped, open_, unused)
+
+
+def _known(column: str, expected: Expected | None, where: str) -> bool:
+    """Whether a column is one of the log format as it stands."""
+    column = plotted(column)
+    if expected is None:
+        return column == TIME or column.rpartition("__")[2] in JOINT_COLUMNS
+    try:
+        return parse_column(column, expected, where) is not None
+    except GapError:
+        return False
+
+
+def _numbers(path: Path) -> tuple[TableFile, dict[str, Array]]:
+    """The file's columns that hold numbers, by the dialect that gives most of them."""
+    reason: GapError | None = None
+    for delimiter, decimal in _DIALECTS:
+        try:
+            table = open_table(
+                path, CsvTable.model_validate({"delimiter": delimiter, "decimal": decimal})
+            )
+            data = _columns(table)
+        except GapError as error:
+            reason = reason or error
+            continue
+        if len(data) > 1:
+            return table, data
+        reason = reason or LogFormatError(f"{table.where}: fewer than two columns of numbers")
+        if table.parquet:
+            break
+    assert reason is not None
+    raise reason
+
+
+def _columns(table: TableFile) -> dict[str, Array]:
+    if table.parquet:
+        return _each(table)
+    try:
+        return read_columns(table, table.header)
+    except GapError:
+        return _each(table)
+
+
+def _each(table: TableFile) -> dict[str, Array]:
+    """Columns one by one, without those of text."""
+    data = {}
+    for name in table.header:
+        try:
+            if table.parquet:
+                data[name] = next(islice(stream_columns(table, [name], _ROWS), 1), {})[name]
+            else:
+                data[name] = read_columns(table, [name])[name]
+        except (GapError, KeyError):
+            continue
+    return {name: x for name, x in data.items() if np.isfinite(x).any()}
+
+
+def _clock(
+    table: TableFile, data: Mapping[str, Array], own: set[str]
+) -> tuple[str, Array, list[str]]:
+    """The column of time, its numbers in seconds, and the lines that say so."""
+    names = [c for c in (TIME, "__time") if c in own and c in data]
+    foreign = [c for c in data if c not in own]
+    for column in names or sorted(foreign, key=lambda c: not {*words_of(c), c} & {*TIMES}):
+        units = clock_units(data[column])
+        stated = table.head.units.get(column) or unit_spelt(column.rpartition("_")[2])
+        if stated in _SECONDS:
+            units = [stated, *(u for u in units if u != stated)]
+        if not units:
+            continue
+        factor = _SECONDS[units[0]]
+        time = factor * data[column]
+        lines = ["", "[time]"] if column not in names or units[0] != "s" else []
+        if column not in names:
+            lines.append(f"column = {json.dumps(column, ensure_ascii=False)}")
+        if lines:
+            typical = float(np.nanmedian(np.diff(time)))
+            other = "".join(f"; or {unit}" for unit in units[1:] if stated not in _SECONDS)
+            lines.append(f'unit = "{units[0]}"  # {1.0 / max(typical, 1e-9):.4g} Hz{other}')
+        return column, time, lines
+    n = len(next(iter(data.values())))
+    lines = ["", "[time]  # no column runs on like a clock: put the rate at which it was logged"]
+    return "", np.arange(n) / 1000.0, [*lines, 'sample_rate = {value = 1000, unit = "Hz"}']
+
+
+def _lines(
+    found: Sequence[Guess], own: set[str]
+) -> tuple[list[str], tuple[str, ...], tuple[str, ...]]:
+    """Lines of the table of columns, and which columns count and which wait."""
+    taken = {plotted(c) for c in own}
+    lines, mapped, open_ = [], [], []
+    for guess in found:
+        target = column_name(guess.joint, guess.quantity)
+        twice = guess.sure and target in taken
+        why = f"{guess.why}; another column gives the same" if twice else guess.why
+        counts = guess.sure and not twice
+        for quantity, unit, when in guess.others:
+            other = _line(guess, quantity, unit)
+            lines.append(f"# {other}  # or {when}")
+        line = f"{_line(guess, guess.quantity, guess.unit)}  # {one_line(why)}"
+        lines.append(line if counts else f"# {line}")
+        (mapped if counts else open_).append(guess.column)
+        taken |= {target} if counts else set()
+    return lines, tuple(mapped), tuple(open_)
+
+
+def _line(guess: Guess, quantity: str, unit: str) -> str:
+    """One line of the table of columns."""
+    name = json.dumps(guess.column, ensure_ascii=False)
+    parts = [f"as = {json.dumps(column_name(guess.joint, quantity), ensure_ascii=False)}"]
+    if unit:
+        parts.append(f'unit = "{unit}"')
+    if guess.scale != 1.0:
+        parts.append(f"scale = {guess.scale:.6g}")
+    return f"{name} = {{{', '.join(parts)}}}"
+
+
+def _gains(found: Sequence[Guess], own: set[str]) -> list[str]:
+    """What a log without any effort needs: the servos' law."""
+    efforts = {"torque", "current", "voltage", "power"}
+    suffixes = {plotted(c).rpartition("__")[2] for c in own}
+    have = {g.quantity for g in found if g.sure} | {
+        JOINT_COLUMNS[s][0] for s in suffixes if s in JOINT_COLUMNS
+    }
+    if efforts & have or "goal_position" not in have:
+        return []
+    return [
+        "",
+        "# Targets and no effort: with the gains of the servos their law tells the torque.",
+        "# [pd_gains]",
+        '# kp = {value = 50, unit = "N*m/rad"}   # one for all joints, or a table by joint',
+        '# kd = {value = 1.0, unit = "N*m*s/rad"}',
+    ]

@@ -1,0 +1,96 @@
+"""From a foreign log to an answer in two commands: `gap mapping`, then `gap`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.blind.twin.trial import make_trial
+from pipeline.cli.main import main
+from tests.pipeline.logs.bags import write_bag
+
+Columns = dict[str, np.ndarray]
+LEG = "urdf/leg.toml"
+JOINTS = [f"rm_joint_{k}" for k in (1, 2, 3)]
+
+
+@pytest.fixture(scope="module")
+def leg() -> Columns:
+    return make_trial(5, ["viscous_friction"], "leg", "low").logs["log"]
+
+
+def hanging() -> Columns:
+    """A leg that swings, with currents that say no more than that somebody measured them."""
+    t = np.arange(1500) / 250.0
+    columns = {"time_s": t}
+    for k, joint in enumerate(JOINTS, start=1):
+        columns[f"{joint}__position_rad"] = 0.3 * np.sin(2 * np.pi * (0.3 + 0.11 * k) * t)
+        columns[f"{joint}__current_A"] = 0.4 * np.cos(2 * np.pi * (0.3 + 0.11 * k) * t + k)
+    return columns
+
+
+def block(columns: Columns, end: str) -> np.ndarray:
+    return np.stack([columns[f"{joint}__{end}"] for joint in JOINTS], axis=1)
+
+
+def as_csv(columns: Columns, folder: Path) -> Path:
+    q, i = np.degrees(block(columns, "position_rad")), 1e3 * block(columns, "current_A")
+    frame = pd.DataFrame({"zeit_ms": 1e3 * columns["time_s"]})
+    for k in range(3):
+        frame[f"Winkel {k + 1} angle"] = q[:, k]
+        frame[f"Motor {k + 1} current"] = i[:, k]
+    frame.to_csv(folder / "log.csv", sep=";", decimal=",", index=False)
+    return folder / "log.csv"
+
+
+def as_npz(columns: Columns, folder: Path) -> Path:
+    arrays = {"q": block(columns, "position_rad"), "iq": block(columns, "current_A")}
+    np.savez(folder / "log.npz", t=columns["time_s"], **arrays)
+    return folder / "log.npz"
+
+
+def as_bag(columns: Columns, folder: Path) -> Path:
+    stamps = 10**18 + np.round(columns["time_s"] * 1e9).astype(int)
+    q, i = block(columns, "position_rad"), block(columns, "current_A")
+    sent = (
+        ("/dynamic_joint_states", int(t), int(t), JOINTS, {"position": a, "current": b})
+        for t, a, b in zip(stamps, q, i, strict=True)
+    )
+    return write_bag(folder / "log", sent, dynamic=["/dynamic_joint_states"])
+
+
+def second_command(log: Path, mapping: Path, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """What `gap mapping` says to run next."""
+    assert main(["gap", "mapping", str(log), "--robot", LEG, "--out", str(mapping)]) == 0
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert said.startswith("next: python -m pipeline gap ")
+    return said.removeprefix("next: python -m pipeline ").split()
+
+
+@pytest.mark.parametrize("write", [as_csv, as_npz, as_bag])
+def test_two_commands_judge_a_foreign_log(
+    write: Callable[[Columns, Path], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mapping = tmp_path / "mapping.toml"
+    gap, *second = second_command(write(hanging(), tmp_path), mapping, capsys)
+    assert main([gap, "read", *second, "--out", str(tmp_path / "out")]) == 0
+    assert "checks passed" in capsys.readouterr().out
+    assert main(["gap", "mapping", second[0], "--out", str(mapping)]) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("write", [as_csv, as_npz, as_bag])
+def test_two_commands_name_what_a_model_lacks(
+    write: Callable[[Columns, Path], Path],
+    leg: Columns,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    second = second_command(write(leg, tmp_path), tmp_path / "mapping.toml", capsys)
+    assert main([*second, "--out", str(tmp_path / "out")]) in (0, 1)
+    assert "viscous friction" in capsys.readouterr().out

@@ -1,0 +1,158 @@
+"""A foreign log in many disguises: the first mapping file reads it as what it is."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from pipeline.logs.first_mapping.names import assign, read_name
+from pipeline.logs.first_mapping.write import first_mapping
+from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.mapping import load_mapping, parse_mapping
+from pipeline.logs.reading.read import read_log
+
+Array = NDArray[np.float64]
+Columns = dict[str, Array]
+
+
+def renamed(columns: Columns, pattern: dict[str, str], joints: dict[str, str]) -> Columns:
+    """The columns under other names: quantity's end to a pattern with {}, joint to a name."""
+    return {
+        pattern[end].format(joints[joint]): values
+        for name, values in columns.items()
+        for joint, _, end in [name.partition("__")]
+        if end in pattern
+    }
+
+
+def ur_style(columns: Columns) -> Columns:
+    ends = {"position_rad": "actual_q_{}", "velocity_rad_s": "actual_qd_{}"}
+    ends |= {"torque_Nm": "actual_current_{}"}
+    out = renamed(columns, ends, {"a": "0", "b": "1"})
+    out |= {k: 0.1 * v for k, v in out.items() if "current" in k}
+    return {"timestamp": columns["time_s"]} | out
+
+
+def degrees_and_milliseconds(columns: Columns) -> Columns:
+    ends = {"position_rad": "Joint{} Angle", "velocity_rad_s": "Joint{} Speed"}
+    ends |= {"torque_Nm": "Joint{} Torque [mNm]"}
+    out = renamed(columns, ends, {"a": "A", "b": "B"})
+    for name in out:
+        out[name] = out[name] * (1e3 if "Torque" in name else 180.0 / np.pi)
+    return {"t": 1e3 * columns["time_s"]} | out
+
+
+def at_the_motor(columns: Columns) -> Columns:
+    ends = {"position_rad": "enc_{}", "velocity_rad_s": "vel_{}", "torque_Nm": "tau_{}"}
+    out = renamed(columns, ends, {"a": "a", "b": "b"})
+    out["enc_a"], out["enc_b"] = 100.0 * out["enc_a"], -100.0 * out["enc_b"]
+    return {"time": columns["time_s"]} | out
+
+
+def exchanged_velocities(columns: Columns) -> Columns:
+    out = at_the_motor(columns)
+    out["enc_a"], out["enc_b"] = columns["a__position_rad"], columns["b__position_rad"]
+    out["vel_a"], out["vel_b"] = out["vel_b"], out["vel_a"]
+    return out
+
+
+def rpm_and_unnamed(columns: Columns) -> Columns:
+    out = at_the_motor(columns)
+    out["enc_a"], out["enc_b"] = columns["a__position_rad"], columns["b__position_rad"]
+    out["channel 7"] = out.pop("vel_a") * 60.0 / (2.0 * np.pi)
+    out["vel_b"] = out["vel_b"] * 60.0 / (2.0 * np.pi)
+    return out
+
+
+@pytest.mark.parametrize(
+    "disguise",
+    [ur_style, degrees_and_milliseconds, at_the_motor, exchanged_velocities, rpm_and_unnamed],
+)
+def test_a_disguised_log_is_read_as_what_it_is(
+    disguise: Callable[[Columns], Columns],
+    columns: Columns,
+    write: Callable[..., Path],
+    two_joints: Expected,
+    tmp_path: Path,
+) -> None:
+    path = write(disguise(columns), "foreign.csv")
+    made = first_mapping(path, two_joints)
+    (tmp_path / "first.toml").write_text(made.text, encoding="utf-8")
+    assert made.open == ()
+    log = read_log(path, two_joints, load_mapping(tmp_path / "first.toml"))
+    assert log.velocity is not None
+    effort = log.torque if log.current is None else 10.0 * log.current
+    assert effort is not None
+    assert np.allclose(log.time, columns["time_s"])
+    for j, joint in enumerate("ab"):
+        assert np.allclose(log.position[:, j], columns[f"{joint}__position_rad"], atol=1e-9)
+        assert np.allclose(effort[:, j], columns[f"{joint}__torque_Nm"], atol=1e-9)
+        # The factor of a velocity whose unit nothing states is that of its unit, exactly.
+        assert np.allclose(log.velocity[:, j], columns[f"{joint}__velocity_rad_s"], atol=1e-9)
+
+
+def test_without_a_robot_the_log_keeps_its_names(
+    columns: Columns, write: Callable[..., Path]
+) -> None:
+    path = write(degrees_and_milliseconds(columns), "foreign.csv")
+    made = first_mapping(path)
+    mapping = parse_mapping(tomllib.loads(made.text), "first")
+    assert mapping.columns["JointA Angle"].target == "a__position_rad"
+    assert mapping.columns["JointA Angle"].unit == "deg"
+    assert mapping.time.unit == "ms"
+
+
+def test_what_nothing_tells_is_left_to_the_reader(
+    columns: Columns, write: Callable[..., Path], two_joints: Expected
+) -> None:
+    foreign = at_the_motor(columns)
+    counts = {k: np.round(1e4 * v) for k, v in foreign.items() if k.startswith("enc")}
+    still = {k: v for k, v in foreign.items() if not k.startswith("vel")} | counts
+    made = first_mapping(write(still, "foreign.csv"), two_joints)
+    assert {"enc_a", "enc_b"} <= {*made.open}
+    assert (
+        '# "enc_a" = {as = "a__motor_position_rad", unit = "rad"}  # or at the motor' in made.text
+    )
+    assert (
+        "columns" not in tomllib.loads(made.text)
+        or "enc_a" not in tomllib.loads(made.text)["columns"]
+    )
+
+
+def test_a_log_in_the_format_needs_nothing(
+    columns: Columns, write: Callable[..., Path], two_joints: Expected
+) -> None:
+    assert tomllib.loads(first_mapping(write(columns), two_joints).text) == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "joint", "unit"),
+    [
+        ("tau_a", "torque", "a", ""),
+        ("hip_pos_deg", "position", "hip", "deg"),
+        ("q_d[3]", "goal_position", "3", ""),
+        ("dq[3]", "velocity", "3", ""),
+        ("motorCurrent2 (mA)", "current", "2", "mA"),
+        ("joint_vel_rad_s_4", "velocity", "rad_s_4", ""),
+        ("battery_voltage", "supply", "battery", ""),
+        ("/joint_states/position[2]", "position", "2", ""),
+        ("shoulder.temperature", "temperature", "shoulder", ""),
+    ],
+)
+def test_names(name: str, quantity: str, joint: str, unit: str) -> None:
+    named = read_name(name, "")
+    assert (named.quantity, named.joint, named.unit) == (quantity, joint, unit)
+
+
+def test_joints_are_told_by_name_or_by_order_and_never_shifted() -> None:
+    joints = ("arm_joint_1", "arm_joint_2", "arm_joint_3")
+    assert assign(["2", "1", "3"], joints)[0]["2"] == "arm_joint_2"
+    told, by = assign(["0", "1", "2"], joints)
+    assert told == dict(zip("012", joints, strict=True))
+    assert "guess" in by
+    assert assign(["0", "1"], joints)[0] == {}
