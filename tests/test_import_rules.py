@@ -15,6 +15,7 @@ ROOT = Path(__file__).parents[1]
 ORDER = (
     *(
         "cli",
+        "sweep",
         "api",
         "reports",
         "blind",
@@ -31,7 +32,14 @@ ORDER = (
 LEAVES = {
     *("actuators.units", "actuators.parameters", "actuators.errors", "actuators.text_file"),
     "actuators.checked",
-    *("pipeline.errors", "pipeline.progress", "reports.atomic", "reports.column", "reports.errors"),
+    *(
+        "pipeline.errors",
+        "pipeline.progress",
+        "pipeline.spread",
+        "reports.atomic",
+        "reports.column",
+        "reports.errors",
+    ),
 }
 #: Numbers, and the library by which files are read.
 ACTUATORS_NEED = {"numpy", "scipy", "pydantic", "pydantic_core"}
@@ -108,8 +116,8 @@ def test_the_rule_can_fail() -> None:
     assert allowed("reports.page", "pipeline.simulation.predict")
 
 
-def test_leaves_use_the_standard_library_what_reads_files_and_the_bar_only() -> None:
-    allowed_there = sys.stdlib_module_names | {"pydantic", "pydantic_core", "tqdm"}
+def test_leaves_use_the_standard_library_what_reads_files_the_bar_and_workers_only() -> None:
+    allowed_there = sys.stdlib_module_names | {"pydantic", "pydantic_core", "tqdm", "distributed"}
     for leaf in LEAVES:
         path = ROOT / Path(*leaf.split(".")).with_suffix(".py")
         modules = {m for m in imports(path) if m.split(".")[0] not in allowed_there}

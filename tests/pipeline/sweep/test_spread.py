@@ -1,0 +1,124 @@
+"""Blocks of work on processes and on a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from pipeline.errors import GaitError
+from pipeline.spread import SpreadError, spread
+
+ROOT = Path(__file__).parents[3]
+
+
+def square(number: int) -> int:
+    return number * number
+
+
+def square_or_die(number: int) -> int:
+    if number == 3:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number * number
+
+
+def refuse(number: int) -> int:
+    raise GaitError(f"{number}: no")
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_every_block_once_whatever_the_number_of_workers(workers: int) -> None:
+    found = dict(spread(square, range(20), workers=workers))
+    assert found == {n: n * n for n in range(20)}
+
+
+def test_no_blocks_need_no_workers() -> None:
+    assert list(spread(square, [], workers=2)) == []
+
+
+def test_a_killed_process_is_one_line() -> None:
+    with pytest.raises(SpreadError, match="a worker process ended") as error:
+        list(spread(square_or_die, range(8), workers=2))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_what_a_block_raises_comes_as_it_was_raised(workers: int) -> None:
+    with pytest.raises(GaitError, match="^[01]: no$"):
+        list(spread(refuse, range(2), workers=workers))
+
+
+@pytest.mark.parametrize("workers", [0, 1000])
+def test_workers_out_of_range(workers: int) -> None:
+    with pytest.raises(SpreadError, match="give a number from 1 to"):
+        list(spread(square, range(2), workers=workers))
+
+
+def test_stopping_early_ends_the_processes() -> None:
+    blocks = spread(square, range(50), workers=2)
+    assert next(blocks)
+    blocks.close()  # type: ignore[attr-defined]
+
+
+def test_a_scheduler_that_is_not_there_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("pipeline.spread._PATIENCE", "1s")
+    with pytest.raises(SpreadError, match="no scheduler answers") as error:
+        list(spread(square, range(2), scheduler="tcp://127.0.0.1:9"))
+    assert "\n" not in str(error.value)
+
+
+@contextmanager
+def dask(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    command = [sys.executable, "-m", f"distributed.cli.dask_{arguments[0]}", *arguments[1:]]
+    started = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    try:
+        yield started
+    finally:
+        started.kill()
+        started.communicate()
+
+
+@contextmanager
+def cluster() -> Iterator[tuple[str, list[subprocess.Popen[str]]]]:
+    """A scheduler and workers on the loopback; the address, and the processes, scheduler first."""
+    with dask("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard") as scheduler:
+        assert scheduler.stderr
+        address = next(line.split()[-1] for line in scheduler.stderr if "Scheduler at:" in line)
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard")
+        with dask("worker", address, *options) as one, dask("worker", address, *options) as two:
+            yield address, [scheduler, one, two]
+
+
+def slow_square(number: int) -> int:
+    time.sleep(0.2)
+    return number * number
+
+
+@pytest.mark.slow
+def test_a_cluster_does_every_block_though_a_worker_is_killed() -> None:
+    with cluster() as (address, processes):
+        found = {}
+        for place, result in spread(slow_square, range(30), scheduler=address):
+            found[place] = result
+            if len(found) == 5:
+                processes[1].kill()
+    assert found == {n: n * n for n in range(30)}
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_dies_is_one_line_and_what_was_done_is_known() -> None:
+    found = {}
+    with cluster() as (address, processes):
+        blocks = spread(slow_square, range(30), scheduler=address)
+        found.update(next(blocks) for _ in range(5))
+        processes[0].kill()
+        with pytest.raises(SpreadError, match="the scheduler is gone"):
+            found.update(blocks)
+    assert 5 <= len(found) < 30
