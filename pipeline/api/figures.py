@@ -87,7 +87,7 @@ def write_figures(
 def drawings(
     given: Settings, standing: Standing, walking: Walking, *, paper: bool = False
 ) -> Drawings:
-    """Every figure of a run, the longest first, so that two processes end together."""
+    """Every figure of a run."""
     parts = stretches(given.robot, walking)
     return {
         **robot_drawings(Scene(given.robot), standing, parts),

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import gc
-import os
-import signal
-import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from reports.atomic import replacing
-from reports.errors import FigureError, ReportError
 from reports.figures.style import house_style
 
 if TYPE_CHECKING:
@@ -70,15 +66,15 @@ def save_figures(
     drawings: Mapping[str, Callable[[], Figure]],
     folder: Path,
     *,
-    processes: int | None = None,
     done: Callable[[float], None] | None = None,
 ) -> int:
     """Draw and save every figure.
 
+    In one process: a second one would load fonts and lay out their letters once more.
+
     Args:
         drawings: File name without ending to what makes the figure.
         folder: For the files.
-        processes: 1 or 2; by default 2 where there are two processors and forking is safe.
         done: Called with the share that is drawn, now and then.
 
     Returns:
@@ -87,74 +83,13 @@ def save_figures(
     Raises:
         ReportError: A figure that cannot be drawn or saved.
     """
-    if processes is None:  # on macOS system libraries do not survive a fork, Windows has none
-        processes = 2 if sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1 else 1
     gc.freeze()  # what is loaded by now stays: the collector need not search it again and again
     try:
-        if processes < 2 or len(drawings) < 2:
-            _save(drawings, list(drawings), folder, done)
-        else:
-            _save_in_two(drawings, folder, done)
+        with house_style():  # once for all: entering it costs as much as a small drawing
+            for turn, (name, draw) in enumerate(drawings.items()):
+                if done is not None:
+                    done(turn / len(drawings))
+                save_figure(draw(), folder, name)
     finally:
         gc.unfreeze()
     return len(drawings)
-
-
-def _save(
-    drawings: Mapping[str, Callable[[], Figure]],
-    names: Sequence[str],
-    folder: Path,
-    done: Callable[[float], None] | None,
-) -> None:
-    with house_style():  # once for all: entering it costs as much as a small drawing
-        for turn, name in enumerate(names):
-            if done is not None:
-                done(turn / len(names))
-            save_figure(drawings[name](), folder, name)
-
-
-def _save_in_two(
-    drawings: Mapping[str, Callable[[], Figure]],
-    folder: Path,
-    done: Callable[[float], None] | None,
-) -> None:
-    """A forked child draws every second figure."""
-    import multiprocessing
-
-    # Imported before the fork, so that it is done once.
-    import matplotlib.backends.backend_agg
-    import matplotlib.backends.backend_svg
-    import matplotlib.figure  # noqa: F401
-
-    context = multiprocessing.get_context("fork")
-    receive, send = context.Pipe(duplex=False)
-    names, parent, stopped = list(drawings), os.getpid(), context.Event()
-
-    def stop_with_parent(_: float) -> None:
-        if stopped.is_set() or os.getppid() != parent:
-            sys.exit(0)
-
-    def draw_half() -> None:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent answers it for both
-        try:
-            _save(drawings, names[1::2], folder, stop_with_parent)
-        except ReportError as error:
-            send.send((type(error), str(error)))
-
-    child = context.Process(target=draw_half, daemon=True)
-    child.start()
-    send.close()
-    try:
-        _save(drawings, names[::2], folder, done)
-    finally:
-        if sys.exc_info()[0] is not None:
-            stopped.set()
-        child.join()
-    with receive:
-        try:
-            kind, text = receive.recv()
-        except EOFError:  # nothing to report
-            if child.exitcode == 0:
-                return
-            kind, text = FigureError, f"drawing figures ended with {child.exitcode}; run again"
-        raise kind(text)

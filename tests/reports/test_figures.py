@@ -314,13 +314,11 @@ DRAWINGS = {
 }
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-def test_number_of_processes_and_order_leave_the_bytes(tmp_path: Path, processes: int) -> None:
+def test_their_order_leaves_the_bytes(tmp_path: Path) -> None:
     for name, draw in DRAWINGS.items():
         save_figure(draw(), tmp_path / "each", name)
-    names = sorted(DRAWINGS, reverse=processes == 2)
-    every = {name: DRAWINGS[name] for name in names}
-    assert save_figures(every, tmp_path / "all", processes=processes) == 3
+    every = {name: DRAWINGS[name] for name in sorted(DRAWINGS, reverse=True)}
+    assert save_figures(every, tmp_path / "all") == 3
     files = {path.name: path.read_bytes() for path in (tmp_path / "all").iterdir()}
     assert files == {path.name: path.read_bytes() for path in (tmp_path / "each").iterdir()}
     assert len(files) == 6
@@ -330,13 +328,9 @@ def fail() -> None:
     raise FigureError("nothing to draw")
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-@pytest.mark.parametrize("bad", [0, 1])  # the second is drawn by the other process
-def test_an_error_in_either_process_is_that_error(tmp_path: Path, processes: int, bad: int) -> None:
-    every = [("demand", demand), ("stages", DRAWINGS["stages"])]
-    every.insert(bad, ("bad", fail))
+def test_an_error_in_a_figure_is_that_error(tmp_path: Path) -> None:
     with pytest.raises(FigureError, match="nothing to draw"):
-        save_figures(dict(every), tmp_path, processes=processes)
+        save_figures({"demand": demand, "bad": fail}, tmp_path)
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 

@@ -110,8 +110,6 @@ class Calibrated:
 
 def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibrated]:
     """What the calibration says of every free number and of the motor's constants."""
-    from scipy.stats import truncnorm
-
     known, nearest = results["posterior"]["numbers"], results["nearest"]
     out = []
     for free, coordinate in zip(prior.free, nearest["z"], strict=True):
@@ -121,7 +119,7 @@ def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibra
         out.append(
             Calibrated(
                 *(free.key, free.unit, value, min(low, value), max(high, value)),
-                number_verdict(shift, spread, float(truncnorm.std(*free.ends))),
+                number_verdict(shift, spread, free.spread),
                 *(own["r_hat"], own["effective"], free.centre, free.interval),
                 *(shift, spread, own["at_lower"], own["at_upper"]),
             )

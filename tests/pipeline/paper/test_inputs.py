@@ -143,3 +143,10 @@ def test_the_prior_names_numbers_that_exist(
     known = {f"robot.{name}" for name in spec.parameters}
     known |= {f"{component}.{p.name}" for component, p in catalog.rows()}
     assert set(prior.keys) <= known
+
+
+def test_spread_within_bounds_is_that_of_scipys_truncated_normal() -> None:
+    from scipy.stats import truncnorm
+
+    for free in load_prior().free:
+        assert free.spread == pytest.approx(float(truncnorm.std(*free.ends)), rel=1e-9)
