@@ -231,6 +231,7 @@ def _gains(found: Sequence[Guess], own: set[str]) -> list[str]:
         "",
         "# Targets and no effort: with the gains of the servos their law tells the torque.",
         "# [pd_gains]",
-        '# kp = {value = 50, unit = "N*m/rad"}   # one for all joints, or a table by joint',
-        '# kd = {value = 1.0, unit = "N*m*s/rad"}',
+        "# kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}",
+        "# kd = 1.0  # [N*m*s/rad]",
+        "# limit = 20.0  # largest torque [N*m]",
     ]

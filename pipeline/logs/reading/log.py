@@ -21,6 +21,8 @@ Mask = NDArray[np.bool_]
 
 #: Channels in which measurement and simulation are compared, the most direct first, with unit.
 EFFORTS: Final[Mapping[str, str]] = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
+#: What servos are told.
+GOALS: Final = ("goal_position", "goal_velocity", "goal_torque")
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,8 @@ class Log:
         voltage: Of the motor, shape (N, J) [V].
         power: Electrical, shape (N, J) [W].
         goal_position: Shape (N, J) [rad].
+        goal_velocity: Shape (N, J) [rad/s].
+        goal_torque: What the servos add to their law, at the joint side, shape (N, J) [N*m].
         temperature: Shape (N, J) [degC].
         feet: Names of the legs whose feet were measured.
         foot_force: Of the world on the robot, shape (N, F, 3) [N].
@@ -100,6 +104,8 @@ class Log:
     voltage: Array | None = None
     power: Array | None = None
     goal_position: Array | None = None
+    goal_velocity: Array | None = None
+    goal_torque: Array | None = None
     temperature: Array | None = None
     feet: tuple[str, ...] = ()
     foot_force: Array | None = None
@@ -134,7 +140,7 @@ class Log:
         shapes = {"time": (n,), "valid": (n, j), "torque_off": (n, j)}
         shapes |= dict.fromkeys(("base_roll", "base_pitch", "supply"), (n,))
         shapes |= dict.fromkeys(
-            ("velocity", *EFFORTS, "goal_position", "temperature", "motor_position"), (n, j)
+            ("velocity", *EFFORTS, *GOALS, "temperature", "motor_position"), (n, j)
         )
         for key, shape in shapes.items():
             value = getattr(self, key)

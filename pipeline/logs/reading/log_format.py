@@ -22,6 +22,8 @@ JOINT_COLUMNS: Final = {
     "voltage_V": ("voltage", "V"),
     "power_W": ("power", "W"),
     "goal_position_rad": ("goal_position", "rad"),
+    "goal_velocity_rad_s": ("goal_velocity", "rad/s"),
+    "goal_torque_Nm": ("goal_torque", "N*m"),
     "temperature_degC": ("temperature", "degC"),
 }
 _SUFFIX: Final = {quantity: suffix for suffix, (quantity, _) in JOINT_COLUMNS.items()}

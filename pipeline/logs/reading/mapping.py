@@ -36,6 +36,11 @@ All tables are optional::
     law = "duty"                            # computes voltage where there is none
     torque_off_bridge = "open"              # or "shorted"; what the bridge does with the drive off
 
+    [pd_gains]                              # torque by the servos' law where no effort is logged
+    kp = 50.0                               # [N*m/rad]; or {hip = 60.0, knee = 40.0}
+    kd = 1.0                                # [N*m*s/rad]
+    limit = 23.7                            # largest torque [N*m]
+
     [supply]
     voltage = {value = 24, unit = "V"}      # or column = "supply_voltage_V"
 
@@ -77,6 +82,7 @@ from actuators.units import dimension, from_si, to_si
 from pipeline.logs.errors import MappingError
 from pipeline.logs.reading.log import EFFORTS
 from pipeline.logs.reading.log_format import BASE_COLUMNS, JOINT_COLUMNS
+from pipeline.logs.reading.servo_law import PdGains
 
 #: Beyond these a number is a slip, and some product of it overflows.
 LARGEST = 1e12
@@ -307,6 +313,7 @@ class Mapping(Table):
     torque_enabled: dict[str, str] = Field(default_factory=dict)
     gear_ratio: dict[str, Factor] = Field(default_factory=dict)
     controller: ControllerTable = ControllerTable()
+    pd_gains: PdGains | None = None
     supply: SupplyTable = SupplyTable()
     constants: dict[str, QuantityTable] = Field(default_factory=dict)
     keep: KeepTable = KeepTable()

@@ -76,6 +76,17 @@ class ReadingPlan:
             and all(self.has(joint, "goal_position") for joint in self.expected.joints)
         )
 
+    @property
+    def derives_torque(self) -> bool:
+        """Whether torque follows from the servos' law, targets and gains."""
+        efforts = [q for q in EFFORTS if any(t.quantity == q for t in self.sources)]
+        return (
+            self.mapping.pd_gains is not None
+            and "torque" not in efforts
+            and (not efforts or self.mapping.effort == "torque")
+            and any(t.quantity == "goal_position" for t in self.sources)
+        )
+
     def has(self, owner: str, quantity: str) -> bool:
         """Whether the file has a quantity of a joint."""
         return any(t.owner == owner and t.quantity == quantity for t in self.sources)
@@ -243,6 +254,11 @@ def _check_names(plan: ReadingPlan) -> None:
                 f"{suggest_column(column, table.header)}"
             )
     named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values())
+    if mapping.pd_gains is not None:
+        try:
+            mapping.pd_gains.refuse_unknown(expected.joints)
+        except ValueError as error:
+            raise GapError(f"{mapping.where}: {error}") from None
     for joint in (*named, *mapping.gear_ratio):
         if joint not in expected.joints:
             raise GapError(
@@ -305,9 +321,15 @@ def _check_efforts(plan: ReadingPlan) -> None:
                 )
     if not found and plan.derives_voltage:
         found = ["voltage"]
+    if plan.derives_torque:
+        found = ["torque", *found]
     if not found:
         columns = ", ".join(column_name(plan.expected.joints[0], c) for c in EFFORTS)
-        raise LogFormatError(f"{where}: no effort channel; at least one of {columns} must be there")
+        goals = any(t.quantity == "goal_position" for t in plan.sources)
+        hint = "; or give the servos' gains under [pd_gains] in a mapping file" if goals else ""
+        raise LogFormatError(
+            f"{where}: no effort channel; at least one of {columns} must be there{hint}"
+        )
     if mapping.effort is not None and mapping.effort not in found:
         raise LogFormatError(
             f"{mapping.where}: effort = '{mapping.effort}' is not in {where}; "

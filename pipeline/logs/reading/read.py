@@ -18,6 +18,7 @@ from pipeline.logs.reading.log import EFFORTS, Log
 from pipeline.logs.reading.log_format import Target, column_name, parse_column
 from pipeline.logs.reading.mapping import ColumnTable, Mapping
 from pipeline.logs.reading.plan import ReadingPlan, plan_reading
+from pipeline.logs.reading.servo_law import CANNOT
 from pipeline.logs.reading.sides import sides_of
 from pipeline.logs.reading.table_file import read_columns, stream_columns
 
@@ -87,11 +88,13 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
     }
     own, motor = joints.pop("position", None), joints.pop("motor_position", None)
     sides = sides_of(own, motor, expected, mapping.gear_ratio, where)
-    derived = mapping.controller.law == "duty" and "goal_position" in joints
+    derived = "goal_position" in joints and (
+        mapping.controller.law == "duty" or plan.derives_torque
+    )
     efforts = [joints[c] for c in EFFORTS if c in joints]
     position, left_out = _stand_still(sides.position, efforts, derived, plan)
     feet, unused = _feet(columns, expected.feet, time.size)
-    drive = _drive(plan, data, joints | {"position": position})
+    drive = _drive(plan, data, joints | {"position": position}, time)
     log = Log(
         name=plan.table.path.stem,
         time=time,
@@ -102,7 +105,6 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
         left_out=left_out,
         remarks={column_name(j, "motor_position"): text for j, text in sides.remarks.items()},
         repeated_times=int((~fresh).sum()),
-        told=plan.table.remarks,
         gain=plan.rule.gain_per_rad,
         torque_off_bridge=mapping.controller.torque_off_bridge,
         constants={name: quantity.si for name, quantity in plan.rule.constants.items()},
@@ -115,7 +117,7 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
         sha256=digest,
         source=plan.table.path,
         rules={(t.owner, t.quantity): source for t, source in plan.sources.items()},
-        **base | joints | feet | drive,
+        **base | joints | feet | {"told": plan.table.remarks} | drive,
     )
     return log if fresh.all() else log.rows(fresh)
 
@@ -236,7 +238,9 @@ def _feet(
     return out, unused
 
 
-def _drive(plan: ReadingPlan, data: dict[str, Array], joints: dict[str, Array]) -> dict[str, Any]:
+def _drive(
+    plan: ReadingPlan, data: dict[str, Array], joints: dict[str, Array], time: Array
+) -> dict[str, Any]:
     """Supply, switched-off rows, the voltage of the servo's own law, and rows that are valid."""
     mapping, position, out = plan.mapping, joints["position"], dict[str, Any]()
     supply, gain = mapping.supply, plan.rule.gain_per_rad or 0.0
@@ -259,6 +263,13 @@ def _drive(plan: ReadingPlan, data: dict[str, Array], joints: dict[str, Array]) 
         if "torque_off" in out:
             out["voltage"][out["torque_off"]] = np.nan
         out["derived"] = {"voltage": "supply x clip(gain x (goal - position), -1, 1)"}
+    gains = mapping.pd_gains
+    if gains is not None and plan.derives_torque:
+        out["torque"] = gains.torque(plan.expected.joints, joints, time)
+        if "torque_off" in out:
+            out["torque"][out["torque_off"]] = 0.0
+        out["derived"] = {"torque": gains.formula(joints)}
+        out["told"] = (*plan.table.remarks, f"the torque {CANNOT}")
     channels = joints | out
     effort = mapping.effort or next((c for c in EFFORTS if c in channels), None)
     if effort is not None:
