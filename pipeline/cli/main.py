@@ -15,6 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.cli import components, gap, robots, studies, walking
+from pipeline.cli.exchange.export import add_export
 from pipeline.cli.exchange.mapping import add_mapping
 from pipeline.cli.options import Run
 from pipeline.errors import PipelineError, StanceError
@@ -54,6 +55,7 @@ def parser() -> argparse.ArgumentParser:
     walking.add_verbs(add)
     gap.add_verb(add)
     add_mapping(add)
+    add_export(add)
     studies.add_verbs(add)
     walking.add_diff(add)
     studies.add_calibrate(add)

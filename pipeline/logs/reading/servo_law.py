@@ -98,6 +98,16 @@ class PdGains(Table):
         law += " + goal torque" if "goal_torque" in channels else ""
         return law if self.limit is None else f"{law}, clipped at the limit"
 
+    def by_joint(self, joints: Sequence[str]) -> dict[str, tuple[float, float]]:
+        """Stiffness and damping of every joint.
+
+        Raises:
+            ValueError: The gains are those of other joints.
+        """
+        self.refuse_unknown(joints)
+        kp, kd = self._of(self.kp, joints), self._of(self.kd, joints)
+        return {j: (float(p), float(d)) for j, p, d in zip(joints, kp, kd, strict=True)}
+
     @staticmethod
     def _of(gains: Gains, joints: Sequence[str]) -> Array:
         if isinstance(gains, dict):

@@ -11,7 +11,7 @@ import pytest
 
 from pipeline.blind.twin.trial import make_trial
 from pipeline.cli.main import main
-from tests.pipeline.logs.bags import write_bag
+from tests.pipeline.logs.formats.bags import write_bag
 
 Columns = dict[str, np.ndarray]
 LEG = "urdf/leg.toml"

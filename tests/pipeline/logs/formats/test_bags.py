@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.logs.formats.convert import plain
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.read import read_log
-from tests.pipeline.logs.bags import Sent, write_bag
+from tests.pipeline.logs.formats.bags import Sent, write_bag
 
 Array = NDArray[np.float64]
 START = 1_700_000_000 * 10**9

@@ -1,0 +1,87 @@
+"""A model file's machine as other tools read it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from actuators.errors import closest, one_line
+from pipeline.effects.model_file import apply_edits, base_model, file_sha256, read_model_file
+from pipeline.logs.errors import MappingError, ModelFileError
+from pipeline.logs.reading.mapping import load_mapping
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
+from pipeline.robot.urdf_source import read_urdf
+from pipeline.simulation.export import mjcf, ros2_control, urdf
+from pipeline.simulation.export.joints import found_text, joint_numbers, left_out
+
+KINDS = ("mjcf", "urdf", "ros2_control")
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A file for another tool.
+
+    Attributes:
+        text: Its contents.
+        left: What it cannot hold, in words.
+        joints: How many joints it has.
+    """
+
+    text: str
+    left: tuple[str, ...]
+    joints: int
+
+
+def exported(
+    model: Path, to: str, *, robot: Path | None = None, mapping: Path | None = None
+) -> Exported:
+    """Write a machine with what was found on it for another tool.
+
+    Args:
+        model: Model file.
+        to: ``mjcf``, ``urdf`` or ``ros2_control``.
+        robot: Robot file or URDF instead of the one that the model file names.
+        mapping: Mapping file whose ``[pd_gains]`` are the servos' gains.
+
+    Raises:
+        GapError: The model file or mapping cannot be used.
+        PipelineError: The robot cannot be used.
+        ActuatorError: The actuator cannot be used.
+    """
+    if to not in KINDS:
+        raise ModelFileError(f"'{one_line(to)}' is none of the formats; {closest(to, KINDS)}")
+    file = read_model_file(model)
+    if robot is not None:
+        file = replace(file, robot=robot, robot_sha256=file_sha256(robot))
+    bare = base_model(file)
+    machine = apply_edits(bare, file.edits)
+    numbers = joint_numbers(machine)
+    gains = None
+    if mapping is not None:
+        pd = load_mapping(mapping).pd_gains
+        if pd is None:
+            raise MappingError(f"{one_line(mapping.name)}: has no [pd_gains]")
+        try:
+            gains = pd.by_joint(machine.joints)
+        except ValueError as error:
+            raise MappingError(f"{one_line(mapping.name)}: {error}") from None
+    fixed = {"mjcf": mjcf.LEFT, "urdf": urdf.LEFT, "ros2_control": ros2_control.LEFT}[to]
+    left = (*left_out(machine, numbers), *fixed)
+    remarks = [
+        f"{machine.name} with what gap found ({one_line(model.name)}):",
+        *(found_text(file.edits) or ["nothing"]),
+        "Not carried over:",
+        *left,
+    ]
+    if to == "mjcf":
+        text = mjcf.mjcf(machine, numbers, remarks, gains)
+    elif to == "ros2_control":
+        text = ros2_control.ros2_control(numbers, remarks, gains)
+    else:
+        bare_urdf = file.robot.suffix.lower() == ".urdf"
+        source = (
+            read_urdf(file.robot) if bare_urdf else load_robot(load_robot_file(file.robot)).urdf
+        )
+        text = urdf.urdf(source, str(file.robot), bare, file.edits, numbers, remarks)
+    return Exported(text, left, len(numbers))

@@ -1,0 +1,200 @@
+"""What was found, written for other tools: they must compute the torques that we do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+from numpy.typing import NDArray
+from ruamel.yaml import YAML
+
+from actuators.shaft import ShaftSeries
+from pipeline.cli.main import main
+from pipeline.effects.model_file import file_sha256, load_model
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.export.joints import bodies_of
+
+Array = NDArray[np.float64]
+Effects = tuple[tuple[str, str, dict[str, tuple[float, str]]], ...]
+Write = Callable[[Effects], Path]
+LINK = """
+  <link name="{name}"><inertial>
+    <origin xyz="{x} 0.02 -0.05" rpy="0.1 0.2 0.3"/><mass value="{mass}"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.015" ixy="0.001" ixz="0.0" iyz="-0.001"/>
+  </inertial></link>"""
+URDF = (
+    '<robot name="arm"><link name="base"/>'
+    + LINK.format(name="upper", x=0.1, mass=2.0)
+    + LINK.format(name="lower", x=0.15, mass=1.0)
+    + """
+  <joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0.1 0.3" rpy="0.2 0 0.1"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="60" velocity="8"/></joint>
+  <joint name="elbow" type="revolute"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0.3 0 0" rpy="0 0.4 0"/><axis xyz="0.6 0 0.8"/>
+    <limit lower="-2" upper="2" effort="30" velocity="8"/><dynamics damping="7"/></joint>
+</robot>
+"""
+)
+EDIT = """
+[[edit]]
+effect = "{effect}"
+place = ["{place}"]
+source = "a test"
+parameters = {{{values}}}
+"""
+PLAIN = (
+    ("coulomb_friction", "shoulder", {"torque": (1.3, "N*m")}),
+    ("viscous_friction", "shoulder", {"coefficient": (0.7, "N*m*s/rad")}),
+    ("viscous_friction", "elbow", {"coefficient": (0.2, "N*m*s/rad")}),
+    ("rotor_inertia", "elbow", {"added": (0.08, "kg*m^2")}),
+    ("parallel_spring", "elbow", {"stiffness": (5.0, "N*m/rad"), "rest": (0.3, "rad")}),
+    ("link_mass", "lower", {"mass": (0.5, "kg"), "x": (0.2, "m")}),
+    ("base_tilt", "ground", {"roll": (0.05, "rad"), "pitch": (-0.1, "rad")}),
+)
+BENT = (
+    *PLAIN,
+    ("load_dependent_friction", "shoulder", {"share": (0.1, "1")}),
+    ("joint_elasticity", "elbow", {"stiffness": (900.0, "N*m/rad")}),
+    (
+        "stribeck_friction",
+        "elbow",
+        {"coulomb": (1.0, "N*m"), "excess": (0.5, "N*m"), "velocity": (0.2, "rad/s")},
+    ),
+)
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Write a model file with effects of an arm."""
+
+    def _write(effects: Effects) -> Path:
+        (tmp_path / "arm.urdf").write_text(URDF, encoding="utf-8")
+        digest = file_sha256(tmp_path / "arm.urdf")
+        text = f'schema = 1\n[robot]\nfile = "arm.urdf"\nsha256 = "{digest}"\n'
+        for effect, place, values in effects:
+            inside = ", ".join(
+                f'{k} = {{value = {v}, unit = "{u}"}}' for k, (v, u) in values.items()
+            )
+            text += EDIT.format(effect=effect, place=place, values=inside)
+        (tmp_path / "model.toml").write_text(text, encoding="utf-8")
+        return tmp_path / "model.toml"
+
+    return _write
+
+
+def motion(n: int = 200) -> tuple[Array, Array, Array]:
+    """A moving trajectory of two joints, no row near rest: position, speed, acceleration."""
+    t = np.linspace(0.0, 3.0, n)[:, None]
+    w, phase = np.array([2.1, 3.3]), np.array([0.4, 1.3])
+    q, v = 0.8 * np.sin(w * t + phase), 0.8 * w * np.cos(w * t + phase)
+    moves = (np.abs(v) > 0.3).all(axis=1)
+    return q[moves], v[moves], (-(w**2) * q)[moves]
+
+
+def our_torque(machine: MachineModel, q: Array, v: Array, a: Array) -> Array:
+    """What the motors give at the joints, by rigid bodies and the drivetrains' own laws."""
+    model = bodies_of(machine)
+    data = model.createData()
+    rigid = np.array([pin.rnea(model, data, *row) for row in zip(q, v, a, strict=True)])
+    out = np.empty_like(rigid)
+    for k, drive in enumerate(machine.actuators):
+        load = drive.drive_load(q[:, k], rigid[:, k])
+        side = ShaftSeries(
+            joints=(drive.name,),
+            time=np.arange(len(q), dtype=float),
+            position=q[:, k : k + 1],
+            velocity=v[:, k : k + 1],
+            acceleration=a[:, k : k + 1],
+            torque=load[:, None],
+            direction=np.sign(v[:, k : k + 1]),
+        )
+        out[:, k] = drive.at_motor(side).torque[:, 0] * drive.ratio
+    return out
+
+
+def mujoco_torque(path: Path, q: Array, v: Array, a: Array) -> Array:
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    out = np.empty_like(q)
+    for k in range(len(q)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], v[k], a[k]
+        mujoco.mj_inverse(model, data)
+        out[k] = data.qfrc_inverse
+    return out
+
+
+def test_mujoco_computes_the_torques_that_we_do(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = write(PLAIN)
+    out = tmp_path / "arm.xml"
+    assert main(["gap", "export", str(model), "--to", "mjcf", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert [line for line in said.splitlines() if "not carried over" in line] == [
+        "not carried over: meshes, collisions and contacts: bodies and joints alone are written"
+    ]
+    q, v, a = motion()
+    ours = our_torque(load_model(model), q, v, a)
+    assert np.abs(mujoco_torque(out, q, v, a) - ours).max() < 1e-3 * np.abs(ours).max()
+    # Without what was found they are far apart: the comparison can fail.
+    bare = write(())
+    assert main(["gap", "export", str(bare), "--to", "mjcf", "--out", str(tmp_path / "b.xml")]) == 0
+    assert np.abs(mujoco_torque(tmp_path / "b.xml", q, v, a) - ours).max() > 1.0
+
+
+def test_what_has_no_number_is_told(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = write(BENT)
+    out = tmp_path / "arm.xml"
+    assert main(["gap", "export", str(model), "--to", "mjcf", "--out", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "shoulder: friction grows with load, by 0.1 of it" in said
+    assert "elbow: friction bends with speed: up to 0.3" in said
+    assert "elbow: elasticity of the transmission, 900 N*m/rad" in said
+    assert "friction grows with load" in out.read_text(encoding="utf-8")
+
+
+def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Path) -> None:
+    model = write(PLAIN)
+    out = tmp_path / "found.urdf"
+    assert main(["gap", "export", str(model), "--to", "urdf", "--out", str(out)]) == 0
+    again, machine = pin.buildModelFromUrdf(str(out)), load_model(model)
+    # Pinocchio reads `dynamics`: friction as dry friction, damping as viscous.
+    assert np.allclose(again.upperDryFrictionLimit, [1.3, 0.0], atol=1e-7)
+    assert np.allclose(again.damping, [0.7, 0.2], atol=1e-7)
+    for mine, theirs in zip(bodies_of(machine).inertias, again.inertias, strict=True):
+        assert np.allclose(
+            mine.toDynamicParameters(), theirs.toDynamicParameters(), rtol=1e-6, atol=1e-9
+        )
+    assert main(["check", str(out)]) == 0
+
+
+def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
+    model = write(PLAIN)
+    mapping = tmp_path / "mapping.toml"
+    mapping.write_text("[pd_gains]\nkp = {shoulder = 80.0, elbow = 40.0}\nkd = 2.0\n")
+    export = ["gap", "export", str(model), "--mapping", str(mapping)]
+    out = tmp_path / "control.yaml"
+    assert main([*export, "--to", "ros2_control", "--out", str(out)]) == 0
+    gains = YAML(typ="safe").load(out)["joint_trajectory_controller"]["ros__parameters"]["gains"]
+    assert gains["shoulder"] == {
+        "p": 80.0,
+        "i": 0.0,
+        "d": 2.0,
+        "ff_velocity_scale": pytest.approx(0.7),
+        "u_clamp_max": 60,
+        "u_clamp_min": -60,
+    }
+    assert main([*export, "--to", "mjcf", "--out", str(tmp_path / "arm.xml")]) == 0
+    compiled = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    assert compiled.actuator_gainprm[0, 0] == 80.0
+    assert np.allclose(compiled.actuator_biasprm[0, :3], [0.0, -80.0, -2.0])
+    mapping.write_text("[pd_gains]\nkp = {knee = 80.0}\n")
+    assert main([*export, "--to", "mjcf", "--out", str(tmp_path / "none.xml")]) == 2
+    assert not (tmp_path / "none.xml").exists()
