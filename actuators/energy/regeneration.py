@@ -56,10 +56,24 @@ class Supply:
 
 
 def supply(result: ChainResult, policy: str = "none", fraction: float = 0.0) -> Supply:
+    """Return the supply's account of a chain's motors under a policy; see `supply_of`."""
+    joint = result.joint
+    return supply_of(result.electrical_power, joint.time, joint.joints, policy, fraction)
+
+
+def supply_of(
+    power: FloatArray,
+    time: FloatArray,
+    joints: tuple[str, ...],
+    policy: str = "none",
+    fraction: float = 0.0,
+) -> Supply:
     """Return the supply's account under a policy.
 
     Args:
-        result: The chain's electrical power.
+        power: Into each motor, its driver's loss included where there is one, (N, J) [W].
+        time: (N,) [s].
+        joints: J names.
         policy: `none`: each joint's returned power is dumped (the paper). `fraction`: that share
             of it goes back into the supply. `bus`: the joints share a bus, one's return feeds
             another's demand, and what is left over is dumped.
@@ -74,7 +88,7 @@ def supply(result: ChainResult, policy: str = "none", fraction: float = 0.0) -> 
         raise EnergyError(f"regeneration fraction {fraction} must lie between 0 and 1")
     if fraction != 0.0 and policy != "fraction":
         raise EnergyError(f"regeneration '{policy}' takes no fraction: use policy 'fraction'")
-    power, accounts = result.electrical_power, result.joint.joints
-    if policy == "bus":
+    accounts = joints
+    if policy == BUS:
         power, accounts = power.sum(axis=1, keepdims=True), (BUS,)
-    return Supply(policy, accounts, result.joint.time, power, fraction)
+    return Supply(policy, accounts, time, power, fraction)

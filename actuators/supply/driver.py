@@ -1,0 +1,95 @@
+"""The driver (servo amplifier) between bus and motor: its losses, and the voltage it leaves.
+
+Of the bus's direct current it makes the motor's. Two transistors at a time carry the current from
+terminal to terminal, in a bridge for a brushed motor and on average in one of three phases, where
+each phase flows through one: 3 I_rms^2 R_on = 2 R_on x 1.5 I_rms^2. In the motor's own ampere
+(`actuators.loading.converted`, c = 1, 0.75 or 1.5) conduction costs 2 c R_on I^2 as the winding
+costs c R I^2. Hard switching costs in proportion to voltage and current, 1/2 U I (t_r + t_f) f
+(Mohan, Undeland and Robbins, Power Electronics, chapter 2); gate drivers and logic cost the same at
+any current.
+
+    loss = idle + 2 c R_on I^2 + switching U |I|            at the bus, positive
+    |U_motor| <= voltage_share U - 2 c R_on |I|
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+
+
+@dataclass(frozen=True, eq=False)
+class Driver:
+    """One driver; numbers may be arrays that broadcast against current and voltage.
+
+    Attributes:
+        name: Of the part.
+        resistance: In series with the winding, 2 c R_on [ohm].
+        idle: Power while it is enabled, whatever the current [W]; none while it is off.
+        switching: Loss over bus voltage times current [1].
+        voltage_share: Greatest motor voltage over bus voltage, without current [1].
+        continuous_current: Permissible root mean square current [A].
+        peak_current: Permissible instantaneous current [A].
+        least_voltage: Of the bus, below which it switches off [V].
+        most_voltage: Of the bus [V].
+
+    Raises:
+        UnphysicalElementError: A loss is negative or not finite, or a limit not positive.
+    """
+
+    name: str
+    resistance: Scalars = 0.0
+    idle: Scalars = 0.0
+    switching: Scalars = 0.0
+    voltage_share: Scalars = 1.0
+    continuous_current: Scalars = math.inf
+    peak_current: Scalars = math.inf
+    least_voltage: Scalars = 0.0
+    most_voltage: Scalars = math.inf
+
+    def __post_init__(self) -> None:
+        require_non_negative(
+            self.name,
+            resistance=self.resistance,
+            idle=self.idle,
+            switching=self.switching,
+            voltage_share=self.voltage_share,
+            least_voltage=self.least_voltage,
+        )
+        for limit in ("voltage_share", "continuous_current", "peak_current", "most_voltage"):
+            require(np.greater(getattr(self, limit), 0.0), self.name, f"{limit} must be > 0")
+
+    def loss(self, current: FloatArray, bus: Scalars) -> FloatArray:
+        """Return the power that the enabled driver turns into heat, (...) [W], not negative.
+
+        The bus supplies it beside the motor's electrical power, whichever way that flows.
+
+        Args:
+            current: Of the motor, (...) [A].
+            bus: Voltage of the bus [V].
+        """
+        size = np.abs(current)
+        return self.idle + self.resistance * size * size + self.switching * bus * size
+
+    def mean_loss(self, rms: FloatArray, mean: FloatArray, bus: Scalars) -> FloatArray:
+        """Return the mean of `loss` over time, (...) [W].
+
+        Args:
+            rms: Root mean square of the current, (...) [A].
+            mean: Mean of its magnitude, (...) [A].
+            bus: Voltage of the bus [V].
+        """
+        return self.idle + self.resistance * rms * rms + self.switching * bus * mean
+
+    def headroom(self, voltage: FloatArray, current: FloatArray, bus: Scalars) -> FloatArray:
+        """Return the voltage that is left, (...) [V]; negative where the motor lacks it.
+
+        Args:
+            voltage: That the motor needs, either sign, (...) [V].
+            current: At that instant, (...) [A].
+            bus: Voltage of the bus, as the battery's is at that power [V].
+        """
+        available = self.voltage_share * bus - self.resistance * np.abs(current)
+        return np.asarray(available - np.abs(voltage))

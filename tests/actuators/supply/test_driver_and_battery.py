@@ -1,0 +1,147 @@
+"""Drivers and batteries against closed forms and energy balances."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad, solve_ivp
+
+from actuators.energy.regeneration import supply_of
+from actuators.errors import UnphysicalElementError
+from actuators.supply.battery import Battery
+from actuators.supply.driver import Driver
+
+PACK = Battery("pack", energy=650 * 3600.0, full=54.0, empty=42.0, resistance=0.08)
+
+
+@given(st.floats(-50, 50), st.floats(-20, 20))
+def test_the_driver_s_loss_is_what_three_phases_conduct_and_what_switching_costs(current, voltage):
+    """3 I_rms^2 R_on by phase is 2 c R_on I^2 in the root mean square's ampere, c = 1.5."""
+    on, rms = 2.5e-3, current
+    driver = Driver("d", resistance=2 * 1.5 * on, idle=0.7, switching=0.01, voltage_share=0.9)
+    by_phase = sum(on * (math.sqrt(2) * rms * math.sin(a)) ** 2 for a in np.arange(3) * 2.0944)
+    loss = driver.loss(np.array(current), 48.0)
+    assert loss == pytest.approx(0.7 + by_phase + 0.01 * 48 * abs(current), rel=1e-4)
+    left = driver.headroom(np.array(voltage), np.array(current), 48.0)
+    assert left == pytest.approx(0.9 * 48 - 7.5e-3 * abs(current) - abs(voltage))
+
+
+def test_the_mean_loss_is_the_mean_of_the_loss():
+    driver = Driver("d", resistance=7e-3, idle=np.array([0.7, 8.8]), switching=0.004)
+    current = np.random.default_rng(1).normal(0.0, 9.0, (4000, 1))
+    mean = driver.mean_loss(np.sqrt(np.mean(current**2)), np.mean(np.abs(current)), 48.0)
+    assert np.allclose(driver.loss(current, 48.0).mean(axis=0), mean)
+
+
+def test_headroom_ends_where_the_motor_s_top_speed_is():
+    """At |U| = share U_bus - R_d I the motor reaches (share U_bus - (R + R_d) I) / k."""
+    driver = Driver("d", resistance=0.02, voltage_share=0.95)
+    k, resistance, current, bus = 0.05, 0.3, 8.0, 24.0
+    speed = (0.95 * bus - (resistance + 0.02) * current) / k
+    left = driver.headroom(np.array(resistance * current + k * speed), np.array(current), bus)
+    assert left == pytest.approx(0.0, abs=1e-12)
+
+
+@given(st.floats(-3000, 5000), st.floats(0, 1))
+def test_the_battery_s_current_keeps_its_energy_balance(power, charged):
+    """Chemical power is that at the terminals and the heat of the resistance."""
+    current = PACK.current(np.array(power), np.array(charged))
+    heat = PACK.resistance * current**2
+    assert PACK.open_voltage(charged) * current == pytest.approx(power + heat, abs=1e-6)
+    assert PACK.voltage(np.array(power), charged) * current == pytest.approx(power, abs=1e-6)
+
+
+def test_no_battery_gives_more_than_its_greatest_power():
+    most = PACK.full**2 / (4 * PACK.resistance)
+    assert PACK.voltage(np.array(most * (1 - 1e-12)), 1.0) == pytest.approx(27.0, rel=1e-5)
+    assert np.isnan(PACK.current(np.array(1.001 * most), np.array(1.0)))
+    assert PACK.hours(np.array([1.001 * most]), np.array([1.0])) == 0.0
+
+
+def closed_form(b: Battery, power: float, last: float) -> float:
+    """Hours at constant power: the integral of 1/I = (E + sqrt(E^2 - 4RP)) / 2P over E."""
+    a = 4 * b.resistance * power
+
+    def f(e: float) -> float:
+        root = math.sqrt(e * e - a)
+        return 0.5 * e * e + 0.5 * (e * root - a * math.log(e + root))
+
+    e = b.empty + (b.full - b.empty) * last
+    return b.charge * (f(b.full) - f(e)) / (b.full - b.empty) / (2 * power) / 3600
+
+
+@pytest.mark.parametrize("power", [1.0, 200.0, 4000.0, 7000.0])
+@pytest.mark.parametrize("cut_off", [0.0, 44.0])
+def test_life_at_constant_power_is_the_closed_form(power, cut_off):
+    last = float(PACK.charge_at_end(np.array(power), cut_off))
+    found = PACK.hours(np.array([power]), np.array([1.0]), cut_off=cut_off)
+    assert found == pytest.approx(closed_form(PACK, power, last) if last < 1 else 0.0, rel=1e-5)
+    if 0 < last < 1 and cut_off:
+        assert PACK.voltage(np.array(power), last) == pytest.approx(cut_off)
+
+
+def test_without_resistance_the_life_is_energy_over_mean_power():
+    ideal = Battery("b", energy=3.6e6, full=50.0, empty=40.0)
+    hours = ideal.hours(np.array([[100.0, 300.0], [0.0, 0.0]]), np.array([0.75, 0.25]))
+    assert hours[0] == pytest.approx(1000.0 / 150.0)
+    assert hours[1] == math.inf
+    flat = Battery("b", energy=3.6e6, full=45.0, empty=45.0)
+    assert flat.hours(np.array([100.0, 300.0]), np.array([0.75, 0.25])) == hours[0]
+
+
+def test_life_in_modes_with_return_is_that_of_a_general_integrator():
+    b = Battery("b", 9e5, full=29.0, empty=20.0, resistance=0.1, returned=0.8)
+    power, shares = np.array([900.0, 30.0, -150.0]), np.array([0.2, 0.5, 0.3])
+    last = float(b.charge_at_end(np.array(900.0), 15.0))
+
+    def rate(_, s):
+        current = b.current(power, np.full(3, s[0]))
+        return [-(np.where(current < 0, 0.8 * current, current) @ shares) / b.charge]
+
+    ends = lambda _, s: s[0] - last  # noqa: E731
+    ends.terminal = True
+    solved = solve_ivp(rate, (0, 1e6), [1.0], events=ends, rtol=1e-10, atol=1e-12)
+    assert b.hours(power, shares, cut_off=15.0) == pytest.approx(solved.t[-1] / 3600, rel=1e-6)
+
+
+def test_energy_drawn_and_heat_are_the_energy_of_the_open_circuit():
+    """Over the whole discharge at constant power, nothing is lost but the heat."""
+    power = 1500.0
+    life = 3600 * PACK.hours(np.array([power]), np.array([1.0]))
+    heat = quad(lambda s: PACK.resistance * PACK.charge * PACK.current(power, s), 0, 1)[0]
+    assert power * life + heat == pytest.approx(PACK.energy, rel=1e-9)
+
+
+def test_drivers_take_part_in_the_bus():
+    """Driver losses and one joint's return meet on the bus; alone, the return is lost."""
+    time = np.linspace(0.0, 1.0, 11)
+    motor = np.stack([np.full(11, 10.0), np.full(11, -6.0)], axis=1)
+    power = motor + Driver("d", idle=1.0).loss(np.zeros((11, 2)), 24.0)
+    assert supply_of(power, time, ("a", "b"), "bus").supplied_energy == pytest.approx([6.0])
+    alone = supply_of(power, time, ("a", "b"))
+    assert alone.supplied_energy == pytest.approx([11.0, 0.0])
+    assert alone.dumped_energy == pytest.approx([0.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    "build",
+    [
+        lambda: Battery("b", 0.0, 50.0, 40.0),
+        lambda: Battery("b", 1.0, 40.0, 50.0),
+        lambda: Battery("b", math.nan, 50.0, 40.0),
+        lambda: Battery("b", 1.0, 50.0, 40.0, returned=1.1),
+        lambda: Battery("b", 1.0, 50.0, 40.0, resistance=-1.0),
+        lambda: PACK.hours(np.array([1.0, 1.0]), np.array([0.5, 0.6])),
+        lambda: PACK.hours(np.array([1.0, 1.0]), np.array([-0.5, 1.5])),
+        lambda: Driver("d", idle=-1.0),
+        lambda: Driver("d", switching=math.nan),
+        lambda: Driver("d", voltage_share=0.0),
+        lambda: Driver("d", peak_current=0.0),
+    ],
+)
+def test_what_cannot_be_is_refused_in_one_line(build):
+    with pytest.raises(UnphysicalElementError) as error:
+        build()
+    assert "\n" not in str(error.value)
