@@ -92,21 +92,6 @@ def test_any_bytes_give_parameters_or_a_parameter_error(tmp_path_factory, conten
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("content", ["a = " + "[" * 5000, "[parameters]\n'x\\ny' = 1", "[a]\n[a]"])
-def test_odd_toml(tmp_path, content):
-    path = tmp_path / "odd.toml"
-    path.write_text(content)
-    with pytest.raises(ParameterError) as caught:
-        load_parameters(path, SCHEMA)
-    assert "\n" not in str(caught.value)
-
-
-def test_missing_file_and_directory(tmp_path):
-    for path, fact in ((tmp_path / "none.toml", "no such file"), (tmp_path, "is a folder")):
-        with pytest.raises(ParameterError, match=fact):
-            load_parameters(path, SCHEMA)
-
-
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=8),
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=6), inner),

@@ -112,7 +112,7 @@ def test_the_manifest_names_what_the_run_wrote(out: Path, tmp_path: Path, comman
     assert set(manifest.files) < set(contents(out))
 
 
-@pytest.mark.parametrize("at", [1, 2, 8, 15])
+@pytest.mark.parametrize("at", [1, 8])
 def test_a_process_killed_while_it_puts_files_in_place(
     root: Path, tmp_path: Path, command: Command, at: int
 ) -> None:
@@ -163,12 +163,8 @@ def killed_at_random(root: Path, folder: Path, verb: str, kills: int, seed: int)
     print(f"{verb}: after {kills} kills within {takes:.1f} s: {' '.join(seen)}")
 
 
-def test_kills_at_random_instants_leave_whole_sets(root: Path, tmp_path: Path) -> None:
-    killed_at_random(root, tmp_path, "stand", 3, seed=1)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("verb", ["walk", "reports"])
+@pytest.mark.parametrize("verb", ["stand", "walk", "reports"])
 def test_many_kills_at_random_instants_leave_whole_sets(
     root: Path, tmp_path: Path, verb: str
 ) -> None:
@@ -223,7 +219,7 @@ def test_a_run_that_fails_in_its_figures_leaves_the_last_run_alone(
     def failing(*arguments: object, **more: object) -> None:
         raise FigureError("a figure that cannot be drawn")
 
-    monkeypatch.setattr(figures, "stage_energy_figure", failing)
+    monkeypatch.setattr(figures, "gait_figure", failing)  # the first
     assert command("reports", tmp_path) == 2
     assert capsys.readouterr().err == "a figure that cannot be drawn\n"
     assert settled(tmp_path) == before
@@ -263,14 +259,15 @@ VERBS = {
 }
 
 
-@pytest.mark.parametrize("verb", ["walk", "reports", "gap", "twin", "blind"])
-def test_a_full_disk(root: Path, tmp_path: Path, command: Command, verb: str) -> None:
+@pytest.mark.parametrize("verb", ["walk", "gap", "twin", "blind"])
+def test_a_full_disk(tmp_path: Path, short_demo: Path, command: Command, verb: str) -> None:
     """One line, exit 2, and the last run's files as they were; twin leaves neither log nor seal."""
     place = tmp_path / "out"
     if verb != "twin":
         assert command("stand", place) == 0
         before = contents(place)
-    arguments = [*VERBS[verb], "--out", str(place)]
+    words = [str(short_demo) if word == str(DEMO) else word for word in VERBS[verb]]
+    arguments = [*words, "--out", str(place)]
     done = in_another_process(arguments, tmp_path, partial(full, 30_000))
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("\n") == 1

@@ -5,16 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import RobotFileError, UrdfError
 from pipeline.motion.motion import Segment
 from pipeline.robot.kinematics import (
-    foot_force_torques,
-    foot_jacobian_rates,
-    foot_jacobians,
     foot_positions,
 )
 from pipeline.robot.robot import Robot, load_robot
@@ -32,41 +28,6 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> Robot:
 def random_legs(robot: Robot, seed: int) -> np.ndarray:
     values = np.random.default_rng(seed).uniform(-1, 1, (N, *robot.leg_columns.shape))
     return np.where(robot.layout.real, values, 0.0)
-
-
-def test_feet_and_jacobians_agree_with_pinocchio(mixed: Robot) -> None:
-    q = random_legs(mixed, 1)
-    feet, jacobian = foot_jacobians(mixed.chains, q)
-    np.testing.assert_allclose(foot_positions(mixed.chains, q), feet, atol=1e-14)
-    model, data = mixed.model, mixed.model.createData()
-    rows = mixed.configuration(mixed.joint_positions(q), np.zeros((N, 3)))
-    for n, row in enumerate(rows):
-        pin.computeJointJacobians(model, data, row)
-        pin.updateFramePlacements(model, data)
-        for i, leg in enumerate(mixed.spec.legs):
-            frame = model.getFrameId(leg.foot)
-            np.testing.assert_allclose(feet[n, i], data.oMf[frame].translation, atol=1e-13)
-            full = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
-            columns = mixed.velocity_index[mixed.layout.of(i)]
-            np.testing.assert_allclose(
-                jacobian[n, i, :, : columns.size], full[:, columns], atol=1e-13
-            )
-            assert not jacobian[n, i, :, columns.size :].any()
-
-
-def test_torques_are_the_jacobian_transposed_and_rates_its_derivative(mixed: Robot) -> None:
-    q, rate = random_legs(mixed, 2), random_legs(mixed, 3)
-    force = np.random.default_rng(4).normal(size=(N, len(MIXED), 3))
-    _, jacobian = foot_jacobians(mixed.chains, q)
-    np.testing.assert_allclose(
-        foot_force_torques(mixed.chains, q, force),
-        np.einsum("nlij,nli->nlj", jacobian, force),
-        atol=1e-13,
-    )
-    h = 1e-6
-    ahead, behind = (foot_jacobians(mixed.chains, q + s * h * rate)[1] for s in (1, -1))
-    expected = np.einsum("nlij,nlj->nli", (ahead - behind) / (2 * h), rate)
-    np.testing.assert_allclose(foot_jacobian_rates(mixed.chains, q, rate), expected, atol=1e-8)
 
 
 def test_what_fills_up_a_short_leg_is_not_heeded(mixed: Robot) -> None:
