@@ -78,6 +78,12 @@ KINDS: Final[Mapping[str, Mapping[str, Entry]]] = {
         "mass": ENTRIES["mass"],
         "specific_energy": Entry("specific energy", "energy per mass", "180 Wh/kg"),
         "voltage": Entry("voltage", "nominal", "48 V"),
+        "voltage_swing": Entry(
+            "ratio", "open-circuit voltage above nominal when full, and below when empty", "0.15"
+        ),
+        "sag": Entry("ratio", "of voltage at the current that empties it in one hour", "0.03"),
+        "usable": Entry("ratio", "of its energy", "0.9"),
+        "returned": Entry("ratio", "of charge fed in that can be drawn again", "0.97"),
     },
 }
 
