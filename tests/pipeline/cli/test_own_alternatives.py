@@ -47,16 +47,14 @@ def _column(file: Path, name: str) -> list[str]:
         return [row[name] for row in csv.DictReader(stream)]
 
 
+@pytest.mark.usefixtures("sketched")
 @pytest.mark.parametrize("kind", ["fifth", "no_ideal", "only_reversible", "renamed"])
 def test_every_verb_runs_on_any_list_of_alternatives(
     root: Path,
     tmp_path: Path,
     kind: str,
     capsys: pytest.CaptureFixture[str],
-    request: pytest.FixtureRequest,
 ) -> None:
-    if kind != "fifth":  # the most of everything is rendered, too
-        request.getfixturevalue("sketched")
     names = _catalogue(kind, tmp_path / "actuators")
     robot = str(root / "urdf" / "hexapod.toml")
     for verb, table in (("stand", "standing"), ("walk", "walking"), ("reports", "walking")):
