@@ -82,20 +82,9 @@ def copy(tmp_path):
         ("alternatives.toml", 'law = "hypoid"\n', "", r"'element 2 \(hypoid\)': missing key 'law'"),
         ("alternatives.toml", 'name = "hypoid"\n', "", r"'element 2': missing key 'name'"),
         ("alternatives.toml", r'name = "hypoid"', "name = 3", r"'element 2\.name' must be text"),
-        ("alternatives.toml", r'\ntitle = "[^"]*"', "\ntitle = 3", "'title' must be text"),
-        ("alternatives.toml", r'\nmotor = "[^"]*"', "\nmotor = 3", "'motor' must be text"),
-        ("alternatives.toml", r'\nratio = "[^"]*"', "\nratio = 3", "'ratio' must be text"),
-        ("alternatives.toml", r'name = "hypoid"', 'name = " "', r"'element 2 .*name' is empty"),
-        ("planetary.toml", r'title = "[^"]*"', "title = 3", "'title' must be text"),
         ("planetary.toml", r'kind = "planetary"\n', "", "missing key 'kind'"),
         ("planetary.toml", 'kind = "planetary"', 'kind = "planetry"', "did you mean 'planetary'"),
         ("planetary.toml", r"value = [\d.]+\n", "value = 13\n", "ratios multiply to"),
-        (
-            "planetary.toml",
-            r"\[parameters\.ratio\]",
-            "[parameters.rati]",
-            "unknown parameter 'rati'",
-        ),
         ("planetary.toml", "title =", "titel =", "did you mean 'title'"),
         (
             "alternatives.toml",
@@ -116,14 +105,7 @@ def copy(tmp_path):
             "value = 5.7",
             "peak_current must not be below continuous_current",
         ),
-        (
-            "motor_re40_24v.toml",
-            r"parameters\.resistance",
-            "parameters.resistence",
-            "missing parameter 'resistance'",
-        ),
         ("hypoid.toml", r"(parameters.friction\]\nvalue = )", r"\1-", "backwards|outside its"),
-        ("hypoid.toml", r"(parameters.friction\]\nvalue = [\d.]+)", r"\1.", "malformed TOML.*line"),
     ],
 )
 def test_typos_give_one_clear_line(copy, file, old, new, message):

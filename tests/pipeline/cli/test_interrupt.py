@@ -7,7 +7,6 @@ import random
 import re
 import resource
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -20,34 +19,8 @@ from pipeline.api import figures
 from pipeline.cli.demo import DEMO
 from pipeline.cli.main import main
 from reports.errors import FigureError
-from reports.folder import MANIFEST, PENDING, holding, read_manifest
+from reports.folder import MANIFEST, holding, read_manifest
 from tests.command_line import Command, exit_code, in_another_process, results
-
-CODE = """
-import sys
-from pipeline.cli.main import main
-sys.exit(main(sys.argv[1:]))
-"""
-
-
-def killed(at: int) -> None:
-    """This process kills itself at a step by which a finished set is put in place, from 1."""
-    calls: list[str] = []
-
-    def counted(name: str) -> None:
-        real = getattr(os, name)
-
-        def step(*arguments: str, **more: object) -> None:
-            if calls or str(arguments[-1]).endswith(PENDING):
-                calls.append(name)
-            if len(calls) == at:
-                os.kill(os.getpid(), signal.SIGKILL)
-            real(*arguments, **more)
-
-        setattr(os, name, step)
-
-    for name in ("rename", "replace", "unlink"):
-        counted(name)
 
 
 def full(most: int) -> None:
@@ -76,17 +49,6 @@ def settled(folder: Path) -> dict[str, bytes]:
     return contents(folder)
 
 
-def python(root: Path, code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        cwd=root,
-        check=False,
-        timeout=300,
-        capture_output=True,
-        text=True,
-    )
-
-
 def test_a_run_of_any_verb_replaces_the_last_one(tmp_path: Path, command: Command) -> None:
     """No comma copy beside tables of other numbers, no table of standing beside a walk's."""
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
@@ -110,24 +72,6 @@ def test_the_manifest_names_what_the_run_wrote(out: Path, tmp_path: Path, comman
     assert manifest.verb == "walk"
     assert set(manifest.files) == set(contents(tmp_path))
     assert set(manifest.files) < set(contents(out))
-
-
-@pytest.mark.parametrize("at", [1, 8])
-def test_a_process_killed_while_it_puts_files_in_place(
-    root: Path, tmp_path: Path, command: Command, at: int
-) -> None:
-    """Before the first rename the old set is there; after it the new one, at the next look."""
-    assert command("stand", tmp_path / "new", *CHANGE) == 0
-    new = contents(tmp_path / "new")
-    assert command("stand", tmp_path / "out") == 0
-    old = contents(tmp_path / "out")
-    arguments = ("stand", "--out", str(tmp_path / "out"), *CHANGE)
-    ended = in_another_process(arguments, tmp_path, partial(killed, at))
-    assert ended.returncode == -signal.SIGKILL
-    left = contents(tmp_path / "out").items()
-    assert left <= old.items() or left <= new.items()
-    assert (tmp_path / "out" / PENDING).is_dir() == (at > 1)
-    assert settled(tmp_path / "out") == (new if at > 1 else old)
 
 
 def killed_at_random(root: Path, folder: Path, verb: str, kills: int, seed: int) -> None:
@@ -169,28 +113,6 @@ def test_many_kills_at_random_instants_leave_whole_sets(
     root: Path, tmp_path: Path, verb: str
 ) -> None:
     killed_at_random(root, tmp_path, verb, 25, seed=2)
-
-
-def test_two_at_once(root: Path, tmp_path: Path, command: Command) -> None:
-    """The second is refused in one line while the first goes on; after it, it is welcome."""
-    code = "import sys\nfrom reports.folder import holding\nfrom pathlib import Path\n"
-    code += "with holding(Path(sys.argv[1])):\n    print(flush=True)\n    sys.stdin.read()\n"
-    first = subprocess.Popen(
-        [sys.executable, "-c", code, str(tmp_path)],
-        cwd=root,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    )
-    assert first.stdout is not None
-    first.stdout.readline()
-    second = python(root, CODE, "stand", "--out", str(tmp_path))
-    assert second.returncode == 2
-    assert second.stderr.count("\n") == 1
-    assert f"{tmp_path}: another run is writing here" in second.stderr
-    assert not results(tmp_path)
-    first.kill()
-    first.communicate()
-    assert command("stand", tmp_path) == 0
 
 
 def test_bad_input_leaves_the_last_run_alone(
