@@ -15,7 +15,7 @@ quoted = '$(subst ','\'',$(1))'
 SHARE  ?= 0.15
 
 .DEFAULT_GOAL := help
-.PHONY: help env reports view gap blind calibrate test test-slow lint check bench mutants readme docs urdf lock clean
+.PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench mutants readme docs urdf lock clean
 
 help:  ## Print this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 14
@@ -30,6 +30,9 @@ $(STAMP): requirements.lock pyproject.toml
 
 reports: $(STAMP)  ## Compute standing and walking, write CSV and figures to reports/out (OUT=, ROBOT=, ARGS=)
 	$(PY) -m pipeline reports --robot $(call quoted,$(ROBOT)) --out $(call quoted,$(OUT)) $(ARGS)
+
+choose: $(STAMP)  ## Which motor, gear and brake for a robot's day (ROBOT=, ARGS="--mission FILE")
+	$(PY) -m pipeline choose --robot $(call quoted,$(ROBOT)) --out $(call quoted,$(OUT)/choose) $(ARGS)
 
 view: $(VENV)/.view  ## Play robot, gait, ground forces and joint torques in a browser (ROBOT=, ARGS=)
 	$(PY) -m pipeline view --robot $(call quoted,$(ROBOT)) $(ARGS)

@@ -15,6 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from pipeline.cli import components, gap, robots, studies, walking
+from pipeline.cli.design import choose
 from pipeline.cli.exchange.export import add_export
 from pipeline.cli.exchange.mapping import add_mapping
 from pipeline.cli.options import Run
@@ -52,6 +53,7 @@ def parser() -> argparse.ArgumentParser:
 
     robots.add_verbs(add)
     components.add_verb(add)
+    choose.add_verb(add)
     walking.add_verbs(add)
     gap.add_verb(add)
     add_mapping(add)

@@ -61,6 +61,7 @@ class BestRow:
     more_than_best_W: float = column("above the first", "W")
     actuator_mass_kg: float = column("of the group", "kg")
     chance_best: float = column("share of the draws in which nothing is better", "1")
+    chance_within: float = column("share of the draws in which it keeps every limit", "1")
     nearest_limit: str = column("the limit that is nearest")
     limit_use: float = column("share of it that is used", "1")
     lost_by: str = column("where most of what it takes above the first goes")

@@ -1,0 +1,278 @@
+"""The choice: groups searched one by one, mass fed back, winners drawn and recomputed in full."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.chain import ChainResult
+from actuators.energy.regeneration import supply
+from actuators.errors import CatalogError, closest
+from actuators.loading.parts import PARTS, Part, load_parts
+from pipeline.choice.designs import GEARS, Designs, Shelf, combinations
+from pipeline.choice.doubt import Doubt, doubt
+from pipeline.choice.errors import ChoiceError
+from pipeline.choice.fronts import merged
+from pipeline.choice.group import Found, groups_of, search
+from pipeline.choice.loads import Load, loads_of
+from pipeline.choice.mission import Mode
+from pipeline.choice.search import Account, Demanded
+from pipeline.machine.drivetrains import Drivetrains
+from pipeline.machine.joint import joints_of
+from pipeline.progress import Progress
+
+if TYPE_CHECKING:
+    from pipeline.api.machine import Machine
+
+Array = NDArray[np.float64]
+Design = tuple[str, str, str]
+#: Rounds of mass fed back, at most; two or three settle it.
+_ROUNDS: Final = 4
+_NUDGE: Final = 0.1  # [kg], by which what a kilogram costs is found; demand is affine in it
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is searched, and what is counted.
+
+    Attributes:
+        parts: Folder of parts.
+        kinds: Kinds of gears; all where empty.
+        only: Names of which a design's motors and gears must be, or begin with; all where empty.
+        without: Names that no part may be, or begin with.
+        voltage: Of the supply: motors for less are left out [V].
+        brakes: Whether brakes are among the parts.
+        groups: ``NAME=PATTERN,...``; by default joints that are alike in all legs.
+        account: Idle power, hotel load, returned energy.
+        battery: Energy of the robot's battery [W*h].
+        present: Mass of an actuator that the robot's bodies hold already, each joint's [kg]; by
+            default that of the motors of its actuator files.
+        draws: Over what is not printed.
+    """
+
+    parts: Path = PARTS
+    kinds: tuple[str, ...] = ()
+    only: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()
+    voltage: float | None = None
+    brakes: bool = True
+    groups: tuple[str, ...] = ()
+    account: Account = field(default_factory=Account)
+    battery: float | None = None
+    present: float | None = None
+    draws: int = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """The answer.
+
+    Attributes:
+        machine: The robot.
+        wanted: What was asked.
+        loads: The mission's modes, with the answer's masses in the robot.
+        found: The search of each group.
+        doubts: Draws over the finalists of each group.
+        answer: Design of each group.
+        first: What the first search, before mass was fed back, took the answer's power for [W].
+        price: What a kilogram at one group's joints costs the robot [W/kg].
+        present: Mass of an actuator that the bodies hold already [kg].
+        shelf: The parts.
+    """
+
+    machine: Machine
+    wanted: Wanted
+    loads: tuple[Load, ...]
+    found: Mapping[str, Found]
+    doubts: Mapping[str, Doubt]
+    answer: Mapping[str, Design]
+    first: Mapping[str, float]
+    price: Mapping[str, float]
+    present: float
+    shelf: Shelf
+
+    @property
+    def hours(self) -> float:
+        """Of the mission in a day [h]."""
+        return sum(load.mode.hours for load in self.loads)
+
+    def designs(self, group: str) -> Designs:
+        """The answer of one group, as one design."""
+        return self.shelf.designs([self.answer[group]])
+
+    def battery_hours(self, power: float) -> float | None:
+        """On one charge [h]."""
+        return self.wanted.battery / power if self.wanted.battery and power > 0 else None
+
+    def full(self, load: Load) -> tuple[ChainResult, Array]:
+        """One mode through the chains of the answer, and mean power from the supply (J,) [W]."""
+        return through(
+            load,
+            {g: (f.demanded.joints, self.designs(g)) for g, f in self.found.items()},
+            self.wanted.account,
+        )
+
+    def robots(self) -> tuple[Array, Array, NDArray[np.intp]]:
+        """Front of robots: power with hotel load [W], mass [kg], design of each group."""
+        fronts = []
+        for group, found in self.found.items():
+            own, per = found.front, self.price[group]
+            ours = per * self.designs(group).mass[0] * len(found.demanded.joints)
+            fronts.append((found.score[own] - ours, found.mass[own]))
+        power, mass, taken = merged(fronts)
+        return power + self.wanted.account.hotel, mass, taken
+
+
+def through(
+    load: Load, built: Mapping[str, tuple[tuple[str, ...], Designs]], account: Account
+) -> tuple[ChainResult, Array]:
+    """One mode through full chains: the result, and mean power out of the supply (J,) [W].
+
+    Args:
+        load: The mode.
+        built: Joints of each group, and their one design.
+        account: What is counted; drivers that are on are, the hotel load is not.
+    """
+    mode, names = load.mode, load.series.joints
+    models = {}
+    for joints, design in built.values():
+        engaged = not mode.stands or mode.hold == "brake"
+        chain = design.chain(0, engaged=engaged)
+        models |= {model.name: model for model in joints_of(chain, joints)}
+    result = Drivetrains("answer", tuple(models[j] for j in names)).moving(load.series)
+    share = account.recovered
+    out = supply(result, "fraction" if share else "none", share).supplied_energy / load.duration
+    on = np.ones(len(names)) if mode.drivers else (result.current != 0.0).any(axis=0)
+    return result, out + account.idle * on
+
+
+def choose(
+    machine: Machine,
+    modes: Sequence[Mode],
+    wanted: Wanted | None = None,
+    progress: Progress | None = None,
+) -> Chosen:
+    """Which motor, gear and brake for each group of joints.
+
+    Args:
+        machine: From `load`.
+        modes: Of the mission.
+        wanted: What is searched and counted.
+        progress: Told of each step.
+
+    Raises:
+        PipelineError: A mode cannot be done, or no design is within limits.
+        ActuatorError: Parts cannot be read.
+    """
+    wanted = wanted or Wanted()
+    told = progress.step if progress else lambda words: None
+    robot = machine.ready.robot
+    if robot.sliding_joints:
+        raise ChoiceError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
+    groups = groups_of(robot.spec, wanted.groups)
+    shelf = Shelf.of(filtered(load_parts(wanted.parts), wanted))
+    every = combinations(shelf, brakes=wanted.brakes, voltage=wanted.voltage)
+    designs = shelf.designs(every)
+    present = wanted.present
+    if present is None:
+        present = machine.ready.motors.mass[0]
+    told("the mission's demand")
+    loads = loads_of(machine, modes)
+    answer: dict[str, Design] = {}
+    price = dict.fromkeys(groups, 0.0)
+    first: dict[str, float] = {}
+    for turn in range(_ROUNDS):
+        told(f"{len(every)} designs for each of {len(groups)} groups, round {turn + 1}")
+        demanded = {g: Demanded.of(g, joints, loads) for g, joints in groups.items()}
+        found = {g: search(d, designs, wanted.account, price[g]) for g, d in demanded.items()}
+        best = {g: every[f.looked[f.finalists[0]]] for g, f in found.items()}
+        first = first or {g: float(f.power[f.finalists[0]]) for g, f in found.items()}
+        if best == answer:
+            break
+        answer = best
+        added = _added(groups, shelf, answer, present)
+        loads = loads_of(machine, modes, added)
+        price = _prices(machine, modes, groups, shelf, answer, added, wanted.account)
+    told("draws over what no sheet prints")
+    doubts = {
+        g: doubt(f.demanded, shelf, _finalists(f), wanted.account, price[g], draws=wanted.draws)
+        for g, f in found.items()
+    }
+    answer = {g: _finalists(f)[doubts[g].order[0]] for g, f in found.items()}
+    loads = loads_of(machine, modes, _added(groups, shelf, answer, present))
+    return Chosen(machine, wanted, loads, found, doubts, answer, first, price, present, shelf)
+
+
+def _finalists(found: Found) -> list[Design]:
+    return [found.designs.parts[i] for i in found.looked[found.finalists]]
+
+
+def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
+    """Parts that the options leave.
+
+    Raises:
+        CatalogError: A name is no part's, nor the beginning of one's.
+        ChoiceError: A kind is none of a gear.
+    """
+    for name in (*wanted.only, *wanted.without):
+        if not any(part.startswith(name) for part in parts):
+            raise CatalogError(f"no part '{name}': {closest(name, [*parts])}")
+    for kind in wanted.kinds:
+        if kind not in GEARS:
+            raise ChoiceError(f"--kind {kind}: {closest(kind, GEARS)}")
+    named = {kind: False for kind in ("motor", "gear")}
+    for name, part in parts.items():
+        what = "gear" if part.kind in GEARS else part.kind
+        if what in named and name.startswith(wanted.only or ("\0",)):
+            named[what] = True  # a filter of motors alone leaves all gears
+
+    def kept(name: str, part: Part) -> bool:
+        what = "gear" if part.kind in GEARS else part.kind
+        if what not in (*named, "brake") or (wanted.without and name.startswith(wanted.without)):
+            return False
+        if what == "gear" and wanted.kinds and part.kind not in wanted.kinds:
+            return False
+        return not named.get(what) or name.startswith(wanted.only)
+
+    return {name: part for name, part in parts.items() if kept(name, part)}
+
+
+def _added(
+    groups: Mapping[str, Sequence[str]], shelf: Shelf, answer: Mapping[str, Design], present: float
+) -> dict[str, float]:
+    """Mass at every joint beside what the bodies hold already [kg]."""
+    mass = {g: float(shelf.designs([answer[g]]).mass[0]) - present for g in groups}
+    return {joint: mass[g] for g, joints in groups.items() for joint in joints}
+
+
+def _prices(
+    machine: Machine,
+    modes: Sequence[Mode],
+    groups: Mapping[str, tuple[str, ...]],
+    shelf: Shelf,
+    answer: Mapping[str, Design],
+    added: Mapping[str, float],
+    account: Account,
+) -> dict[str, float]:
+    """What a kilogram at the joints of a group, spread over them, costs the robot [W/kg]."""
+    built = {g: (tuple(joints), shelf.designs([answer[g]])) for g, joints in groups.items()}
+
+    def total(masses: Mapping[str, float]) -> float:
+        loads = loads_of(machine, modes, masses)
+        hours = sum(load.mode.hours for load in loads)
+        return sum(
+            load.mode.hours / hours * float(through(load, built, account)[1].sum())
+            for load in loads
+        )
+
+    base = total(added)
+    out = {}
+    for g, joints in groups.items():
+        nudged = {j: m + _NUDGE / len(joints) * (j in joints) for j, m in added.items()}
+        out[g] = (total(nudged) - base) / _NUDGE
+    return out

@@ -1,0 +1,137 @@
+"""How sure: draws over what no sheet prints, chance of being best, regret, what to measure next.
+
+Every unprinted entry is drawn from its range, uniformly and apart from others, in a Latin
+hypercube; designs that share a part share its draw. With P the score of a design in a draw, and *
+the design of least mean,
+
+    regret            mean P* - mean min P
+    worth of knowing u    min mean P - mean over u of min mean(P | u)
+
+the expected value of partial perfect information (Raiffa and Schlaifer, 1961), the inner mean over
+quantile bins of u. A design that exceeds a limit in a draw cannot be the best of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats.qmc import LatinHypercube
+
+from actuators.loading.data_sheet import Number
+from pipeline.choice.designs import Designs, Shelf
+from pipeline.choice.search import Account, Demanded
+
+Array = NDArray[np.float64]
+DRAWS: Final = 256
+_BINS: Final = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Doubt:
+    """Designs of one group over the draws.
+
+    Attributes:
+        power: (S, D) [W].
+        score: With what their mass costs elsewhere (S, D) [W].
+        within: Whether every limit is kept (S, D).
+        unknowns: Part, entry and range of what was drawn, U of them.
+        values: Of these (S, U).
+    """
+
+    power: Array
+    score: Array
+    within: NDArray[np.bool_]
+    unknowns: tuple[tuple[str, str, Number], ...]
+    values: Array
+
+    @property
+    def expected(self) -> Array:
+        """Mean score of each design, (D,) [W]."""
+        return np.asarray(self.score.mean(axis=0))
+
+    @property
+    def order(self) -> NDArray[np.intp]:
+        """From the best expected score on; those that keep limits in half of the draws first."""
+        return np.lexsort((self.expected, self.within.mean(axis=0) < 0.5))
+
+    @property
+    def _held(self) -> Array:
+        return np.where(self.within, self.score, np.inf)
+
+    @property
+    def chance(self) -> Array:
+        """Share of the draws in which a design is the best, (D,)."""
+        winner = self._held.argmin(axis=1)
+        return np.bincount(winner, minlength=self.score.shape[1]) / len(self.score)
+
+    @property
+    def regret(self) -> float:
+        """Of the best expected one [W]."""
+        least = self._held.min(axis=1)
+        own = self.score[:, self.order[0]]
+        return float(np.mean(own - np.where(np.isfinite(least), np.minimum(least, own), own)))
+
+    def worth(self) -> Array:
+        """Expected regret that knowing each unknown alone removes, (U,) [W]."""
+        base = self.expected.min()
+        out = np.zeros(len(self.unknowns))
+        for u in range(len(out)):
+            parts = np.array_split(np.argsort(self.values[:, u], kind="stable"), _BINS)
+            known = sum(len(p) * self.score[p].mean(axis=0).min() for p in parts)
+            out[u] = max(base - known / len(self.score), 0.0)
+        return out
+
+    def moves(self) -> Array:
+        """Slope of the best one's power over each unknown's range, (U,) [W]."""
+        own = self.power[:, self.order[0]]
+        out = np.zeros(len(self.unknowns))
+        for u, (_, _, number) in enumerate(self.unknowns):
+            centred = self.values[:, u] - self.values[:, u].mean()
+            slope = centred @ (own - own.mean()) / max(centred @ centred, 1e-300)
+            out[u] = slope * (number.high - number.low)
+        return out
+
+
+def doubt(
+    demanded: Demanded,
+    shelf: Shelf,
+    combinations: Sequence[tuple[str, str, str]],
+    account: Account,
+    price: float,
+    *,
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> Doubt:
+    """Draw what is not printed of some designs, and evaluate them in every draw.
+
+    Args:
+        demanded: What the day asks of the group.
+        shelf: The parts.
+        combinations: Motor, gear and brake of each design.
+        account: What is counted.
+        price: What a kilogram at these joints costs the robot [W/kg].
+        draws: How many.
+        seed: Of the draws.
+    """
+    unknowns = tuple(dict.fromkeys(u for row in combinations for u in shelf.unknown(row)))
+    count = len(combinations)
+    values = np.zeros((draws, len(unknowns)))
+    if unknowns:
+        low, high = (np.array([getattr(n, end) for _, _, n in unknowns]) for end in ("low", "high"))
+        values = low + LatinHypercube(len(unknowns), rng=seed).random(draws) * (high - low)
+    keys = [(part, entry) for part, entry, _ in unknowns]
+    made = [
+        shelf.designs(combinations, dict(zip(keys, row, strict=True))) for row in values.tolist()
+    ]
+    designs = Designs.together(made)
+    power = demanded.power(designs, account)
+    within = np.all([share <= 1.0 for share in demanded.limits(designs).values()], axis=0)
+    score = power + price * designs.mass * len(demanded.joints)
+    shape = (draws, count)
+    return Doubt(
+        power.reshape(shape), score.reshape(shape), within.reshape(shape), unknowns, values
+    )

@@ -1,0 +1,164 @@
+"""One group of joints: which designs are within limits, and which of them are worth keeping."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from itertools import takewhile
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.errors import closest
+from pipeline.choice.designs import Designs
+from pipeline.choice.errors import ChoiceError
+from pipeline.choice.fronts import front
+from pipeline.choice.search import Account, Demanded
+from pipeline.robot.robot_file import RobotSpec
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+#: Designs of a group that are looked at in every draw.
+FINALISTS: Final = 24
+_FIRST: Final = 400  # looked at sample by sample before bounds decide
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search of one group found.
+
+    Attributes:
+        demanded: What the day asks.
+        designs: All of them.
+        use: Share of each limit that is used, by its name (D,).
+        within: Those within every limit.
+        looked: Of these, the ones evaluated sample by sample; nothing better is among the others.
+        power: Of those [W].
+        score: Power and what their mass costs elsewhere [W].
+    """
+
+    demanded: Demanded
+    designs: Designs
+    use: Mapping[str, Array]
+    within: Index
+    looked: Index
+    power: Array
+    score: Array
+
+    @property
+    def mass(self) -> Array:
+        """Of all actuators of the group, of those looked at [kg]."""
+        return np.asarray(self.designs.mass[self.looked] * len(self.demanded.joints))
+
+    @property
+    def finalists(self) -> Index:
+        """The best by score, numbers among `looked`."""
+        return np.asarray(np.argsort(self.score, kind="stable")[:FINALISTS])
+
+    @property
+    def front(self) -> Index:
+        """The front of score and mass, numbers among `looked`."""
+        return front(self.score, self.mass)
+
+
+def search(demanded: Demanded, designs: Designs, account: Account, price: float = 0.0) -> Found:
+    """Every design of one group; exact, and most of them by bounds alone.
+
+    Args:
+        demanded: What the day asks.
+        designs: All of them.
+        account: What is counted.
+        price: What a kilogram at these joints costs the robot [W/kg].
+
+    Raises:
+        ChoiceError: None is within limits; says which limit removed how many.
+    """
+    use = demanded.limits(designs)
+    over = {name: share > 1.0 for name, share in use.items()}
+    within = np.flatnonzero(~np.any(list(over.values()), axis=0))
+    if not len(within):
+        removed = sorted(((int(o.sum()), name) for name, o in over.items() if o.any()))[::-1]
+        words = ", ".join(f"{name} {n}" for n, name in removed)
+        raise ChoiceError(
+            f"group '{demanded.name}': none of {len(designs)} designs is within limits; "
+            f"removed by {words}"
+        )
+    own = designs.taken(within)
+    cost = price * own.mass * len(demanded.joints)
+    bound = demanded.net(own, account) + cost
+    score = np.full(len(own), np.inf)
+    todo = np.union1d(np.argsort(bound)[:_FIRST], np.argsort(own.mass)[:_FIRST])
+    while len(todo):
+        score[todo] = demanded.power(own.taken(todo), account) + cost[todo]
+        done = np.isfinite(score)
+        last = np.sort(score[done])[:FINALISTS][-1]
+        best = _best_below(own.mass, np.where(done, score, np.inf))
+        todo = np.flatnonzero(~done & ((bound < last) | (bound < best)))
+        todo = todo[np.argsort(bound[todo])][: 4 * _FIRST]
+    looked = np.flatnonzero(np.isfinite(score))
+    return Found(
+        demanded, designs, use, within, within[looked], (score - cost)[looked], score[looked]
+    )
+
+
+def _best_below(mass: Array, score: Array) -> Array:
+    """The least score among designs no heavier, (D,)."""
+    order = np.argsort(mass, kind="stable")
+    least = np.minimum.accumulate(score[order])
+    last = np.searchsorted(mass[order], mass, side="right") - 1
+    return np.asarray(least[last])
+
+
+def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str, ...]]:
+    """Joints that are built alike, by the name of their group.
+
+    Args:
+        spec: The robot.
+        given: ``NAME=PATTERN,PATTERN`` of one's own; by default the first joints of all legs, the
+            second ones, and so on, and those outside the legs.
+
+    Raises:
+        ChoiceError: A pattern fits no joint, or a joint is in no group or in two.
+    """
+    out: dict[str, tuple[str, ...]] = {}
+    if given:
+        for text in given:
+            name, _, patterns = text.partition("=")
+            each = [p.strip() for p in patterns.split(",") if p.strip()]
+            for pattern in each:
+                if not any(fnmatchcase(joint, pattern) for joint in spec.joints):
+                    hint = closest(pattern, spec.joints)
+                    raise ChoiceError(f"--group {text}: no joint '{pattern}': {hint}")
+            joints = [j for j in spec.joints if any(fnmatchcase(j, p) for p in each)]
+            if not name or not joints or name in out:
+                raise ChoiceError(f"--group {text}: expected NAME=PATTERN,PATTERN, each name once")
+            out[name] = tuple(joints)
+    else:
+        longest = max(len(leg.joints) for leg in spec.legs) if spec.legs else 0
+        for k in range(longest):
+            alike = tuple(leg.joints[k] for leg in spec.legs if k < len(leg.joints))
+            out[_shared(alike, f"joint {k + 1}", out)] = alike
+        legs = {joint for leg in spec.legs for joint in leg.joints}
+        if others := tuple(joint for joint in spec.joints if joint not in legs):
+            out["held"] = others
+    counts = {joint: sum(joint in joints for joints in out.values()) for joint in spec.joints}
+    for joint, count in counts.items():
+        if count != 1:
+            which = "no group" if count == 0 else "two groups"
+            raise ChoiceError(f"--group: joint '{joint}' is in {which}")
+    return out
+
+
+def _shared(joints: Sequence[str], otherwise: str, taken: Mapping[str, object]) -> str:
+    """What the names of joints end in, or begin with, alike."""
+    end = _alike([joint[::-1] for joint in joints])[::-1].strip("_- ")
+    name = end or _alike(joints).strip("_- ")
+    return otherwise if not name or name in taken else name
+
+
+def _alike(names: Sequence[str]) -> str:
+    """What names begin with alike."""
+    same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+    return "".join(letters[0] for letters in same)

@@ -1,0 +1,156 @@
+"""A robot's day: a CSV of modes, each with its share of time and what the robot does in it.
+
+Columns, of which `mode` and one of `share` and `hours` are needed; a word may be left empty:
+
+    mode      name
+    share     of the time, all together 1; or
+    hours     in a day
+    gait      stand, or a gait's name; the robot file's own where empty
+    motion    CSV of a motion of one's own, beside the mission's file, in place of a gait
+    speed     of walking, with its unit
+    slope     by which the ground rises ahead, with its unit
+    payload   on the body, with its unit
+    standing  legs that stand, with spaces between; all for all
+    hold      motor (default), brake (engaged where there is one) or none (no torque is asked)
+    drivers   on (default), or off: those of joints that hold without current are switched off
+
+and any key of the table [gait] as ``gait.KEY``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import pandas as pd
+
+from actuators.errors import closest, one_line
+from pipeline.choice.errors import MissionError
+
+STAND: Final = "stand"
+DAY: Final = 24.0  # [h]
+_CHOICES: Final = {"hold": ("motor", "brake", "none"), "drivers": ("on", "off")}
+#: Column to the number of the gait that it changes.
+_CHANGES: Final = {
+    "speed": "gait.speed",
+    "slope": "gait.slope_forward",
+    "payload": "gait.payload_mass",
+}
+_COLUMNS: Final = (
+    *("mode", "share", "hours", "gait", "motion", "standing"),
+    *_CHANGES,
+    *_CHOICES,
+)
+_SUM: Final = 1e-6
+
+
+@dataclass(frozen=True)
+class Mode:
+    """What the robot does for some of the day.
+
+    Attributes:
+        name: Of the mode.
+        hours: In a day.
+        stands: Whether it stands still.
+        motion: File of a motion in place of the gait; None to walk.
+        changes: Numbers of the robot's file that differ; see `Machine.with_values`.
+        hold: ``motor``, ``brake`` or ``none``.
+        drivers: Whether drivers stay on where a joint needs no current.
+        where: File and row, for messages.
+    """
+
+    name: str
+    hours: float
+    stands: bool
+    motion: Path | None
+    changes: Mapping[str, object]
+    hold: str
+    drivers: bool
+    where: str
+
+
+def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:
+    """The modes of a mission's file.
+
+    Args:
+        path: CSV; see the module for its columns.
+        hours: In a day, where shares are stated.
+
+    Raises:
+        MissionError: It cannot be read; a column, word or number is unknown or cannot be; shares
+            do not sum to one, or hours to more than a day.
+    """
+    try:
+        table = pd.read_csv(path, comment="#", dtype=str, keep_default_na=False)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or one_line(error)
+        raise MissionError(f"{path}: no mission that can be read: {why}") from None
+    table.columns = [str(name).strip() for name in table.columns]
+    for name in table.columns:
+        if name not in _COLUMNS and not name.startswith("gait."):
+            raise MissionError(f"{path}: no column '{one_line(name)}': {closest(name, _COLUMNS)}")
+    times = [name for name in ("share", "hours") if name in table.columns]
+    if "mode" not in table.columns or len(times) != 1:
+        raise MissionError(f"{path}: expected a column mode, and one of share and hours")
+    if table.empty:
+        raise MissionError(f"{path}: no modes; add a row")
+    rows = [{str(k): str(v).strip() for k, v in row.items()} for row in table.to_dict("records")]
+    modes = tuple(_mode(row, path, n, times[0], hours) for n, row in enumerate(rows, start=2))
+    names = [mode.name for mode in modes]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise MissionError(f"{path}: mode '{twice[0]}' stands twice; rename one")
+    total = sum(mode.hours for mode in modes)
+    if times == ["share"] and abs(total / hours - 1.0) > _SUM:
+        raise MissionError(f"{path}: the shares sum to {total / hours:g}; they have to sum to 1")
+    if total > DAY * (1 + _SUM):
+        raise MissionError(f"{path}: the modes take {total:g} h; a day has {DAY:g}")
+    return modes
+
+
+def _mode(row: Mapping[str, str], path: Path, line: int, time: str, day: float) -> Mode:
+    name = row["mode"]
+    where = f"{path}: row {line}, mode '{one_line(name)}'"
+    if not name:
+        raise MissionError(f"{path}: row {line}: the mode has no name")
+    try:
+        span = float(row[time])
+    except ValueError:
+        span = math.nan
+    if not 0.0 < span < math.inf:
+        raise MissionError(f"{where}: {time} '{one_line(row[time])}' is no number above 0")
+    words = {key: row.get(key) or known[0] for key, known in _CHOICES.items()}
+    for key, known in _CHOICES.items():
+        if words[key] not in known:
+            hint = closest(words[key], known)
+            raise MissionError(f"{where}: no {key} '{one_line(words[key])}': {hint}")
+    gait, motion = row.get("gait", ""), row.get("motion", "")
+    stands = gait == STAND
+    if motion and gait:
+        raise MissionError(f"{where}: gait and motion are both stated; leave one empty")
+    if stands and row.get("speed"):
+        raise MissionError(f"{where}: standing has no speed; leave it empty")
+    if not stands and words["hold"] != "motor":
+        raise MissionError(f"{where}: hold is of standing; leave it empty, or write gait {STAND}")
+    changes: dict[str, object] = {
+        key: row[column] for column, key in _CHANGES.items() if row.get(column)
+    }
+    changes |= {key: text for key, text in row.items() if key.startswith("gait.") and text}
+    if gait and not stands:
+        changes["gait.name"] = gait
+    if row.get("standing"):
+        if not stands:
+            raise MissionError(f"{where}: column standing is of gait {STAND}; leave it empty")
+        changes["standing.feet"] = ",".join(row["standing"].split())
+    return Mode(
+        name=name,
+        hours=span * (day if time == "share" else 1.0),
+        stands=stands,
+        motion=path.parent / motion if motion else None,
+        changes=changes,
+        hold=words["hold"],
+        drivers=words["drivers"] == "on",
+        where=where,
+    )

@@ -1,0 +1,88 @@
+"""The choice as a result: tables, three lines, and what its sidecars say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from pipeline.api.result import Result, by_name
+from pipeline.api.tables import inputs_of, metadata
+from pipeline.choice.choose import Chosen, Wanted, choose
+from pipeline.choice.mission import read_mission
+from pipeline.choice.tables import ROBOT, tables_of, words
+from pipeline.progress import Progress
+
+if TYPE_CHECKING:
+    from pipeline.api.machine import Machine
+
+
+@dataclass(frozen=True, eq=False)
+class Choice(Result):
+    """What to build.
+
+    Attributes:
+        chosen: The search, with its arrays.
+    """
+
+    chosen: Chosen = field(repr=False)
+
+    @property
+    def lines(self) -> list[str]:
+        """The answer in three lines."""
+        rows = {row["group"]: row for row in self.table("answer").frame().to_dict("records")}
+        robot = rows.pop(ROBOT)
+        found = next(iter(self.chosen.found.values()))
+        battery = ""
+        if self.chosen.wanted.battery:
+            battery = f", {robot['battery_h']:.3g} h on {self.chosen.wanted.battery:.4g} Wh"
+        first = (
+            f"{self.chosen.machine.ready.robot.spec.name}: {robot['power_W']:.4g} W "
+            f"({robot['power_low_W']:.3g} to {robot['power_high_W']:.3g}), "
+            f"{robot['energy_Wh_per_day']:.4g} Wh a day{battery}, "
+            f"{robot['actuator_mass_kg']:.3g} kg of actuators; {len(found.designs)} designs a group"
+        )
+        each = [
+            f"{group}: {words((row['motor'], row['gear'], row['brake']))} at {row['ratio']:.4g}:1 "
+            f"({row['power_W']:.3g} W, best in {100 * row['chance_best']:.0f} % of draws)"
+            for group, row in rows.items()
+        ]
+        unknown = self.table("unknowns").frame()
+        last = "nothing unprinted would change the choice"
+        if len(unknown) and unknown["worth_W"][0] > 0.0:
+            top = unknown.iloc[0]
+            last = (
+                f"measure next {top['part']}.{top['entry']} ({top['low']:.3g} to "
+                f"{top['high']:.3g} {top['unit']}): worth {top['worth_W']:.2g} W of the expected "
+                f"regret of {robot['regret_W']:.2g} W"
+            )
+        return [first, "; ".join(each), last]
+
+
+def choice(
+    machine: Machine,
+    mission: str | Path,
+    wanted: Wanted | None = None,
+    *,
+    progress: Progress | None = None,
+) -> Choice:
+    """Choose the actuators of a machine for a mission's file.
+
+    Args:
+        machine: From `load`.
+        mission: CSV; see `pipeline.choice.mission`.
+        wanted: What is searched and counted.
+        progress: Told of each step.
+
+    Raises:
+        PipelineError: The mission cannot be used, or no design is within limits.
+        ActuatorError: Parts cannot be read.
+    """
+    path = Path(mission)
+    chosen = choose(machine, read_mission(path), wanted, progress)
+    given = machine.ready
+    inputs: Sequence[Path] = (*inputs_of(given), path)
+    return Choice(
+        "choose", by_name(tables_of(chosen)), lambda: metadata(given), tuple(inputs), chosen
+    )

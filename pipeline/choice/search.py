@@ -1,0 +1,308 @@
+"""All designs of a group of joints against a day: limits, net energy and energy out of the supply.
+
+A chain of ratio n with friction per load c, dry friction C, viscous friction b and inertia J needs
+
+    T = tau / n + (c / n) |tau| s + C s + (b n) w + (J n) dw/dt,        s = sgn w,
+
+which is theta . x: five coefficients of the design times five series of the joint. With the motor's
+k and R its power is P = T n w + (R / k^2) T^2, so that over any weights of the samples
+
+    net energy = n (sum W w x) . theta + (R / k^2) theta . G theta,      G = sum W x x^T,
+
+exactly as the chain integrates it; the root mean square of T is the same with the weights of a
+piecewise linear series. Peaks of |T| and of |R T / k + k n w| are maxima of linear functions of x:
+they lie on the convex hull of its samples. At rest the chain gives the holding torque of least
+magnitude, sgn(tau) max(0, (1 - c) |tau| / n - C - brake), which is no product: those samples go
+one by one, and so does what flows back and is lost, P < 0. As that only adds, the net energy is a
+lower bound by which most designs need not be looked at sample by sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull, QhullError
+
+from actuators.shaft import ShaftSeries
+from pipeline.choice.designs import Designs
+from pipeline.choice.loads import Load
+
+Array = NDArray[np.float64]
+Which = NDArray[np.bool_]
+SPEED = 3  # the series w among the five
+#: Numbers of a block of designs times samples: 16 MB.
+BLOCK = 2_000_000
+_MANY = 50  # samples from which on their hull is worth finding
+
+
+@dataclass(frozen=True)
+class Account:
+    """What is counted besides the motors.
+
+    Attributes:
+        idle: Of a driver that is on [W].
+        hotel: Of the robot's electronics [W].
+        recovered: Share of returned power that is used again [1].
+    """
+
+    idle: float = 0.0
+    hotel: float = 0.0
+    recovered: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """One mode at the joints of a group.
+
+    Attributes:
+        load: The mode, of all joints.
+        series: Of the group's joints.
+        share: Of the mission's time.
+    """
+
+    load: Load
+    series: ShaftSeries
+    share: float
+
+    @cached_property
+    def x(self) -> Array:
+        """The five series, (5, N, J)."""
+        one = self.series
+        s = one.direction
+        each = (one.torque, np.abs(one.torque) * s, s, one.velocity, one.acceleration)
+        return np.stack([part * (s != 0.0) for part in each])
+
+    @cached_property
+    def rest(self) -> Which:
+        """Samples at rest, (N, J)."""
+        return self.series.direction == 0.0
+
+    @cached_property
+    def step(self) -> Array:
+        """Between samples, (N - 1,) [s]."""
+        return np.diff(self.series.time)
+
+    @cached_property
+    def weight(self) -> Array:
+        """Of each sample in the mean over the mode, (N,)."""
+        out = np.zeros(self.series.time.size)
+        out[:-1] += 0.5 * self.step
+        out[1:] += 0.5 * self.step
+        return out / self.load.duration
+
+    @cached_property
+    def grams(self) -> Array:
+        """Of the mean of a product, trapezoids, summed over the joints (5, 5)."""
+        flat = self.x.reshape(5, -1)
+        weights = np.repeat(self.weight, self.series.torque.shape[1])
+        return np.asarray((flat * weights) @ flat.T)
+
+    @cached_property
+    def squares(self) -> Array:
+        """Of the mean square of a piecewise linear product, of every joint (J, 5, 5)."""
+        a, b = self.x[:, :-1], self.x[:, 1:]
+        h = self.step / (3.0 * self.load.duration)
+        same = np.einsum("inj,n,knj->jik", a, h, a) + np.einsum("inj,n,knj->jik", b, h, b)
+        cross = np.einsum("inj,n,knj->jik", a, h, b)
+        return np.asarray(same + 0.5 * (cross + cross.transpose(0, 2, 1)))
+
+    @property
+    def engaged(self) -> bool:
+        """Whether brakes hold at rest."""
+        return not self.load.mode.stands or self.load.mode.hold == "brake"
+
+    def torque(self, designs: Designs) -> Array:
+        """Of the motors, (D, N, J) [N*m]."""
+        shape = (len(designs), *self.series.torque.shape)
+        out = np.asarray((designs.theta @ self.x.reshape(5, -1)).reshape(shape))
+        if self.rest.any():
+            tau = self.series.torque[self.rest]
+            free = designs.coulomb + designs.brake_torque * self.engaged
+            passed = np.maximum(1.0 - designs.load, 0.0) / designs.ratio
+            held = np.maximum(np.abs(tau) * passed[:, None] - free[:, None], 0.0)
+            out[:, self.rest] = held * np.sign(tau)
+        return out
+
+    def power(self, designs: Designs, torque: Array) -> Array:
+        """Electrical, with the brakes' coils, (D, N, J) [W]."""
+        heat = (designs.resistance / designs.torque_constant**2)[:, None, None]
+        out = torque * heat
+        out += designs.ratio[:, None, None] * self.series.velocity * ~self.rest
+        out *= torque
+        if designs.brake_power.any():
+            drawn = ~self.rest | (not self.engaged)
+            out += designs.brake_power[:, None, None] * drawn
+        return out
+
+    def supplied(self, designs: Designs, account: Account) -> Array:
+        """Mean power out of the supply in this mode, with drivers, (D,) [W]."""
+        torque = self.torque(designs)
+        power = self.power(designs, torque)
+        positive = np.maximum(power, 0.0)
+        forward = np.einsum("dnj,n->d", positive, self.weight)
+        sign = np.signbit(power)
+        d, n, j = np.nonzero(sign[:, :-1] != sign[:, 1:])
+        a, b = np.abs(power[d, n, j]), np.abs(power[d, n + 1, j])
+        both = np.maximum(a + b, 1e-300)
+        tip = 0.5 * self.step[n] * (a * (b / both)) / self.load.duration
+        forward -= np.bincount(d, tip, minlength=len(designs))
+        if account.recovered:
+            net = np.einsum("dnj,n->d", power, self.weight)
+            forward -= account.recovered * (forward - net)
+        return np.asarray(forward + account.idle * self.drivers(torque))
+
+    def drivers(self, torque: Array) -> Array:
+        """How many are on, (D,)."""
+        joints = torque.shape[2]
+        if self.load.mode.drivers:
+            return np.full(len(torque), float(joints))
+        return np.asarray((torque != 0.0).any(axis=1).sum(axis=1, dtype=np.float64))
+
+
+@dataclass(frozen=True, eq=False)
+class Demanded:
+    """What a day asks of one group of joints.
+
+    Attributes:
+        name: Of the group.
+        joints: Its joints.
+        tracks: The modes.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    tracks: tuple[Track, ...]
+
+    @classmethod
+    def of(cls, name: str, joints: Sequence[str], loads: Sequence[Load]) -> Demanded:
+        """One group's part of every mode."""
+        total = sum(load.mode.hours for load in loads)
+        tracks = []
+        for load in loads:
+            one = load.series
+            at = [one.joints.index(joint) for joint in joints]
+            part = ShaftSeries(
+                tuple(joints),
+                one.time,
+                *(
+                    getattr(one, field)[:, at]
+                    for field in ("position", "velocity", "acceleration", "torque", "direction")
+                ),
+            )
+            tracks.append(Track(load, part, load.mode.hours / total))
+        return cls(name, tuple(joints), tuple(tracks))
+
+    @cached_property
+    def hull(self) -> Array:
+        """Samples at which a linear function of the five series can be extreme, (H, 5)."""
+        return extreme(np.concatenate([t.x[:, ~t.rest].T for t in self.tracks]))
+
+    def limits(self, designs: Designs) -> dict[str, Array]:
+        """Share of each limit that is used, by its name, (D,)."""
+        theta, k, n = designs.theta, designs.torque_constant, designs.ratio
+        fastest = np.abs(self.hull[:, SPEED]).max(initial=0.0)
+        peak, volts = np.zeros(len(designs)), np.zeros(len(designs))
+        for rows in _blocks(len(designs), max(len(self.hull), 1)):
+            torque = theta[rows] @ self.hull.T
+            peak[rows] = np.abs(torque).max(axis=1, initial=0.0)
+            torque *= (designs.resistance[rows] / k[rows])[:, None]
+            torque += (k[rows] * n[rows])[:, None] * self.hull[:, SPEED]
+            volts[rows] = np.abs(torque).max(axis=1, initial=0.0)
+        rms = np.zeros(len(designs))
+        for track in self.tracks:
+            mean = _rms(track, designs)
+            rms = np.maximum(rms, mean)
+            if track.rest.any():
+                held = self._held(track, designs)
+                peak = np.maximum(peak, held)
+                volts = np.maximum(volts, designs.resistance * held / k)
+        tau = [np.abs(track.series.torque).max() for track in self.tracks]
+        lasting = [np.sqrt((track.weight @ track.series.torque**2).max()) for track in self.tracks]
+        return {
+            "peak current": peak / k / designs.peak_current,
+            "continuous current": rms / k / designs.continuous_current,
+            "voltage": volts / designs.voltage,
+            "motor's speed": fastest * n / designs.max_speed,
+            "gear's speed": fastest * n / designs.gear_speed,
+            "gear's peak torque": max(tau) / designs.gear_peak,
+            "gear's continuous torque": max(lasting) / designs.gear_continuous,
+        }
+
+    @staticmethod
+    def _held(track: Track, designs: Designs) -> Array:
+        """Greatest torque of a motor at rest, (D,): that of the greatest load."""
+        tau = np.abs(track.series.torque[track.rest]).max()
+        free = designs.coulomb + designs.brake_torque * track.engaged
+        return np.maximum(np.maximum(1.0 - designs.load, 0.0) * tau / designs.ratio - free, 0.0)
+
+    def net(self, designs: Designs, account: Account) -> Array:
+        """A lower bound of `power`: what flows back is all used again, (D,) [W]."""
+        theta = designs.theta
+        heat = designs.resistance / designs.torque_constant**2
+        out = np.zeros(len(designs))
+        for track in self.tracks:
+            if track.rest.any():
+                one = Demanded(self.name, self.joints, (track,))
+                out += one.power(designs, Account(account.idle, recovered=1.0))
+                continue
+            gram = track.grams
+            each = designs.ratio * (theta @ gram[SPEED])
+            each += heat * np.einsum("di,di->d", theta @ gram, theta)
+            each += len(self.joints) * (designs.brake_power + account.idle)
+            out += track.share * each
+        return out
+
+    def power(self, designs: Designs, account: Account) -> Array:
+        """Mean over the mission out of the supply, sample by sample, (D,) [W]."""
+        out = np.zeros(len(designs))
+        for track in self.tracks:
+            for rows in _blocks(len(designs), track.series.torque.size):
+                own = designs.taken(np.arange(len(designs))[rows])
+                out[rows] += track.share * track.supplied(own, account)
+        return out
+
+
+def extreme(points: Array) -> Array:
+    """Points (H, K) among (N, K) on whose convex hull all others lie; all where they are few.
+
+    Directions in which the points do not differ, or only with others, are left out for the hull.
+    """
+    if len(points) < _MANY:
+        return points
+    centred = points - points.mean(axis=0)
+    scale = np.maximum(np.abs(centred).max(axis=0), 1e-300)
+    _, size, axes = np.linalg.svd(centred / scale, full_matrices=False)
+    flat = (centred / scale) @ axes[size > 1e-9 * size[0]].T
+    if flat.shape[1] < 2:
+        return points
+    try:
+        return np.asarray(points[ConvexHull(flat).vertices])
+    except QhullError:
+        return points
+
+
+def _rms(track: Track, designs: Designs) -> Array:
+    """Of the motor's torque at the joint where it is greatest, (D,) [N*m]."""
+    theta = designs.theta
+    if not track.rest.any():
+        i, k = np.triu_indices(5)
+        pairs = theta[:, i] * theta[:, k] * np.where(i == k, 1.0, 2.0)
+        square = (pairs @ track.squares[:, i, k].T).max(axis=1)
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+    out = np.zeros(len(designs))
+    for rows in _blocks(len(designs), track.series.torque.size):
+        torque = track.torque(designs.taken(np.arange(len(designs))[rows]))
+        a, b = torque[:, :-1], torque[:, 1:]
+        square = np.einsum("dnj,n->dj", a * a + a * b + b * b, track.step) / 3.0
+        out[rows] = np.sqrt(square.max(axis=1) / track.load.duration)
+    return out
+
+
+def _blocks(count: int, size: int) -> Iterator[slice]:
+    """Of rows, so that rows times size is bounded."""
+    rows = max(BLOCK // max(size, 1), 1)
+    return (slice(first, first + rows) for first in range(0, count, rows))

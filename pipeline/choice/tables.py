@@ -1,0 +1,293 @@
+"""The tables of a choice; rows are declared in `reports.tables.choice`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.energy.energy import integral
+from actuators.energy.regeneration import supply
+from actuators.loading.build import WINDING
+from actuators.units import from_si
+from pipeline.choice.choose import Chosen
+from pipeline.choice.group import Found
+from pipeline.choice.loads import Load
+from pipeline.choice.search import Demanded
+from reports.table import Table, table_of
+from reports.tables.choice import AnswerRow, BestRow, DayRow, ExcludedRow, FrontRow, UnknownRow
+
+Array = NDArray[np.float64]
+ROBOT = "robot"
+
+
+def tables_of(chosen: Chosen) -> list[Table]:
+    """Every table of a choice."""
+    day = list(day_rows(chosen))
+    return [
+        table_of(AnswerRow, answer_rows(chosen, day)),
+        table_of(FrontRow, front_rows(chosen)),
+        table_of(BestRow, list(best_rows(chosen))),
+        table_of(ExcludedRow, list(excluded_rows(chosen))),
+        table_of(DayRow, day),
+        table_of(UnknownRow, unknown_rows(chosen)),
+    ]
+
+
+def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
+    """A row for each group, and the robot's."""
+    rows = []
+    for group, found in chosen.found.items():
+        doubt = chosen.doubts[group]
+        best, joints = doubt.order[0], len(found.demanded.joints)
+        power = sum(row.energy_Wh for row in day if row.group == group) / chosen.hours
+        motor, gear, brake = chosen.answer[group]
+        design = chosen.designs(group)
+        low, high = np.quantile(doubt.power[:, best], [0.05, 0.95])
+        rows.append(
+            AnswerRow(
+                group=group,
+                joints=joints,
+                motor=motor,
+                gear=gear,
+                ratio=float(design.ratio[0]),
+                brake=brake,
+                power_W=power,
+                energy_Wh_per_day=power * chosen.hours,
+                battery_h=None,
+                actuator_mass_kg=float(design.mass[0]) * joints,
+                chance_best=float(doubt.chance[best]),
+                power_low_W=float(low),
+                power_high_W=float(high),
+                regret_W=doubt.regret,
+                searched_power_W=chosen.first[group],
+                not_printed=chosen.shelf.not_printed(chosen.answer[group]),
+            )
+        )
+    hotel = chosen.wanted.account.hotel
+    totals = {
+        name: sum(getattr(row, name) for row in rows)
+        for name in ("joints", "actuator_mass_kg", "regret_W")
+    }
+    powers = {
+        name: hotel + sum(getattr(row, name) for row in rows)
+        for name in ("power_W", "power_low_W", "power_high_W", "searched_power_W")
+    }
+    energy = powers["power_W"] * chosen.hours
+    hours = chosen.battery_hours(powers["power_W"])
+    rows.append(
+        AnswerRow(
+            group=ROBOT,
+            motor="",
+            gear="",
+            ratio=None,
+            brake="",
+            energy_Wh_per_day=energy,
+            battery_h=hours,
+            chance_best=float(np.prod([row.chance_best for row in rows])),
+            not_printed="",
+            **totals,
+            **powers,
+        )
+    )
+    return rows
+
+
+def words(design: tuple[str, str, str]) -> str:
+    """Motor, gear and brake."""
+    return " + ".join(part for part in design if part)
+
+
+def front_rows(chosen: Chosen) -> list[FrontRow]:
+    """Robots that none beats in power and mass."""
+    power, mass, taken = chosen.robots()
+    groups = list(chosen.found.items())
+    rows = []
+    for k, (p, m, which) in enumerate(zip(power, mass, taken, strict=True), start=1):
+        names = [
+            f"{group}: {words(found.designs.parts[found.looked[found.front[i]]])}"
+            for (group, found), i in zip(groups, which, strict=True)
+        ]
+        own = float(p)
+        hours = chosen.battery_hours(own)
+        rows.append(FrontRow(k, own, own * chosen.hours, hours, float(m), "; ".join(names)))
+    return rows
+
+
+def best_rows(chosen: Chosen) -> Iterator[BestRow]:
+    """The ten best of each group, and why nine of them lost."""
+    for group, found in chosen.found.items():
+        doubt = chosen.doubts[group]
+        losses = _losses(found)
+        best = doubt.order[0]
+        for rank, k in enumerate(doubt.order[:10], start=1):
+            at = found.looked[found.finalists[k]]
+            motor, gear, brake = found.designs.parts[at]
+            use = {name: float(share[at]) for name, share in found.use.items()}
+            limit = max(use, key=lambda name: use[name])
+            more = {n: each[k] - each[best] for n, each in losses.items()}
+            more["mass"] = float(
+                np.mean((doubt.score - doubt.power)[:, k] - (doubt.score - doubt.power)[:, best])
+            )
+            worst = max(more, key=lambda name: more[name])
+            yield BestRow(
+                group=group,
+                rank=rank,
+                motor=motor,
+                gear=gear,
+                ratio=float(found.designs.ratio[at]),
+                brake=brake,
+                power_W=float(doubt.power[:, k].mean()),
+                nominal_power_W=float(found.power[found.finalists[k]]),
+                more_than_best_W=float(doubt.expected[k] - doubt.expected[best]),
+                actuator_mass_kg=float(found.designs.mass[at]) * len(found.demanded.joints),
+                chance_best=float(doubt.chance[k]),
+                chance_within=float(doubt.within[:, k].mean()),
+                nearest_limit=limit,
+                limit_use=use[limit],
+                lost_by="" if k == best else f"{worst}: {more[worst]:+.3g} W",
+                not_printed=chosen.shelf.not_printed((motor, gear, brake)),
+            )
+
+
+def _losses(found: Found) -> dict[str, Array]:
+    """Where the power of the finalists goes, mean over the mission, by kind (F,) [W]."""
+    designs = found.designs.taken(found.looked[found.finalists])
+    out = {name: np.zeros(len(designs)) for name in ("windings", "friction and returns", "brakes")}
+    for track in found.demanded.tracks:
+        torque = track.torque(designs)
+        heat = (designs.resistance / designs.torque_constant**2)[:, None, None] * torque**2
+        copper = track.share * np.einsum("dnj,n->d", heat, track.weight)
+        held = np.einsum("nj,n->", (~track.rest | (not track.engaged)) * 1.0, track.weight)
+        brakes = track.share * designs.brake_power * held
+        out["windings"] += copper
+        out["brakes"] += brakes
+        out["friction and returns"] -= copper + brakes
+    out["friction and returns"] += found.power[found.finalists]
+    return out
+
+
+def excluded_rows(chosen: Chosen) -> Iterator[ExcludedRow]:
+    """Which limit removed how many."""
+    for group, found in chosen.found.items():
+        over = {name: share > 1.0 for name, share in found.use.items()}
+        count = np.sum(list(over.values()), axis=0)
+        for name, own in over.items():
+            yield ExcludedRow(
+                group,
+                name,
+                int(own.sum()),
+                int((own & (count == 1)).sum()),
+                len(found.designs),
+                len(found.within),
+            )
+
+
+def day_rows(chosen: Chosen) -> Iterator[DayRow]:
+    """Every mode at every group through the full chains, and the robot's."""
+    account = chosen.wanted.account
+    full = [(load, *chosen.full(load)) for load in chosen.loads]
+    total = sum(load.mode.hours * (float(power.sum()) + account.hotel) for load, _, power in full)
+    for load, result, power in full:
+        joints, time = load.series.joints, load.series.time
+        means: dict[str, Array] = {
+            "mechanical_W": integral(time, result.joint.power) / load.duration,
+            "winding_W": integral(time, result.losses[WINDING]) / load.duration,
+            "friction_W": np.zeros(len(joints)),
+            "brakes_W": np.zeros(len(joints)),
+            "returned_W": supply(
+                result, "fraction" if account.recovered else "none", account.recovered
+            ).dumped_energy
+            / load.duration,
+            "idle_W": account.idle
+            * (np.ones(len(joints)) if load.mode.drivers else (result.current != 0).any(axis=0)),
+        }
+        for name, loss in result.losses.items():
+            if name != WINDING:
+                key = "brakes_W" if name == "brake" else "friction_W"
+                means[key] = means[key] + integral(time, loss) / load.duration
+        for group, found in chosen.found.items():
+            at = [joints.index(joint) for joint in found.demanded.joints]
+            sums = {name: float(mean[at].sum()) for name, mean in means.items()}
+            yield _day_row(
+                load, group, float(power[at].sum()), total, sums, None, _limits(chosen, load, group)
+            )
+        sums = {name: float(mean.sum()) for name, mean in means.items()}
+        sums["idle_W"] += account.hotel
+        own = float(power.sum()) + account.hotel
+        transport = own / (load.weight * load.speed) if load.speed else None
+        yield _day_row(load, ROBOT, own, total, sums, transport, {})
+
+
+def _day_row(
+    load: Load,
+    group: str,
+    power: float,
+    total: float,
+    sums: Mapping[str, float],
+    transport: float | None,
+    limits: Mapping[str, float],
+) -> DayRow:
+    energy, none = power * load.mode.hours, dict.fromkeys(_LIMITS)
+    more: dict[str, Any] = {**none, **limits}
+    return DayRow(
+        mode=load.mode.name,
+        group=group,
+        hours=load.mode.hours,
+        power_W=power,
+        energy_Wh=energy,
+        share_of_day=energy / total if total else 0.0,
+        cost_of_transport=transport,
+        **sums,
+        **more,
+    )
+
+
+#: Column to the limit of a search, and column of the limit to the number of the design.
+_LIMITS = {
+    "rms_current_A": ("continuous current", ""),
+    "continuous_current_A": ("", "continuous_current"),
+    "peak_current_A": ("peak current", ""),
+    "most_current_A": ("", "peak_current"),
+    "speed_rad_s": ("motor's speed", ""),
+    "most_speed_rad_s": ("", "max_speed"),
+    "voltage_V": ("voltage", ""),
+    "most_voltage_V": ("", "voltage"),
+    "gear_rms_Nm": ("gear's continuous torque", ""),
+    "gear_continuous_Nm": ("", "gear_continuous"),
+    "gear_peak_Nm": ("gear's peak torque", ""),
+    "gear_most_Nm": ("", "gear_peak"),
+}
+
+
+def _limits(chosen: Chosen, load: Load, group: str) -> dict[str, float | None]:
+    """What the worst joint uses of every limit in one mode."""
+    design = chosen.designs(group)
+    finite = {
+        name: float(getattr(design, key)[0])
+        for name, (_, key) in _LIMITS.items()
+        if key and np.isfinite(getattr(design, key)[0])
+    }
+    use = Demanded.of(group, chosen.found[group].demanded.joints, [load]).limits(design)
+    out: dict[str, float | None] = {}
+    names = list(_LIMITS)
+    for name, limit in zip(names[::2], names[1::2], strict=True):
+        if limit in finite:
+            share = float(use[_LIMITS[name][0]][0])
+            out |= {name: share * finite[limit], limit: finite[limit]}
+    return out
+
+
+def unknown_rows(chosen: Chosen) -> list[UnknownRow]:
+    """What is worth measuring, the most worth first."""
+    rows = []
+    for group, doubt in chosen.doubts.items():
+        known = zip(doubt.unknowns, doubt.worth(), doubt.moves(), strict=True)
+        for (part, entry, number), worth, moves in known:
+            low, high = (from_si(x, number.unit) for x in (number.low, number.high))
+            rows.append(
+                UnknownRow(group, part, entry, low, high, number.unit, float(worth), float(moves))
+            )
+    return sorted(rows, key=lambda row: (-row.worth_W, -abs(row.moves_W)))

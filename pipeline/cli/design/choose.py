@@ -1,0 +1,127 @@
+"""The verb `choose`: which motor, gear and brake for a robot's day."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from actuators.loading.data_sheet import Entry, read_entry
+from actuators.loading.parts import PARTS
+from pipeline.cli.options import (
+    OUT,
+    AddVerb,
+    add_machine_options,
+    add_out_option,
+    changes_of,
+    decimal_of,
+    folder_held,
+    named_path,
+)
+from pipeline.progress import Progress
+
+#: The day that comes with the project, of any walking robot.
+DAY = Path(__file__).parents[2] / "choice" / "missions" / "day.csv"
+_NUMBERS = {
+    "idle": Entry("power", "of a driver that is on", "0.672 W"),
+    "hotel": Entry("power", "of the electronics", "10 W"),
+    "battery": Entry("energy", "when full", "500 Wh"),
+    "voltage": Entry("voltage", "of the supply", "48 V"),
+    "present": Entry("mass", "of an actuator that the bodies hold already", "0.48 kg"),
+}
+
+
+def add_verb(add: AddVerb) -> None:
+    """Declare the verb."""
+    sub = add("choose", "which motor, gear and brake: every combination over a day", run_choose)
+    sub.description = (
+        "Search every combination of the parts that can be bought over a robot's day, group of "
+        "joints by group of joints: the least energy within limits, how sure, and what to measure."
+    )
+    add_machine_options(sub, "robot file or name", "change a number for this run: NAME=VALUE")
+    text = "CSV of modes with their share of the time; columns in pipeline/choice/README.md"
+    sub.add_argument("--mission", type=named_path, default=DAY, help=text)
+    sub.add_argument("--parts", type=named_path, default=PARTS, help="folder with KIND/NAME.toml")
+    for word, kind in (("kind", "kind of gears"), ("only", "parts"), ("without", "parts")):
+        more = "these only" if word != "without" else "not these"
+        sub.add_argument(
+            f"--{word}", action="append", default=[], metavar="NAME", help=f"{kind}: {more}"
+        )
+    sub.add_argument("--no-brakes", action="store_true", help="no design with a brake")
+    sub.add_argument(
+        "--group",
+        action="append",
+        default=[],
+        metavar="NAME=PATTERN,...",
+        help="joints that are built alike; by default those alike in all legs",
+    )
+    for name, entry in _NUMBERS.items():
+        usual = "0.672 W" if name == "idle" else "531 Wh" if name == "battery" else None
+        sub.add_argument(
+            f"--{name}",
+            default=usual,
+            metavar="NUMBER",
+            help=f"{entry.kind} {entry.words}, such as '{entry.example}'",
+        )
+    sub.add_argument(
+        "--regeneration", default="none", metavar="POLICY", help="none, or a fraction used again"
+    )
+    sub.add_argument("--draws", type=int, default=256, help="over what no sheet prints; 256")
+    add_out_option(sub, OUT / "choose")
+
+
+def run_choose(options: argparse.Namespace) -> int:
+    """Search, write the tables, print three lines."""
+    with folder_held(options), Progress("choose") as progress:
+        progress.step("loading")
+        from pipeline.api.machine import load
+        from pipeline.choice.choose import Wanted
+        from pipeline.choice.errors import ChoiceError
+        from pipeline.choice.result import choice
+        from pipeline.choice.search import Account
+        from pipeline.simulation.settings import regeneration_of
+
+        policy = regeneration_of(options.regeneration)
+        if policy.policy == "bus":
+            raise ChoiceError(
+                "--regeneration bus: groups would share it and could not be searched apart; "
+                "expected none or a fraction"
+            )
+        if options.draws < 8:
+            raise ChoiceError(f"--draws {options.draws}: at least 8")
+        numbers = {name: _number(name, getattr(options, name)) for name in _NUMBERS}
+        machine = load(
+            options.robot,
+            model=options.model,
+            gait=options.gait,
+            actuators=options.actuators,
+            changes=changes_of(options.set),
+        )
+        wanted = Wanted(
+            parts=options.parts,
+            kinds=tuple(options.kind),
+            only=tuple(options.only),
+            without=tuple(options.without),
+            voltage=numbers["voltage"],
+            brakes=not options.no_brakes,
+            groups=tuple(options.group),
+            account=Account(numbers["idle"] or 0.0, numbers["hotel"] or 0.0, policy.fraction),
+            battery=numbers["battery"],
+            present=numbers["present"],
+            draws=options.draws,
+        )
+        result = choice(machine, options.mission, wanted, progress=progress)
+        progress.step("writing")
+        result.save(options.out, decimal=decimal_of(options))
+        progress.close()
+        print(*result.lines, f"wrote {options.out}", sep="\n")
+    return 0
+
+
+def _number(name: str, words: str | None) -> float | None:
+    """An option with its unit, SI, energy in watt hours."""
+    if words is None:
+        return None
+    if words.strip() in ("0", "0 W"):
+        return 0.0
+    value = read_entry(name, words, _NUMBERS).value
+    return value / 3600.0 if name == "battery" else value

@@ -1,0 +1,140 @@
+"""The search against full chains, brute force, and a closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pipeline as lw
+from actuators.energy.limits import limit_rows
+from actuators.energy.regeneration import supply
+from actuators.loading.parts import load_parts
+from pipeline.choice.designs import Designs, Shelf, combinations
+from pipeline.choice.fronts import front, merged
+from pipeline.choice.group import search
+from pipeline.choice.loads import Load, loads_of
+from pipeline.choice.mission import read_mission
+from pipeline.choice.search import Account, Demanded
+
+ACCOUNT = Account(idle=0.672)
+MISSION = """mode,share,gait,hold,drivers,payload
+walk,0.3,,,,
+loaded,0.1,,,,2 kg
+stand,0.4,stand,motor,on,
+wait,0.2,stand,brake,off,
+"""
+
+
+@pytest.fixture(scope="module")
+def loads(tmp_path_factory: pytest.TempPathFactory) -> tuple[Load, ...]:
+    path = tmp_path_factory.mktemp("mission") / "day.csv"
+    path.write_text(MISSION)
+    return loads_of(lw.load("urdf/hexapod.toml"), read_mission(path))
+
+
+@pytest.fixture(scope="module")
+def shelf() -> Shelf:
+    """Few parts of every kind, so that brute force stays short."""
+    parts = load_parts()
+    names = [
+        *("maxon_148867", "maxon_634043", "maxon_607930", "cubemars_ak10_9_v3", "maxon_353297"),
+        *("hd_csg_17_80", "hd_csg_25_100", "maxon_gp_62_a_100", "maxon_gp_42_hd_74"),
+        *("hpc_m1_40", "hpc_m1_120", "mitsubishi_hc_mf_053b_13b"),
+    ]
+    return Shelf.of({name: parts[name] for name in names})
+
+
+def in_full(designs: Designs, i: int, demanded: Demanded, account: Account) -> tuple[float, bool]:
+    """One design through its chain: mean power, and whether its motor is within limits."""
+    power, fits = 0.0, True
+    for track in demanded.tracks:
+        mode = track.load.mode
+        chain = designs.chain(i, engaged=not mode.stands or mode.hold == "brake")
+        result = chain.moving(track.series)
+        spent = supply(result).supplied_energy.sum() / track.load.duration
+        on = len(demanded.joints) if mode.drivers else (result.current != 0).any(axis=0).sum()
+        power += track.share * (spent + account.idle * on)
+        fits &= not any(row.breach for row in limit_rows(result))
+        torque = result.joint.torque
+        fits &= np.abs(torque).max() <= designs.gear_peak[i]
+        fits &= np.sqrt((track.weight @ torque**2).max()) <= designs.gear_continuous[i]
+        fits &= np.abs(result.motor.velocity).max() <= designs.gear_speed[i]
+    return power, bool(fits)
+
+
+@pytest.mark.parametrize("which", ["2", "3"])
+def test_ten_best_are_those_of_brute_force(
+    loads: tuple[Load, ...], shelf: Shelf, which: str
+) -> None:
+    joints = [joint for joint in loads[0].series.joints if joint.endswith(which)]
+    demanded = Demanded.of(which, joints, loads)
+    designs = shelf.designs(combinations(shelf))
+    found = search(demanded, designs, ACCOUNT)
+    full = [in_full(designs, i, demanded, ACCOUNT) for i in range(len(designs))]
+    fits = np.array([ok for _, ok in full])
+    assert set(np.flatnonzero(fits)) == set(found.within)
+    assert len(found.within) >= 10
+    power = np.array([p if ok else np.inf for p, ok in full])
+    best = found.looked[found.finalists[:10]]
+    assert list(best) == list(np.argsort(power, kind="stable")[:10])
+    assert np.allclose(found.power, power[found.looked], rtol=1e-9)
+
+
+def test_bound_is_below_and_net_where_all_is_used_again(
+    loads: tuple[Load, ...], shelf: Shelf
+) -> None:
+    joints = [joint for joint in loads[0].series.joints if joint.endswith("3")]
+    demanded = Demanded.of("knee", joints, loads)
+    designs = shelf.designs(combinations(shelf))
+    net = demanded.net(designs, ACCOUNT)
+    assert np.all(net <= demanded.power(designs, ACCOUNT) + 1e-9)
+    assert np.allclose(net, demanded.power(designs, replace(ACCOUNT, recovered=1.0)), rtol=1e-9)
+
+
+def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...]) -> None:
+    """Least mean square torque at n^4 = k2 / (J^2 k1): Roos, Johansson, Wikander 2006, eta = 1.
+
+    With T = n J a + tau / n the mean square is n^2 J^2 k1 + k2 / n^2 + 2 J mean(a tau).
+    """
+    joints = [joint for joint in loads[0].series.joints if joint.endswith("1")]
+    demanded = Demanded.of("hip", joints[:1], loads[:1])
+    track = demanded.tracks[0]
+    inertia, ratios = 5e-5, np.geomspace(5.0, 5000.0, 4001)
+    one = Shelf.of({"maxon_353297": load_parts()["maxon_353297"]})
+    plain = one.designs([("maxon_353297", "", "")] * len(ratios))
+    zero = np.zeros(len(ratios))
+    designs = replace(
+        plain,
+        **{"ratio": ratios, "inertia": zero + inertia},
+        **dict.fromkeys(("load", "coulomb", "viscous"), zero),
+    )
+    net = demanded.net(designs, Account())
+    k1 = float(track.weight @ track.series.acceleration[:, 0] ** 2)
+    k2 = float(track.weight @ track.series.torque[:, 0] ** 2)
+    assert ratios[net.argmin()] == pytest.approx((k2 / (inertia**2 * k1)) ** 0.25, rel=2e-3)
+
+
+def test_fronts_add() -> None:
+    rng = np.random.default_rng(1)
+    groups = [(rng.random(30), rng.random(30)) for _ in range(3)]
+    fronts = []
+    for power, mass in groups:
+        own = front(power, mass)
+        fronts.append((power[own], mass[own]))
+    power, mass, taken = merged(fronts)
+    every_p = sum(np.meshgrid(*(p for p, _ in groups), indexing="ij")).ravel()
+    every_m = sum(np.meshgrid(*(m for _, m in groups), indexing="ij")).ravel()
+    own = front(every_p, every_m)
+    assert np.allclose(power, every_p[own])
+    assert np.allclose(mass, every_m[own])
+    assert np.allclose(power, sum(p[taken[:, k]] for k, (p, _) in enumerate(fronts)))
+
+
+def test_mission_that_ships_is_read() -> None:
+    import pipeline.choice.mission as module
+
+    modes = read_mission(Path(module.__file__).parent / "missions" / "day.csv")
+    assert sum(mode.hours for mode in modes) == pytest.approx(24.0)
