@@ -17,6 +17,7 @@ ORDER = (
         "cli",
         "choice",
         "sweep",
+        "measured",
         "api",
         "reports",
         "blind",

@@ -60,6 +60,7 @@ def parser() -> argparse.ArgumentParser:
     add_export(add)
     studies.add_verbs(add)
     walking.add_diff(add)
+    walking.add_measured(add)
     studies.add_calibrate(add)
     return root
 

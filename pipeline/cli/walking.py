@@ -1,4 +1,4 @@
-"""The verbs stand, walk, reports, view and diff: options in, one call, lines out."""
+"""The verbs stand, walk, reports, view, diff and measured: options in, one call, lines out."""
 
 from __future__ import annotations
 
@@ -52,6 +52,25 @@ def add_diff(add: AddVerb) -> None:
     sub.add_argument("a", type=named_path, metavar="A", help=kinds)
     sub.add_argument("b", type=named_path, metavar="B", help="another, of a run of the same kind")
     add_out_option(sub, OUT / "diff")
+
+
+def add_measured(add: AddVerb) -> None:
+    """Declare the verb measured."""
+    text = "robots whose power others measured, beside what is predicted of them before any fit"
+    sub = add("measured", text, run_measured)
+    add_out_option(sub, OUT / "measured")
+    add_verbose_option(sub)
+
+
+def run_measured(options: argparse.Namespace) -> int:
+    """Predict every measured robot; write tables, figure and page."""
+    with folder_held(options), Progress(options.verb) as progress:
+        from pipeline.measured.page import write_measured
+
+        lines = write_measured(options.out, decimal_of(options), progress)
+        progress.close()
+        print(*lines, sep="\n")
+    return 0
 
 
 def run_reports(options: argparse.Namespace) -> int:

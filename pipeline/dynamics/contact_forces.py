@@ -8,7 +8,8 @@ the feet stand; "the tangential forces at the feet are the minimum ones which gu
 robot motion" (section II.B of the paper) then has a closed form: every foot takes an equal share of
 the horizontal force, plus a share of the yaw moment in proportion to its distance from the centroid
 of the stance. Of the normal forces that remain open with more than three feet, those of least
-spread about their mean are taken; as their sum is bound, these are the ones of least squares.
+spread about their mean are taken; as their sum is bound, these are the ones of least squares. Two
+feet meet all but the moment about their line, by which a trotting body rocks to and fro.
 """
 
 from __future__ import annotations
@@ -109,7 +110,8 @@ def least_tangential_forces(
     Args:
         wrench: Force and moment about the origin that the ground must supply, in a frame whose z
             axis is the ground's normal [N, N*m], shape (N, 6).
-        feet: Foot points in the same frame [m], shape (N, F, 3), F >= 3.
+        feet: Foot points in the same frame [m], shape (N, F, 3), F >= 2; two meet all of the wrench
+            but the moment about their line.
         friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
 
     Returns:
@@ -160,6 +162,9 @@ def _closed_form(wrench: Array, feet: Array) -> Array:
 def _normals(x: Array, y: Array, total: Array, moment_x: Array, moment_y: Array) -> Array:
     # Least squares about the centroid: N_i = total/F + a x_i + b y_i, with
     # sum y N = moment_x and -sum x N = moment_y; exact and unique for three feet.
+    if x.shape[1] == 2:  # the moment across their line; nothing meets the one along it
+        lean = (y[:, 1] * moment_x - x[:, 1] * moment_y) / (x[:, 1] ** 2 + y[:, 1] ** 2)
+        return 0.5 * np.stack([total - lean, total + lean], axis=1)
     xx, yy = np.einsum("nf,nf->n", x, x), np.einsum("nf,nf->n", y, y)
     xy = np.einsum("nf,nf->n", x, y)
     det = xx * yy - xy * xy

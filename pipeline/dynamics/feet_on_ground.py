@@ -62,14 +62,19 @@ class FeetOnGround:
         return self._to_ground(self.in_base)
 
     def least_tangential(
-        self, wrench: Array, standing: NDArray[np.bool_], friction_coefficient: float | None = None
+        self,
+        wrench: Array,
+        standing: NDArray[np.bool_],
+        friction_coefficient: float | None = None,
+        least: int = 3,
     ) -> Array:
         """Forces that supply a wrench, with the least tangential parts.
 
         Args:
             wrench: Force and moment demanded of the base, in its frame [N, N*m], shape (N, 6).
-            standing: Which feet do, shape (N, L); samples with fewer than three have no forces.
+            standing: Which feet do, shape (N, L).
             friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
+            least: Feet that stand; samples with fewer have no forces.
 
         Returns:
             Shape (N, L, 3) [N]; zero in the air. See `least_tangential_forces` for samples at which
@@ -82,7 +87,7 @@ class FeetOnGround:
         for code in np.unique(codes):
             rows = np.flatnonzero(codes == code)
             stance = np.flatnonzero(standing[rows[0]])
-            if stance.size >= 3:
+            if stance.size >= least:
                 own = np.ix_(rows, stance)
                 force[own] = least_tangential_forces(turned[rows], feet[own], friction_coefficient)
         return force

@@ -29,12 +29,16 @@ def internal_basis(feet: Array) -> Array:
     """Orthonormal basis of the forces that add up to no force and no moment.
 
     Args:
-        feet: Foot points [m], shape (N, F, 3), F >= 3, not in one line.
+        feet: Foot points [m], shape (N, F, 3), F >= 3, not in one line; or two.
 
     Returns:
-        Shape (N, F, 3, D) with D = 3 F - 6.
+        Shape (N, F, 3, D) with D = 3 F - 6; for two feet 1, a squeeze along their line.
     """
     n, count, _ = feet.shape
+    if count == 2:
+        along = feet[:, 1] - feet[:, 0]
+        along /= np.sqrt(2.0) * np.linalg.norm(along, axis=1)[:, None]
+        return np.stack([along, -along], axis=1)[..., None]
     arm = feet - feet.mean(axis=1, keepdims=True)
     arm = arm / np.abs(arm).max()  # newtons beside newton-metres: only the null space counts
     balance = np.zeros((n, count, 3, 6))

@@ -92,17 +92,19 @@ def _ground_forces(
     choice: GroundForces,
 ) -> Array:
     """Forces of the ground in its frame, (N, L, 3), or a refusal."""
-    if len(segment.stance) < 3:
+    rocks = segment.rocks and len(segment.stance) == 2
+    if len(segment.stance) < 3 and not rocks:
         raise GaitError(
             f"segment '{segment.name}' stands on {len(segment.stance)} feet; a statically stable "
             "stance needs at least 3"
         )
+    limit, least = choice.friction_coefficient, len(segment.stance) if rocks else 3
     stance = [robot.leg_names.index(leg) for leg in segment.stance]
     standing = np.zeros((segment.time.size, len(robot.leg_names)), dtype=np.bool_)
     standing[:, stance] = True
-    force = feet.least_tangential(wrench, standing, choice.friction_coefficient)
+    force = feet.least_tangential(wrench, standing, limit, least)
     points = feet.points[:, stance]
-    refuse_falling(robot, segment, force[:, stance], points, choice.friction_coefficient)
+    refuse_falling(robot, segment, force[:, stance], points, limit)
     if choice.rule is not None:
         own = robot.layout.real[stance]
         force[:, stance] = choice.rule.forces(
@@ -114,7 +116,7 @@ def _ground_forces(
                 feet.unit_torque()[:, stance][:, own],
                 points,
                 force[:, stance],
-                choice.friction_coefficient,
+                limit,
             )
         )
     return force

@@ -33,6 +33,30 @@ class BaseMotion:
     acceleration: Array
 
 
+def surge(gait: Gait, share: Array) -> Course:
+    """The body's way ahead of its even course and back, twice a period, shape (N, 3).
+
+    A foot that stands a way x ahead of its hip at height h under it, and presses with a force that
+    points at the hip, slows the body by g x / h. Along a stroke S that x falls from S/2 to -S/2:
+    with feet that touch down together in two sets half a period apart its first harmonic is
+    (S / pi) sin(w t), w = 4 pi / T, counted from the middle of a support less T/4, and the body's
+    way the same times g / (h w^2).
+
+    Args:
+        gait: The gait.
+        share: Of the period, from the first touch-down, shape (N,).
+    """
+    duty = float(np.mean(list(gait.footfall.duty.values())))
+    rate = 4.0 * np.pi / gait.period  # [rad/s]
+    phase = rate * gait.period * (share - (duty / 2.0 - 0.25))
+    ahead = gait.surge * np.array([*gait.twist[:2], 0.0]) / max(gait.speed, 1e-12)
+    return Course(
+        np.sin(phase)[:, None] * ahead,
+        rate * np.cos(phase)[:, None] * ahead,
+        -(rate**2) * np.sin(phase)[:, None] * ahead,
+    )
+
+
 def base_motion(gait: Gait, time: Array, shift: Course | None) -> BaseMotion:
     """The base over a stretch of time.
 

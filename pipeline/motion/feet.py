@@ -38,6 +38,14 @@ class Course:
     velocity: Array
     acceleration: Array
 
+    def __add__(self, other: Course) -> Course:
+        """Both courses together."""
+        return Course(
+            self.position + other.position,
+            self.velocity + other.velocity,
+            self.acceleration + other.acceleration,
+        )
+
 
 def along_ground(vector: Array) -> Plane:
     """The first two components of vectors (..., 2 or more) as complex numbers."""

@@ -35,11 +35,13 @@ class Footfall:
         phase: Leg to its touch-down as a share of the period, in [0, 1); legs that stand together
             are told in this order.
         duty: Leg to the share of the period for which it stands, between 0 and 1.
+        least: Feet that stand at any time, at least: three, or two where the body may rock.
     """
 
     name: str
     phase: Mapping[str, float]
     duty: Mapping[str, float]
+    least: int = LEAST_FEET
 
     def since(self, leg: str, share: float, *, stood: bool) -> float:
         """Share of the period since a leg's touch-down, or its lift-off where it did not stand."""
@@ -57,7 +59,7 @@ class Footfall:
         The first starts at 0; the last ends at 1.
 
         Raises:
-            GaitError: Fewer than three legs stand in one of them.
+            GaitError: Fewer legs than `least` stand in one of them.
         """
         events = {0.0, 1.0}
         for leg, phase in self.phase.items():
@@ -69,8 +71,8 @@ class Footfall:
         for start, end in pairwise(sorted(events)):
             middle = (start + end) / 2
             stance = tuple(leg for leg in self.phase if self.stands(leg, middle))
-            if len(stance) < LEAST_FEET:
-                if len(self.phase) == LEAST_FEET:
+            if len(stance) < self.least:
+                if len(self.phase) == self.least == LEAST_FEET:
                     raise GaitError(
                         f"gait '{self.name}': none of {LEAST_FEET} legs can be lifted, a static "
                         f"gait needs {LEAST_FEET} feet on the ground; `stand` has an answer"
@@ -78,7 +80,7 @@ class Footfall:
                 raise GaitError(
                     f"gait '{self.name}': from {100 * start:.4g} % to {100 * end:.4g} % of the "
                     f"period only {len(stance)} feet stand ({', '.join(stance) or 'none'}); a "
-                    f"static gait needs {LEAST_FEET}; raise gait.duty_factor or change gait.phase"
+                    f"static gait needs {self.least}; raise gait.duty_factor or change gait.phase"
                 )
             if out and out[-1][2] == stance:
                 out[-1] = (out[-1][0], end, stance)

@@ -7,7 +7,7 @@ from the robot file's parameters, and the third follows; all three stated must a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,7 @@ class Gait:
         ground: The plane it walks on.
         body: Rotation from the base to the ground's axes at zero heading, shape (3, 3).
         path: Name of the foot's path through the air.
+        surge: Path of the body ahead of its even course and back, twice a period [m].
         margin: Distance from every edge of the support that the body's sway keeps [m]; None where
             the body does not sway.
         margin_stated: Whether it must be that one; else it may be half of what there is to have.
@@ -61,6 +62,7 @@ class Gait:
     ground: Ground
     body: Array
     path: str
+    surge: float
     margin: float | None
     margin_stated: bool
     source: str
@@ -102,7 +104,7 @@ def gait_of(spec: RobotSpec) -> Gait:
     if not table.tripods and table.tripods is not None:
         raise GaitError(f"{spec.path}: gait.tripods is empty: the robot has no gait; state one")
     try:
-        footfall = _footfall(table, spec)
+        footfall = replace(_footfall(table, spec), least=table.least_feet)
         footfall.stances()  # refuses too few feet before any number is asked for
     except GaitError as error:
         raise GaitError(f"{spec.path}: {str(error).removeprefix(f'{spec.path}: ')}") from None
@@ -128,10 +130,31 @@ def gait_of(spec: RobotSpec) -> Gait:
         ground=ground,
         body=body_rotation(table),
         path=table.transfer_path,
+        surge=_surge(table, spec, footfall, twist, period, neutral),
         margin=margin if sway == "least" else None,
         margin_stated=table.stability_margin is not None,
         source=str(spec.path),
     )
+
+
+def _surge(
+    table: GaitTable,
+    spec: RobotSpec,
+    footfall: Footfall,
+    twist: Array,
+    period: float,
+    neutral: Array,
+) -> float:
+    """Half the body's way ahead and back [m]; see `pipeline.motion.base_motion.Surge`."""
+    if not table.surge:
+        return 0.0
+    duty = float(np.mean(list(footfall.duty.values())))
+    stroke, height = (
+        float(np.hypot(twist[0], twist[1])) * duty * period,
+        -float(neutral[:, 2].mean()),
+    )
+    rate = 4.0 * np.pi / period  # [rad/s]
+    return float(table.surge * spec.parameters["gravity"] / height * stroke / np.pi / rate**2)
 
 
 def lifts(table: GaitTable, spec: RobotSpec) -> Array:

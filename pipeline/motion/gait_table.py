@@ -104,6 +104,7 @@ _SHARE = _size(
     "never steps; give a number such as 0.75",
 )
 _FRICTION = _size("ratio", 0, math.inf, "must lie above 0: give a number such as 0.6")
+_SURGE = _size("ratio", 0, 2.0, "must lie from 0 to below 2", low_too=True)
 _PHASE = _size("ratio", -math.inf, math.inf, "")
 Length = Annotated[float, BeforeValidator(_LENGTH)]
 Height = Annotated[float, BeforeValidator(_HEIGHT)]
@@ -147,6 +148,8 @@ class GaitTable(BaseModel):
         sets: Sets of legs that swing in turn.
         tripods: The same with two sets, half a period each.
         phase: Touch-down of each leg as a share of the period.
+        least_feet: Feet that stand at any time, at least: 3, or 2, when the moment about the line
+            of two feet is left out and the body would rock.
         duty_factor: Share of the period for which a foot stands, of all or by leg.
         transfer_path: Of the foot through the air.
         period: Of the gait [s].
@@ -168,6 +171,8 @@ class GaitTable(BaseModel):
         payload_x: Place of its centre of mass in the base's axes [m].
         payload_y: Likewise.
         payload_z: Likewise.
+        surge: Share of slowing and speeding up with every step with which the ground's forces point
+            from the feet to the hips; 0, the default, for constant speed.
         sway: Path of the body over its feet: ``none``, or the ``least`` that keeps the margin.
         stability_margin: Distance that the sway keeps from every edge of the support [m].
     """
@@ -178,6 +183,7 @@ class GaitTable(BaseModel):
     sets: Legs | None = None
     tripods: Legs | None = None
     phase: Phases | None = None
+    least_feet: Literal[2, 3] = 3
     duty_factor: Shares | None = None
     transfer_path: Path = "harmonic"
     period: Time | None = None
@@ -198,6 +204,7 @@ class GaitTable(BaseModel):
     payload_x: Offset = 0.0
     payload_y: Offset = 0.0
     payload_z: Offset = 0.0
+    surge: Annotated[float, BeforeValidator(_SURGE)] = 0.0
     sway: Literal["none", "least"] | None = None
     stability_margin: Height | None = None
 

@@ -35,6 +35,7 @@ class Segment:
             ground, shape (3,); the standing feet rest on one plane with this normal.
         foot_target: Where the feet should be in the base frame, shape (N, L, 3) [m]; None where
             the motion was not made from feet.
+        rocks: Whether it stands on two feet, whose forces leave the moment about their line open.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Segment:
     stance: tuple[str, ...]
     ground_normal: Array = field(default_factory=level_ground)
     foot_target: Array | None = None
+    rocks: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what no later stage could compute with.

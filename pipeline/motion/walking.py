@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import GaitError, OutOfReachError
-from pipeline.motion.base_motion import base_motion
+from pipeline.motion.base_motion import base_motion, surge
 from pipeline.motion.feet import Course, support_course, transfer_course
+from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.postures import refuse_beyond_limits, start_postures
@@ -95,7 +96,11 @@ def _segment(
     passed = np.linspace(0.0, 1.0, samples)
     time = gait.period * begin + gait.period * (end - begin) * passed
     time[-1] = gait.period * end  # the instant at which the next segment starts, to the last bit
-    shift = None if sway is None else sway.course(begin + (end - begin) * passed)
+    share = begin + (end - begin) * passed
+    shift = None if sway is None else sway.course(share)
+    if gait.surge:
+        along = surge(gait, share)
+        shift = along if shift is None else shift + along
     feet = _feet(gait, begin, end, passed, shift)
     q = solve_positions(robot.chains, feet.position, start, time)
     refuse_beyond_limits(robot, robot.joint_positions(q), time)
@@ -118,6 +123,7 @@ def _segment(
         stance=stance,
         ground_normal=gait.ground.normal,
         foot_target=feet.position,
+        rocks=len(stance) < LEAST_FEET,
     )
 
 

@@ -1,0 +1,1 @@
+"""Robots whose electrical power others measured, beside what the model predicts of them."""
