@@ -14,11 +14,14 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.errors import one_line
 from pipeline.logs.reading.log_format import JOINT_COLUMNS, TIME
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 _ROWS: Final = 50_000  # of the table that are put together at once
+#: Times the usual step beyond which nothing is drawn between two messages.
+_GAP: Final = 5.0
 #: What ROS calls a quantity, and its column's end in the log format.
 _SUFFIX: Final = {quantity: suffix for suffix, (quantity, _) in JOINT_COLUMNS.items()} | {
     "effort": "torque_Nm"
@@ -44,6 +47,22 @@ class _Block(NamedTuple):
     stamps: Stamps
     logged: Stamps
     at: int  # in the file [B]
+
+
+class _Sender(NamedTuple):
+    """Blocks that share columns: what one publisher sends.
+
+    Attributes:
+        columns: Of all of them.
+        blocks: The blocks.
+        rows: The row of every message, by block.
+        times: Of the rows [ns].
+    """
+
+    columns: tuple[Column, ...]
+    blocks: list[_Block]
+    rows: list[Stamps]
+    times: Stamps
 
 
 class Spool:
@@ -84,6 +103,8 @@ class Spool:
         """Write all numbers as a Parquet table of the log format, rows by time.
 
         Numbers of one instant stand in one row; where a message lacks a column its cell is empty.
+        What others send on stamps of their own is brought to the rows of the one that sends the
+        joints' states, or most, by straight lines.
 
         Returns:
             What a reader should know of the times and topics.
@@ -93,22 +114,70 @@ class Spool:
 
         stamps, remarks = self._times()
         names, more = self._names()
-        start = min(int(s.min()) for s in stamps)
-        rows, times = self._rows(stamps)
-        schema = pa.schema([(name, pa.float64()) for name in (TIME, *names.values())])
-        at = {column: k for k, column in enumerate(names, start=1)}
+        main, *others = self._senders(stamps)
+        columns = [c for sender in (main, *others) for c in sender.columns]
+        schema = pa.schema([(n, pa.float64()) for n in (TIME, *(names[c] for c in columns))])
         with pq.ParquetWriter(path, schema) as writer:
-            for first in range(0, times.size, _ROWS):
-                last = min(first + _ROWS, times.size)
-                out = np.full((last - first, len(names) + 1), np.nan)
-                out[:, 0] = 1e-9 * (times[first:last] - start)
-                for block, row in zip(self._blocks, rows, strict=True):
-                    inside = (row >= first) & (row < last)
-                    if inside.any():
-                        places = [at[column] for column in block.columns]
-                        out[np.ix_(row[inside] - first, places)] = self._values(block)[inside]
-                writer.write_table(pa.table(list(out.T), schema=schema))
+            for first in range(0, main.times.size, _ROWS):
+                times = main.times[first : first + _ROWS]
+                blocks = [self._rows(main, first, first + times.size)]
+                blocks += [self._between(sender, times) for sender in others]
+                seconds = 1e-9 * (times - main.times[0])
+                arrays = [seconds, *np.concatenate(blocks, axis=1).T]
+                writer.write_table(pa.table(arrays, schema=schema))
+        apart = [s for s in others if not np.isin(s.times, main.times).all()]
+        if apart:
+            count = sum(len(sender.columns) for sender in apart)
+            told = f"{count} columns come at other times ({one_line(names[apart[0].columns[0]])}"
+            more.append(f"{told}, ...) and are brought to those of the others by straight lines")
         return remarks + more
+
+    def _senders(self, stamps: list[Stamps]) -> list[_Sender]:
+        """Blocks that share columns together, those of the joints' states or most rows first."""
+        groups: list[tuple[set[Column], list[int]]] = []
+        for k, block in enumerate(self._blocks):
+            same = [g for g in groups if g[0] & {*block.columns}]
+            groups = [g for g in groups if g not in same]
+            columns = {*block.columns}.union(*(g[0] for g in same))
+            groups.append((columns, [*(m for g in same for m in g[1]), k]))
+        senders = []
+        for columns, members in groups:
+            blocks = [self._blocks[k] for k in members]
+            rows, times = _ordered(blocks, [stamps[k] for k in members])
+            senders.append(_Sender(tuple(sorted(columns)), blocks, rows, times))
+        return sorted(
+            senders, key=lambda s: ("state" not in s.columns[0].topic, -s.times.size, s.columns)
+        )
+
+    def _rows(self, sender: _Sender, first: int, last: int) -> Array:
+        """Some of a sender's rows, shape (last - first, columns)."""
+        out = np.full((last - first, len(sender.columns)), np.nan)
+        at = {column: k for k, column in enumerate(sender.columns)}
+        for block, row in zip(sender.blocks, sender.rows, strict=True):
+            inside = (row >= first) & (row < last)
+            if inside.any():
+                places = [at[column] for column in block.columns]
+                out[np.ix_(row[inside] - first, places)] = self._values(block)[inside]
+        return out
+
+    def _between(self, sender: _Sender, times: Stamps) -> Array:
+        """A sender's numbers at other times (N,), shape (N, columns); empty in its gaps."""
+        own = sender.times
+        after = np.clip(np.searchsorted(own, times), 0, own.size - 1)
+        before = np.maximum(after - 1, 0)
+        first, last = int(before.min()), int(after.max()) + 1
+        values = self._rows(sender, first, last)
+        width = own[after] - own[before]
+        usual = np.median(np.diff(own)) if own.size > 1 else 0
+        share = np.where(width > 0, (times - own[before]) / np.maximum(width, 1), 1.0)
+        with np.errstate(invalid="ignore"):
+            low, high = values[before - first], values[after - first]
+            out = low + share[:, None] * (high - low)
+        exact = own[after] == times
+        out[exact] = high[exact]
+        outside = (width == 0) | (width > _GAP * usual) | (share < 0.0) | (share > 1.0)
+        out[~exact & outside] = np.nan
+        return np.asarray(out)
 
     def _values(self, block: _Block) -> Array:
         self._file.seek(block.at)
@@ -163,30 +232,25 @@ class Spool:
         text = f"columns of {', '.join(others)} are kept as TOPIC/JOINT/QUANTITY"
         return names, [f"joints are those of {', '.join(first)}; {text}"]
 
-    def _rows(self, stamps: list[Stamps]) -> tuple[list[Stamps], Stamps]:
-        """The row of every message, by block, and the rows' times [ns].
 
-        Messages with the same columns never share a row: the second of two with one stamp is the
-        reader's to drop and to tell.
-        """
-        turns: list[Stamps] = [np.zeros(0, dtype=np.int64)] * len(self._blocks)
-        kinds: dict[tuple[Column, ...], list[int]] = {}
-        for k, block in enumerate(self._blocks):
-            kinds.setdefault(block.columns, []).append(k)
-        for members in kinds.values():
-            joined = np.concatenate([stamps[k] for k in members])
-            order = np.argsort(joined, kind="stable")
-            ordered = joined[order]
-            turn = np.empty_like(order)
-            turn[order] = np.arange(order.size) - np.searchsorted(ordered, ordered)
-            cuts = np.cumsum([stamps[k].size for k in members])[:-1]
-            for k, part in zip(members, np.split(turn, cuts), strict=True):
-                turns[k] = part
-        when, turn = np.concatenate(stamps), np.concatenate(turns)
-        order = np.lexsort((turn, when))
-        new = np.ones(order.size, dtype=np.bool_)
-        new[1:] = (np.diff(when[order]) != 0) | (np.diff(turn[order]) != 0)
-        row = np.empty_like(order)
-        row[order] = np.cumsum(new) - 1
-        cuts = np.cumsum([s.size for s in stamps])[:-1]
-        return np.split(row, cuts), when[order][new]
+def _ordered(blocks: Sequence[_Block], stamps: Sequence[Stamps]) -> tuple[list[Stamps], Stamps]:
+    """The row of every message, by block, and the rows' times [ns].
+
+    Messages with the same columns never share a row: the second of two with one stamp is the
+    reader's to drop and to tell.
+    """
+    kinds = {columns: k for k, columns in enumerate(dict.fromkeys(b.columns for b in blocks))}
+    when = np.concatenate(stamps)
+    kind = np.concatenate([np.full(b.stamps.size, kinds[b.columns]) for b in blocks])
+    order = np.lexsort((kind, when))
+    new = np.ones(order.size, dtype=np.bool_)
+    new[1:] = (np.diff(when[order]) != 0) | (np.diff(kind[order]) != 0)
+    start = np.maximum.accumulate(np.where(new, np.arange(order.size), 0))
+    turn = np.empty_like(order)
+    turn[order] = np.arange(order.size) - start  # how many of this kind and stamp came before
+    order = np.lexsort((turn, when))
+    new[1:] = (np.diff(when[order]) != 0) | (np.diff(turn[order]) != 0)
+    row = np.empty_like(order)
+    row[order] = np.cumsum(new) - 1
+    cuts = np.cumsum([s.size for s in stamps])[:-1]
+    return np.split(row, cuts), when[order][new]

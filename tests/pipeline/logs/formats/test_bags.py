@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import sqlite3
+import sys
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.logs.errors import LogFormatError
 from pipeline.logs.formats.convert import plain
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.read import read_log
@@ -52,3 +56,132 @@ def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
         assert (log.torque[:, j] == columns[f"{joint}__torque_Nm"][:400]).all()
     assert plain(path) is plain(path)
     assert log.told == ()
+
+
+def test_headers_without_stamps_fall_back_on_the_recording_and_say_so(
+    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
+) -> None:
+    messages = [(topic, 0, logged, *rest) for topic, _, logged, *rest in sent(columns)]
+    log = read_log(write_bag(tmp_path / "walk", messages), two_joints)  # type: ignore[arg-type]
+    assert np.allclose(log.time, columns["time_s"][:400], atol=1e-9)
+    assert "400 messages have no stamp" in log.told[0]
+
+
+def test_joints_in_changing_order_and_efforts_that_are_no_numbers(
+    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
+) -> None:
+    messages = []
+    for k, (topic, stamp, logged, names, numbers) in enumerate(sent(columns)):
+        turned = k % 3 == 1
+        given = {q: list(reversed(x)) if turned else list(x) for q, x in numbers.items()}
+        if k == 7:
+            given["effort"] = [np.nan, np.nan]
+        if k == 8:
+            del given["effort"]
+        order = tuple(reversed(names)) if turned else names
+        messages.append((topic, stamp, logged, order, given))
+    log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
+    assert log.torque is not None
+    for j, joint in enumerate("ab"):
+        assert (log.position[:, j] == columns[f"{joint}__position_rad"][:400]).all()
+    assert np.flatnonzero(np.isnan(log.torque).any(axis=1)).tolist() == [7, 8]
+
+
+def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
+    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
+) -> None:
+    one, other = [], []
+    for topic, stamp, logged, _, numbers in sent(columns):
+        a, b = ({q: [x[j]] for q, x in numbers.items()} for j in (0, 1))
+        one.append((topic, stamp, logged, ("a",), a))
+        other.append((topic, stamp + 700_000, logged + 700_000, ("b",), b))
+    both = sorted([*one, *other[:200:2], *other[200:]], key=lambda message: message[2])
+    log = read_log(write_bag(tmp_path / "walk", both), two_joints)
+    time, q = columns["time_s"][:400], columns["b__position_rad"][:400]
+    assert np.allclose(log.time, time, atol=1e-9)
+    assert (log.position[:, 0] == columns["a__position_rad"][:400]).all()
+    held = np.interp(time, np.delete(time, np.s_[1:200:2]) + 7e-4, np.delete(q, np.s_[1:200:2]))
+    assert np.isnan(log.position[0, 1])  # before the other's first message
+    assert np.allclose(log.position[1:, 1], held[1:], atol=1e-12)
+    assert "brought to those of the others" in log.told[0]
+
+
+def test_interfaces_of_dynamic_joint_states_beside_joint_states(
+    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
+) -> None:
+    messages = []
+    for message in sent(columns):
+        _, stamp, logged, names, numbers = message
+        more = {**numbers, "temperature": [40.0, 41.0], "gripper": [1.0, 2.0]}
+        messages += [message, ("/dynamic_joint_states", stamp, logged, names, more)]
+    path = write_bag(tmp_path / "walk", messages, dynamic=["/dynamic_joint_states"])
+    log = read_log(path, two_joints)
+    assert log.temperature is not None
+    assert log.temperature[5].tolist() == [40.0, 41.0]
+    assert len(log) == 400
+    assert "/dynamic_joint_states/a/gripper" in log.ignored
+
+
+def test_repeated_and_exchanged_stamps_are_told(
+    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
+) -> None:
+    messages = sent(columns)
+    messages.insert(50, messages[50])
+    (topic, one, early, *first), (_, two, late, *second) = messages[99:101]
+    # Recorded in the other order than stamped.
+    messages[99:101] = [(topic, two, early, *second), (topic, one, late, *first)]  # type: ignore[list-item]
+    log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
+    assert len(log) == 400
+    assert log.repeated_times == 1
+    assert "1 messages are stamped before the one that came before" in log.told[0]
+
+
+def test_a_folder_of_split_files_is_one_log(
+    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
+) -> None:
+    messages = sent(columns)
+    folder = tmp_path / "split"
+    folder.mkdir()
+    for k, part in enumerate((messages[:150], messages[150:])):
+        bag = write_bag(tmp_path / f"part{k}", part)
+        (bag / f"part{k}.mcap").rename(folder / f"walk_{k}.mcap")
+    log = read_log(folder, two_joints)
+    assert np.allclose(log.time, columns["time_s"][:400], atol=1e-9)
+
+
+def test_a_bag_without_definitions_is_read_by_those_of_ros(
+    columns: dict[str, Array], two_joints: Expected, tmp_path: Path
+) -> None:
+    bag = write_bag(tmp_path / "walk", sent(columns), kind="db3")
+    with closing(sqlite3.connect(bag / "walk.db3")) as file:
+        file.execute("DELETE FROM message_definitions")
+        file.commit()
+    assert len(read_log(bag, two_joints)) == 400
+
+
+def test_what_cannot_be_read_is_one_line(
+    columns: dict[str, Array], two_joints: Expected, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(path: Path) -> str:
+        with pytest.raises(LogFormatError) as error:
+            read_log(path, two_joints)
+        assert "\n" not in str(error.value)
+        return str(error.value)
+
+    bag = write_bag(tmp_path / "walk", sent(columns)) / "walk.mcap"
+    whole = bag.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) // 2])
+    assert refused(cut).startswith("cut.mcap: the bag cannot be read")
+    (tmp_path / "empty").mkdir()
+    assert "without files of a bag" in refused(tmp_path / "empty")
+    wrong = [(t, s, r, n, {**x, "position": [1.0]}) for t, s, r, n, x in sent(columns)[:3]]
+    assert "1 numbers for 2 names" in refused(write_bag(tmp_path / "few", wrong))
+    none = write_bag(tmp_path / "none", sent(columns)[:1]) / "none.mcap"
+    other = tmp_path / "other.mcap"
+    other.write_bytes(none.read_bytes().replace(b"msg/JointState", b"msg/JointStatf"))
+    assert refused(other).startswith("other.mcap: ")
+    monkeypatch.setitem(sys.modules, "rosbags.rosbag1", None)
+    again = tmp_path / "again.mcap"
+    again.write_bytes(whole)
+    assert "needs the extra 'bags'" in refused(again)
