@@ -109,8 +109,8 @@ class Chosen:
         """On one charge [h]."""
         return self.wanted.battery / power if self.wanted.battery and power > 0 else None
 
-    def full(self, load: Load) -> tuple[ChainResult, Array]:
-        """One mode through the chains of the answer, and mean power from the supply (J,) [W]."""
+    def full(self, load: Load) -> tuple[ChainResult, Array, Array]:
+        """One mode through the chains of the answer; see `through`."""
         return through(
             load,
             {g: (f.demanded.joints, self.designs(g)) for g, f in self.found.items()},
@@ -130,8 +130,8 @@ class Chosen:
 
 def through(
     load: Load, built: Mapping[str, tuple[tuple[str, ...], Designs]], account: Account
-) -> tuple[ChainResult, Array]:
-    """One mode through full chains: the result, and mean power out of the supply (J,) [W].
+) -> tuple[ChainResult, Array, Array]:
+    """One mode through full chains: result, mean power out of the supply [W], drivers on, (J,).
 
     Args:
         load: The mode.
@@ -139,16 +139,18 @@ def through(
         account: What is counted; drivers that are on are, the hotel load is not.
     """
     mode, names = load.mode, load.series.joints
-    models = {}
+    models, locks = {}, {}
     for joints, design in built.values():
         engaged = not mode.stands or mode.hold == "brake"
         chain = design.chain(0, engaged=engaged)
         models |= {model.name: model for model in joints_of(chain, joints)}
+        locks |= dict.fromkeys(joints, bool(design.locks(engaged)[0]))
     result = Drivetrains("answer", tuple(models[j] for j in names)).moving(load.series)
     share = account.recovered
     out = supply(result, "fraction" if share else "none", share).supplied_energy / load.duration
-    on = np.ones(len(names)) if mode.drivers else (result.current != 0.0).any(axis=0)
-    return result, out + account.idle * on
+    free = ~np.array([locks[joint] for joint in names])
+    on = np.where(mode.drivers | free | (result.current != 0.0).any(axis=0), 1.0, 0.0)
+    return result, out + account.idle * on, on
 
 
 def choose(

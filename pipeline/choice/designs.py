@@ -110,6 +110,14 @@ class Designs:
         columns = (1 / n, self.load / n, self.coulomb, self.viscous * n, self.inertia * n)
         return np.stack(columns, axis=1)
 
+    def locks(self, engaged: bool) -> NDArray[np.bool_]:
+        """Whether gear or brake hold what pushes from outside, (D,); then a driver may be off.
+
+        Args:
+            engaged: Whether brakes are closed.
+        """
+        return np.asarray((self.load >= 1.0) | ((self.brake_torque > 0.0) & engaged))
+
     def chain(self, i: int, *, engaged: bool = True) -> Chain:
         """One design as a chain.
 

@@ -12,7 +12,8 @@ Columns, of which `mode` and one of `share` and `hours` are needed; a word may b
     payload   on the body, with its unit
     standing  legs that stand, with spaces between; all for all
     hold      motor (default), brake (engaged where there is one) or none (no torque is asked)
-    drivers   on (default), or off: those of joints that hold without current are switched off
+    drivers   on (default), or off: of joints that lock, by a gear or a closed brake, and hold
+              without current
 
 and any key of the table [gait] as ``gait.KEY``.
 """
@@ -58,7 +59,7 @@ class Mode:
         motion: File of a motion in place of the gait; None to walk.
         changes: Numbers of the robot's file that differ; see `Machine.with_values`.
         hold: ``motor``, ``brake`` or ``none``.
-        drivers: Whether drivers stay on where a joint needs no current.
+        drivers: Whether drivers stay on where a joint locks and needs no current.
         where: File and row, for messages.
     """
 
@@ -134,6 +135,8 @@ def _mode(row: Mapping[str, str], path: Path, line: int, time: str, day: float) 
         raise MissionError(f"{where}: standing has no speed; leave it empty")
     if not stands and words["hold"] != "motor":
         raise MissionError(f"{where}: hold is of standing; leave it empty, or write gait {STAND}")
+    if not stands and words["drivers"] == "off":
+        raise MissionError(f"{where}: a motion needs its drivers; leave drivers empty")
     changes: dict[str, object] = {
         key: row[column] for column, key in _CHANGES.items() if row.get(column)
     }

@@ -9,10 +9,13 @@ from typing import TYPE_CHECKING
 
 from pipeline.api.result import Result, by_name
 from pipeline.api.tables import inputs_of, metadata
+from pipeline.choice.break_even import rows
 from pipeline.choice.choose import Chosen, Wanted, choose
 from pipeline.choice.mission import read_mission
 from pipeline.choice.tables import ROBOT, tables_of, words
 from pipeline.progress import Progress
+from reports.table import table_of
+from reports.tables.choice import BreakEvenRow
 
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
@@ -65,6 +68,8 @@ def choice(
     mission: str | Path,
     wanted: Wanted | None = None,
     *,
+    compare: Sequence[str] = (),
+    compare_joints: str = "*",
     progress: Progress | None = None,
 ) -> Choice:
     """Choose the actuators of a machine for a mission's file.
@@ -73,6 +78,9 @@ def choice(
         machine: From `load`.
         mission: CSV; see `pipeline.choice.mission`.
         wanted: What is searched and counted.
+        compare: Two candidates for the table ``break_even``: alternatives of the machine's actuator
+            files, or ``answer``.
+        compare_joints: Pattern of the joints that count in it.
         progress: Told of each step.
 
     Raises:
@@ -80,9 +88,13 @@ def choice(
         ActuatorError: Parts cannot be read.
     """
     path = Path(mission)
+    wanted = wanted or Wanted()
     chosen = choose(machine, read_mission(path), wanted, progress)
+    tables = tables_of(chosen)
+    if compare:
+        idle = wanted.account.idle
+        found = rows(machine, compare, idle=idle, chosen=chosen, joints=compare_joints)
+        tables.append(table_of(BreakEvenRow, list(found)))
     given = machine.ready
     inputs: Sequence[Path] = (*inputs_of(given), path)
-    return Choice(
-        "choose", by_name(tables_of(chosen)), lambda: metadata(given), tuple(inputs), chosen
-    )
+    return Choice("choose", by_name(tables), lambda: metadata(given), tuple(inputs), chosen)

@@ -153,14 +153,15 @@ class Track:
         if account.recovered:
             net = np.einsum("dnj,n->d", power, self.weight)
             forward -= account.recovered * (forward - net)
-        return np.asarray(forward + account.idle * self.drivers(torque))
+        return np.asarray(forward + account.idle * self.drivers(designs, torque))
 
-    def drivers(self, torque: Array) -> Array:
-        """How many are on, (D,)."""
+    def drivers(self, designs: Designs, torque: Array) -> Array:
+        """How many are on, (D,): where the mode lets them, those of joints that lock are not."""
         joints = torque.shape[2]
         if self.load.mode.drivers:
             return np.full(len(torque), float(joints))
-        return np.asarray((torque != 0.0).any(axis=1).sum(axis=1, dtype=np.float64))
+        current = (torque != 0.0).any(axis=1)
+        return np.asarray((current | ~designs.locks(self.engaged)[:, None]).sum(axis=1) * 1.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -189,8 +189,10 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
     """Every mode at every group through the full chains, and the robot's."""
     account = chosen.wanted.account
     full = [(load, *chosen.full(load)) for load in chosen.loads]
-    total = sum(load.mode.hours * (float(power.sum()) + account.hotel) for load, _, power in full)
-    for load, result, power in full:
+    total = sum(
+        load.mode.hours * (float(power.sum()) + account.hotel) for load, _, power, _ in full
+    )
+    for load, result, power, on in full:
         joints, time = load.series.joints, load.series.time
         means: dict[str, Array] = {
             "mechanical_W": integral(time, result.joint.power) / load.duration,
@@ -201,8 +203,7 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
                 result, "fraction" if account.recovered else "none", account.recovered
             ).dumped_energy
             / load.duration,
-            "idle_W": account.idle
-            * (np.ones(len(joints)) if load.mode.drivers else (result.current != 0).any(axis=0)),
+            "idle_W": account.idle * on,
         }
         for name, loss in result.losses.items():
             if name != WINDING:

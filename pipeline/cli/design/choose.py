@@ -65,6 +65,16 @@ def add_verb(add: AddVerb) -> None:
     sub.add_argument(
         "--regeneration", default="none", metavar="POLICY", help="none, or a fraction used again"
     )
+    sub.add_argument(
+        "--compare",
+        nargs=2,
+        default=(),
+        metavar=("A", "B"),
+        help="map two candidates over standing, speed and idle power: alternatives, or answer",
+    )
+    sub.add_argument(
+        "--compare-joints", default="*", metavar="PATTERN", help="joints that count in it; all"
+    )
     sub.add_argument("--draws", type=int, default=256, help="over what no sheet prints; 256")
     add_out_option(sub, OUT / "choose")
 
@@ -109,7 +119,14 @@ def run_choose(options: argparse.Namespace) -> int:
             present=numbers["present"],
             draws=options.draws,
         )
-        result = choice(machine, options.mission, wanted, progress=progress)
+        result = choice(
+            machine,
+            options.mission,
+            wanted,
+            compare=options.compare,
+            compare_joints=options.compare_joints,
+            progress=progress,
+        )
         progress.step("writing")
         result.save(options.out, decimal=decimal_of(options))
         progress.close()

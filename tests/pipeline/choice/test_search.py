@@ -52,10 +52,11 @@ def in_full(designs: Designs, i: int, demanded: Demanded, account: Account) -> t
     power, fits = 0.0, True
     for track in demanded.tracks:
         mode = track.load.mode
-        chain = designs.chain(i, engaged=not mode.stands or mode.hold == "brake")
-        result = chain.moving(track.series)
+        engaged = not mode.stands or mode.hold == "brake"
+        result = designs.chain(i, engaged=engaged).moving(track.series)
         spent = supply(result).supplied_energy.sum() / track.load.duration
-        on = len(demanded.joints) if mode.drivers else (result.current != 0).any(axis=0).sum()
+        idle = not mode.drivers and designs.locks(engaged)[i]
+        on = (result.current != 0).any(axis=0).sum() if idle else len(demanded.joints)
         power += track.share * (spent + account.idle * on)
         fits &= not any(row.breach for row in limit_rows(result))
         torque = result.joint.torque

@@ -1,0 +1,168 @@
+"""Two candidates over the share of standing, the speed of walking and the idle power of drivers.
+
+With w and h the power walking and standing, n drivers on and P each one's idle power, the mean at
+a share of standing f is (1 - f) (w + n_w P) + f (h + n_h P); both candidates take the same at
+
+    f = dw / (dw - dh),      d the difference of the two in the brackets.
+
+Walking, all drivers are on; standing, those of joints that lock and hold without current are off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.energy.regeneration import supply
+from actuators.errors import CatalogError, closest
+from pipeline.choice.choose import Chosen, through
+from pipeline.choice.errors import ChoiceError
+from pipeline.choice.loads import Load, loads_of
+from pipeline.choice.mission import Mode
+from pipeline.choice.search import Account
+from pipeline.machine.drivetrains import Actuators
+from reports.tables.choice import BreakEvenRow
+
+if TYPE_CHECKING:
+    from pipeline.api.machine import Machine
+
+Array = NDArray[np.float64]
+#: The candidate that the search chose, among the names of alternatives.
+ANSWER: Final = "answer"
+SHARES: Final = tuple(round(0.05 * k, 2) for k in range(21))
+#: Of the gait's own speed.
+SPEEDS: Final = (0.5, 0.75, 1.0)
+#: Besides the one asked for: none, and a driver with more around its gates [W].
+IDLES: Final = (0.0, 2.0)
+#: A load that only what locks by itself holds without current [N*m].
+_GREAT: Final = 1e9
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Of one candidate in one mode.
+
+    Attributes:
+        power: Without drivers [W].
+        drivers: That are on.
+    """
+
+    power: float
+    drivers: float
+
+
+def break_even(first: tuple[Cost, Cost], second: tuple[Cost, Cost], idle: float) -> float | None:
+    """Share of standing at which two candidates take the same; None where there is none.
+
+    Args:
+        first: Walking and standing.
+        second: Likewise.
+        idle: Of a driver that is on [W].
+    """
+    walk, stand = (
+        b.power - a.power + idle * (b.drivers - a.drivers)
+        for a, b in zip(first, second, strict=True)
+    )
+    if walk * stand >= 0.0:
+        return None
+    return walk / (walk - stand)
+
+
+def rows(
+    machine: Machine,
+    names: Sequence[str],
+    *,
+    idle: float,
+    chosen: Chosen | None = None,
+    joints: str = "*",
+    samples: int = 201,
+) -> Iterator[BreakEvenRow]:
+    """The map of two candidates.
+
+    Args:
+        machine: From `load`.
+        names: Two alternatives of its actuator files, or `ANSWER`.
+        idle: Of a driver that is on [W].
+        chosen: The search, for `ANSWER`.
+        joints: Pattern of the joints that count.
+        samples: Per half period of the gait.
+
+    Raises:
+        CatalogError: No such alternative.
+        ChoiceError: The pattern fits no joint.
+        PipelineError: A speed cannot be walked.
+    """
+    one, two = names
+    stand = Mode("stand", 1.0, True, None, {}, "motor", False, "standing")
+    walk = Mode("walk", 1.0, False, None, {}, "motor", True, "walking")
+    (still, own) = loads_of(machine, [stand, walk], samples=samples)
+    counted = [k for k, j in enumerate(own.series.joints) if fnmatchcase(j, joints)]
+    if not counted:
+        hint = closest(joints, own.series.joints)
+        raise ChoiceError(f"--compare-joints {joints}: no such joint: {hint}")
+    for share in SPEEDS:
+        speed = share * own.speed
+        mode = replace(walk, changes={"gait.speed": f"{speed!r} m/s"} if share != 1.0 else {})
+        (moved,) = loads_of(machine, [mode], samples=samples)
+        costs = {
+            name: tuple(cost(machine, name, load, counted, chosen) for load in (moved, still))
+            for name in (one, two)
+        }
+        for power in dict.fromkeys((IDLES[0], idle, *IDLES[1:])):
+            yield from _rows(costs, speed, power)
+
+
+def _rows(
+    costs: Mapping[str, tuple[Cost, ...]], speed: float, idle: float
+) -> Iterator[BreakEvenRow]:
+    (one, (walk1, stand1)), (two, (walk2, stand2)) = costs.items()
+    even = break_even((walk1, stand1), (walk2, stand2), idle)
+    for share in SHARES:
+        first, second = (
+            (1 - share) * (walk.power + idle * walk.drivers)
+            + share * (stand.power + idle * stand.drivers)
+            for walk, stand in ((walk1, stand1), (walk2, stand2))
+        )
+        better = one if first <= second else two
+        yield BreakEvenRow(share, speed, idle, one, two, first, second, better, even)
+
+
+def cost(
+    machine: Machine, name: str, load: Load, counted: Sequence[int], chosen: Chosen | None
+) -> Cost:
+    """One candidate in one mode, through its full chain.
+
+    Args:
+        machine: From `load`.
+        name: Of an alternative, or `ANSWER`.
+        load: The mode.
+        counted: Columns of the joints that count.
+        chosen: The search, for `ANSWER`.
+
+    Raises:
+        CatalogError: No such alternative.
+    """
+    if name == ANSWER and chosen is not None:
+        built = {g: (f.demanded.joints, chosen.designs(g)) for g, f in chosen.found.items()}
+        _, power, on = through(load, built, Account())
+        return Cost(float(power[counted].sum()), float(on[counted].sum()))
+    known = machine.ready.catalog.alternatives
+    if name not in known:
+        raise CatalogError(f"--compare: no alternative '{name}': {closest(name, [*known, ANSWER])}")
+    chain = machine.ready.chain(name)
+    result = chain.moving(load.series)
+    power = supply(result).supplied_energy / load.duration
+    idle = load.mode.stands & _locks(chain, load) & (result.current == 0.0).all(axis=0)
+    return Cost(float(power[counted].sum()), float((~idle)[counted].sum()))
+
+
+def _locks(chain: Actuators, load: Load) -> NDArray[np.bool_]:
+    """Whether joints hold any load without current, (J,)."""
+    position = load.series.position[0]
+    ends = [chain.holding(sign * _GREAT + 0.0 * position, position).current for sign in (-1, 1)]
+    return np.all([end == 0.0 for end in ends], axis=0)
