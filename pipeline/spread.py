@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any, Final, TypeVar
 
 from pipeline.errors import PipelineError
@@ -20,6 +20,7 @@ Block = TypeVar("Block")
 Result = TypeVar("Result")
 MOST_WORKERS: Final = 256
 _PATIENCE: Final = "10s"  # for a scheduler and its first worker
+_LOCK: Final = Lock()
 _KEPT: Final = "finished blocks are kept; the same command goes on from them"
 
 
@@ -49,7 +50,8 @@ def spread(
         workers: Processes of this machine; with 1 the work is done in the calling process.
         scheduler: Address of a Dask scheduler (``tcp://host:8786``) in place of processes. Its
             workers need this project at the same version, and the files that `work` reads under the
-            same names. A block whose worker dies is given to another one.
+            same names; each does one block at a time. A block whose worker dies is given to
+            another one.
         title: Before the bar.
         done: Blocks that were finished earlier; they count in the bar only.
 
@@ -113,6 +115,12 @@ def _begin() -> None:
     Thread(target=follow, daemon=True).start()
 
 
+def _alone(work: Callable[[Block], Result], block: Block) -> Result:
+    """One block at a time, though a worker may have several threads."""
+    with _LOCK:
+        return work(block)
+
+
 def _on_cluster(
     work: Callable[[Block], Result], blocks: Sequence[Block], address: str
 ) -> Iterator[tuple[int, Result]]:
@@ -134,7 +142,7 @@ def _on_cluster(
         reason = str(error).split("\n")[0]
         raise SpreadError(f"--scheduler {address}: no scheduler answers ({reason})") from None
     try:
-        futures = [client.submit(work, block, pure=False) for block in blocks]
+        futures = [client.submit(_alone, work, block, pure=False) for block in blocks]
         places = {future.key: place for place, future in enumerate(futures)}
         for future in distributed.as_completed(futures):
             yield places[future.key], future.result()

@@ -1,14 +1,23 @@
-"""The verbs twin, blind and calibrate: their options."""
+"""The verbs sweep, twin, blind and calibrate: their options."""
 
 from __future__ import annotations
 
 import argparse
 
-from pipeline.cli.options import OUT, AddVerb, folder_held, named_path
+from pipeline.cli.options import (
+    OUT,
+    AddVerb,
+    add_verbose_option,
+    add_walk_options,
+    changes_of,
+    folder_held,
+    named_path,
+)
 
 
 def add_verbs(add: AddVerb) -> None:
     """Declare the verbs."""
+    _add_sweep(add)
     twin = add("twin", "simulate a machine with hidden effects and write its log", _run_twin)
     twin.add_argument("--seed", type=int, default=1, help="of the random numbers")
     text = "effects to hide; none by default"
@@ -38,6 +47,33 @@ def add_verbs(add: AddVerb) -> None:
     blind.add_argument("--out", type=named_path, default=OUT / "blind", help=text)
 
 
+def _add_sweep(add: AddVerb) -> None:
+    text = "walk with many speeds, loads, postures, dimensions; a row for each case and actuator"
+    sub = add("sweep", text, _run_sweep)
+    sub.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="NAME=VALUES",
+        help="a number of --set with its values, 'speed=0.1:0.4:7 m/s' (first, last, how many), "
+        "'payload=0,5,10 kg', or with --sample a range, 'lift=20:60 mm'; 'gait.' may be left out",
+    )
+    text = 'TOML with a table [vary] of lines NAME = "VALUES", in place of or beside --vary'
+    sub.add_argument("--plan", type=named_path, metavar="FILE", help=text)
+    text = "draw so many cases; every combination by default"
+    sub.add_argument("--sample", type=int, metavar="N", help=text)
+    text = "of the draw: sobol (default), or lhs, a Latin hypercube"
+    sub.add_argument("--method", default="sobol", help=text)
+    sub.add_argument("--seed", type=int, default=1, help="of the draw; 1")
+    add_walk_options(sub, samples=101)
+    sub.add_argument("--workers", type=int, default=2, help="number of processes; 2")
+    text = "send the cases to a Dask scheduler, such as tcp://host:8786, in place of processes"
+    sub.add_argument("--scheduler", metavar="ADDRESS", help=text)
+    text = "folder for sweep.parquet; the same command goes on where it was stopped there"
+    sub.add_argument("--out", type=named_path, default=OUT / "sweep", help=text)
+    add_verbose_option(sub)
+
+
 def add_calibrate(add: AddVerb) -> None:
     """Declare the verb calibrate."""
     text = "fit the unpublished numbers to the paper's figures and store them"
@@ -46,6 +82,37 @@ def add_calibrate(add: AddVerb) -> None:
     calibrate.add_argument("--robot", type=named_path, default=robot, help="robot file")
     calibrate.add_argument("--workers", type=int, default=2, help="number of processes")
     calibrate.add_argument("--seed", type=int, default=1, help="of the random numbers")
+
+
+def _run_sweep(options: argparse.Namespace) -> int:
+    from reports.folder import output_errors
+
+    with folder_held(options), output_errors(options.out):
+        from pipeline.simulation.ground_forces.force_choice import ForceChoice
+        from pipeline.sweep.case import Order
+        from pipeline.sweep.plan import read_plan
+        from pipeline.sweep.sweep import sweep
+
+        paths = (options.robot, options.model, options.gait, options.actuators)
+        done = sweep(
+            Order(
+                *(path.resolve() if path and path.exists() else path for path in paths),
+                tuple(changes_of(options.set).items()),
+                options.samples,
+                options.quasi_static,
+                options.regeneration,
+                ForceChoice(options.forces, options.power_of, options.friction_coefficient),
+            ),
+            [*(read_plan(options.plan) if options.plan else ()), *options.vary],
+            options.out,
+            sample=options.sample,
+            method=options.method,
+            seed=options.seed,
+            workers=options.workers,
+            scheduler=options.scheduler,
+        )
+    print(done)
+    return int(sum(done.refused.values()) == done.cases)
 
 
 def _run_twin(options: argparse.Namespace) -> int:

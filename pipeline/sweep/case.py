@@ -1,0 +1,187 @@
+"""One case of a sweep: a machine with other numbers walks; a row for each actuator."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, fields
+from functools import cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from actuators.errors import ActuatorError
+from pipeline.api.machine import Machine, load
+from pipeline.api.tables import metadata, tables_of_walking, walked
+from pipeline.errors import PipelineError
+from pipeline.simulation.cycle_energy import RobotEnergy
+from pipeline.simulation.ground_forces.force_choice import ForceChoice
+from pipeline.simulation.settings import PAPER_FORCES, SAMPLES, Settings
+from pipeline.sweep.plan import Axis, SweepError, Value
+from reports.column import column
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class SweepRow(RobotEnergy):
+    """A case with one actuator: the robot's energy, and the peaks of `walk`'s other tables."""
+
+    table: ClassVar = "sweep"
+    least_margin_m: float = column("least static margin of the cycle", "m")
+    least_normal_force_N: float = column("lightest load on a supporting foot", "N")
+    greatest_friction_needed: float = column("largest tangential over normal force", "1")
+    peak_torque_Nm: float = column("largest magnitude at any joint", "N*m")
+    joint_of_peak_torque: str = column("joint that needs it")
+    peak_speed_rad_s: float = column("largest magnitude of a motor", "rad/s")
+    peak_voltage_V: float = column("largest magnitude of a motor", "V")
+    peak_current_A: float = column("largest magnitude of a motor", "A")
+    peak_rms_current_A: float = column("of the motor that has most", "A")
+    beyond: str = column("limits of motors that are exceeded, with the first joint that does")
+    refusal: str = column("why the robot does not walk so; empty where it does")
+
+
+@dataclass(frozen=True)
+class Order:
+    """A machine and how it walks, so that any process can load it again.
+
+    Attributes:
+        robot: File or name; None for the default.
+        model: Model file.
+        gait: Gait file.
+        actuators: Folder.
+        changes: Of ``--set``, key and value.
+        samples: Per half period.
+        quasi_static: See `walk`.
+        regeneration: See `walk`.
+        forces: See `walk`.
+        axes: What is varied.
+        digest: Of everything read; empty until it is known.
+    """
+
+    robot: Path | None = None
+    model: Path | None = None
+    gait: Path | None = None
+    actuators: Path | None = None
+    changes: tuple[tuple[str, object], ...] = ()
+    samples: int = SAMPLES
+    quasi_static: bool = False
+    regeneration: str = "none"
+    forces: ForceChoice = PAPER_FORCES
+    axes: tuple[Axis, ...] = ()
+    digest: str = ""
+
+    def walking(self, machine: Machine) -> Settings:
+        """A machine ready to walk."""
+        return machine.walking(
+            samples=self.samples,
+            quasi_static=self.quasi_static,
+            regeneration=self.regeneration,
+            forces=self.forces,
+        )
+
+    @property
+    def source(self) -> tuple[object, ...]:
+        """What names the machine, for `machine_of`."""
+        return self.robot, self.model, self.gait, self.actuators, self.changes
+
+
+@cache
+def machine_of(
+    robot: Path | None,
+    model: Path | None,
+    gait: Path | None,
+    actuators: Path | None,
+    changes: tuple[tuple[str, object], ...],
+) -> Machine:
+    """The machine before anything is varied, loaded once in a process."""
+    return load(robot, model=model, gait=gait, actuators=actuators, changes=dict(changes))
+
+
+def digest_of(given: Settings) -> str:
+    """Hash of everything that was read and every option."""
+    said = metadata(given)
+    kept = {k: said[k] for k in ("inputs_sha256", "urdf_sha256", "options")}
+    kept["version"] = said["versions"]["legwatt"]
+    return hashlib.sha256(json.dumps(kept, sort_keys=True, default=str).encode()).hexdigest()
+
+
+@cache
+def _checked(order: Order) -> Machine:
+    """The order's machine; what another computer reads must be the same.
+
+    Raises:
+        SweepError: It is not.
+    """
+    machine = machine_of(*order.source)  # type: ignore[arg-type]
+    if digest_of(order.walking(machine)) != order.digest:
+        raise SweepError(
+            "a worker reads other robot or actuator files, or is of another version, than the "
+            "process that asked it; give both the same"
+        )
+    return machine
+
+
+def rows_of_block(order: Order, block: tuple[int, tuple[tuple[Value, ...], ...]]) -> list[Row]:
+    """The rows of some cases in a row.
+
+    Args:
+        order: The machine.
+        block: Number of the first case, and the values of each.
+    """
+    first, cases = block
+    machine = _checked(order)
+    return [
+        row
+        for number, values in enumerate(cases, first)
+        for row in _rows(order, machine, number, values)
+    ]
+
+
+def _rows(order: Order, machine: Machine, number: int, values: tuple[Value, ...]) -> list[Row]:
+    head: Row = {"case": number}
+    head |= {axis.header: value for axis, value in zip(order.axes, values, strict=True)}
+    changes = {a.key: a.change(v) for a, v in zip(order.axes, values, strict=True)}
+    try:
+        return [head | row for row in _walked(order.walking(machine.with_values(changes)))]
+    except (PipelineError, ActuatorError) as error:
+        empty = dict.fromkeys(f.name for f in fields(SweepRow))
+        return [head | empty | {"alternative": "", "refusal": str(error)}]
+
+
+def _walked(given: Settings) -> list[Row]:
+    walking = walked(given, given.chains())
+    tables = tables_of_walking(given, walking)
+    energy, stability, limits = (
+        {header: list(values) for header, values in made.columns.items()}
+        for made in (
+            tables[name]() for name in ("robot_energy", "walking_stability", "motor_limits")
+        )  # type: ignore[operator]
+    )
+    peaks = np.max([np.abs(part.torque).max(axis=0) for part in walking.demand.segments], axis=0)
+    most = int(peaks.argmax())
+    rows = []
+    for k, name in enumerate(energy["alternative"]):
+        own = [i for i, other in enumerate(limits["alternative"]) if other == name]
+        found = {
+            quantity: max(limits["peak"][i] for i in own if limits["quantity"][i] == quantity)
+            for quantity in ("speed", "voltage", "current", "rms_current")
+        }
+        over: dict[str, str] = {}
+        for i in own:
+            if limits["breach"][i]:
+                over.setdefault(limits["quantity"][i], limits["joint"][i])
+        row = SweepRow(
+            *(values[k] for values in energy.values()),
+            min(stability["least_margin_m"]),
+            min(stability["least_normal_force_N"]),
+            max(stability["greatest_friction_needed"]),
+            float(peaks[most]),
+            walking.demand.joints[most],
+            *found.values(),
+            beyond=", ".join(f"{quantity} of {joint}" for quantity, joint in over.items()),
+            refusal="",
+        )
+        rows.append(asdict(row))
+    return rows

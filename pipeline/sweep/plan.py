@@ -1,0 +1,260 @@
+"""What a sweep varies: axes as they are written, and the cases they make.
+
+    speed=0.1:0.4:7 m/s       seven values, first and last included
+    payload=0, 5, 10 kg       these values
+    lift=20:60 mm             a range, with a sample only
+
+Names are those of ``--set``; ``gait.`` may be left out.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from scipy.stats import qmc
+
+from actuators.errors import ActuatorError, closest, one_line
+from actuators.text_file import UnreadableTextError, read_toml_file
+from actuators.units import dimension, from_si, to_si
+from pipeline.api.machine import Machine
+from pipeline.errors import PipelineError
+from pipeline.motion.gait_table import gait_keys
+from pipeline.simulation.changes import GAIT, changed
+from reports.typeset import unit_suffix
+
+#: Everyday words for keys of ``[gait]``.
+WORDS: Final = {
+    "payload": "gait.payload_mass",
+    "slope": "gait.slope_forward",
+    "duty": "gait.duty_factor",
+    "step_height": "gait.lift",
+}
+METHODS: Final = ("sobol", "lhs")
+MOST_CASES: Final = 10_000_000
+#: Numbers, and the unit behind them.
+_NUMBERS: Final = re.compile(r"([-+0-9.,:eE ]*[0-9.])\s*([A-Za-z%].*)")
+
+Value = float | str
+
+
+class SweepError(PipelineError):
+    """What is to be varied cannot be read, or another sweep is in the way."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One number or choice that is varied.
+
+    Attributes:
+        key: As ``--set`` writes it.
+        unit: Of the values; empty for pure numbers and words.
+        values: In their order; the two ends of a range.
+        ranged: Whether everything between two ends is meant.
+    """
+
+    key: str
+    unit: str
+    values: tuple[Value, ...]
+    ranged: bool = False
+
+    @property
+    def header(self) -> str:
+        """Of its column."""
+        name = self.key.removeprefix(GAIT).replace(".", "__")
+        suffix = unit_suffix(self.unit) if self.unit else ""
+        return f"{name}_{suffix}" if suffix else name
+
+    def change(self, value: Value) -> object:
+        """A value as `Machine.with_values` takes it, units as the key's file has them."""
+        return f"{value!r} {self.unit}" if self.unit and self.key.startswith(GAIT) else value
+
+    def at(self, share: float) -> Value:
+        """The value at a share in [0, 1) of the axis."""
+        if self.ranged:
+            low, high = (float(value) for value in self.values)
+            return low + share * (high - low)
+        return self.values[int(share * len(self.values))]
+
+
+def read_axis(text: str, machine: Machine) -> Axis:
+    """One ``NAME=VALUES`` of ``--vary``.
+
+    Args:
+        text: As above.
+        machine: Whose numbers are varied.
+
+    Raises:
+        SweepError: It cannot be read, or the machine has no such number in this unit; one line.
+    """
+    name, _, written = (part.strip() for part in text.partition("="))
+    place = f"--vary {one_line(text)}"
+    if not name or not written:
+        raise SweepError(f"{place}: expected NAME=VALUES, such as 'speed=0.1:0.4:7 m/s'")
+    key = WORDS.get(name, name)
+    key = f"{GAIT}{key}" if f"{GAIT}{key}" in gait_keys() else key
+    if "." not in key and key not in machine.ready.robot.spec.parameters:
+        known = [*WORDS, *(k.removeprefix(GAIT) for k in gait_keys())]
+        known += [*machine.ready.robot.spec.parameters]
+        hint = closest(name, known)
+        listed = hint if hint.startswith("did") else "parameters.csv of any run lists all names"
+        raise SweepError(f"{place}: there is no such number; {listed}")
+    body, unit = _without_unit(written, place)
+    own = _unit_of(machine, key)
+    axis = Axis(key, unit, *_values(body, place))
+    if own and unit and unit != own:
+        try:
+            if dimension(unit) != dimension(own):
+                raise SweepError(f"{place}: its unit is {own}, not {unit}")
+            numbers = tuple(from_si(to_si(float(v), unit), own) for v in axis.values)
+        except ValueError:
+            raise SweepError(f"{place}: a word has no unit") from None
+        axis = Axis(key, own, numbers, axis.ranged)
+    elif own:
+        axis = Axis(key, "" if own == "1" else own, axis.values, axis.ranged)
+    _refuse_impossible(axis, machine, place)
+    return axis
+
+
+def _without_unit(written: str, place: str) -> tuple[str, str]:
+    """Values and the unit behind the last of them."""
+    match = _NUMBERS.fullmatch(written)
+    if match is None:
+        return written, ""
+    try:
+        dimension(match[2])
+    except ActuatorError as error:
+        raise SweepError(f"{place}: {error}") from None
+    return match[1], match[2]
+
+
+def _unit_of(machine: Machine, key: str) -> str:
+    """In which a robot's or an actuator's file states a number; empty where neither does."""
+    given = machine.ready
+    try:
+        numbers = given.robot.spec.parameters
+        return (numbers if key in numbers else given.catalog).parameter(key).unit
+    except ActuatorError:
+        return ""
+
+
+def _values(body: str, place: str) -> tuple[tuple[Value, ...], bool]:
+    """Values, and whether they are the ends of a range."""
+    parts = [part.strip() for part in body.split(":")]
+    if len(parts) == 1:
+        values = tuple(_value(part.strip()) for part in body.split(","))
+        if "" in values or len(set(values)) < len(values):
+            raise SweepError(f"{place}: a value is empty or stands twice")
+        return values, False
+    try:
+        low, high = float(parts[0]), float(parts[1])
+        count = int(parts[2]) if len(parts) == 3 else 2
+        if len(parts) > 3 or count < 2 or not (math.isfinite(low) and math.isfinite(high)):
+            raise ValueError
+    except ValueError:
+        raise SweepError(
+            f"{place}: expected FIRST:LAST:COUNT, finite numbers and a count from 2, such as "
+            "'speed=0.1:0.4:7 m/s'"
+        ) from None
+    if low == high:
+        raise SweepError(f"{place}: first and last are the same")
+    if len(parts) == 2:
+        return (low, high), True
+    return tuple(float(f"{v:.12g}") for v in np.linspace(low, high, count)), False
+
+
+def _value(text: str) -> Value:
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _refuse_impossible(axis: Axis, machine: Machine, place: str) -> None:
+    """Each value by itself must be one that ``--set`` takes; together they may still be refused."""
+    files = machine.files
+    assert files.spec is not None
+    for value in axis.values:
+        try:
+            changed(files.spec, files.catalog, {**machine.changes, axis.key: axis.change(value)})
+        except (PipelineError, ActuatorError) as error:
+            reason = str(error).partition(": ")[2]
+            raise SweepError(f"{place}: {reason or error}") from None
+
+
+def read_plan(path: Path) -> list[str]:
+    """The axes of a TOML file with one table ``[vary]``, as ``--vary`` writes them.
+
+    Raises:
+        SweepError: It cannot be read, or holds something else.
+    """
+    try:
+        table = read_toml_file(path)
+    except UnreadableTextError as error:
+        raise SweepError(f"{path}: {error}") from None
+    vary = table.get("vary")
+    if [*table] != ["vary"] or not isinstance(vary, Mapping) or not vary:
+        raise SweepError(f'{path}: expected one table [vary] with lines NAME = "VALUES"')
+    for name, value in vary.items():
+        if not isinstance(value, str):
+            raise SweepError(f'{path}: {one_line(name)}: expected text such as "0, 5, 10 kg"')
+    return [f"{name}={value}" for name, value in vary.items()]
+
+
+def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
+    """All axes.
+
+    Raises:
+        SweepError: None, one that cannot be read, or a number twice.
+    """
+    axes = tuple(read_axis(text, machine) for text in texts)
+    if not axes:
+        raise SweepError("nothing is varied: give --vary NAME=VALUES or --plan FILE")
+    for k, axis in enumerate(axes):
+        if axis.key in [other.key for other in axes[:k]]:
+            raise SweepError(f"--vary {axis.key}: stands twice")
+    return axes
+
+
+def cases_of(
+    axes: tuple[Axis, ...], sample: int | None = None, method: str = "sobol", seed: int = 1
+) -> list[tuple[Value, ...]]:
+    """The values of every case, in the order of the axes.
+
+    Args:
+        axes: What is varied.
+        sample: Number of cases drawn; every combination of the values by default.
+        method: ``sobol`` or ``lhs`` (Latin hypercube), of SciPy.
+        seed: Of the draw.
+
+    Raises:
+        SweepError: A range without a sample, an unknown method, or too many cases.
+    """
+    if method not in METHODS:
+        raise SweepError(f"--method {one_line(method)}: {closest(method, METHODS)}")
+    total = math.prod(len(axis.values) for axis in axes) if sample is None else sample
+    if not 1 <= total <= MOST_CASES:
+        raise SweepError(f"{total} cases: expected 1 to {MOST_CASES}")
+    if sample is None:
+        for axis in axes:
+            if axis.ranged:
+                low, high = axis.values
+                raise SweepError(
+                    f"--vary {axis.key}={low}:{high}: a range needs --sample, or a number of "
+                    f"values: {low}:{high}:5"
+                )
+        return list(product(*(axis.values for axis in axes)))
+    if method == "lhs":
+        shares = qmc.LatinHypercube(len(axes), rng=seed).random(sample)
+    else:  # a power of two keeps its balance
+        shares = qmc.Sobol(len(axes), rng=seed).random_base2(max(sample - 1, 1).bit_length())
+    return [
+        tuple(axis.at(float(share)) for axis, share in zip(axes, row, strict=True))
+        for row in shares[:sample]
+    ]

@@ -1,0 +1,215 @@
+"""Sweeps: the cases, the rows, and that nothing is lost or repeated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas
+import pyarrow.parquet as pq
+import pytest
+
+import pipeline as lw
+from pipeline.cli.main import main
+from pipeline.spread import SpreadError
+from pipeline.sweep import sweep as module
+from pipeline.sweep.case import Order, machine_of, rows_of_block
+from pipeline.sweep.plan import cases_of, read_axes
+from pipeline.sweep.sweep import sweep
+
+VARY = ("speed=0.1:0.3:2 m/s", "payload=0,5,600 kg", "body_pitch=0,80 deg")
+ORDER = Order(samples=51)
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A finished sweep of twelve cases, in one process."""
+    return sweep(ORDER, VARY, tmp_path_factory.mktemp("sweep")).file
+
+
+def test_a_row_is_what_walk_says_of_the_same_machine(swept: Path) -> None:
+    frame = pandas.read_parquet(swept)
+    case = frame[
+        (frame.speed_m_s == 0.3) & (frame.payload_mass_kg == 5) & (frame.body_pitch_deg == 0)
+    ]
+    machine = lw.load().with_values({"gait.speed": "0.3 m/s", "gait.payload_mass": "5 kg"})
+    walk = lw.walk(machine, samples=51)
+    energy = walk.table("robot_energy").frame()
+    for name in energy.columns:
+        assert case[name].tolist() == energy[name].tolist()
+    torque = np.concatenate([part.torque for part in walk.result.demand.segments])
+    assert case.peak_torque_Nm.iloc[0] == np.abs(torque).max()
+    joint = walk.result.demand.joints[np.abs(torque).max(axis=0).argmax()]
+    assert set(case.joint_of_peak_torque) == {joint}
+    limits = walk.table("motor_limits").frame()
+    for row in case.itertuples():
+        own = limits[limits.alternative == row.alternative]
+        assert row.peak_voltage_V == own[own.quantity == "voltage"].peak.max()
+        assert bool(row.beyond) == bool(own.breach.any())
+    stability = walk.table("walking_stability").frame()
+    assert case.least_margin_m.iloc[0] == stability.least_margin_m.min()
+
+
+def test_every_case_is_there_once_and_a_refused_one_says_why(swept: Path) -> None:
+    frame = pandas.read_parquet(swept)
+    assert sorted(set(frame.case)) == list(range(12))
+    refused = frame[frame.refusal != ""]
+    assert len(refused) == refused.case.nunique() > 0
+    assert refused.alternative.eq("").all()
+    assert refused.average_power_W.isna().all()
+    done = frame[frame.refusal == ""]
+    assert done.groupby("case").alternative.nunique().eq(4).all()
+    assert set(refused.body_pitch_deg) == {80.0}
+
+
+def test_columns_say_their_unit_and_meaning(swept: Path) -> None:
+    schema = pq.read_schema(swept)
+    assert schema.field("cost_of_transport").metadata[b"meaning"]
+    assert schema.field("average_power_W").metadata[b"unit"] == b"W"
+    assert schema.field("speed_m_s").metadata[b"unit"] == b"m/s"
+
+
+def test_the_same_bytes_whatever_the_number_of_workers(swept: Path, tmp_path: Path) -> None:
+    again = sweep(ORDER, VARY, tmp_path, workers=3)
+    assert again.file.read_bytes() == swept.read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["sweep.parquet"]
+
+
+def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
+    swept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stop after the first block, with a half-written part that a kill left."""
+    computed: list[int] = []
+
+    def once(order: Order, block: tuple) -> list:
+        if computed:
+            raise SpreadError("a worker process ended")
+        computed.append(block[0])
+        return rows_of_block(order, block)
+
+    monkeypatch.setattr(module, "rows_of_block", once)
+    with pytest.raises(SpreadError):
+        sweep(ORDER, VARY, tmp_path)
+    parts = tmp_path / "sweep.parts"
+    assert [path.name for path in parts.iterdir()] == ["0000000.parquet"]
+    (parts / ".0000001.parquet.999999.tmp").write_bytes(b"PAR1 half")
+
+    def others(order: Order, block: tuple) -> list:
+        computed.append(block[0])
+        return rows_of_block(order, block)
+
+    monkeypatch.setattr(module, "rows_of_block", others)
+    done = sweep(ORDER, VARY, tmp_path)
+    assert done.kept == module.BLOCK
+    assert sorted(computed) == sorted(set(computed)) == [0, 4, 8]
+    assert done.file.read_bytes() == swept.read_bytes()
+    assert sweep(ORDER, VARY, tmp_path).kept == 12
+    assert sorted(computed) == [0, 4, 8]
+
+
+def test_another_sweep_in_the_way_is_one_line_and_stays(
+    swept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "sweep.parquet").write_bytes(swept.read_bytes())
+    line = refused(["--vary", "speed=0.1,0.2 m/s", "--out", str(tmp_path)], capsys)
+    assert "not of this sweep" in line
+    assert (tmp_path / "sweep.parquet").read_bytes() == swept.read_bytes()
+    (tmp_path / "sweep.parquet").write_bytes(b"no parquet")
+    assert "not of this sweep" in refused(
+        ["--vary", "speed=0.1,0.2 m/s", "--out", str(tmp_path)], capsys
+    )
+
+
+def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    assert main(["sweep", *arguments]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    return said.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([], "nothing is varied"),
+        (["--vary", ""], "expected NAME=VALUES"),
+        (["--vary", "speed="], "expected NAME=VALUES"),
+        (["--vary", "sped=0.1,0.2 m/s"], "did you mean 'speed'"),
+        (["--vary", "hips_spacing=1,2"], "did you mean 'hip_spacing'"),
+        (["--vary", "harmonic_drive.lod=1,2"], "no such number"),
+        (["--vary", "speed=0.1:0.4:7"], "has no unit"),
+        (["--vary", "speed=0.1:0.4:7 kg"], "expected a velocity"),
+        (["--vary", "speed=0.1:0.4:7 furlong"], "unknown unit"),
+        (["--vary", "speed=0.1,nan m/s"], "speed"),
+        (["--vary", "speed=nan:1:3 m/s"], "finite"),
+        (["--vary", "speed=0.1:0.4:1 m/s"], "count from 2"),
+        (["--vary", "speed=0.1:0.1:3 m/s"], "the same"),
+        (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
+        (["--vary", "speed=0.1,-0.2 m/s"], "must not be negative"),
+        (["--vary", "speed=0.1:0.4 m/s"], "needs --sample"),
+        (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
+        (["--vary", "hip_spacing=1,2 kg"], "its unit is"),
+        (["--vary", "duty=0.6,1.4"], "share above 0 and below 1"),
+        (["--vary", "duty=0.6,0.7", "--sample", "0"], "0 cases"),
+        (["--vary", "duty=0.6,0.7", "--sample", "5", "--method", "grid"], "--method grid"),
+        (["--vary", "duty=0.6,0.7", "--workers", "0"], "give a number from 1"),
+        (["--vary", "duty=0.6,0.7", "--samples", "5"], "at least 51"),
+        (["--vary", "duty=0.6,0.7", "--scheduler", "tcp://127.0.0.1:9"], "no scheduler answers"),
+        (["--plan", "no.toml"], "no.toml"),
+    ],
+)
+def test_bad_input_is_one_line(
+    arguments: list[str],
+    words: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("pipeline.spread._PATIENCE", "300ms")
+    out = tmp_path / "out"
+    assert words in refused([*arguments, "--out", str(out)], capsys)
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[vary]\n", "[other]\nspeed = '1'\n", "[vary]\nspeed = 3\n", "[vary"]
+)
+def test_a_plan_that_cannot_be_read_is_one_line(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan = tmp_path / "plan.toml"
+    plan.write_text(text)
+    assert "plan.toml" in refused(["--plan", str(plan), "--out", str(tmp_path / "out")], capsys)
+
+
+def test_samples_fill_the_ranges_and_are_the_same_for_a_seed() -> None:
+    machine = machine_of(None, None, None, None, ())
+    axes = read_axes(["speed=0.1:0.4 m/s", "payload=0, 5, 10 kg", "hip_spacing=200:240mm"], machine)
+    for method in ("sobol", "lhs"):
+        cases = cases_of(axes, 30, method, seed=3)
+        assert len(cases) == len(set(cases)) == 30
+        assert cases == cases_of(axes, 30, method, seed=3) != cases_of(axes, 30, method, seed=4)
+        speed, load, width = (np.array(column) for column in zip(*cases, strict=True))
+        # A third of either end is met, each load as often as the others, give or take.
+        assert 0.1 <= speed.min() < 0.12 < 0.38 < speed.max() <= 0.4
+        assert all(8 <= (load == value).sum() <= 12 for value in (0, 5, 10))
+        assert ((width > 200) & (width < 240)).all()
+
+
+def test_a_grid_is_every_combination_in_the_order_written() -> None:
+    machine = machine_of(None, None, None, None, ())
+    axes = read_axes(["speed=0.1:0.4:4 m/s", "transfer_path=harmonic,cycloid"], machine)
+    cases = cases_of(axes)
+    assert cases[:3] == [(0.1, "harmonic"), (0.1, "cycloid"), (0.2, "harmonic")]
+    assert [speed for speed, _ in cases[::2]] == [0.1, 0.2, 0.3, 0.4]
+
+
+def test_the_command_line_reads_a_plan_and_ends_with_one_where_no_case_walks(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan = tmp_path / "plan.toml"
+    plan.write_text('[vary]\nbody_pitch = "80, 85 deg"\n')
+    out = tmp_path / "out"
+    arguments = ["sweep", "--plan", str(plan), "--samples", "51", "--workers", "1"]
+    assert main([*arguments, "--out", str(out)]) == 1
+    assert "2 cases" in capsys.readouterr().out
