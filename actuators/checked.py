@@ -1,7 +1,7 @@
 """Tables of TOML files held against their schema; all that is wrong is said at once, in one line.
 
 pydantic does the checking. It knows kinds, choices, nesting and defaults from the declaration of a
-class, goes on after the first error, and tells where each one is; written by hand that takes a
+class, goes on after the first error, and reports where each one is; written by hand that takes a
 hundred lines a file and ends at the first. What is added here: the project's words for its errors,
 the closest known name, numbers without `nan`, and one line for all of them.
 """

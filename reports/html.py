@@ -67,7 +67,7 @@ def html(page: Page, folder: Path) -> str:
 
 
 def _block(block: Block, folder: Path) -> dict[str, object]:
-    """A block with its kind, for the template to tell them apart."""
+    """A block with its kind, for the template to distinguish them."""
     if isinstance(block, Text):
         return {"kind": "text", "it": block}
     if isinstance(block, Points):

@@ -13,7 +13,7 @@ Sign: it is what the motor side supplies in addition, T' = T + friction; positiv
 - Stribeck (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30(7), 1994): `excess`.
 - By direction (Armstrong, "Control of machines with friction", 1991): dry friction is
   coulomb + skew forward and coulomb - skew backward. In motion `skew` equals a constant torque;
-  only standstill tells the two apart.
+  only standstill distinguishes the two.
 - By quadrant of power (Hamon, Gautier and Garrec, IROS 2010): `when_driving` where s T > 0, the
   motor driving the load, `when_driven` where s T < 0.
 - The rest: the sum that Bona and Indri, "Friction compensation in robotics", CDC 2005, review.

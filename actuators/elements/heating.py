@@ -72,7 +72,7 @@ class Heating:
         return np.clip(result, -EXTREME, EXTREME)
 
     def sensed(self, temperature: FloatArray) -> FloatArray:
-        """Return the part of dT (...) [K] that a sensor at some temperature (...) [degC] tells."""
+        """Return the part of dT (...) [K] that a sensor's temperature (...) [degC] implies."""
         return self.sensor_gain * (temperature - REFERENCE)
 
 

@@ -33,7 +33,7 @@ class Footfall:
     Attributes:
         name: Of the gait.
         phase: Leg to its touch-down as a share of the period, in [0, 1); legs that stand together
-            are told in this order.
+            are reported in this order.
         duty: Leg to the share of the period for which it stands, between 0 and 1.
         least: Feet that stand at any time, at least: three, or two where the body may rock.
     """

@@ -59,7 +59,7 @@ SWAY_SAMPLES = 121
 
 
 def _swayed(robot: Robot, gait: Gait, start: Array, samples: int, sway: Sway) -> Motion:
-    """The motion with a sway; what the legs cannot follow is told with how far the body sways."""
+    """The motion with a sway; an error that legs cannot follow states how far the body sways."""
     try:
         return _motion(robot, gait, start, samples, sway)
     except (OutOfReachError, GaitError) as error:

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 ACCEPTED = 1e-9  # [m]
 _SINGULAR = 1e8  # condition number of a leg's Jacobian that is none any more
 _JUMP = 0.2  # [rad] between two samples that no velocity explains
-_PATH = 16  # samples from which velocities tell the way from one to the next
+_PATH = 16  # samples; fewer are too coarse for velocities to predict the next position
 
 
 def reach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Array]:

@@ -70,7 +70,7 @@ class Effects:
     def counts_in(self, alternative: str) -> bool:
         """Whether all that the effects change in actuators counts in an alternative.
 
-        The ideal one has no losses by definition; there is nothing to tell about it.
+        The ideal one has no losses by definition; there is nothing to report about it.
         """
         return alternative in (IDEAL, self.found_with) or not self.of_drivetrain
 

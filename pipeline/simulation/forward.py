@@ -41,7 +41,7 @@ _EXACT: Final = 1e-9  # residual over the scale of torques
 
 @dataclass(frozen=True, eq=False)
 class ServoInput:
-    """What the servos of a machine are told, and the first instant.
+    """What the servos of a machine are commanded, and the first instant.
 
     Attributes:
         name: Of the log.

@@ -60,7 +60,7 @@ class FoundBody:
 
     @property
     def differs(self) -> NDArray[np.bool_]:
-        """Which of mass and coordinates the intervals tell from the URDF's, (4,)."""
+        """Which of mass and coordinates the intervals distinguish from the URDF's, (4,)."""
         slack = ROUNDING * np.maximum(np.abs(self.urdf), np.abs(self.found))
         return (self.urdf < self.low - slack) | (self.urdf > self.high + slack)
 
@@ -129,7 +129,7 @@ def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> tuple[FoundBody, 
 def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Edit]) -> str:
     """A URDF whose inertial elements are those found.
 
-    A motion tells of links that are fixed to each other what they are together. What was found goes
+    Of links that are fixed to each other a motion determines the sum. What was found goes
     into the link that the joint carries; where no body would be left of it by itself, it is the
     whole, and the links fixed to it have no inertial element any more.
 

@@ -190,7 +190,7 @@ class Simulator:
         m = self.measurement
         out = np.empty((torque.size, len(m.channels)))
         if "torque" in m.channels:
-            # What the motor supplies, brought to the joint side, as drives tell it: with every
+            # What the motor supplies, brought to the joint side, as drives report it: with every
             # friction and inertia of the elements that the model has, of which there may be none.
             out[:, 0] = brought
         elif a.motor is None:

@@ -112,7 +112,7 @@ class RigidBodies:
     def _base_motion(self, machine: MachineModel) -> tuple[Array, Array]:
         """Velocity (N, 3) and acceleration (N, 6) of the base in its own frame.
 
-        The measured motion tells what the base did, whatever an effect makes of it.
+        The measured motion determines what the base did, whatever an effect makes of it.
         """
         if self._base is None:
             m = self.measurement
@@ -217,7 +217,7 @@ def _measured_acceleration(
     weightless.gravity.linear = np.zeros(3)
     pool, still = pin.ModelPool(weightless, threads), np.zeros_like(v)
     # A composite body's spatial inertia is [[m 1, -m [c]x], [m [c]x, J]]: what turning asks for
-    # tells all of it but the mass.
+    # determines all of it but the mass.
     inertia = np.zeros((n, 6, 6))
     inertia[:, :3, :3] = pin.computeTotalMass(model) * np.eye(3)
     for k in range(3, 6):

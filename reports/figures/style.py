@@ -1,4 +1,4 @@
-"""The common look of all figures: colours told apart by every eye, direct labels, little ink.
+"""The common look of all figures: colours that every eye distinguishes, direct labels, little ink.
 
 Figures are made with Matplotlib's object interface; no pyplot, no global state. Matplotlib is
 imported when the first figure is drawn, not with this module.

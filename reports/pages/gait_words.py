@@ -71,5 +71,5 @@ def _ground(forward: float, left: float) -> str:
 
 
 def _degrees(angle: float) -> str:
-    """Without the dust of the way through radians."""
+    """Without the round-off of the way through radians."""
     return number_text(round(abs(angle), 6))

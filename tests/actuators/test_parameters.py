@@ -78,7 +78,7 @@ def test_replaced_returns_a_new_set_and_keeps_bounds():
     assert new.parameter("mass").basis == "assumed"
     fitted = p.replaced("mass", 5.0, basis="calibrated", source="fit", interval=(4.0, 6.0))
     assert fitted.parameter("mass").interval == (4.0, 6.0)
-    for name, value in (("mass", 10.0), ("mass", math.nan), ("mas", 1.0)):
+    for name, value in (("mass", 10.0), ("mass", math.nan), ("torque", math.inf), ("mas", 1.0)):
         with pytest.raises(ParameterError):
             p.replaced(name, value)
 

@@ -87,7 +87,7 @@ def _meta(both: Comparison) -> dict[str, object]:
 
 
 def labels(a: Run, b: Run) -> tuple[str, str]:
-    """Names of the folders, with as much in front of them as tells them apart."""
+    """Names of the folders, with as much in front of them as distinguishes them."""
     own, other = (run.folder.resolve().parts for run in (a, b))
     count = 1
     while own[-count:] == other[-count:]:

@@ -78,7 +78,7 @@ def quarter_turns(limbs: Sequence[Limb], hips: Array) -> int:
     """
     said = [_said(limb) for limb in limbs]
     if len({one for one in said if one is not None and all(one)}) < 3:
-        return 0  # fewer than three corners tell no turn from a mirror
+        return 0  # fewer than three corners do not distinguish a turn from a mirror image
     place = hips[:, :2] - hips[:, :2].mean(axis=0)
 
     def agrees(turns: int) -> bool:

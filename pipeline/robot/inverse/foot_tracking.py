@@ -1,7 +1,7 @@
 """How well legs can follow their feet: directions they lack, distance from the path, singularity.
 
 A leg of two joints cannot put its foot where it likes; it puts it as near as it gets
-(`pipeline.robot.inverse`). What that costs is told here.
+(`pipeline.robot.inverse`). What that costs is reported here.
 """
 
 from __future__ import annotations

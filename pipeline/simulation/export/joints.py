@@ -5,7 +5,7 @@ The laws of the drivetrain are asked along speeds from slow to fast, without loa
     f(v) = c sign(v) + d v + rest,
 
 `c` (dry friction) and `d` (viscous friction) are carried over, in least squares; what `rest` comes
-to is told, as are load, elasticity and everything else that these tools have no number for.
+to is reported, as are load, elasticity and everything else that these tools have no number for.
 """
 
 from __future__ import annotations
