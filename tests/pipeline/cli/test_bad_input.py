@@ -47,7 +47,7 @@ ROBOT_FILES = {
     "contradicting gait": (r"value = 3$", "value = 4", r"foot_stroke is 0.24 m; change one"),
     "one set of legs": (r', \["rf", "rr", "lm"\]', "", r"must part the legs .* in two sets"),
     "lift in metres": (r"(foot_lift\]\nvalue = )75", r"\g<1>0.075", r"is 0.075 m meant\?"),
-    "gravity in cm/s^2": (
+    "gravity in centimetres": (
         r"(gravity\]\nvalue = )[\d.]+(.*?interval = \[)[\d., ]+",
         r"\g<1>981\g<2>980, 982",
         r"gravity is beyond any planet; check its unit",
@@ -135,7 +135,7 @@ URDFS = {
         r'\1"0 180 0"',
         r"lf_joint_2: lengths in metres fails \(origin 0 180 0: 180 m from its parent; millimetres",
     ),
-    "inertia in kg*mm^2": (
+    "inertia in square millimetres": (
         r'(<link name="lf_tibia_link">.*?ixx=)"[^"]*"(.*?iyy=)"[^"]*"',
         r'\1"3000"\2"3000"',
         r"lf_tibia_link: inertia fits the size fails \(radius of gyration [\d.]+ m, the longest",
