@@ -33,6 +33,7 @@ from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.walk_stand import joint_series
 from reports.tables.walking import walking_joint_demand
 from reports.writer import csv_bytes
+from tests.bench_bags import bag_costs
 from tests.bench_demand import demand_ratios, support
 from tests.bench_gap import gap_costs
 from tests.bench_kinematics import inverse_kinematics
@@ -172,6 +173,7 @@ def main() -> None:
     energy_of_a_search()
     cold_run()
     gap_costs()
+    bag_costs()
 
 
 if __name__ == "__main__":

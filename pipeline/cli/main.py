@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 from pipeline.cli import components, gap, robots, studies, walking
 from pipeline.cli.design import choose
@@ -31,6 +32,14 @@ class _Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> None:  # type: ignore[override]
         self.exit(EXIT_UNUSABLE, f"{self.prog}: {message}; see {self.prog} --help\n")
+
+    def parse_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
+        """Parse a command; a verb of two words is joined before."""
+        words = list(sys.argv[1:] if args is None else args)
+        # A log file that is called like a verb's second word is a log.
+        if " ".join(words[:2]) in TWO_WORDS and not Path(words[1]).is_file():
+            words[:2] = [" ".join(words[:2])]
+        return super().parse_args(words, namespace)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -74,11 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit code.
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    # A log file that is called like a verb's second word is a log.
-    if " ".join(words[:2]) in TWO_WORDS and not Path(words[1]).is_file():
-        words[:2] = [" ".join(words[:2])]
-    options = parser().parse_args(words)
+    options = parser().parse_args(arguments)
     level = logging.INFO if getattr(options, "verbose", False) else logging.WARNING
     logging.basicConfig(level=level, format="%(message)s")
     from actuators.errors import ActuatorError

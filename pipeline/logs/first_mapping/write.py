@@ -162,7 +162,7 @@ def _clock(
     table: TableFile, data: Mapping[str, Array], own: set[str]
 ) -> tuple[str, Array, list[str]]:
     """The column of time, its numbers in seconds, and the lines that say so."""
-    names = [c for c in (TIME, "__time") if c in own and c in data]
+    names: list[str] = [c for c in (TIME, "__time") if c in own and c in data]
     foreign = [c for c in data if c not in own]
     for column in names or sorted(foreign, key=lambda c: not {*words_of(c), c} & {*TIMES}):
         units = clock_units(data[column])
@@ -191,7 +191,9 @@ def _lines(
 ) -> tuple[list[str], tuple[str, ...], tuple[str, ...]]:
     """Lines of the table of columns, and which columns count and which wait."""
     taken = {plotted(c) for c in own}
-    lines, mapped, open_ = [], [], []
+    lines: list[str] = []
+    mapped: list[str] = []
+    open_: list[str] = []
     for guess in found:
         target = column_name(guess.joint, guess.quantity)
         twice = guess.sure and target in taken

@@ -174,11 +174,11 @@ class _Decoder:
             left = self._matching(layout, topic, block, logged, left)
         while left.size:
             message = self._deserialised(bytes(block[left[0]]), kind)
-            layout = self._layout(message, kind)
-            if layout is not None and (block[left[0], layout.fixed] == layout.text).all():
-                known.insert(0, layout)
+            own = self._layout(message, kind)
+            if own is not None and (block[left[0], own.fixed] == own.text).all():
+                known.insert(0, own)
                 del known[16:]
-                left = self._matching(layout, topic, block, logged, left)
+                left = self._matching(own, topic, block, logged, left)
                 continue
             one = self._numbers(message, kind)  # e.g. of the other byte order
             first, left = left[0], left[1:]

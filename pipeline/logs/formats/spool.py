@@ -156,7 +156,7 @@ class Spool:
         for block, row in zip(sender.blocks, sender.rows, strict=True):
             inside = (row >= first) & (row < last)
             if inside.any():
-                places = [at[column] for column in block.columns]
+                places = np.array([at[column] for column in block.columns])
                 out[np.ix_(row[inside] - first, places)] = self._values(block)[inside]
         return out
 

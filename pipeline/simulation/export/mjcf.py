@@ -41,20 +41,21 @@ def mjcf(
     ElementTree.SubElement(root, "compiler", angle="radian", autolimits="true")
     ElementTree.SubElement(root, "option", gravity=_text(model.gravity.linear))
     world = ElementTree.SubElement(root, "worldbody")
-    own = {n.joint: n for n in numbers}
+    joints = {n.joint: n for n in numbers}
     bodies: dict[int, ElementTree.Element] = {0: world}
     for k in range(1, model.njoints):
         parent = bodies[model.parents[k]]
-        bodies[k] = _body(parent, model, k, own.get(str(model.names[k])))
+        bodies[k] = _body(parent, model, k, joints.get(str(model.names[k])))
     actuators = ElementTree.SubElement(root, "actuator")
     for n in numbers:
         limits = {"forcerange": _text([-n.effort, n.effort])} if np.isfinite(n.effort) else {}
         common = {"name": n.joint, "joint": n.joint, **limits}
         if gains and n.joint in gains:
             kp, kv = gains[n.joint]
-            ElementTree.SubElement(actuators, "position", kp=f"{kp:.9g}", kv=f"{kv:.9g}", **common)
+            own = {"kp": f"{kp:.9g}", "kv": f"{kv:.9g}"}
+            ElementTree.SubElement(actuators, "position", common | own)
         else:
-            ElementTree.SubElement(actuators, "motor", **common)
+            ElementTree.SubElement(actuators, "motor", common)
     ElementTree.indent(root)
     return ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -107,14 +108,9 @@ def _joint(body: ElementTree.Element, model: pin.Model, k: int, n: JointNumbers)
         low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
         if np.isfinite([low, high]).all() and low < high and max(-low, high) < 1e6:
             given["range"] = _text([low, high])
-    ElementTree.SubElement(
-        body,
-        "joint",
-        name=n.joint,
-        type="hinge" if turns else "slide",
-        axis=_text(column[3:] if turns else column[:3]),
-        **given,
-    )
+    kind = "hinge" if turns else "slide"
+    axis = _text(column[3:] if turns else column[:3])
+    ElementTree.SubElement(body, "joint", {"name": n.joint, "type": kind, "axis": axis} | given)
 
 
 def _text(numbers: Array | Sequence[float]) -> str:
