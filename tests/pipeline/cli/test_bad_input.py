@@ -30,13 +30,7 @@ ROBOT_FILES = {
         '"midle"',
         r"'legs.lm.station' = 'midle': did you mean 'middle'",
     ),
-    "sets of no legs": (r"^tripods = .*?$", "tripods = 2", r"gait.tripods: must be two lists"),
     "beyond any robot": (r"value = 40$", "value = 1e300", r"total_mass.*is beyond any machine"),
-    "unknown path": (
-        r'path = "\w+"',
-        'path = "cubical"',
-        r"'cubical' is not known; did you mean 'cubic'",
-    ),
     "missing number": (
         r"^\[parameters\.total_mass\].*?\n\n",
         "",
@@ -44,8 +38,6 @@ ROBOT_FILES = {
     ),
     "negative mass": (r"value = 40$", "value = -40", r"total_mass = -40 kg must be positive"),
     "negative period": (r"value = 3$", "value = -3", r"gait_period = -3 s must be positive"),
-    "contradicting gait": (r"value = 3$", "value = 4", r"foot_stroke is 0.24 m; change one"),
-    "one set of legs": (r', \["rf", "rr", "lm"\]', "", r"must part the legs .* in two sets"),
     "lift in metres": (r"(foot_lift\]\nvalue = )75", r"\g<1>0.075", r"is 0.075 m meant\?"),
     "gravity in centimetres": (
         r"(gravity\]\nvalue = )[\d.]+(.*?interval = \[)[\d., ]+",

@@ -98,11 +98,6 @@ def test_numbers_that_bind_each_other_change_together() -> None:
     assert given_.catalog.chain("reversible").ratio == pytest.approx(400)
 
 
-@pytest.mark.parametrize("path", ["cubic", "harmonic", "quintic", "cycloid"])
-def test_transfer_paths_by_name(path: str) -> None:
-    assert with_changes(f"gait.transfer_path={path}").robot.spec.gait["transfer_path"] == path
-
-
 def test_a_change_reaches_the_files(tmp_path: Path, command: Command, out: Path) -> None:
     """Twice the winding's resistance is not allowed; 1.2 times it heats 1.2 times at rest."""
     resistance = written("motor_re40_24v.resistance").value_as_written
@@ -142,11 +137,6 @@ def test_regeneration_is_ordered_and_recorded(tmp_path: Path, command: Command, 
     assert legs == {"robot"}
 
 
-def test_a_fraction_of_nothing_is_none(tmp_path: Path, command: Command, out: Path) -> None:
-    assert command("walk", tmp_path, "--regeneration", "0") == 0
-    assert total(tmp_path) == total(out)
-
-
 def test_quasi_static_leaves_inertia_out(tmp_path: Path, command: Command, out: Path) -> None:
     """The table of the full run says what the quasi-static run then gives."""
     assert command("walk", tmp_path, "--quasi-static") == 0
@@ -182,20 +172,6 @@ def test_the_order_of_legs_changes_rows_not_numbers(
         assert float(energy[row["alternative"], row["leg"]]["electrical_J"]) == pytest.approx(
             float(row["electrical_J"]), rel=1e-9
         )
-
-
-def test_comma_copies_hold_the_same_numbers(tmp_path: Path, command: Command, out: Path) -> None:
-    assert command("stand", tmp_path, "--decimal", "comma") == 0
-    for plain in sorted(tmp_path.glob("*.meta.json")):
-        name = plain.name.removesuffix(".meta.json")
-        rows = rows_of(tmp_path / f"{name}.csv")
-        copies = rows_of(tmp_path / f"{name}.comma.csv", delimiter=";")
-        assert (tmp_path / f"{name}.csv").read_bytes() == (out / f"{name}.csv").read_bytes()
-        assert len(rows) == len(copies)
-        for row, copy in zip(rows, copies, strict=True):
-            for column, value in row.items():
-                same = copy[column] == value
-                assert same or float(copy[column].replace(",", ".")) == float(value)
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:

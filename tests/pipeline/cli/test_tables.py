@@ -165,7 +165,7 @@ def test_stages_are_spelled_out_beside_their_codes(out: Path) -> None:
 
 @pytest.mark.usefixtures("sketched")
 def test_comma_copies_of_a_run(tmp_path: Path, short_demo: Path, command: Command) -> None:
-    """No quotes around numbers and no dot in them; the paper's 0.94 in a text column, too."""
+    """The same numbers, without quotes or dots; the paper's 0.94 in a text column, too."""
     assert command("reports", tmp_path / "reports", "--decimal", "comma") == 0
     gap = ["gap", "where", str(short_demo), "--out", str(tmp_path / "gap"), "--decimal", "comma"]
     assert exit_code(gap) == 0
@@ -178,6 +178,11 @@ def test_comma_copies_of_a_run(tmp_path: Path, short_demo: Path, command: Comman
         for line in lines:
             assert not re.search(r'(^|;)"[-+0-9.,e]*"(;|$)', line), (path.name, line)
             assert not [cell for cell in line.split(";") if number.fullmatch(cell)], path.name
+        plain = rows_of(path.with_name(path.name.replace(".comma", "")))
+        for row, copy in zip(plain, rows_of(path, delimiter=";"), strict=True):
+            for column, value in row.items():
+                same = copy[column] == value
+                assert same or float(copy[column].replace(",", ".")) == float(value)
     conclusions = (tmp_path / "reports" / "conclusions.comma.csv").read_text(encoding="utf-8-sig")
     assert ";1;0,94;" in conclusions
 
