@@ -1,4 +1,4 @@
-"""A page as one self-contained HTML file: no script, no network, pictures inside."""
+"""A page as one self-contained HTML file: no network, pictures inside, a script only to sort."""
 
 from __future__ import annotations
 
@@ -55,6 +55,7 @@ def html(page: Page, folder: Path) -> str:
     return environment.get_template("page.html").render(
         page=page,
         picture=_block(page.picture, folder) if page.picture else None,
+        script=_script(page),
         sections=[
             {
                 "id": f"s{number}",
@@ -64,6 +65,14 @@ def html(page: Page, folder: Path) -> str:
             for number, section in enumerate(page.sections, 1)
         ],
     )
+
+
+def _script(page: Page) -> str:
+    """What sorts and filters tables, where the page has such; empty else."""
+    blocks = (block for section in page.sections for block in section.blocks)
+    if not any(isinstance(block, TableBlock) and block.sortable for block in blocks):
+        return ""
+    return (_TEMPLATES / "sort.js").read_text(encoding="utf-8")
 
 
 def _block(block: Block, folder: Path) -> dict[str, object]:

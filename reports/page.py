@@ -43,6 +43,8 @@ class TableBlock:
         tones: Text of a cell to ``good``, ``bad`` or ``quiet``, for verdicts.
         digits: Significant digits of numbers.
         hints: What each column means, for a reader who points at its heading; empty for none.
+        sortable: Whether a reader may sort it by a column and filter its rows.
+        anchor: Before a row's first cell, makes what links lead to; empty for none.
     """
 
     headers: tuple[str, ...]
@@ -52,6 +54,8 @@ class TableBlock:
     tones: Mapping[str, str] = field(default_factory=dict)
     digits: int = 4
     hints: tuple[str, ...] = ()
+    sortable: bool = False
+    anchor: str = ""
 
     def __post_init__(self) -> None:
         """Refuse ragged rows.

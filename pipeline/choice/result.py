@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuators.loading.parts import load_parts
 from pipeline.api.result import Result, by_name
 from pipeline.api.tables import inputs_of, metadata
 from pipeline.choice.break_even import rows
@@ -14,6 +15,7 @@ from pipeline.choice.choose import Chosen, Wanted, choose
 from pipeline.choice.mission import read_mission
 from pipeline.choice.tables import ROBOT, tables_of, words
 from pipeline.progress import Progress
+from reports.pages.choice_page import PartSource, write_choice_page
 from reports.table import table_of
 from reports.tables.choice import BreakEvenRow
 
@@ -30,6 +32,14 @@ class Choice(Result):
     """
 
     chosen: Chosen = field(repr=False)
+
+    def _write(self, out: Path, decimal: str) -> None:
+        """The page, too."""
+        super()._write(out, decimal)
+        parts = load_parts(self.chosen.wanted.parts)
+        sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
+        title = f"Which actuators for a day of {self.chosen.machine.ready.robot.spec.name}"
+        write_choice_page(self.tables, sources, self.lines, out, title=title)
 
     @property
     def lines(self) -> list[str]:

@@ -1,0 +1,215 @@
+"""The page of a choice of actuators: the answer, pictures, tables to sort, every part's source."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from reports.figures.choice import break_even_figure, day_figure, front_figure
+from reports.figures.save import save_figures
+from reports.html import write_html
+from reports.page import Block, FigureBlock, Page, Section, TableBlock, Text, table_block
+from reports.table import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+ANCHOR: Final = "part-"
+_PARTS: Final = ("motor", "gear", "brake", "part")
+_LOSSES: Final = {
+    "mechanical": "mechanical_W",
+    "windings": "winding_W",
+    "gears and rotors": "friction_W",
+    "brakes": "brakes_W",
+    "returned and lost": "returned_W",
+    "idle and electronics": "idle_W",
+}
+_HEADINGS: Final = {
+    "answer": "The answer, group by group",
+    "ten_best": "The ten best of each group, and why the others lost",
+    "front": "Robots that none beats in energy and mass",
+    "unknowns": "What to measure next",
+    "day": "The day, mode by mode",
+    "excluded": "What the limits forbid",
+    "break_even": "Two candidates by standing, speed and idle power",
+}
+#: Columns that the page leaves to the CSV.
+_LEFT: Final = {
+    "day": ("mechanical_W", "returned_W", "gear_rms_Nm", "gear_continuous_Nm", "gear_peak_Nm",
+            "gear_most_Nm", "voltage_V", "most_voltage_V", "share_of_day", "peak_current_A",
+            "most_current_A", "speed_rad_s", "most_speed_rad_s"),
+    "answer": ("not_printed", "searched_power_W"),
+    "ten_best": ("not_printed", "nominal_power_W"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PartSource:
+    """Where the numbers of a part come from.
+
+    Attributes:
+        title: What it is.
+        basis: Of its numbers.
+        source: Where they were read.
+        note: What is doubtful or filled in.
+    """
+
+    title: str
+    basis: str
+    source: str
+    note: str = ""
+
+
+def write_choice_page(
+    tables: Mapping[str, Table],
+    parts: Mapping[str, PartSource],
+    lines: Sequence[str],
+    out: Path,
+    *,
+    title: str,
+) -> int:
+    """Write pictures and ``index.html``.
+
+    Args:
+        tables: Of the choice, by name, rows as in `reports.tables.choice`; at least the answer.
+        parts: By name; those that no table names are left out.
+        lines: The answer, a sentence each.
+        out: Folder.
+        title: Of the page.
+
+    Returns:
+        How many files.
+    """
+    drawings = _drawings(tables)
+    files = save_figures(drawings, out) if drawings else 0
+    page = choice_page(tables, parts, lines, out, list(drawings), title=title)
+    write_html(page, out / "index.html")
+    return files + 1
+
+
+def choice_page(
+    tables: Mapping[str, Table],
+    parts: Mapping[str, PartSource],
+    lines: Sequence[str],
+    out: Path,
+    figures: Sequence[str],
+    *,
+    title: str,
+) -> Page:
+    """The page; see `write_choice_page`.
+
+    Args:
+        tables: As there.
+        parts: As there.
+        lines: As there.
+        out: Folder that holds the pictures.
+        figures: Their names.
+        title: Of the page.
+    """
+    named = {
+        str(name)
+        for table in tables.values()
+        for column in _PARTS
+        for name in table.columns.get(column, ())
+        if name in parts
+    }
+    sections = []
+    for name, heading in _HEADINGS.items():
+        if name not in tables or not tables[name].rows:
+            continue
+        blocks: list[Block] = [
+            FigureBlock(out / f"{figure}.svg", alt=heading, half=True)
+            for figure in figures
+            if figure in (f"{name}_map", f"{name}_energy") and name != "front"
+        ]
+        sections.append(Section(heading, (*blocks, _sortable(tables[name], named))))
+    if named:
+        sections.append(Section("Parts and their sources", _sources(parts, named)))
+    picture = "front_map" if "front_map" in figures else None
+    return Page(
+        title=title,
+        answer=tuple(lines),
+        picture=FigureBlock(out / f"{picture}.svg", alt=_HEADINGS["front"]) if picture else None,
+        sections=tuple(sections),
+        files={f"{n}.csv": t.description or _HEADINGS.get(n, "") for n, t in tables.items()},
+        footer="Every CSV has a .meta.json beside it: meanings, units, input hashes, versions.",
+    )
+
+
+def _sortable(table: Table, named: set[str]) -> TableBlock:
+    """A table to sort and filter, whose parts lead to their sources."""
+    columns = [c for c in table.columns if c not in _LEFT.get(table.name, ())]
+    block = table_block(table, columns, digits=3)
+    rows = tuple(
+        tuple(
+            f"[{value}](#{ANCHOR}{value})" if column in _PARTS and value in named else value
+            for column, value in zip(columns, row, strict=True)
+        )
+        for row in block.rows
+    )
+    return replace(block, rows=rows, sortable=True)
+
+
+def _sources(parts: Mapping[str, PartSource], named: set[str]) -> tuple[Block, ...]:
+    rows = tuple(
+        (name, parts[name].title, parts[name].basis, parts[name].source, parts[name].note)
+        for name in sorted(named)
+    )
+    table = TableBlock(
+        ("part", "what it is", "basis", "source", "note"),
+        rows,
+        "Where the numbers of every part on this page come from.",
+        sortable=True,
+        anchor=ANCHOR,
+    )
+    return Text("What no sheet prints is a range of the part's class; the note says so."), table
+
+
+def _drawings(tables: Mapping[str, Table]) -> dict[str, Callable[[], Figure]]:
+    """What makes each picture, of the tables that there are."""
+    out: dict[str, Callable[[], Figure]] = {}
+    if "front" in tables and tables["front"].rows:
+        out["front_map"] = lambda: _front(tables["front"], tables["answer"])
+    if "day" in tables and tables["day"].rows:
+        out["day_energy"] = lambda: _day(tables["day"])
+    if "break_even" in tables and len({*tables["break_even"].columns["speed_m_s"]}) > 1:
+        out["break_even_map"] = lambda: _break_even(tables["break_even"])
+    return out
+
+
+def _numbers(table: Table, column: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return np.array([np.nan if v is None else v for v in table.columns[column]], dtype=np.float64)
+
+
+def _front(front: Table, answer: Table) -> Figure:
+    robot = list(answer.columns["group"]).index("robot")
+    mass, power = (float(answer.columns[c][robot]) for c in ("actuator_mass_kg", "power_W"))
+    return front_figure(
+        _numbers(front, "actuator_mass_kg"), _numbers(front, "power_W"), (mass, power)
+    )
+
+
+def _day(day: Table) -> Figure:
+    """Energy of each mode of the groups together; the hotel load is the robot's."""
+    rows = [k for k, group in enumerate(day.columns["group"]) if group == "robot"]
+    modes = [str(day.columns["mode"][k]) for k in rows]
+    hours = [float(day.columns["hours"][k]) for k in rows]
+    losses = {n: np.array(hours) * _numbers(day, column)[rows] for n, column in _LOSSES.items()}
+    return day_figure(modes, {n: v for n, v in losses.items() if np.abs(v).max() > 0}, hours)
+
+
+def _break_even(table: Table) -> Figure:
+    share, speed, idle = (
+        np.unique(_numbers(table, c)) for c in ("standing_share", "speed_m_s", "idle_W")
+    )
+    less = {float(w): np.full((speed.size, share.size), np.nan) for w in idle}
+    more = _numbers(table, "second_W") - _numbers(table, "first_W")
+    each = [_numbers(table, c) for c in ("standing_share", "speed_m_s", "idle_W")]
+    for f, v, w, difference in zip(*each, more, strict=True):
+        less[float(w)][np.searchsorted(speed, v), np.searchsorted(share, f)] = difference
+    first, second = (str(table.columns[c][0]) for c in ("first", "second"))
+    return break_even_figure(share, speed, less, first, second)
