@@ -11,7 +11,6 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 import pipeline.identification.workflow.setup as setup_module
-from pipeline.blind.twin.trial import make_trial
 from pipeline.effects.registry import catalogue
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.regression.design_matrix import make_benches
@@ -20,6 +19,7 @@ from pipeline.identification.selection.screen import Screen, score_all
 from pipeline.identification.workflow.locate import Whereabouts, find_where
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, setup, take_in
+from tests.leg_log import leg_logs
 
 ROOT = Path(__file__).parents[1]
 #: How often the log is repeated.
@@ -30,7 +30,7 @@ SHARES = (0.25, 0.5, 1.0)
 
 def gap_costs() -> None:
     """Print quality, where and prove per row, and screening per candidate."""
-    log = make_trial(5, ["viscous_friction"], "leg", "low").logs["log"]
+    log = leg_logs(5, ["viscous_friction"])["log_1"]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.parquet"
         _rows(log, path)

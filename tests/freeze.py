@@ -65,8 +65,7 @@ def runs() -> Iterator[tuple[str, list[str]]]:
         "gap",
         ["gap", f"{DEMO}/walk.parquet", "--holdout", f"{DEMO}/walk_slow.parquet", "--out", "OUT"],
     )
-    # What the issue of the gap replaces: kept for the rooms that it takes its numbers from.
-    yield "twin", ["twin", "--seed", "3", "--out", "OUT"]
+    yield "twin", ["twin", "--seed", "3", "--machine", "leg", "--out", "OUT"]
 
 
 def refusals(folder: Path) -> Iterator[tuple[str, list[str]]]:

@@ -107,28 +107,6 @@ def parameters(out: Path) -> str:
     ).replace("| --- | ---: | ---: |", "| --- | ---: | --- |")
 
 
-#: Rates of the blind trials in the page's order and words.
-RATES = {
-    "right_and_written": "one effect the log can show: the first name, with its place, is it or "
-    "one of its class, **and the model file holds it**",
-    "right_and_written_where_no_class": "the same, where the log tells it from every other effect",
-    "right_and_written_of_all": "the same of all trials with one effect, shown by the log or not",
-    "right_first": "one effect the log can show: the first name is right, though it may be "
-    "doubted and left out",
-    "wrong_name": "anything hidden, also what has no name in the catalogue: a wrong name given "
-    "with confidence",
-    "wrong_name_of_known": "the same, only effects of the catalogue hidden",
-    "nothing_found_in_empty_logs": "nothing hidden: nothing named",
-    "empty_logs_called_explained": "the same, and nothing called unexplained",
-    "both_of_a_pair": "two effects the log can show: both named, nothing wrong",
-    "both_of_a_pair_written": "the same, and the model file holds both",
-    "unknown_called_unexplained": "an effect outside the catalogue: called unexplained",
-    "unknown_not_misnamed": "the same: no name given with confidence",
-    "intervals_that_cover": "95 % intervals of trusted right names that hold the truth",
-    "gap_closed": "right names that close at least 90 % of the gap on held-out data",
-}
-
-
 def agreement(out: Path) -> str:
     """What is fitted, predicted and contradicted: the first paragraph of `summary.md`."""
     from pipeline.api.judgement import judged
@@ -198,39 +176,38 @@ def aim(row: dict[str, str]) -> str:
 
 
 def blind(out: Path) -> str:
-    """Rates of the blind trials, from the stored run."""
-    found = {r["rate"]: r for r in rows(PICTURES, "blind_rates")}
-    lines = [
-        (
-            words,
-            f"{share(found[name]['hits'], found[name]['trials'])}, "
-            f"{percentage(found[name]['share'])} %",
-            f"{percentage(found[name]['low'])} to {percentage(found[name]['high'])} %",
-            aim(found[name]),
-        )
-        for name, words in RATES.items()
-    ]
+    """Rates of the blind trials, from the stored run; a sentence where none is stored."""
+    if not (PICTURES / BLIND[0]).exists():
+        return "No run is stored yet."
+    found = [r for r in rows(PICTURES, "blind_rates") if r["count"] != "0"]
+    sources = list(dict.fromkeys(r["source"] for r in found))
+    lines = []
+    for name in dict.fromkeys(r["rate"] for r in found):
+        own = {r["source"]: r for r in found if r["rate"] == name}
+        first = next(iter(own.values()))
+        cells = [
+            f"{share(own[s]['hits'], own[s]['count'])}, {percentage(own[s]['share'])} % "
+            f"({percentage(own[s]['low'])} to {percentage(own[s]['high'])})"
+            if s in own
+            else ""
+            for s in sources
+        ]
+        lines.append((first["meaning"], *cells, aim(first) if first["aim_low"] else ""))
     count = len(rows(PICTURES, "blind_trials"))
-    return table((f"{count} trials", "reached", "95 % interval", "aim"), lines)
+    return table((f"{count} trials", *sources, "aim"), lines)
 
 
 def blind_effects(out: Path) -> str:
     """How each effect fared that was hidden alone, from the stored run."""
-    lines = []
-    for r in rows(PICTURES, "blind_by_effect"):
-        known = r["in_catalogue"] == "true"
-        lines.append(
-            (
-                f"`{r['effect']}`" if known else f"`{r['effect']}` (no name)",
-                share(r["right_and_written"], r["visible"]) if known else "",
-                share(r["right_first"], r["visible"]) if known else "",
-                share(r["right_and_written_of_all"], r["trials"]) if known else "",
-                share(r["called_unexplained"], r["trials"]),
-                r["wrong"],
-            )
-        )
-    header = ("hidden alone", "right and written", "right first", "of all trials")
-    return table((*header, "called unexplained", "wrong"), lines)
+    if not (PICTURES / BLIND[0]).exists():
+        return "No run is stored yet."
+    columns = ("found", "unexplained", "wrong", "wrong_confirmed")
+    lines = [
+        (f"`{r['effect']}`", r["source"], *(share(r[name], r["trials"]) for name in columns))
+        for r in rows(PICTURES, "blind_by_effect")
+    ]
+    header = ("named and written", "called unexplained", "wrong written", "wrong confirmed")
+    return table(("hidden alone", "source", *header), lines)
 
 
 def force_rules(out: Path) -> str:
@@ -253,44 +230,6 @@ def force_rules(out: Path) -> str:
     )
 
 
-def blind_standard(out: Path) -> str:
-    """Rates of the standard matrix, from the stored run; a sentence where none is stored."""
-    if not (PICTURES / STANDARD[0]).exists():
-        return "No run of the standard matrix is stored yet."
-    lines = [
-        (
-            r["meaning"],
-            f"{share(r['hits'], r['trials'])}, {percentage(r['share'])} %",
-            f"{percentage(r['low'])} to {percentage(r['high'])} %",
-            aim(r) if r["aim_low"] else "",
-        )
-        for r in rows(PICTURES, "blind_standard_rates")
-        if r["trials"] != "0"
-    ]
-    count = len(rows(PICTURES, "blind_standard_trials"))
-    return table((f"{count} trials", "reached", "95 % interval", "aim"), lines)
-
-
-def blind_standard_effects(out: Path) -> str:
-    """How each effect of the standard matrix fared that was hidden alone, from the stored run."""
-    if not (PICTURES / STANDARD[0]).exists():
-        return "No run of the standard matrix is stored yet."
-    lines = []
-    for r in rows(PICTURES, "blind_standard_by_effect"):
-        known = r["in_catalogue"] == "true"
-        lines.append(
-            (
-                f"`{r['effect']}`" if known else f"`{r['effect']}` (no name)",
-                share(r["right_and_written"], r["visible"]) if known else "",
-                share(r["right_and_written_of_all"], r["trials"]) if known else "",
-                share(r["called_unexplained"], r["trials"]),
-                r["wrong"],
-            )
-        )
-    header = ("hidden alone", "right and written", "of all trials", "called unexplained", "wrong")
-    return table(header, lines)
-
-
 #: Block -> the page it stands on, and what makes it; some need a run, some the code alone.
 BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "standing": ("README.md", standing),
@@ -301,20 +240,12 @@ BLOCKS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "effects": ("pipeline/effects/README.md", effects),
     "blind": ("pipeline/blind/README.md", blind),
     "blind effects": ("pipeline/blind/README.md", blind_effects),
-    "blind standard": ("pipeline/blind/README.md", blind_standard),
-    "blind standard effects": ("pipeline/blind/README.md", blind_standard_effects),
 }
 OF_BLIND = ("blind", "blind effects")
-OF_STANDARD = ("blind standard", "blind standard effects")
-WITHOUT_RUN = {"agreement", "effects", "force rules", *OF_BLIND, *OF_STANDARD}
+WITHOUT_RUN = {"agreement", "effects", "force rules", *OF_BLIND}
 PAGES = tuple(dict.fromkeys(page for page, _ in BLOCKS.values()))
-#: What a run of `make blind` leaves that its page shows.
-BLIND = ("blind_trials.csv", "blind_rates.csv", "blind_by_effect.csv", "blind_confusion.csv")
-BLIND_PICTURE = "blind_confusion.png"
-#: The same of its standard matrix.
-STANDARD = tuple(
-    f"blind_standard_{name}.csv" for name in ("trials", "rates", "by_effect", "reliability")
-)
+#: What a run of `make blind` leaves that its page shows, as it is called where it is stored.
+BLIND = tuple(f"blind_{name}.csv" for name in ("trials", "rates", "by_effect", "names"))
 
 
 def renewed(page: str, text: str, out: Path, names: Collection[str] = tuple(BLOCKS)) -> str:
@@ -351,15 +282,14 @@ def renew(out: Path, names: Collection[str]) -> None:
 
 
 def store_blind(folder: Path) -> int:
-    """Take over the tables and the picture of a run of `make blind`, renew their page.
+    """Take over the tables of a run of `make blind`, renew their page.
 
     Args:
         folder: Of that run.
     """
-    standard = (folder / STANDARD[0]).exists()
-    for name in STANDARD if standard else (*BLIND, BLIND_PICTURE):
-        shutil.copyfile(folder / name, PICTURES / name)
-    renew(folder, OF_STANDARD if standard else OF_BLIND)
+    for name in BLIND:
+        shutil.copyfile(folder / name.removeprefix("blind_"), PICTURES / name)
+    renew(folder, OF_BLIND)
     return 0
 
 

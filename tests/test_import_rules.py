@@ -48,7 +48,7 @@ ACTUATORS_NEED = {"numpy", "scipy", "pydantic", "pydantic_core"}
 #: No room stands on the actuators' laws before there is a machine.
 WITHOUT_LAWS = {"robot", "motion", "dynamics"}
 #: Where the twin lives, which shares no law with the workflow that it tests.
-TWIN = "pipeline.blind.twin"
+TWIN = "pipeline.blind.machines"
 SHARE = 0.2  # of all lines, at most, in one room
 FILES_IN_FOLDER = 14
 
@@ -110,8 +110,8 @@ def test_room_imports_only_what_stands_below_it(path: Path) -> None:
 def test_the_rule_can_fail() -> None:
     assert not allowed("actuators.shaft", "pinocchio")
     assert not allowed("pipeline.robot.robot", "actuators.chain")
-    assert not allowed("pipeline.identification.results", "pipeline.blind.twin.trial")
-    assert not allowed("pipeline.blind.twin.plant", "actuators.elements.friction")
+    assert not allowed("pipeline.identification.results", "pipeline.blind.machines.trial")
+    assert not allowed("pipeline.blind.machines.plant", "actuators.elements.friction")
     assert not allowed("pipeline.simulation.predict", "reports.table")
     assert not allowed("reports.page", "pipeline.cli.main")
     assert allowed("pipeline.robot.robot", "actuators.units")

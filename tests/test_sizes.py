@@ -9,10 +9,6 @@ ROOT = Path(__file__).parents[1]
 LONGEST = 60  # lines, signature and docstring included
 #: What is longer still, with its length. Entries go, or get smaller; none is added.
 LONGER = {
-    "pipeline/blind/summary.py:rates": 141,
-    "pipeline/blind/twin/sensors.py:measure": 62,
-    "pipeline/blind/twin/simulator.py:Simulation.run": 148,
-    "pipeline/blind/twin/trial.py:make_trial": 82,
     "pipeline/identification/selection/select.py:select": 68,
     "pipeline/logs/prepared/prepare.py:prepare": 69,
 }

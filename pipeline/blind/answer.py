@@ -1,67 +1,49 @@
-"""The workflow's answer to one trial: `gap` in a process and a folder of its own."""
+"""The workflow's answer to one trial: what `gap` wrote, asked for in a process of its own."""
 
 from __future__ import annotations
 
 import csv
+import math
 import os
 import shutil
 import subprocess
 import sys
-import tempfile
-import threading
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from pipeline.identification.results import CONFIRMED, INDISTINGUISHABLE
-
-_ROOT = Path(__file__).parents[2]
-#: An answer takes some ten seconds of computing; after this much it counts as failed [s].
-_PATIENCE: Final = 120
+_ROOT: Final = Path(__file__).parents[2]
+#: An answer takes some ten seconds of computing; after this much it counts as none [s].
+PATIENCE: Final = 240
+#: Exit code of an answer that was not given in time or broke.
 FAILED: Final = -1
-#: Processes that answer now, and whether they are to end.
-_running: Final[set[subprocess.Popen[bytes]]] = set()
-_stopped: Final = threading.Event()
+#: Exit code of a command that Ctrl-C ended.
+INTERRUPTED: Final = 130
+CONFIRMED: Final = "confirmed"
+#: How `candidates.csv` says that two names cannot be told apart.
+_CLASS: Final = "indistinguishable from "
+_THREADS: Final = tuple(f"{name}_NUM_THREADS" for name in ("OMP", "OPENBLAS", "MKL", "ARROW"))
 
 
 @dataclass(frozen=True)
-class Named:
-    """One effect that was found.
+class Name:
+    """One name that the model file holds.
 
     Attributes:
-        effect: Name.
+        effect: In the catalogue's words.
         place: Where.
-        rivals: What the answer calls indistinguishable from it, in its words; empty where the name
-            is given with confidence.
-        intervals: Parameter to value and ends of the 95 % interval.
-        doubt: Why the answer does not trust the name; empty where it does.
-        gap_before: Error on *prove* without it.
-        gap_after: The same with it.
-        noise_floor: Of the joints it acts on.
-        written: Whether the model file holds it.
-        level: ``"confirmed"``, ``"approximate"`` or ``"suspected"``.
-        share: How often the name wins on redrawn blocks; NaN where the answer states none.
-        amounts_to: Effects of one term each that it is the sum of.
+        level: ``"confirmed"`` or ``"approximate"``.
+        values: Parameter to value and ends of the 95 % interval; NaN where there is none.
+        rivals: Names that the answer calls indistinguishable from it.
     """
 
     effect: str
     place: tuple[str, ...]
-    rivals: str
-    doubt: str
-    intervals: dict[str, tuple[float, float, float]]
-    gap_before: float
-    gap_after: float
-    noise_floor: float
-    written: bool = True
-    level: str = ""
-    share: float = float("nan")
-    amounts_to: tuple[str, ...] = ()
-
-    @property
-    def confident(self) -> bool:
-        """Whether the name is trusted and nothing else is offered beside it."""
-        return not self.rivals and not self.doubt
+    level: str
+    values: dict[str, tuple[float, float, float]]
+    rivals: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -69,131 +51,108 @@ class Answer:
     """What `gap` said about one log.
 
     Attributes:
-        code: Exit code, `FAILED` where it did not end.
+        code: 0 explained, 1 a part unexplained, 2 refused, `FAILED` none.
         seconds: Of computing.
-        named: In the order of acceptance.
-        message: Its last line on standard error, where it gave none of the answers.
+        names: Of the model file, in its order.
+        message: Last line on standard error where no answer was given.
     """
 
     code: int
     seconds: float
-    named: tuple[Named, ...]
+    names: tuple[Name, ...]
     message: str = ""
 
-
-def begin_answers() -> None:
-    """Let answers be given, after others were stopped."""
-    _stopped.clear()
-
-
-def stop_answers() -> None:
-    """End the processes that answer; none begins after them."""
-    _stopped.set()
-    for process in list(_running):
-        process.kill()
+    @property
+    def given(self) -> bool:
+        """Whether there is one."""
+        return self.code in (0, 1)
 
 
-def ask(folder: str, robot: str, out: str, more: Sequence[str] = ()) -> dict[str, Any]:
-    """Run `gap name` in a folder that holds nothing but log, robot and actuators.
+def ask(folder: Path, options: list[str]) -> dict[str, Any]:
+    """Run the command in a trial's folder `given`, which holds nothing but what it may see.
 
     Args:
-        folder: Of the trial.
-        robot: Robot file, relative to the folder.
-        out: Where `gap` writes; outside of the folder.
-        more: Further options; by default the folder's actuators.
+        folder: Of the trial; the answer is written to its folder `answer`.
+        options: Of the trial's truth: log and what belongs to it.
 
     Returns:
-        What `read_answer` needs beside the files.
+        Exit code, seconds of computing and the last line on standard error.
     """
+    out = (folder / "answer").resolve()
     shutil.rmtree(out, ignore_errors=True)  # an older answer is none
-    command = [sys.executable, "-P", "-m", "pipeline", "gap", "name", "log.csv"]
-    command += ["--robot", robot, "--out", str(Path(out).resolve())]
-    command += more or ("--actuators", "actuators")
+    command = [sys.executable, "-P", "-m", "pipeline", "gap", *options, "--out", str(out)]
     environment = {k: v for k, v in os.environ.items() if k in ("PATH", "HOME", "LANG")}
-    environment |= {"PYTHONPATH": str(_ROOT), "MPLBACKEND": "Agg"}
-    environment |= dict.fromkeys(
-        ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "ARROW_NUM_THREADS"), "1"
+    environment |= {"PYTHONPATH": str(_ROOT), "MPLBACKEND": "Agg"} | dict.fromkeys(_THREADS, "1")
+    # The limit is one of computing time: other work on the machine must not cost an answer.
+    limited = ["/bin/sh", "-c", f'ulimit -t {PATIENCE}; exec "$@"', "gap", *command]
+    process = subprocess.Popen(
+        limited,
+        cwd=folder / "given",
+        env=environment,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
     )
-    with tempfile.TemporaryFile() as said:
-        # The limit is one of computing time: other work on the machine must not cost an answer.
-        # Ctrl-C is answered by the process that asks: it ends this one with `stop_answers`.
-        prepared = f"ulimit -t {_PATIENCE}; trap '' INT; exec \"$@\""
-        limited = ["/bin/sh", "-c", prepared, "gap", *command]
-        process = subprocess.Popen(
-            limited, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=said
-        )
-        _running.add(process)
-        try:
-            if _stopped.is_set():
-                process.kill()
-            _, status, used = os.wait4(process.pid, 0)
-        except BaseException:
-            process.kill()
-            raise
-        finally:
-            _running.discard(process)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        lines = said.read().decode(errors="replace").strip().splitlines()
-    code, seconds = process.returncode, used.ru_utime + used.ru_stime
-    if code < 0:
-        lines = [f"no answer within {_PATIENCE} s of computing"]
-    return {"code": code, "seconds": seconds, "message": lines[-1] if lines else ""}
+    assert process.stderr is not None
+    try:
+        said = process.stderr.read().decode(errors="replace").strip().splitlines()
+        _, status, used = os.wait4(process.pid, 0)
+    except BaseException:
+        process.kill()
+        raise
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode == INTERRUPTED:
+        raise KeyboardInterrupt
+    code = process.returncode if process.returncode in (0, 1, 2) else FAILED
+    if process.returncode < 0:
+        said = [f"no answer within {PATIENCE} s of computing"]
+    if code in (0, 1) and not (out / "model.toml").exists():
+        code = FAILED
+    return {
+        "code": code,
+        "seconds": used.ru_utime + used.ru_stime,
+        "message": said[-1] if said and code not in (0, 1) else "",
+    }
 
 
-def read_answer(run: dict[str, Any], out: Path) -> Answer:
-    """Read what `gap` wrote.
+def read_answer(files: Mapping[str, str], run: dict[str, Any]) -> Answer:
+    """Read what was written: names of `model.toml`, classes of `candidates.csv`.
 
     Args:
+        files: Name to text.
         run: From `ask`.
-        out: Its folder.
     """
-    if run["code"] not in (0, 1):
-        code = run["code"] if run["code"] == 2 else FAILED
-        return Answer(code, run["seconds"], (), run["message"])
-    if not (out / "candidates.csv").exists():
-        return Answer(FAILED, run["seconds"], (), "candidates.csv was not written")
-    rivals = {
-        (row["effect"], row["place"]): row["verdict"].removeprefix(INDISTINGUISHABLE)
-        for row in _rows(out / "candidates.csv")
-        if row["verdict"].startswith(INDISTINGUISHABLE)
-    }
-    grouped: dict[tuple[int, str, str], list[dict[str, str]]] = {}
-    for row in _rows(out / "found.csv"):
-        grouped.setdefault((int(row["order"]), row["effect"], row["place"]), []).append(row)
-    named = []
-    for (_, effect, place), rows in sorted(grouped.items()):
-        first = rows[0]
-        named.append(
-            Named(
-                effect=effect,
-                place=tuple(place.split("+")),
-                rivals=rivals.get((effect, place), ""),
-                doubt=first["reason"] or ("" if first["level"] == CONFIRMED else first["level"]),
-                intervals={
-                    row["parameter"]: (
-                        _number(row["value"]),
-                        _number(row["ci_low"]),
-                        _number(row["ci_high"]),
-                    )
-                    for row in rows
-                },
-                gap_before=_number(first["gap_before"]),
-                gap_after=_number(first["gap_after"]),
-                noise_floor=_number(first["noise_floor"]),
-                written=first["written"] == "true",
-                level=first["level"],
-                share=_number(first["share"]),
-                amounts_to=tuple(filter(None, first["amounts_to"].split("+"))),
-            )
-        )
-    return Answer(run["code"], run["seconds"], tuple(named))
+    names: tuple[Name, ...] = ()
+    if run["code"] in (0, 1):
+        edits = tomllib.loads(files["model.toml"]).get("edit", [])
+        classes = _classes(files.get("candidates.csv", ""))
+        names = tuple(_name(edit, classes) for edit in edits)
+    return Answer(run["code"], run["seconds"], names, run["message"])
 
 
-def _rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
+def _name(edit: dict[str, Any], classes: dict[tuple[str, str], list[str]]) -> Name:
+    place = tuple(edit.get("place", ()))
+    values = {}
+    for name, entry in edit["parameters"].items():
+        low, high = entry.get("interval", (math.nan, math.nan))
+        values[name] = (float(entry["value"]), float(low), float(high))
+    rivals = tuple(classes.get((edit["effect"], "+".join(place)), ()))
+    return Name(edit["effect"], place, edit.get("level", ""), values, rivals)
 
 
-def _number(text: str) -> float:
-    return float(text) if text else float("nan")
+def _classes(text: str) -> dict[tuple[str, str], list[str]]:
+    """Names that the answer cannot tell from one, both ways, by effect and place."""
+    rows = list(csv.DictReader(text.splitlines()))
+    out: dict[tuple[str, str], list[str]] = {}
+    places: dict[str, set[str]] = {}
+    for row in rows:
+        places.setdefault(row["effect"], set()).add(row["place"])
+    for row in rows:
+        if row["verdict"].startswith(_CLASS):
+            told = row["verdict"].removeprefix(_CLASS)
+            others = [name for name in places if name in told]
+            out.setdefault((row["effect"], row["place"]), []).extend(others)
+            for other in others:
+                for place in places[other]:
+                    if place in told:
+                        out.setdefault((other, place), []).append(row["effect"])
+    return out

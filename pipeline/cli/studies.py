@@ -19,29 +19,26 @@ def add_verbs(add: AddVerb) -> None:
     """Declare the verbs."""
     _add_sweep(add)
     twin = add("twin", "simulate a machine with hidden effects and write its log", _run_twin)
+    sources = "own: inverse of the true machine; mujoco: forward dynamics with a controller"
+    twin.add_argument("--source", default="own", help=f"{sources}; own by default")
     twin.add_argument("--seed", type=int, default=1, help="of the random numbers")
-    text = "effects to hide; none by default"
-    twin.add_argument("--hide", nargs="*", default=[], metavar="EFFECT", help=text)
-    twin.add_argument("--motion", default="leg", help="leg (on a stand; default) or walk (hexapod)")
-    twin.add_argument("--noise", default="low", help="low (default) or high")
-    twin.add_argument("--logs", type=int, default=1, help="number of logs of the machine; 1")
+    twin.add_argument("--number", type=int, default=0, help="of the trial; 0")
+    text = "pendulum, leg, arm or walk (hexapod; own only); drawn by default"
+    twin.add_argument("--machine", help=text)
+    text = "effects to hide; drawn by default, none without names"
+    twin.add_argument("--hide", nargs="*", metavar="EFFECT", help=text)
     twin.add_argument("--out", type=named_path, required=True, help="new folder for the trial")
-    text = "file for the truth, outside of that folder"
-    twin.add_argument("--sealed", type=named_path, help=text)
 
     text = "simulate machines with hidden effects and count how often gap finds them"
     blind = add("blind", text, _run_blind)
-    text = "run only the first so many, a random sample of the matrix"
-    blind.add_argument("--trials", type=int, help=text)
     blind.add_argument(
-        "--matrix",
-        choices=["bench", "standard"],
-        default="bench",
-        help="bench: the paper's leg and hexapod with their actuators; standard: bare URDFs with "
-        "friction, wrong bodies and coloured noise beside what is hidden",
+        "--source", choices=["own", "mujoco", "both"], default="own", help=f"{sources}; own"
     )
+    blind.add_argument("--trials", type=int, default=60, help="number per source; 60")
     blind.add_argument("--seed", type=int, default=1, help="of the random numbers")
     blind.add_argument("--workers", type=int, default=2, help="number of processes; 2")
+    text = "address of a Dask scheduler whose workers run the trials, e.g. tcp://10.0.0.1:8786"
+    blind.add_argument("--scheduler", metavar="ADDRESS", help=text)
     blind.add_argument("--resume", action="store_true", help="go on where a run was stopped")
     text = "folder for everything written"
     blind.add_argument("--out", type=named_path, default=OUT / "blind", help=text)

@@ -183,7 +183,7 @@ VERBS = {
 
 @pytest.mark.parametrize("verb", ["walk", "gap", "twin", "blind"])
 def test_a_full_disk(tmp_path: Path, short_demo: Path, command: Command, verb: str) -> None:
-    """One line, exit 2, and the last run's files as they were; twin leaves neither log nor seal."""
+    """One line, exit 2, and the last run's files as they were; twin leaves nothing."""
     place = tmp_path / "out"
     if verb != "twin":
         assert command("stand", place) == 0
@@ -200,7 +200,7 @@ def test_a_full_disk(tmp_path: Path, short_demo: Path, command: Command, verb: s
         assert not list(tmp_path.iterdir())
     else:
         after = settled(place)
-        work = ("trials/", "sealed.jsonl")  # of `blind`, which goes on from there
+        work = ("trials/", "answers.jsonl")  # of `blind`, which goes on from there
         assert {n: c for n, c in after.items() if not n.startswith(work)} == before
 
 
@@ -237,16 +237,14 @@ def test_what_is_no_folder(
     assert contents(tmp_path) == {"file": b"mine"}
 
 
-def test_a_twin_in_the_current_folder_is_sealed_beside_it(
+def test_a_twin_asks_for_an_empty_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "my trial").mkdir()
     monkeypatch.chdir(tmp_path / "my trial")
-    assert main(["twin", "--out", "."]) == 0
-    assert {p.name for p in tmp_path.iterdir()} == {"my trial", "my trial.sealed.json"}
-    assert {p.name for p in Path().iterdir()} == {"actuators", "log.csv", "urdf"}
-    # The command it prints can be pasted, spaces or not, and leaves the trial alone.
-    assert f"'{tmp_path}/my trial/log.csv'" in capsys.readouterr().out
+    assert main(["twin", "--machine", "pendulum", "--out", "."]) == 0
+    assert {p.name for p in Path().iterdir()} == {"given", "truth.json"}
+    assert "cd given && python -m pipeline gap log.csv" in capsys.readouterr().out
     before = contents(tmp_path)
     assert main(["twin", "--out", "."]) == 2
     assert "not empty" in capsys.readouterr().err

@@ -14,7 +14,6 @@ import pyarrow.parquet as pq
 import pytest
 
 import pipeline.identification.workflow.setup
-from pipeline.blind.twin.trial import make_trial
 from pipeline.cli.gap import add_gap_options, options_of
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.selection.identify import identify
@@ -23,6 +22,7 @@ from pipeline.identification.workflow.setup import Setup, setup, take_in
 from pipeline.logs.prepared.informative import STRETCH, choose, scan
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE
 from pipeline.logs.prepared.parts import GUARD
+from tests.leg_log import leg_logs
 from tests.pipeline.logs.made import made_log, motion
 
 JOINTS = ("rm_joint_1", "rm_joint_2", "rm_joint_3")
@@ -38,7 +38,7 @@ def long_leg(path: Path, effects: list[str], logs: int, seed: int = 5, times: in
         seed: Of the machine.
         times: How often each motion is there.
     """
-    made = make_trial(seed, effects, "leg", "low", logs=logs).logs
+    made = leg_logs(seed, effects, logs)
     columns: dict[str, list[np.ndarray]] = {}
     start = 0.0
     for log in list(made.values()) * times:

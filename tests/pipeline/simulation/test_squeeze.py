@@ -14,7 +14,6 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.loading.build import load_catalog
-from pipeline.blind.twin.walking import squeeze_torque
 from pipeline.effects.registry import effect_named
 from pipeline.logs.prepared.measurement import FIT, Measurement
 from pipeline.machine.machine import MachineModel, machine_of_robot
@@ -124,16 +123,3 @@ def test_standing_and_walking_squeeze_in_the_same_sense(hexapod: Robot, name: st
         expected(hexapod, before.position[0], stance),
         atol=1e-6,
     )
-
-
-@pytest.mark.parametrize("name", STANCES)
-def test_the_twin_hides_a_squeeze_of_the_same_sense(
-    hexapod: Robot, position: Array, name: str
-) -> None:
-    """Its feet push inward, so that the ground pushes outward."""
-    configuration = hexapod.model.nq * [0.0]
-    configuration[6] = 1.0  # level
-    for k, value in zip(hexapod.position_index, position, strict=True):
-        configuration[k] = value
-    torque = squeeze_torque(hexapod, np.array([configuration]), STANCES[name], PUSH)
-    np.testing.assert_allclose(torque[0], expected(hexapod, position, STANCES[name]), atol=1e-6)

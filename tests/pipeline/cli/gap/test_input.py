@@ -14,12 +14,12 @@ import pinocchio as pin
 import pyarrow.parquet as pq
 import pytest
 
-from pipeline.blind.twin.trial import make_trial
 from pipeline.cli.demo import DEMO
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup, take_in
 from pipeline.machine.machine import machine_of_urdf
 from tests.command_line import exit_code, rows_of, sidecar_of
+from tests.leg_log import leg_logs
 
 Columns = dict[str, np.ndarray]
 
@@ -102,7 +102,7 @@ def test_a_bad_log_is_refused_in_one_line(
 @pytest.fixture(scope="module")
 def simulated_leg() -> Columns:
     """A log that the model explains: only its model can tell that its units were changed."""
-    return make_trial(3, None, "leg", "low").logs["log"]
+    return leg_logs(3, [])["log_1"]
 
 
 def _scaled(factor: float, *names: str) -> Callable[[Columns], Columns]:
@@ -123,7 +123,7 @@ def _exchanged(c: Columns) -> Columns:
 
 
 def _of_another_machine(c: Columns) -> Columns:
-    other = make_trial(4, None, "leg", "low").logs["log"]
+    other = leg_logs(4, [])["log_1"]
     rows = min(other["time_s"].size, c["time_s"].size)
     return {k: (other if k.endswith("current_A") else c)[k][:rows] for k in c}
 
@@ -350,7 +350,7 @@ def test_data_given_twice_is_refused_under_any_name(
 
 
 def test_two_logs_of_one_machine_are_not_the_same(tmp_path: Path, root: Path) -> None:
-    logs = make_trial(3, None, "leg", "low", logs=2).logs
+    logs = leg_logs(3, [], 2)
     one, two = (write_log(tmp_path / f"{name}.csv", log) for name, log in logs.items())
     robot = root / "urdf" / "leg.toml"
     assert _gap("where", [one], tmp_path / "out", "--holdout", str(two), robot=robot) == 0

@@ -1,0 +1,130 @@
+"""Fixed-base machines drawn anew for every trial, each a bare URDF, and their true bodies.
+
+A pendulum, a leg of three joints, and an arm of six or seven whose axes, offsets, lengths and
+masses are all drawn, so that no machine comes twice.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pipeline.robot.robot import Robot
+
+Array = NDArray[np.float64]
+FIXED: Final = ("pendulum", "leg", "arm")
+#: Link lengths [m] and masses [kg] before they are drawn; an arm draws its number of joints.
+_SIZES: Final = {
+    "pendulum": ((0.4,), (1.2,)),
+    "leg": ((0.1, 0.35, 0.35), (1.5, 1.2, 0.5)),
+    "arm": ((0.2, 0.4, 0.3, 0.15, 0.12, 0.1, 0.08), (6.0, 5.0, 3.0, 2.0, 1.5, 1.0, 0.5)),
+}
+_AXES: Final = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
+
+
+@dataclass(frozen=True)
+class Machine:
+    """A machine as its files say.
+
+    Attributes:
+        name: One of `FIXED`, or ``"walk"`` for the hexapod.
+        urdf: Text of the file; empty where `robot` has files of its own.
+        model: Bodies.
+        joints: Names of the columns.
+        links: Link that each joint carries.
+        ratio: Motor turns per joint turn, shape (J,).
+        lengths: Of the links [m], shape (J,).
+        robot: The walking robot; None for a fixed base.
+    """
+
+    name: str
+    urdf: str
+    model: pin.Model
+    joints: tuple[str, ...]
+    links: tuple[str, ...]
+    ratio: Array
+    lengths: Array
+    robot: Robot | None = None
+
+
+def draw_chain(rng: np.random.Generator, name: str) -> Machine:
+    """A fixed-base machine with axes, lengths, offsets, masses and gear ratios of its own."""
+    lengths, masses = _SIZES[name]
+    n = int(rng.integers(6, 8)) if name == "arm" else len(lengths)
+    length = np.array(lengths[:n]) * rng.uniform(0.7, 1.35, n)
+    mass = np.array(masses[:n]) * rng.uniform(0.6, 1.6, n)
+    parts = ['<robot name="machine">', '  <link name="base"/>']
+    parent, last = "base", ""
+    for k in range(n):
+        axis = {"pendulum": "y", "leg": "xyy"[k % 3]}.get(name) or _axis(rng, last)
+        # A first upright axis leans, so that gravity acts on it.
+        lean = rng.uniform(0.2, 0.6) if k == 0 and axis == "z" else 0.0
+        reach, side = (length[k - 1], rng.uniform(-0.05, 0.05)) if k else (0.0, 0.0)
+        radius, r = rng.uniform(0.02, 0.05), length[k]
+        swing, spin = mass[k] * (r**2 / 12 + radius**2 / 4), mass[k] * radius**2 / 2
+        x, y, z = rng.uniform(-0.02, 0.02), rng.uniform(-0.02, 0.02), -r * rng.uniform(0.35, 0.6)
+        parts += [
+            f'  <joint name="joint_{k + 1}" type="revolute">',
+            f'    <parent link="{parent}"/><child link="link_{k + 1}"/>',
+            f'    <origin xyz="0 {side:.6g} {-reach:.6g}" rpy="{lean:.6g} 0 0"/>',
+            f'    <axis xyz="{_AXES[axis]}"/>',
+            '    <limit lower="-2.9" upper="2.9" effort="1000" velocity="30"/>',
+            "  </joint>",
+            f'  <link name="link_{k + 1}"><inertial>',
+            f'    <origin xyz="{x:.6g} {y:.6g} {z:.6g}"/><mass value="{mass[k]:.6g}"/>',
+            f'    <inertia ixx="{swing:.6g}" iyy="{swing:.6g}" izz="{spin:.6g}"'
+            ' ixy="0" ixz="0" iyz="0"/>',
+            "  </inertial></link>",
+        ]
+        parent, last = f"link_{k + 1}", axis
+    text = "\n".join([*parts, "</robot>", ""])
+    model = pin.buildModelFromXML(text)
+    joints = tuple(str(joint) for joint in list(model.names)[1:])
+    links = tuple(f"link_{k + 1}" for k in range(n))
+    return Machine(name, text, model, joints, links, rng.choice([30.0, 50.0, 100.0], n), length)
+
+
+def _axis(rng: np.random.Generator, last: str) -> str:
+    """Any axis; upright ones are not followed by their like, which no log could tell apart."""
+    return str(rng.choice([axis for axis in "xyyz" if axis != "z" or last != "z"]))
+
+
+def true_bodies(machine: Machine, rng: np.random.Generator, off: float) -> pin.Model:
+    """Bodies whose masses, centres and inertias are off the URDF's.
+
+    Args:
+        machine: The nominal one.
+        rng: For what they are off by.
+        off: Largest relative error, at least half of it for every link; 0 for the URDF's bodies.
+    """
+    model = machine.model.copy()
+    for joint, length in zip(machine.joints, machine.lengths, strict=True):
+        index = model.getJointId(joint)
+        body = model.inertias[index]
+        factor = 1.0 + rng.choice([-1.0, 1.0]) * rng.uniform(0.5 * off, off)
+        way = rng.standard_normal(3)
+        shift = way / np.linalg.norm(way) * rng.uniform(0.5 * off, off) * 0.5 * length
+        spread = factor * rng.uniform(1.0 - off, 1.0 + off)
+        model.inertias[index] = pin.Inertia(
+            factor * body.mass, body.lever + shift, spread * body.inertia
+        )
+    return model
+
+
+def with_payload(model: pin.Model, joint: str, mass: float, at: Array) -> pin.Model:
+    """The same with a point mass [kg] fixed at a place of a joint's frame [m]."""
+    out = model.copy()
+    index = out.getJointId(joint)
+    out.inertias[index] = out.inertias[index] + pin.Inertia(mass, at, np.zeros((3, 3)))
+    return out
+
+
+def tilted(model: pin.Model, roll: float, pitch: float) -> pin.Model:
+    """The same machine on tilted ground [rad]; its frames stay with the ground."""
+    out = model.copy()
+    out.gravity.linear = pin.rpy.rpyToMatrix(roll, pitch, 0.0).T @ model.gravity.linear
+    return out

@@ -1,0 +1,186 @@
+"""What a log could show of a hidden effect, by its own numbers and without the workflow.
+
+An effect's *change* is the torque that was logged less what the same machine without it needs
+along the positions that were logged. Taken out of it are the bodies, where they are 20 % off (else
+they are the URDF's, or next to it), and, unless friction or the torque's zero is what is hidden,
+Coulomb and viscous friction and an offset at its joint. *z* is what remains over the noise of its
+rows, in standard deviations; an effect is visible from `THRESHOLD` on. Names whose own columns
+leave less than `THRESHOLD` of the change, or 3 % of z, are *alike*: there the class is the answer.
+More general laws are not among them.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from pipeline.blind.machines.chains import Machine, tilted
+from pipeline.blind.machines.hidden import EFFECTS, Case
+from pipeline.blind.machines.motions import Course
+from pipeline.blind.machines.own import link_torque
+from pipeline.blind.machines.own import run as inverse
+from pipeline.blind.machines.plant import Happened, Plant
+from pipeline.blind.machines.sensors import Sensors, exact_torque, sampled
+
+Array = NDArray[np.float64]
+THRESHOLD: Final = 6.0
+#: Rows looked at; more tell the same.
+_ROWS: Final = 500
+#: Share of z below which what a rival leaves is a matter of its form at rest, e.g. of presliding.
+_ALIKE: Final = 0.03
+#: Errors of a URDF from which on its bodies are taken for unknown [1].
+_UNKNOWN_BODIES: Final = 0.1
+
+
+def change(
+    machine: Machine, plant: Plant, without: Plant, happened: Happened, sensors: Sensors
+) -> tuple[Array, Course, NDArray[np.intp]]:
+    """Change of the logged torque by an effect (N, J) [N*m], along what course, at what rows."""
+    course = happened.course
+    whole = exact_torque(inverse(machine, plant, course), plant, sensors)
+    seen = course
+    shift = plant.zero - without.zero
+    if plant.sides == "motor" and plant.parted.any():
+        q = happened.motor
+        v = np.gradient(q, course.dt, axis=0)
+        seen = Course(course.time, q, v, np.gradient(v, course.dt, axis=0))
+    elif shift.any():
+        seen = Course(
+            course.time, course.q + shift, course.v, course.a, course.body, course.stances
+        )
+    less = exact_torque(inverse(machine, without, seen), without, sensors)
+    rows = sampled(happened, sensors)
+    return whole - less, seen, rows
+
+
+def judge(
+    case: Case,
+    without: Plant,
+    row: dict[str, object],
+    off: float,
+    happened: Happened,
+    sensors: Sensors,
+) -> tuple[float, list[str]]:
+    """Z of a hidden effect, and names that look like it to this log."""
+    machine, j = case.machine, int(row["joint"])  # type: ignore[call-overload]
+    effect = EFFECTS[str(row["effect"])]
+    y, course, rows = change(machine, case.plant, without, happened, sensors)
+    every = max(1, rows.size // _ROWS)
+    y, rows = y[::every], rows[::every]
+    alike = max(1.0, 2.0 * sensors.memory * sensors.rate / every)
+    sigma = np.sqrt(sensors.white**2 / every + sensors.coloured**2 * alike)
+    known = _columns(case, course, rows, j)
+    free = [] if effect.friction or effect.name == "effort_offset" else ["dry", "viscous", "one"]
+    if off >= _UNKNOWN_BODIES and effect.place not in ("link", "ground"):
+        free.append("bodies")
+    base = [known[name] for name in free if name in known]
+    z = _left(y, base, sigma)
+    if effect.name in ("joint_elasticity", "backlash") and case.plant.sides == "both":
+        between = _sides(happened, j, sensors)
+        if between >= THRESHOLD:  # nothing else parts the two positions
+            return max(z, between), []
+    enough = max(THRESHOLD, _ALIKE * z)
+    same = [
+        name
+        for name, needed in _RIVALS.items()
+        if name != effect.name
+        and not set(_RIVALS.get(effect.name, ("none",))) < set(needed)  # no more general law
+        and all(column in known for column in needed)
+        and _left(y, [*base, *(known[column] for column in needed)], sigma) < enough
+    ]
+    return z, same if z >= THRESHOLD else []
+
+
+#: Names, and the columns that they are made of.
+_RIVALS: Final = {
+    "coulomb_friction": ("dry",),
+    "viscous_friction": ("viscous",),
+    "stribeck_friction": ("dry", "slow"),
+    "load_dependent_friction": ("load",),
+    "backdrive_loss": ("driving", "driven"),
+    "direction_dependent_friction": ("dry", "one"),
+    "effort_offset": ("one",),
+    "parallel_spring": ("one", "angle"),
+    "rotor_inertia": ("acceleration",),
+    "effort_gain": ("torque",),
+    "torque_constant_error": ("torque",),
+    "time_delay": ("rate",),
+    "position_offset": ("turned",),
+    "base_tilt": ("roll", "pitch"),
+    "rigid_body_parameters": ("bodies",),
+    "link_mass": ("body",),
+    "center_of_mass_offset": ("centre",),
+}
+
+
+def _columns(case: Case, course: Course, rows: NDArray[np.intp], j: int) -> dict[str, Array]:
+    """Columns by name, each (N, J, P)."""
+    machine, model = case.machine, case.plant.model
+    n = len(machine.joints)
+    torque = link_torque(machine, model, course)[0]
+    rate = np.gradient(torque, course.dt, axis=0)
+    v = course.v[rows, j]
+    way, load = np.tanh(v / 0.01), torque[rows, j]
+    drives = load * v > 0
+    slow = 0.1 * float(np.quantile(np.abs(v), 0.95))
+    single = {
+        "one": np.ones(rows.size),
+        "dry": way,
+        "viscous": v,
+        "slow": way * np.exp(-((v / max(slow, 1e-3)) ** 2)),
+        "load": way * np.abs(load),
+        "driving": way * np.abs(load) * drives,
+        "driven": way * np.abs(load) * ~drives,
+        "angle": course.q[rows, j],
+        "acceleration": course.a[rows, j],
+        "torque": torque[rows, j],
+    }
+    out = {}
+    for name, values in single.items():
+        out[name] = np.zeros((rows.size, n, 1))
+        out[name][:, j, 0] = values
+    out["rate"] = rate[rows][:, :, None]
+    if machine.robot is not None:
+        return out
+    step = 1e-3
+    there = course.q.copy()
+    there[:, j] += step
+    turned = Course(course.time[rows], there[rows], course.v[rows], course.a[rows])
+    out["turned"] = ((link_torque(machine, model, turned)[0] - torque[rows]) / step)[:, :, None]
+    here = Course(course.time[rows], course.q[rows], course.v[rows], course.a[rows])
+    for name, angles in (("roll", (step, 0.0)), ("pitch", (0.0, step))):
+        leaning = link_torque(machine, tilted(model, *angles), here)[0]
+        out[name] = ((leaning - torque[rows]) / step)[:, :, None]
+    data = model.createData()
+    bodies = np.stack(
+        [
+            pin.computeJointTorqueRegressor(model, data, *row).copy().reshape(n, -1)
+            for row in zip(here.q, here.v, here.a, strict=True)
+        ]
+    )
+    out["bodies"] = bodies
+    out["body"] = bodies[:, :, 10 * j : 10 * j + 10]
+    out["centre"] = bodies[:, :, 10 * j + 1 : 10 * j + 4]
+    return out
+
+
+def _left(y: Array, columns: list[Array], sigma: Array) -> float:
+    """What columns leave of a change, in standard deviations."""
+    target = (y / sigma).ravel()
+    if columns:
+        design = np.concatenate(columns, axis=2) / sigma[None, :, None]
+        x = design.reshape(-1, design.shape[2])
+        scale = np.linalg.norm(x, axis=0)
+        x = x[:, scale > 0] / scale[scale > 0]
+        target = target - x @ np.linalg.lstsq(x, target, rcond=1e-9)[0]
+    return float(np.linalg.norm(target))
+
+
+def _sides(happened: Happened, j: int, sensors: Sensors) -> float:
+    """Z of motor less joint over the encoders' resolution."""
+    ahead = (happened.motor - happened.course.q)[:, j]
+    rows = min(ahead.size, _ROWS)
+    return float(ahead.std() * np.sqrt(12.0 * rows) / sensors.resolution)

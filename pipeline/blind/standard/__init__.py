@@ -1,1 +1,0 @@
-"""The standard matrix of blind trials: made, asked, scored straight."""

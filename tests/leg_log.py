@@ -1,0 +1,72 @@
+"""Logs of the leg on its stand, for tests of what reads logs: currents and voltages, one effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from actuators.loading.build import CATALOG
+from actuators.parameters import load_parameters
+from pipeline.blind.machines.chains import Machine
+from pipeline.blind.machines.motions import sines, strokes
+from pipeline.blind.machines.own import run
+from pipeline.blind.machines.plant import rigid_plant
+from pipeline.blind.machines.walk import FOLDER
+from pipeline.robot.robot import load_robot
+from pipeline.robot.robot_file import load_robot_file
+
+RATE = 500.0  # [Hz]
+
+
+def leg_logs(seed: int, effects: list[str], count: int = 1) -> dict[str, dict[str, np.ndarray]]:
+    """Logs of one machine with the actuator "rotor", each with a motion of its own.
+
+    Args:
+        seed: Of its encoders' noise and motions.
+        effects: Of ``viscous_friction``, ``rotor_inertia``, ``torque_constant_error``.
+        count: How many.
+    """
+    robot = load_robot(load_robot_file(FOLDER / "leg.toml"))
+    n, model = len(robot.joints), robot.model.copy()
+    machine = Machine("leg", "", model, robot.joints, ("",) * n, np.ones(n), np.full(n, 0.3))
+    rotor = load_parameters(
+        CATALOG / "rotor_re40.toml",
+        {"coulomb": "torque", "viscous": "viscous friction", "inertia": "inertia"},
+    )
+    units = {"torque_constant": "torque constant", "resistance": "resistance", "mass": "mass"}
+    units |= {"max_speed": "angular velocity", "supply_voltage": "voltage"}
+    units |= dict.fromkeys(("continuous_current", "peak_current"), "current")
+    motor = load_parameters(CATALOG / "motor_re40_24v.toml", units)
+    ratio = load_parameters(CATALOG / "requirement.toml", {"ratio": "ratio"})["ratio"]
+    more = {name: 1.5 if name in effects else 0.0 for name in ("viscous_friction", "rotor_inertia")}
+    gain = np.where(np.arange(n) == 1, 1.2 if "torque_constant_error" in effects else 1.0, 1.0)
+    plant = rigid_plant(machine, model)
+    friction = plant.friction
+    for j in range(n):
+        viscous = ratio**2 * rotor["viscous"] * (1 + 20 * more["viscous_friction"] * (j == 1))
+        friction = friction.at(j, coulomb=ratio * rotor["coulomb"], viscous=viscous)
+    inertia = ratio**2 * rotor["inertia"] * (1 + more["rotor_inertia"] * (np.arange(n) == 1))
+    plant = replace(plant, friction=friction, inertia=inertia)
+    out = {}
+    low, high = model.lowerPositionLimit, model.upperPositionLimit
+    for k in range(count):
+        rng = np.random.default_rng([seed, k])
+        course = (sines if k % 2 == 0 else strokes)(rng, n, 8.0, 1 / RATE)
+        reach = 0.3 * (high - low)
+        course = replace(
+            course, q=0.5 * (low + high) + reach * course.q, v=reach * course.v, a=reach * course.a
+        )
+        happened = run(machine, plant, course)
+        current = happened.torque / (ratio * motor["torque_constant"] * gain)
+        voltage = motor["resistance"] * current
+        voltage += ratio * motor["torque_constant"] * gain * course.v
+        columns = {"time_s": course.time}
+        step = 2 * np.pi / 2**20
+        for j, joint in enumerate(robot.joints):
+            columns[f"{joint}__position_rad"] = np.rint(course.q[:, j] / step) * step
+            for name, values in (("current_A", current), ("voltage_V", voltage)):
+                noise = 0.005 * rng.standard_normal(course.time.size)
+                columns[f"{joint}__{name}"] = values[:, j] + noise
+        out[f"log_{k + 1}"] = columns
+    return out

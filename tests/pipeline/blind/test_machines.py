@@ -1,0 +1,166 @@
+"""Machines of the trials: both sources agree, energy balances, a trial hangs on its number."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.blind.machines import forward, own
+from pipeline.blind.machines.chains import draw_chain, true_bodies
+from pipeline.blind.machines.hidden import EFFECTS, possible
+from pipeline.blind.machines.laws import Friction, bristles
+from pipeline.blind.machines.motions import MOTIONS, sines
+from pipeline.blind.machines.plant import Plant, rigid_plant
+from pipeline.blind.machines.trial import KINDS, make
+from pipeline.errors import PipelineError
+
+SECONDS = 1.0
+
+
+def machine(name: str, seed: int = 3):
+    rng = np.random.default_rng(seed)
+    drawn = draw_chain(rng, name)
+    return drawn, rigid_plant(drawn, true_bodies(drawn, rng, 0.2))
+
+
+def followed(name: str, plant_of):
+    """What MuJoCo did, and the own inverse along it."""
+    drawn, plant = machine(name)
+    plant = plant_of(plant)
+    course = sines(np.random.default_rng(1), len(drawn.joints), SECONDS, forward.step_of(plant))
+    happened = forward.run(drawn, plant, course)
+    return happened, own.run(drawn, plant, happened.course)
+
+
+@pytest.mark.parametrize("name", ["pendulum", "leg", "arm"])
+def test_without_dry_friction_both_sources_give_the_same_torque(name: str) -> None:
+    def smooth(plant: Plant) -> Plant:
+        n = plant.inertia.size
+        friction = plant.friction.at(0, viscous=0.3, quadratic=0.2)
+        return replace(plant, inertia=np.full(n, 0.05), friction=friction)
+
+    happened, inverse = followed(name, smooth)
+    size = np.abs(happened.torque).max()
+    np.testing.assert_allclose(happened.torque, inverse.torque, atol=1e-9 * size)
+
+
+def test_a_gear_winds_up_alike_in_both_sources() -> None:
+    def soft(plant: Plant) -> Plant:
+        return plant.at("compliance", 1, 2e-3).at("inertia", 1, 0.05)
+
+    happened, inverse = followed("leg", soft)
+    one, two = (x.motor[:, 1] - x.course.q[:, 1] for x in (happened, inverse))
+    # The engine's gear has a loss of its own, a twentieth of critical damping.
+    assert np.std(one[2000:] - two[2000:]) < 0.05 * np.std(one[2000:])
+    np.testing.assert_allclose(happened.motor[:, 0], happened.course.q[:, 0])
+
+
+def test_a_play_is_as_wide_as_it_says_and_the_joint_sticks() -> None:
+    def loose(plant: Plant) -> Plant:
+        plant = plant.at("play", 0, 0.02).at("inertia", 0, 0.05)
+        return replace(plant, friction=plant.friction.at(0, coulomb=0.3))
+
+    happened, _ = followed("pendulum", loose)
+    ahead = happened.motor - happened.course.q
+    assert 0.009 < np.abs(ahead).max() < 0.0115
+
+
+def test_dry_friction_of_the_engine_takes_the_work_it_should() -> None:
+    """Energy: what the motors gave is in the bodies, or friction took it."""
+
+    def dry(plant: Plant) -> Plant:
+        return replace(plant, friction=plant.friction.at(0, coulomb=0.5, driving=0.1, driven=0.1))
+
+    happened, _ = followed("pendulum", dry)
+    v, dt = happened.course.v[:, 0], happened.course.dt
+    drawn, plant = machine("pendulum")
+    link = own.link_torque(drawn, plant.model, happened.course)[0][:, 0]
+    taken = float(np.sum((happened.torque[:, 0] - link) * v) * dt)
+    expected = float(np.sum((0.5 + 0.1 * np.abs(link)) * np.abs(v)) * dt)
+    assert taken == pytest.approx(expected, rel=0.02)
+
+
+def test_bristles_slide_at_the_level_of_the_law() -> None:
+    law = Friction.none(1).at(0, coulomb=1.0, excess=0.5, stribeck=0.2, asymmetry=0.2, driving=0.1)
+    t = np.arange(2000) * 1e-3
+    v = np.where(t < 1.0, 0.3, -0.3)[:, None]
+    load = np.full_like(v, 2.0)
+    got = bristles(law, t, np.cumsum(v, axis=0) * 1e-3, v, load)
+    for row, way in ((900, 1.0), (1900, -1.0)):
+        dry = 1.0 + 0.5 * np.exp(-((0.3 / 0.2) ** 2)) + 0.2 * way + (0.2 if way > 0 else 0.0)
+        assert got[row, 0] == pytest.approx(way * dry, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", MOTIONS)
+def test_motions_are_what_they_say(kind: str) -> None:
+    course = MOTIONS[kind](np.random.default_rng(2), 3, 6.0, 1e-3)
+    inside = slice(5, -5)
+    v = np.gradient(course.q, course.dt, axis=0)
+    np.testing.assert_allclose(v[inside], course.v[inside], atol=0.05)
+    assert np.abs(course.q).max() < 1.8
+
+
+def test_a_trial_hangs_on_source_seed_and_number_alone(tmp_path: Path) -> None:
+    one, two = (make("own", 2, 6, tmp_path / name) for name in ("one", "two"))
+    assert one == two
+    files = [sorted(p.name for p in (tmp_path / n / "given").iterdir()) for n in ("one", "two")]
+    assert files[0] == files[1] == ["log.csv", "machine.urdf", "mapping.toml", "test.csv"]
+    logs = [(tmp_path / n / "given" / "log.csv").read_bytes() for n in ("one", "two")]
+    assert logs[0] == logs[1]
+    assert json.loads((tmp_path / "one" / "truth.json").read_text())["hidden"] == one["hidden"]
+    assert make("own", 2, 7, tmp_path / "three") != one
+
+
+def test_a_fifth_of_the_trials_is_outside_the_catalogue() -> None:
+    assert KINDS.count("outside") / len(KINDS) >= 0.2
+    assert {name for name in EFFECTS if not EFFECTS[name].in_catalogue} == set(
+        possible("mujoco", "leg", in_catalogue=False)
+    )
+
+
+def test_a_log_shows_what_is_hidden_and_looks_like_no_other_law(tmp_path: Path) -> None:
+    effects = ("coulomb_friction", "joint_elasticity", "parallel_spring")
+    truth = make("own", 4, 1, tmp_path / "t", machine="leg", effects=effects)
+    assert [h["effect"] for h in truth["hidden"]] == list(effects)
+    assert all(h["visible"] and not h["alike"] for h in truth["hidden"])
+
+
+def test_one_scale_of_a_pendulum_is_like_another(tmp_path: Path) -> None:
+    truth = make("own", 4, 4, tmp_path / "t", machine="pendulum", effects=("effort_gain",))
+    assert {"rigid_body_parameters", "link_mass"} <= set(truth["hidden"][0]["alike"])
+
+
+def test_the_hexapod_walks_and_its_feet_carry_it(tmp_path: Path) -> None:
+    import pandas as pd
+
+    truth = make("own", 1, 0, tmp_path / "t", machine="walk", effects=())
+    log = pd.read_csv(tmp_path / "t" / "given" / "log.csv")
+    feet = log[[c for c in log if c.endswith("force_z_N")]].sum(axis=1)
+    assert feet.std() < 0.05 * feet.mean()
+    assert len(truth["joints"]) == 18
+
+
+@pytest.mark.parametrize(
+    ("source", "given", "words"),
+    [
+        ("matlab", {}, "source 'matlab' is not known"),
+        ("own", {"machine": "leg", "effects": ("rust",)}, "effect 'rust' is not known"),
+        ("mujoco", {"machine": "walk", "effects": ()}, "has no machine 'walk'"),
+        ("own", {"machine": "walk", "effects": ("backlash",)}, "cannot be hidden in a walk"),
+    ],
+)
+def test_what_cannot_be_made_is_one_clear_line(
+    tmp_path: Path, source: str, given: dict, words: str
+) -> None:
+    with pytest.raises(PipelineError, match=words) as caught:
+        make(source, 1, 0, tmp_path / "t", **given)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_missing_engine_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(PipelineError, match="development extra"):
+        forward.engine()
