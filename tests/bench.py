@@ -37,6 +37,7 @@ from tests.bench_bags import bag_costs
 from tests.bench_demand import demand_ratios, support
 from tests.bench_gap import gap_costs
 from tests.bench_kinematics import inverse_kinematics
+from tests.bench_supply import supply_ratios, sweep_ratio
 from tests.bench_timing import Call, ratio, spread, timed
 
 ROOT = Path(__file__).parents[1]
@@ -171,6 +172,8 @@ def main() -> None:
     chain_ratios(robot, motion)
     csv_ratio(robot, motion)
     energy_of_a_search()
+    sweep_ratio()
+    supply_ratios()
     cold_run()
     gap_costs()
     bag_costs()

@@ -90,10 +90,9 @@ def _run_sweep(options: argparse.Namespace) -> int:
         from pipeline.sweep.plan import read_plan
         from pipeline.sweep.sweep import sweep
 
-        paths = (options.robot, options.model, options.gait, options.actuators)
         done = sweep(
             Order(
-                *(path.resolve() if path and path.exists() else path for path in paths),
+                *(options.robot, options.model, options.gait, options.actuators),
                 tuple(changes_of(options.set).items()),
                 options.samples,
                 options.quasi_static,

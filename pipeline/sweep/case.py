@@ -147,7 +147,8 @@ def _rows(order: Order, machine: Machine, number: int, values: tuple[Value, ...]
         return [head | row for row in _walked(order.walking(machine.with_values(changes)))]
     except (PipelineError, ActuatorError) as error:
         empty = dict.fromkeys(f.name for f in fields(SweepRow))
-        return [head | empty | {"alternative": "", "refusal": str(error)}]
+        reason = str(error).removeprefix(f"{machine.path}: ")  # a file may lie elsewhere
+        return [head | empty | {"alternative": "", "refusal": reason}]
 
 
 def _walked(given: Settings) -> list[Row]:

@@ -10,11 +10,14 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
 from pipeline.errors import GaitError
 from pipeline.spread import SpreadError, spread
+from pipeline.sweep.case import Order
+from pipeline.sweep.sweep import sweep
 
 ROOT = Path(__file__).parents[3]
 
@@ -110,6 +113,17 @@ def test_a_cluster_does_every_block_though_a_worker_is_killed() -> None:
             if len(found) == 5:
                 processes[1].kill()
     assert found == {n: n * n for n in range(30)}
+
+
+@pytest.mark.slow
+def test_a_sweep_on_a_cluster_has_the_same_bytes_though_a_worker_is_killed(tmp_path: Path) -> None:
+    vary = ["speed=0.02:0.12:20 m/s"]
+    alone = sweep(Order(samples=51), vary, tmp_path / "alone")
+    with cluster() as (address, processes):
+        Timer(4.0, processes[1].kill).start()
+        spread_out = sweep(Order(samples=51), vary, tmp_path / "spread", scheduler=address)
+        assert processes[1].wait(timeout=30) == -signal.SIGKILL
+    assert spread_out.file.read_bytes() == alone.file.read_bytes()
 
 
 @pytest.mark.slow
