@@ -21,7 +21,7 @@ from pipeline.choice.fronts import merged
 from pipeline.choice.group import Found, groups_of, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.search import Account, Demanded
+from pipeline.choice.search import Account, Demanded, Feedback
 from pipeline.machine.drivetrains import Drivetrains
 from pipeline.machine.joint import joints_of
 from pipeline.progress import Progress
@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 Design = tuple[str, str, str]
 #: Rounds of mass fed back, at most; two or three settle it.
 _ROUNDS: Final = 4
+#: Share by which a round has to be better than the one before.
+_SETTLED: Final = 1e-3
 _NUDGE: Final = 0.1  # [kg], by which what a kilogram costs is found; demand is affine in it
 
 
@@ -80,7 +82,6 @@ class Chosen:
         doubts: Draws over the finalists of each group.
         answer: Design of each group.
         first: What the first search, before mass was fed back, took the answer's power for [W].
-        price: What a kilogram at one group's joints costs the robot [W/kg].
         present: Mass of an actuator that the bodies hold already [kg].
         shelf: The parts.
     """
@@ -92,7 +93,6 @@ class Chosen:
     doubts: Mapping[str, Doubt]
     answer: Mapping[str, Design]
     first: Mapping[str, float]
-    price: Mapping[str, float]
     present: float
     shelf: Shelf
 
@@ -104,6 +104,24 @@ class Chosen:
     def designs(self, group: str) -> Designs:
         """The answer of one group, as one design."""
         return self.shelf.designs([self.answer[group]])
+
+    def drawn(self, group: str) -> Array:
+        """Power of the answer of one group in every draw, its mass in the robot, (S,) [W]."""
+        demanded = Demanded.of(group, self.found[group].demanded.joints, self.loads)
+        drawn = doubt(
+            demanded,
+            self.shelf,
+            [self.answer[group]],
+            self.wanted.account,
+            Feedback(),
+            draws=self.wanted.draws,
+        )
+        return drawn.power[:, 0]
+
+    def place(self, group: str) -> int | None:
+        """Of the answer among the finalists of its group; None where the last search left it."""
+        names = _finalists(self.found[group])
+        return names.index(self.answer[group]) if self.answer[group] in names else None
 
     def battery_hours(self, power: float) -> float | None:
         """On one charge [h]."""
@@ -119,11 +137,7 @@ class Chosen:
 
     def robots(self) -> tuple[Array, Array, NDArray[np.intp]]:
         """Front of robots: power with hotel load [W], mass [kg], design of each group."""
-        fronts = []
-        for group, found in self.found.items():
-            own, per = found.front, self.price[group]
-            ours = per * self.designs(group).mass[0] * len(found.demanded.joints)
-            fronts.append((found.score[own] - ours, found.mass[own]))
+        fronts = [(f.score[f.front], f.mass[f.front]) for f in self.found.values()]
         power, mass, taken = merged(fronts)
         return power + self.wanted.account.hotel, mass, taken
 
@@ -185,29 +199,33 @@ def choose(
         present = machine.ready.motors.mass[0]
     told("the mission's demand")
     loads = loads_of(machine, modes)
-    answer: dict[str, Design] = {}
-    price = dict.fromkeys(groups, 0.0)
+    asked = _Asked(machine, modes, groups, shelf, wanted.account, present)
+    price = dict.fromkeys(groups, Feedback())
     first: dict[str, float] = {}
+    least, kept = np.inf, {}
     for turn in range(_ROUNDS):
         told(f"{len(every)} designs for each of {len(groups)} groups, round {turn + 1}")
-        demanded = {g: Demanded.of(g, joints, loads) for g, joints in groups.items()}
-        found = {g: search(d, designs, wanted.account, price[g]) for g, d in demanded.items()}
-        best = {g: every[f.looked[f.finalists[0]]] for g, f in found.items()}
+        found = asked.searched(designs, loads, price)
         first = first or {g: float(f.power[f.finalists[0]]) for g, f in found.items()}
-        if best == answer:
+        answer = {g: _finalists(f)[0] for g, f in found.items()}
+        heavier = loads_of(machine, modes, asked.added(answer))
+        power, dearer = asked.prices(answer, heavier)
+        if power > least * (1.0 - _SETTLED):
             break
-        answer = best
-        added = _added(groups, shelf, answer, present)
-        loads = loads_of(machine, modes, added)
-        price = _prices(machine, modes, groups, shelf, answer, added, wanted.account)
+        least, loads, price, kept = power, heavier, dearer, answer
+    found = asked.searched(designs, loads, price)
     told("draws over what no sheet prints")
     doubts = {
         g: doubt(f.demanded, shelf, _finalists(f), wanted.account, price[g], draws=wanted.draws)
         for g, f in found.items()
     }
     answer = {g: _finalists(f)[doubts[g].order[0]] for g, f in found.items()}
-    loads = loads_of(machine, modes, _added(groups, shelf, answer, present))
-    return Chosen(machine, wanted, loads, found, doubts, answer, first, price, present, shelf)
+    heavier = loads_of(machine, modes, asked.added(answer))
+    if kept and asked.power(answer, heavier) > least:
+        answer = kept
+    else:
+        loads = heavier
+    return Chosen(machine, wanted, loads, found, doubts, answer, first, present, shelf)
 
 
 def _finalists(found: Found) -> list[Design]:
@@ -244,37 +262,68 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
     return {name: part for name, part in parts.items() if kept(name, part)}
 
 
-def _added(
-    groups: Mapping[str, Sequence[str]], shelf: Shelf, answer: Mapping[str, Design], present: float
-) -> dict[str, float]:
-    """Mass at every joint beside what the bodies hold already [kg]."""
-    mass = {g: float(shelf.designs([answer[g]]).mass[0]) - present for g in groups}
-    return {joint: mass[g] for g, joints in groups.items() for joint in joints}
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What stays the same while mass is fed back."""
 
+    machine: Machine
+    modes: Sequence[Mode]
+    groups: Mapping[str, tuple[str, ...]]
+    shelf: Shelf
+    account: Account
+    present: float
 
-def _prices(
-    machine: Machine,
-    modes: Sequence[Mode],
-    groups: Mapping[str, tuple[str, ...]],
-    shelf: Shelf,
-    answer: Mapping[str, Design],
-    added: Mapping[str, float],
-    account: Account,
-) -> dict[str, float]:
-    """What a kilogram at the joints of a group, spread over them, costs the robot [W/kg]."""
-    built = {g: (tuple(joints), shelf.designs([answer[g]])) for g, joints in groups.items()}
+    def searched(
+        self, designs: Designs, loads: Sequence[Load], price: Mapping[str, Feedback]
+    ) -> dict[str, Found]:
+        """Every group's search."""
+        return {
+            g: search(Demanded.of(g, joints, loads), designs, self.account, price[g])
+            for g, joints in self.groups.items()
+        }
 
-    def total(masses: Mapping[str, float]) -> float:
-        loads = loads_of(machine, modes, masses)
+    def added(self, answer: Mapping[str, Design]) -> dict[str, float]:
+        """Mass at every joint beside what the bodies hold already [kg]."""
+        mass = {g: float(self.shelf.designs([answer[g]]).mass[0]) for g in self.groups}
+        return {j: mass[g] - self.present for g, joints in self.groups.items() for j in joints}
+
+    def prices(
+        self, answer: Mapping[str, Design], loads: Sequence[Load]
+    ) -> tuple[float, dict[str, Feedback]]:
+        """Power of an answer [W], and what the mass at a group's joints costs.
+
+        Args:
+            answer: Design of each group.
+            loads: With its masses; their motions are kept, along which demand is affine in mass.
+        """
+        built = {g: (joints, self.shelf.designs([answer[g]])) for g, joints in self.groups.items()}
+        added = self.added(answer)
+
         hours = sum(load.mode.hours for load in loads)
-        return sum(
-            load.mode.hours / hours * float(through(load, built, account)[1].sum())
-            for load in loads
-        )
 
-    base = total(added)
-    out = {}
-    for g, joints in groups.items():
-        nudged = {j: m + _NUDGE / len(joints) * (j in joints) for j, m in added.items()}
-        out[g] = (total(nudged) - base) / _NUDGE
-    return out
+        def total(some: Sequence[Load], without: Sequence[str] = ()) -> float:
+            out = 0.0
+            for load in some:
+                counted = [joint not in without for joint in load.series.joints]
+                power = through(load, built, self.account)[1][counted].sum()
+                out += float(power) * load.mode.hours / hours
+            return out
+
+        out = {}
+        for g, joints in self.groups.items():
+            nudged = {j: m + _NUDGE * (j in joints) for j, m in added.items()}
+            more = loads_of(self.machine, self.modes, nudged, along=loads)
+            others = (total(more, joints) - total(loads, joints)) / _NUDGE
+            mass = added[joints[0]] + self.present
+            out[g] = Feedback(mass, others, Demanded.of(g, joints, more), _NUDGE)
+        return self.power(answer, loads), out
+
+    def power(self, answer: Mapping[str, Design], loads: Sequence[Load]) -> float:
+        """Of an answer in full, infinite where a limit is exceeded [W]."""
+        built = {g: (joints, self.shelf.designs([answer[g]])) for g, joints in self.groups.items()}
+        for g, (joints, design) in built.items():
+            if max(use[0] for use in Demanded.of(g, joints, loads).limits(design).values()) > 1.0:
+                return np.inf
+        hours = sum(load.mode.hours for load in loads)
+        each = [through(load, built, self.account)[1].sum() * load.mode.hours for load in loads]
+        return float(sum(each)) / hours

@@ -34,7 +34,9 @@ from pipeline.choice.errors import ChoiceError
 Array = NDArray[np.float64]
 GEARS: Final = ("strain_wave", "planetary", "self_locking")
 #: What a brake weighs per torque to the power 2/3; no maker's table at hand prints it.
-BRAKE_MASS: Final = Number(0.3, 0.15, 0.45, "kg", "0.15 to 0.45 kg at 1 N*m")
+BRAKE_MASS: Final = (0.15, 0.45)
+#: The same of gears, where none of a folder's prints its own; as of those that come here.
+GEAR_MASS: Final = (0.05, 0.15)
 #: Motor by which a gear's sheet is converted: none of the gear's numbers depends on it.
 _ANY: Final = {
     **dict.fromkeys(("current_of", "resistance_of", "torque_constant", "resistance"), 1.0),
@@ -174,22 +176,22 @@ class Shelf:
     @classmethod
     def of(cls, parts: Mapping[str, Part]) -> Shelf:
         """The motors, gears and brakes among parts; a mass that no sheet prints is filled in."""
-        masses: dict[str, list[float]] = {}
-        for part in parts.values():
-            if part.kind in GEARS and "mass" in part.printed:
-                masses.setdefault(part.kind, []).append(part.printed["mass"].value)
-        everything = [m for each in masses.values() for m in each]
+        sized = [
+            part.printed["mass"].value / part.printed["gear_continuous_torque"].value ** (2 / 3)
+            for part in parts.values()
+            if part.kind in GEARS and {"mass", "gear_continuous_torque"} <= part.printed.keys()
+        ]
+        low, high = np.quantile(sized, [0.1, 0.9]).tolist() if sized else GEAR_MASS
         numbers = {}
         for name, part in parts.items():
             own = _sheet(part) if part.kind == "motor" else dict(part.printed)
             if part.kind in GEARS and "mass" not in own:
-                same = masses.get(part.kind, []) or everything or [0.1, 1.0]
-                if part.kind == "self_locking":  # screws weigh less than worms
-                    same = everything or same
-                own["mass"] = _range(min(same), max(same), "kg")
+                torque = own.get("gear_continuous_torque", own.get("gear_rated_torque"))
+                size = torque.value ** (2 / 3) if torque else 1.0
+                own["mass"] = _range(low * size, high * size, "kg")
             elif part.kind == "brake" and "mass" not in own:
                 size = own["holding_torque"].value ** (2 / 3)
-                own["mass"] = _range(BRAKE_MASS.low * size, BRAKE_MASS.high * size, "kg")
+                own["mass"] = _range(BRAKE_MASS[0] * size, BRAKE_MASS[1] * size, "kg")
             numbers[name] = own
         return cls(parts, numbers)
 

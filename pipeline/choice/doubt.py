@@ -23,7 +23,7 @@ from scipy.stats.qmc import LatinHypercube
 
 from actuators.loading.data_sheet import Number
 from pipeline.choice.designs import Designs, Shelf
-from pipeline.choice.search import Account, Demanded
+from pipeline.choice.search import Account, Demanded, Feedback
 
 Array = NDArray[np.float64]
 DRAWS: Final = 256
@@ -101,7 +101,7 @@ def doubt(
     shelf: Shelf,
     combinations: Sequence[tuple[str, str, str]],
     account: Account,
-    price: float,
+    feedback: Feedback,
     *,
     draws: int = DRAWS,
     seed: int = 0,
@@ -113,7 +113,7 @@ def doubt(
         shelf: The parts.
         combinations: Motor, gear and brake of each design.
         account: What is counted.
-        price: What a kilogram at these joints costs the robot [W/kg].
+        feedback: What the mass of the actuators costs the robot.
         draws: How many.
         seed: Of the draws.
     """
@@ -130,7 +130,7 @@ def doubt(
     designs = Designs.together(made)
     power = demanded.power(designs, account)
     within = np.all([share <= 1.0 for share in demanded.limits(designs).values()], axis=0)
-    score = power + price * designs.mass * len(demanded.joints)
+    score = power + feedback.cost(demanded, designs, account)
     shape = (draws, count)
     return Doubt(
         power.reshape(shape), score.reshape(shape), within.reshape(shape), unknowns, values

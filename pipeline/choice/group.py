@@ -15,7 +15,7 @@ from actuators.errors import closest
 from pipeline.choice.designs import Designs
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.fronts import front
-from pipeline.choice.search import Account, Demanded
+from pipeline.choice.search import Account, Demanded, Feedback
 from pipeline.robot.robot_file import RobotSpec
 
 Array = NDArray[np.float64]
@@ -63,14 +63,16 @@ class Found:
         return front(self.score, self.mass)
 
 
-def search(demanded: Demanded, designs: Designs, account: Account, price: float = 0.0) -> Found:
+def search(
+    demanded: Demanded, designs: Designs, account: Account, feedback: Feedback | None = None
+) -> Found:
     """Every design of one group; exact, and most of them by bounds alone.
 
     Args:
         demanded: What the day asks.
         designs: All of them.
         account: What is counted.
-        price: What a kilogram at these joints costs the robot [W/kg].
+        feedback: What the mass of the actuators costs; nothing by default.
 
     Raises:
         ChoiceError: None is within limits; says which limit removed how many.
@@ -86,7 +88,7 @@ def search(demanded: Demanded, designs: Designs, account: Account, price: float 
             f"removed by {words}"
         )
     own = designs.taken(within)
-    cost = price * own.mass * len(demanded.joints)
+    cost = (feedback or Feedback()).cost(demanded, own, account)
     bound = demanded.net(own, account) + cost
     score = np.full(len(own), np.inf)
     todo = np.union1d(np.argsort(bound)[:_FIRST], np.argsort(own.mass)[:_FIRST])

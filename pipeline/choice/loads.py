@@ -17,8 +17,9 @@ from pipeline.choice.errors import MissionError
 from pipeline.choice.mission import Mode
 from pipeline.errors import PipelineError, StanceError
 from pipeline.motion.gait import gait_of
+from pipeline.motion.motion import Motion
 from pipeline.simulation.settings import LEAST_SAMPLES, SAMPLES
-from pipeline.simulation.walk_stand import stand
+from pipeline.simulation.walk_stand import demand_along, joint_series, stand
 
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
@@ -35,12 +36,14 @@ class Load:
         series: Of all joints; standing is two samples a second apart, at rest.
         weight: Of the robot [N].
         speed: Of walking [m/s]; 0 standing.
+        motion: That was followed; None standing.
     """
 
     mode: Mode
     series: ShaftSeries
     weight: float
     speed: float
+    motion: Motion | None = None
 
     @property
     def duration(self) -> float:
@@ -53,6 +56,7 @@ def loads_of(
     modes: Sequence[Mode],
     added: Mapping[str, float] | None = None,
     samples: int = LEAST_SAMPLES,
+    along: Sequence[Load] = (),
 ) -> tuple[Load, ...]:
     """Every mode's demand.
 
@@ -61,15 +65,19 @@ def loads_of(
         modes: Of the mission.
         added: Mass beside what the robot's bodies have, by joint whose actuator it is [kg].
         samples: Per half period of a gait.
+        along: The same modes with other masses, whose motions are kept; by default motions are
+            planned for the masses there are.
 
     Raises:
         MissionError: A mode cannot be done; its row is named.
         StanceError: The robot tips or slides in it; likewise.
     """
     out = []
-    for mode in modes:
+    motions = [load.motion for load in along] or [None] * len(modes)
+    for mode, motion in zip(modes, motions, strict=True):
         try:
-            out.append(_load(with_masses(machine.with_values(mode.changes), added), mode, samples))
+            own = with_masses(machine.with_values(mode.changes), added)
+            out.append(_load(own, mode, samples, motion))
         except StanceError as error:
             raise type(error)(f"{mode.where}: {error}") from None
         except PipelineError as error:
@@ -114,18 +122,21 @@ def _second_moments(mass: float, place: Array) -> Array:
     return mass * np.array([y * y + z * z, -x * y, x * x + z * z, -x * z, -y * z, x * x + y * y])
 
 
-def _load(machine: Machine, mode: Mode, samples: int) -> Load:
+def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> Load:
     given = machine.ready
     spec = given.robot.spec
     weight = given.machine.mass * spec.parameters["gravity"]  # [N]
     if not mode.stands:
         own = mode.motion is not None
-        asked = demand(machine, mode.motion, samples=SAMPLES if own else samples)
-        floats = own and spec.floating
         speed = 0.0 if own else gait_of(spec).speed
-        if floats:
+        if motion is not None:
+            moved = machine.walking(walks=False)
+            parts = demand_along(moved.machine, motion, adjust=moved.adjust, forces=moved.ground)
+            return Load(mode, joint_series(parts), weight, speed, motion)
+        asked = demand(machine, mode.motion, samples=SAMPLES if own else samples)
+        if own and spec.floating:
             speed = asked.motion.mean_speed
-        return Load(mode, asked.series, weight, speed)
+        return Load(mode, asked.series, weight, speed, asked.motion)
     still = machine.walking(walks=False)
     held = stand(still.machine, {}, adjust=still.adjust, forces=still.ground).demand
     torque = np.repeat(held.torque * (mode.hold != "none"), 2, axis=0)

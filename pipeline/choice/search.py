@@ -267,6 +267,30 @@ class Demanded:
         return out
 
 
+@dataclass(frozen=True, eq=False)
+class Feedback:
+    """What the mass of a group's actuators costs the robot, about the mass it was computed with.
+
+    Attributes:
+        mass: Of one actuator, in the demand that is searched [kg].
+        others: What other groups take for a kilogram at every joint of this one [W/kg].
+        heavier: The group's demand with `step` more at every joint of it; None for no feedback.
+        step: [kg].
+    """
+
+    mass: float = 0.0
+    others: float = 0.0
+    heavier: Demanded | None = None
+    step: float = 0.1
+
+    def cost(self, demanded: Demanded, designs: Designs, account: Account) -> Array:
+        """Of the mass of designs beside `mass`, linear in it, (D,) [W]."""
+        if self.heavier is None:
+            return np.zeros(len(designs))
+        own = (self.heavier.net(designs, account) - demanded.net(designs, account)) / self.step
+        return np.asarray((designs.mass - self.mass) * (own + self.others))
+
+
 def extreme(points: Array) -> Array:
     """Points (H, K) among (N, K) on whose convex hull all others lie; all where they are few.
 

@@ -41,11 +41,11 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
     rows = []
     for group, found in chosen.found.items():
         doubt = chosen.doubts[group]
-        best, joints = doubt.order[0], len(found.demanded.joints)
+        best, joints = chosen.place(group), len(found.demanded.joints)
         power = sum(row.energy_Wh for row in day if row.group == group) / chosen.hours
         motor, gear, brake = chosen.answer[group]
         design = chosen.designs(group)
-        low, high = np.quantile(doubt.power[:, best], [0.05, 0.95])
+        low, high = np.quantile(chosen.drawn(group), [0.05, 0.95])
         rows.append(
             AnswerRow(
                 group=group,
@@ -58,7 +58,7 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
                 energy_Wh_per_day=power * chosen.hours,
                 battery_h=None,
                 actuator_mass_kg=float(design.mass[0]) * joints,
-                chance_best=float(doubt.chance[best]),
+                chance_best=0.0 if best is None else float(doubt.chance[best]),
                 power_low_W=float(low),
                 power_high_W=float(high),
                 regret_W=doubt.regret,
