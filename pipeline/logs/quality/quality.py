@@ -64,6 +64,8 @@ def judge(
             from end to end.
     """
     found = Findings(log.name)
+    for remark in log.told:  # what holds for all of it comes first
+        found.note("", "file", 1, "1", "warning", remark)
     verdict = "refused" if len(log) < FEWEST_ROWS else "ok"
     detail = f"{len(log)} rows; at least {FEWEST_ROWS} are needed"
     found.note("", "rows", len(log), "1", verdict, detail)
@@ -280,8 +282,6 @@ def _as_read(log: Log, found: Findings) -> None:
     """What reading saw: sides of gears, repeated times, headers that were not used."""
     for column, remark in log.remarks.items():
         found.note(column, "side", 1, "1", "warning", remark)
-    for remark in log.told:
-        found.note("", "file", 1, "1", "warning", remark)
     if log.repeated_times:
         detail = f"{log.repeated_times} rows with the time of the row before were dropped"
         found.note("time_s", "repeated_times", log.repeated_times, "1", "warning", detail)
