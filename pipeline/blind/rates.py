@@ -8,7 +8,7 @@ from statistics import NormalDist
 from typing import Any, Final
 
 from pipeline.blind.answer import CONFIRMED
-from pipeline.blind.score import CLASS, DRAWN, RIGHT, WRONG, Score, Verdict
+from pipeline.blind.score import CLASS, DRAWN, RIGHT, WHOLE, WRONG, Score, Verdict
 
 Row = dict[str, Any]
 #: Normal quantile of a two-sided 95 % interval.
@@ -213,7 +213,10 @@ def rates(trials: Sequence[Row], names: Sequence[Row]) -> list[Rate]:
         text = f"the same, {joints[0]} to {joints[1]} joints" if joints[1] > 1 else "one joint"
         name = f"empty_{joints[0]}_joints"
         out.append(Rate(name, f"nothing hidden, {text}", sum(map(_silent, own)), len(own), None))
-    judged = [row for row in names if row["verdict"] != DRAWN]
+    # Bodies are fitted link by link, and are one name.
+    bodies = {(r["source"], r["trial"]): r for r in names if r["effect"] == WHOLE}
+    judged = [r for r in names if r["verdict"] != DRAWN and r["effect"] != WHOLE]
+    judged += bodies.values()
     sure = [row for row in judged if row["level"] == CONFIRMED]
     out += [
         _names("wrong_names", "written names that are wrong", (0.0, 0.05), judged, (WRONG,)),

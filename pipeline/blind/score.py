@@ -39,8 +39,10 @@ EQUIVALENT: Final[Mapping[str, frozenset[str]]] = {
 }
 #: Flexible members: drawn where a joint's friction has no simpler law, no name.
 FLEXIBLE: Final = frozenset({"friction_curve"})
+#: All bodies at once; written link by link.
+WHOLE: Final = "rigid_body_parameters"
 #: Names of bodies; right where the machine's are not the URDF's.
-BODIES: Final = frozenset({"rigid_body_parameters", "link_mass", "center_of_mass_offset"})
+BODIES: Final = frozenset({WHOLE, "link_mass", "center_of_mass_offset"})
 #: Scales and bodies, of which a single pendulum shows only the product.
 SCALES: Final = BODIES | {"effort_gain", "torque_constant_error"}
 #: What else a hidden effect is named by: a constant beside Coulomb friction is friction that one
