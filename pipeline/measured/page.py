@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 FIGURE = "measured"
 ANSWER = (
     "**No number was fitted.** Every watt is computed from robot files and actuator files as they "
-    "are; no watt is a pass mark.",
+    "are; no watt is a pass mark. Ground forces towards the hips, slower trots and an upright "
+    "Tytan were added to what is varied after a first comparison lay above the measurements.",
     "**The range** is the least and the greatest of every combination of what is not published; "
     "the likeliest of each is listed with it. Where the measured power lies outside, something is "
     "missing that the page does not vary.",
@@ -93,7 +94,7 @@ def tables_of(every: Mapping[str, Facts], found: Mapping[str, Predictions]) -> d
         every: Facts by robot.
         found: Predictions by robot and quantity.
     """
-    rows = [
+    rows: list[tuple[Any, Any]] = [
         (Measured, measured_rows),
         (UnknownMoves, unknown_rows),
         (MeasuredRatio, ratio_rows),

@@ -31,7 +31,7 @@ from pipeline.errors import GaitError, InvalidMotionError
 from pipeline.motion.base_motion import base_quaternions, one_sign
 from pipeline.motion.gait import body_rotation, gait_table
 from pipeline.motion.ground import Ground
-from pipeline.motion.motion import Motion, Segment
+from pipeline.motion.motion import Motion, Segment, level_ground
 from pipeline.motion.postures import refuse_beyond_limits
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
@@ -249,8 +249,8 @@ def _segment(
         # Pinocchio's acceleration is the derivative of the components in the base's axes.
         acceleration[:, :3] = back.apply(course(time, 2)) - np.cross(rate, linear)
         acceleration[:, 3:6] = _spin(quaternion, attitude(time, 2))
-    level = {} if normal is None else {"ground_normal": normal}
-    return Segment(name, time, configuration, velocity, acceleration, stance, **level)
+    normal = level_ground() if normal is None else normal
+    return Segment(name, time, configuration, velocity, acceleration, stance, normal)
 
 
 def _spin(q: Array, rate: Array) -> Array:
