@@ -210,9 +210,11 @@ def rates(trials: Sequence[Row], names: Sequence[Row]) -> list[Rate]:
         out.append(Rate(name, meaning, sum(bool(hit(r)) for r in chosen), len(chosen), aim))
     for joints in ((1, 1), (2, 4), (5, 9), (10, 99)):
         own = [r for r in trials if r["kind"] == "empty" and joints[0] <= r["joints"] <= joints[1]]
-        text = f"the same, {joints[0]} to {joints[1]} joints" if joints[1] > 1 else "one joint"
+        text = f"{joints[0]} to {joints[1]} joints" if joints[1] > 1 else "one joint"
         name = f"empty_{joints[0]}_joints"
-        out.append(Rate(name, f"nothing hidden, {text}", sum(map(_silent, own)), len(own), None))
+        out.append(
+            Rate(name, f"the same of machines with {text}", sum(map(_silent, own)), len(own), None)
+        )
     # Bodies are fitted link by link, and are one name.
     bodies = {(r["source"], r["trial"]): r for r in names if r["effect"] == WHOLE}
     judged = [r for r in names if r["verdict"] != DRAWN and r["effect"] != WHOLE]
