@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from pipeline.blind.twin.trial import make_trial
 from pipeline.cli.main import main
+from tests.leg_log import leg_logs
 from tests.pipeline.logs.formats.bags import write_bag
 
 Columns = dict[str, np.ndarray]
@@ -20,7 +20,7 @@ JOINTS = [f"rm_joint_{k}" for k in (1, 2, 3)]
 
 @pytest.fixture(scope="module")
 def leg() -> Columns:
-    return make_trial(5, ["viscous_friction"], "leg", "low").logs["log"]
+    return leg_logs(5, ["viscous_friction"])["log_1"]
 
 
 def hanging() -> Columns:
