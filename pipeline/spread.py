@@ -129,8 +129,8 @@ def _on_cluster(
     except ImportError:
         text = "--scheduler needs the package distributed: pip install 'legwatt[cluster]'"
         raise SpreadError(text) from None
-    # What matters of its log is said below, in one line.
-    logging.getLogger("distributed").handlers = [logging.NullHandler()]
+    for name in ("distributed", "distributed.client", "tornado.application"):
+        logging.getLogger(name).handlers = [logging.NullHandler()]  # what matters is said below
     client: Any = None
     try:
         client = distributed.Client(address, timeout=_PATIENCE)

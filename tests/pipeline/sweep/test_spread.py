@@ -127,7 +127,9 @@ def test_a_sweep_on_a_cluster_has_the_same_bytes_though_a_worker_is_killed(tmp_p
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_dies_is_one_line_and_what_was_done_is_known() -> None:
+def test_a_scheduler_that_dies_is_one_line_and_what_was_done_is_known(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     found = {}
     with cluster() as (address, processes):
         blocks = spread(slow_square, range(30), scheduler=address)
@@ -136,3 +138,4 @@ def test_a_scheduler_that_dies_is_one_line_and_what_was_done_is_known() -> None:
         with pytest.raises(SpreadError, match="the scheduler is gone"):
             found.update(blocks)
     assert 5 <= len(found) < 30
+    assert "Traceback" not in capfd.readouterr().err
