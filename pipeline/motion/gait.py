@@ -45,11 +45,11 @@ class Gait:
         ground: The plane it walks on.
         body: Rotation from the base to the ground's axes at zero heading, shape (3, 3).
         path: Name of the foot's path through the air.
-        surge: Path of the body ahead of its even course and back, twice a period [m].
         margin: Distance from every edge of the support that the body's sway keeps [m]; None where
             the body does not sway.
         margin_stated: Whether it must be that one; else it may be half of what there is to have.
         source: File, for messages.
+        surge: Path of the body ahead of its even course and back, twice a period [m].
     """
 
     legs: tuple[str, ...]
@@ -62,10 +62,10 @@ class Gait:
     ground: Ground
     body: Array
     path: str
-    surge: float
     margin: float | None
     margin_stated: bool
     source: str
+    surge: float = 0.0
 
     @property
     def speed(self) -> float:
