@@ -119,9 +119,13 @@ class Chosen:
         return drawn.power[:, 0]
 
     def place(self, group: str) -> int | None:
-        """Of the answer among the finalists of its group; None where the last search left it."""
-        names = _finalists(self.found[group])
-        return names.index(self.answer[group]) if self.answer[group] in names else None
+        """Of the answer among the finalists of its group; None where the search did not settle.
+
+        Then the answer is the best that was recomputed in full, and the draws speak of others.
+        """
+        first = self.doubts[group].order[0]
+        settled = _finalists(self.found[group])[first] == self.answer[group]
+        return int(first) if settled else None
 
     def battery_hours(self, power: float) -> float | None:
         """On one charge [h]."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -58,7 +59,7 @@ class Choice(Result):
         )
         each = [
             f"{group}: {words((row['motor'], row['gear'], row['brake']))} at {row['ratio']:.4g}:1 "
-            f"({row['power_W']:.3g} W, best in {100 * row['chance_best']:.0f} % of draws)"
+            f"({row['power_W']:.3g} W, {_sure(row['chance_best'])})"
             for group, row in rows.items()
         ]
         unknown = self.table("unknowns").frame()
@@ -108,3 +109,10 @@ def choice(
     given = machine.ready
     inputs: Sequence[Path] = (*inputs_of(given), path)
     return Choice("choose", by_name(tables), lambda: metadata(given), tuple(inputs), chosen)
+
+
+def _sure(chance: float | None) -> str:
+    """Chance of being the best in words; none where mass fed back did not settle."""
+    if chance is None or math.isnan(chance):
+        return "best of those recomputed in full; mass did not settle"
+    return f"best in {100 * chance:.0f} % of draws"

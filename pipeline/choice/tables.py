@@ -58,7 +58,7 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
                 energy_Wh_per_day=power * chosen.hours,
                 battery_h=None,
                 actuator_mass_kg=float(design.mass[0]) * joints,
-                chance_best=0.0 if best is None else float(doubt.chance[best]),
+                chance_best=None if best is None else float(doubt.chance[best]),
                 power_low_W=float(low),
                 power_high_W=float(high),
                 regret_W=doubt.regret,
@@ -67,6 +67,7 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
             )
         )
     hotel = chosen.wanted.account.hotel
+    told = [row.chance_best for row in rows if row.chance_best is not None]
     totals = {
         name: sum(getattr(row, name) for row in rows)
         for name in ("joints", "actuator_mass_kg", "regret_W")
@@ -86,7 +87,9 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
             brake="",
             energy_Wh_per_day=energy,
             battery_h=hours,
-            chance_best=float(np.prod([row.chance_best for row in rows])),
+            chance_best=None
+            if None in chances
+            else float(np.prod([c for c in chances if c is not None])),
             not_printed="",
             **totals,
             **powers,
