@@ -36,10 +36,8 @@ def test_every_known_folder_loads_is_in_the_table_and_states_where_numbers_come_
     for name in folders:
         catalog = load_catalog(KNOWN / name)
         joints = table[name].get("joint", ())
-        own = {
-            table[name]["alternative"],
-            *(j["alternative"] for j in joints if "alternative" in j),
-        }
+        own = {table[name]["alternative"]}
+        own |= {joint["alternative"] for joint in joints if "alternative" in joint}
         assert set(catalog.alternatives) == {"ideal"} | own
         for _, number in catalog.rows():
             assert number.basis in ("published", "datasheet", "derived", "identified", "assumed")
