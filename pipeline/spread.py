@@ -7,7 +7,7 @@ import multiprocessing
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing
@@ -36,7 +36,7 @@ def spread(
     scheduler: str | None = None,
     title: str = "",
     done: int = 0,
-) -> Iterator[tuple[int, Result]]:
+) -> Generator[tuple[int, Result], None, None]:
     """Yield every block's place in `blocks` and its result, in the order in which they finish.
 
     A result is yielded in the calling process as soon as it is there: what the caller stores before
@@ -85,7 +85,7 @@ def spread(
 
 def _on_processes(
     work: Callable[[Block], Result], blocks: Sequence[Block], workers: int
-) -> Iterator[tuple[int, Result]]:
+) -> Generator[tuple[int, Result], None, None]:
     pool = ProcessPoolExecutor(min(workers, len(blocks)), initializer=_begin)
     try:
         places = {pool.submit(work, block): place for place, block in enumerate(blocks)}
@@ -123,7 +123,7 @@ def _alone(work: Callable[[Block], Result], block: Block) -> Result:
 
 def _on_cluster(
     work: Callable[[Block], Result], blocks: Sequence[Block], address: str
-) -> Iterator[tuple[int, Result]]:
+) -> Generator[tuple[int, Result], None, None]:
     try:
         import distributed
     except ImportError:

@@ -22,7 +22,7 @@ SPEEDS = [0.02 + 0.02 * k for k in range(8)]  # [m/s]
 def sweep_ratio() -> None:
     """A sweep against the same walks without rows, parts and file."""
     order = Order(samples=51)
-    machine = machine_of(*order.source)  # type: ignore[arg-type]
+    machine = machine_of(*order.source)
 
     def bare() -> None:
         for speed in SPEEDS:
@@ -62,10 +62,10 @@ def supply_ratios() -> None:
         empty.terminal = True  # type: ignore[attr-defined]
         return float(solve_ivp(rate, (0, 1e7), [1.0], events=empty, rtol=1e-6).t[-1])
 
-    def round_of(row: np.ndarray) -> None:
+    def round_of(row: np.ndarray) -> np.ndarray:
         """Ten rounds by a general integrator."""
         winding, housing = 42.8 / 1.93, 809.0 / 4.65
-        state = [REFERENCE_K] * 2
+        state = np.full(2, REFERENCE_K)
 
         def slope(_: float, x: np.ndarray, loss: float) -> list[float]:
             through = (x[0] - x[1]) / 1.93
@@ -76,6 +76,7 @@ def supply_ratios() -> None:
         for _ in range(10):
             for time, loss in zip(seconds, row, strict=True):
                 state = solve_ivp(slope, (0, time), state, args=(loss,), rtol=1e-6).y[:, -1]
+        return state
 
     calls: dict[str, Call] = {
         "battery life": lambda: pack.hours(power, shares),

@@ -129,7 +129,9 @@ class TwoBody:
             map_, gained = mode.map @ map_, _times(mode.map, gained) + mode.gained
         stable = _largest_eigenvalue(map_) < 1.0
         safe = np.where(stable[..., None, None], map_, 0.0)
-        state: FloatArray = np.linalg.solve(np.eye(2) - safe, gained[..., None])[..., 0]
+        state: FloatArray = np.asarray(
+            np.linalg.solve(np.eye(2) - safe, gained[..., None])[..., 0], dtype=np.float64
+        )
         peaks, means = [state[..., 0]], []
         for mode in modes:
             peaks.append(mode.turning(state))

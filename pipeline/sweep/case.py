@@ -114,7 +114,7 @@ def _checked(order: Order) -> Machine:
     Raises:
         SweepError: It is not.
     """
-    machine = machine_of(*order.source)  # type: ignore[arg-type]
+    machine = machine_of(*order.source)
     if digest_of(order.walking(machine)) != order.digest:
         raise SweepError(
             "a worker reads other robot or actuator files, or is of another version, than the "
@@ -158,7 +158,7 @@ def _walked(given: Settings) -> list[Row]:
         {header: list(values) for header, values in made.columns.items()}
         for made in (
             tables[name]() for name in ("robot_energy", "walking_stability", "motor_limits")
-        )  # type: ignore[operator]
+        )
     )
     peaks = np.max([np.abs(part.torque).max(axis=0) for part in walking.demand.segments], axis=0)
     most = int(peaks.argmax())
@@ -173,7 +173,7 @@ def _walked(given: Settings) -> list[Row]:
         for i in own:
             if limits["breach"][i]:
                 over.setdefault(limits["quantity"][i], limits["joint"][i])
-        row = SweepRow(
+        row: list[Any] = [
             *(values[k] for values in energy.values()),
             min(stability["least_margin_m"]),
             min(stability["least_normal_force_N"]),
@@ -181,8 +181,8 @@ def _walked(given: Settings) -> list[Row]:
             float(peaks[most]),
             walking.demand.joints[most],
             *found.values(),
-            beyond=", ".join(f"{quantity} of {joint}" for quantity, joint in over.items()),
-            refusal="",
-        )
-        rows.append(asdict(row))
+            ", ".join(f"{quantity} of {joint}" for quantity, joint in over.items()),
+            "",
+        ]
+        rows.append(asdict(SweepRow(*row)))
     return rows

@@ -77,7 +77,7 @@ def sweep(
             gone; what was finished stays.
         ActuatorError: An actuator file cannot be used.
     """
-    machine = machine_of(*order.source)  # type: ignore[arg-type]
+    machine = machine_of(*order.source)
     digest = digest_of(order.walking(machine))
     axes = read_axes(vary, machine)
     cases = cases_of(axes, sample, method, seed)
