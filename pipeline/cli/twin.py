@@ -4,11 +4,29 @@ from __future__ import annotations
 
 import argparse
 import shlex
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from pipeline.blind.machines.trial import make
 from pipeline.errors import PipelineError
 from reports.folder import PREFIX, output_errors
+
+
+@contextmanager
+def _whole(out: Path, there: bool) -> Iterator[None]:
+    """The trial or nothing; a folder that was there stays."""
+    try:
+        yield
+    except BaseException:
+        if out.is_dir():
+            for name in ("given", "truth.json"):
+                path = out / name
+                shutil.rmtree(path) if path.is_dir() else path.unlink(missing_ok=True)
+            if not there:
+                out.rmdir()
+        raise
 
 
 def run_twin(options: argparse.Namespace) -> int:
@@ -22,7 +40,8 @@ def run_twin(options: argparse.Namespace) -> int:
     if [path for path in out.glob("*") if not path.name.startswith(PREFIX)]:
         raise PipelineError(f"{out}: not empty; give a new folder for the trial")
     effects = None if options.hide is None else tuple(options.hide)
-    with output_errors(out):
+    there = out.exists()
+    with output_errors(out), _whole(out, there):
         truth = make(
             options.source,
             options.seed,

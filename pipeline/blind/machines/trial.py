@@ -149,7 +149,9 @@ def _run(
     for number, (log, course) in enumerate(zip(("log", "test"), courses, strict=True)):
         happened = run(machine, case.plant, course)
         columns = measure(machine, case.plant, happened, sensors, random(f"noise {number}"))
-        csv.write_csv(pa.table(columns), folder / "given" / f"{log}.csv", _PLAIN)
+        sink = pa.BufferOutputStream()
+        csv.write_csv(pa.table(columns), sink, _PLAIN)
+        (folder / "given" / f"{log}.csv").write_bytes(sink.getvalue())
         if number == 0:
             for row in rows:
                 others = tuple(effect for effect in effects if effect != row["effect"])
