@@ -87,9 +87,7 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
             brake="",
             energy_Wh_per_day=energy,
             battery_h=hours,
-            chance_best=None
-            if None in chances
-            else float(np.prod([c for c in chances if c is not None])),
+            chance_best=float(np.prod(told)) if len(told) == len(rows) else None,
             not_printed="",
             **totals,
             **powers,
