@@ -11,6 +11,7 @@ from pipeline.choice.choose import Wanted, choose
 from pipeline.choice.errors import ChoiceError, MissionError
 from pipeline.choice.loads import loads_of
 from pipeline.choice.mission import read_mission
+from pipeline.choice.tables import tables_of
 from pipeline.errors import StanceError
 
 WRONG = {
@@ -78,3 +79,10 @@ def test_answer_of_few_parts_is_within_limits_in_full(tmp_path: Path) -> None:
         assert doubt.regret >= 0.0
         assert (doubt.worth() <= doubt.regret + 1e-9).all()
         assert chosen.answer[group][0].startswith(only)
+    tables = {table.name: table.frame() for table in tables_of(chosen)}
+    day, robot = tables["day"], tables["answer"].iloc[-1]
+    parts = day[day.group != "robot"]
+    assert parts.energy_Wh.sum() == pytest.approx(robot.energy_Wh_per_day)
+    kinds = ["mechanical_W", "winding_W", "friction_W", "brakes_W", "idle_W", "returned_W"]
+    # Over a cycle no kinetic energy is left.
+    assert day[kinds].sum(axis=1).tolist() == pytest.approx(day.power_W.tolist(), rel=0.01)
