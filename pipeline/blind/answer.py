@@ -105,7 +105,8 @@ def ask(folder: Path, options: list[str]) -> dict[str, Any]:
     code = process.returncode if process.returncode in (0, 1, 2) else FAILED
     if process.returncode < 0:
         said = [f"no answer within {PATIENCE} s of computing"]
-    if code in (0, 1) and not (out / "model.toml").exists():
+    # A model file is written only where there is something to write; the table of names always.
+    if code in (0, 1) and not (out / "candidates.csv").exists():
         code = FAILED
     return {
         "code": code,
@@ -123,7 +124,7 @@ def read_answer(files: Mapping[str, str], run: dict[str, Any]) -> Answer:
     """
     names: tuple[Name, ...] = ()
     if run["code"] in (0, 1):
-        edits = tomllib.loads(files["model.toml"]).get("edit", [])
+        edits = tomllib.loads(files.get("model.toml", "")).get("edit", [])
         classes = _classes(files.get("candidates.csv", ""))
         names = tuple(_name(edit, classes) for edit in edits)
     return Answer(run["code"], run["seconds"], names, run["message"])

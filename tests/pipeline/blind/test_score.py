@@ -164,6 +164,8 @@ interval = [1.1, 1.3]
     assert named.rivals == ("link_mass",)
     assert named.values == {"gain": (1.2, 1.1, 1.3)}
     assert read_answer({}, {**run, "code": 2}).names == ()
+    # Where nothing is found there is no model file, and an answer all the same.
+    assert read_answer({"candidates.csv": candidates}, run).given
 
 
 def test_rates_count_what_they_say() -> None:
