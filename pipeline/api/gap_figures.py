@@ -243,7 +243,7 @@ def write_pictures_and_page(
     model, weighed = story.given.model, told.story.weighed
     write_where_map(where.rows, model.joints, model.name, folder)
     write_waterfall(weighed.stages, story.noise, story.naming.unit, model.name, folder)
-    write_in_time(where.measurements, weighed.stages[1], weighed.stages[-1], told.shown, folder)
+    write_in_time(where.measurements, weighed.stages[0], weighed.stages[-1], told.shown, folder)
     for found, pair, joint in zip(story.naming.found, weighed.pairs, weighed.joints, strict=True):
         name = signature_name(found)
         if name in story.signatures:

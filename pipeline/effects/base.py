@@ -99,6 +99,7 @@ class Effect(ABC):
         competes: Whether it is tried by itself; others are fitted together for a whole machine.
         tolerances: Standard deviation by coordinate, where every machine and place has the same.
         kinds_absorbed: Kinds of tolerances at its place that are this effect in small.
+        additive: Whether what it adds does not depend on what else acts at the joint.
         halved: Nonlinear parameter that is refined by factors; empty for none.
     """
 
@@ -115,6 +116,7 @@ class Effect(ABC):
     competes: ClassVar[bool] = True
     tolerances: ClassVar[Mapping[str, float]] = {}
     kinds_absorbed: ClassVar[tuple[str, ...]] = ()
+    additive: ClassVar[bool] = False
     halved: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:

@@ -23,6 +23,9 @@
     unit = "N*m"
     interval = [0.101, 0.114]
 
+    [noise.current]                  # [A]: standard deviation of what no effect explains
+    rm_joint_1 = 0.0021              # sensor and encoder noise, tolerances of the parts
+
 Edits are applied in order to what the files say; the files themselves are never changed.
 """
 
@@ -110,6 +113,8 @@ class ModelFile:
         alternative: Actuator of the catalogue; empty for none.
         actuators_sha256: Catalogue file to its hash as written.
         edits: In order.
+        noise: Channel to joint to standard deviation of what no effect explains, in the channel's
+            unit; empty where no log was compared.
         changed: Files whose contents are no longer those of the hashes, in words.
     """
 
@@ -118,6 +123,7 @@ class ModelFile:
     alternative: str
     actuators_sha256: Mapping[str, str] = field(default_factory=dict)
     edits: tuple[Edit, ...] = ()
+    noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     changed: tuple[str, ...] = ()
 
     def with_edits(self, edits: Sequence[Edit]) -> ModelFile:
@@ -216,6 +222,10 @@ class _Model(Table):
     robot: _Robot
     actuators: _Actuators = _Actuators()
     edit: Annotated[tuple[_Edit, ...], Strict(False)] = ()
+    noise: dict[
+        Literal["torque", "current", "voltage", "power"],
+        dict[str, Annotated[Number, Field(ge=0.0)]],
+    ] = Field(default_factory=dict)
 
 
 def file_sha256(path: Path) -> str:
@@ -311,7 +321,7 @@ def read_model_file(path: Path, catalog: Path | None = None) -> ModelFile:
     model = checked(_Model, table, where, ModelFileError)
     robot, hashes = path.parent / model.robot.file, model.actuators.sha256
     edits, alternative = tuple(map(_as_edit, model.edit)), model.actuators.alternative
-    file = ModelFile(robot, model.robot.sha256, alternative, hashes, edits)
+    file = ModelFile(robot, model.robot.sha256, alternative, hashes, edits, model.noise)
     return replace(file, changed=_changed(file, where, catalog))
 
 

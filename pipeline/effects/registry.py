@@ -11,7 +11,7 @@ from pipeline.effects.base import Effect
 from pipeline.effects.bodies.base_tilt import BaseTilt
 from pipeline.effects.bodies.center_of_mass_offset import CenterOfMassOffset
 from pipeline.effects.bodies.internal_foot_force import InternalFootForce
-from pipeline.effects.bodies.link_mass import LinkMass, PlacedPayload
+from pipeline.effects.bodies.link_mass import LinkMass
 from pipeline.effects.bodies.rigid_body_parameters import RigidBodyParameters
 from pipeline.effects.drive.backlash import Backlash
 from pipeline.effects.drive.joint_elasticity import JointElasticity
@@ -72,7 +72,6 @@ EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
 )
 _BARE_COUPLING: Final = BareCoupling()
 _SENSED_HEATING: Final = SensedHeating()
-_PLACED_PAYLOAD: Final = PlacedPayload()
 
 
 def effect_named(name: str) -> Effect:
@@ -95,4 +94,4 @@ def catalogue(model: MachineModel) -> tuple[Effect, ...]:
         if e.competes
     ]
     # A log with the motors' temperature has places for this one, any other for the plain one.
-    return (*effects, _SENSED_HEATING, _PLACED_PAYLOAD)
+    return (*effects, _SENSED_HEATING)

@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
 
-from pipeline.regression.result import BaseParameter
-
 #: How far a finding is to be trusted: name, law and size stand; it closes a large part though its
 #: law is not exactly the machine's or its size scatters; it is listed and not written.
 CONFIRMED: Final = "confirmed"
@@ -23,53 +21,22 @@ REJECTED: Final = "rejected"
 NOT_IDENTIFIABLE: Final = "not identifiable on this motion"
 INDISTINGUISHABLE: Final = "indistinguishable from "
 
-#: Chance that any of the candidates tried is accepted by noise alone.
-FALSE_ALARM: Final = 0.002
-#: Least fall of the penalised misfit, in units of the noise's variance of one independent sample.
-LEAST_GAIN: Final = 30.0
-#: ... and as a share of the misfit at noise level of one of the affected joints.
-LEAST_SHARE: Final = 0.02
-#: A tolerance is exceeded beyond this many of its standard deviations.
-TOLERANCE_SIGMAS: Final = 2.5
-#: Chance that noise alone makes any tolerance look exceeded.
-TOLERANCE_ALARM: Final = 0.01
-#: Rivals whose penalised misfit differs by less than this are one class, in noise variances ...
-RIVAL_GAIN: Final = 25.0
-#: ... or by less than this share of what the better one explains.
-RIVAL_SHARE: Final = 0.002
-#: Below this share a candidate's column is explained by everything else that is free.
-LEAST_ALONE: Final = 1e-6
-#: General effects whose own coordinate may be invisible: name and size that would be worth naming.
-WORTH_NAMING: Final = {"backlash": ("width", 1e-3)}  # [rad]
-#: Scatter of an effect's size over blocks, over that of noise, that no right law shows ...
-LARGEST_SCATTER: Final = 8.0
-#: ... where more than this many times the noise is left as well.
-LARGEST_EXCESS: Final = 1.12
-#: ... or this scatter where so much is left that it counts as unexplained.
-SUSPECT_SCATTER: Final = 2.5
-#: A law is not doubted where what is left is less than this share of what the effect does, both
-#: root mean square.
-DWARFED: Final = 0.2
+#: Uncertainties of the URDF that compete [1]; at the first its bodies are kept.
+UNCERTAINTIES: Final = (0.003, 0.01, 0.03, 0.1, 0.3)
+NOTHING: Final = "beside the other effects found its size may be nothing at all"
+#: A rival is excluded where the log is less likely with it by more than this (logarithm) ...
+EXCLUDED: Final = 5.0
+#: ... and predicts blocks it has not seen worse by this many standard errors.
+SURE: Final = 2.0
+#: Rivals of a name that are looked at.
+RIVALS: Final = 6
+SHAPELESS: Final = (
+    "a shape of friction or of a torque over position that is not in the catalogue explains the "
+    "log without it"
+)
 #: What a model leaves over the noise floor, in any channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
-#: A name that leaves more than this share of the gap on *choose* has closed nothing.
-IDLE: Final = 0.95
 IDLE_NAME: Final = "it closes none of the gap on validation data"
-#: What is not acceptable is offered as the nearest, with doubt, where it takes this share of an
-#: unexplained gap on *choose* ...
-NEAREST_SHARE: Final = 0.2
-#: ... and its size would come out as large by chance in this share of logs.
-NEAREST_ALARM: Final = 0.01
-NEAREST: Final = (
-    "it takes a fifth or more of the gap on validation data, but parts of the log disagree about "
-    "its size too much to be sure of the law"
-)
-BOUND: Final = "its estimate runs into the bound of what can be"
-NOTHING: Final = "beside the other effects found its size may be nothing at all"
-#: Effects that a small explanation holds at most; what needs more is fitted as a whole machine.
-FEW: Final = 3
-#: Effects that one log may be found to lack, per joint.
-MOST_EFFECTS: Final = 4
 
 
 @dataclass(frozen=True)
@@ -259,7 +226,7 @@ class Naming:
     channel: str
     unit: str
     notes: tuple[str, ...] = field(default=())
-    base: tuple[BaseParameter, ...] = field(default=())
+    base: tuple[object, ...] = field(default=())
 
 
 def named(found: Found) -> str:

@@ -35,15 +35,18 @@ class BodyChange:
         shift: Displacement of the centre of mass in the frame of the body's joint [m].
         scale: Factor on mass and rotational inertia [1].
         inertia_scale: Further factor on the rotational inertia about the centre of mass [1].
-        carried: Mass [kg] and first moments [kg*m] of what is carried besides, a point mass, in the
+        carried: Ten inertial parameters of what is carried besides, in Pinocchio's order, about the
             frame of the body's joint.
+        strain: Symmetric S (4, 4) by `STRAINS`, with which the pseudo-inertia P = L L^T becomes
+            L exp(S) L^T: whatever S is, some body has it.
     """
 
     payload: float = 0.0
     shift: Vector = (0.0, 0.0, 0.0)
     scale: float = 1.0
     inertia_scale: float = 1.0
-    carried: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    carried: tuple[float, ...] = ()
+    strain: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -171,7 +171,7 @@ def _open(model: MachineModel) -> Iterator[_Open]:
             continue
         unit = 0.1 * total
         for k, arm in enumerate([1.0, *[max(float(np.mean(lengths)), 0.01)] * 3]):
-            carried = np.array(change.carried)
+            carried = np.array(change.carried or (0.0,) * 10)
             carried[k] += unit * arm
             edit = replace(change, carried=tuple(carried.tolist()))
             spread, least = (_CARRIED, 0.0) if k == 0 else (_CARRIED * _OUT, -np.inf)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
+import scipy.linalg
 from numpy.typing import NDArray
 
 from pipeline.dynamics.feet_on_ground import FeetOnGround, inverse_dynamics
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _BLOCK = 2048
+#: Entries of a strain, in this order.
+_ROWS, _COLUMNS = (0, 1, 2, 3, 0, 0, 1, 0, 1, 2), (0, 1, 2, 3, 1, 2, 2, 3, 3, 3)
 _MANY = 8192  # rows from which a second thread pays
 
 
@@ -46,8 +49,10 @@ def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
             change.scale * change.inertia_scale * body.inertia,
         )
         if any(change.carried):
-            ten = np.asarray(changed.toDynamicParameters()) + point_mass(change.carried)
+            ten = np.asarray(changed.toDynamicParameters()) + np.array(change.carried)
             changed = pin.Inertia.FromDynamicParameters(ten)
+        if any(change.strain):
+            changed = strained(changed, change.strain)
         model.inertias[index] = changed
     roll, pitch = bodies.tilt
     if roll or pitch:
@@ -56,16 +61,39 @@ def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
     return model
 
 
-def point_mass(carried: Sequence[float]) -> Array:
-    """Inertial parameters (10,) of a point mass about the origin of its first moments.
+def strained(body: pin.Inertia, strain: Sequence[float]) -> pin.Inertia:
+    """A body whose pseudo-inertia P = L L^T has become L exp(S) L^T.
+
+    P = [[tr(I) / 2 - I, m c], [(m c)^T, m]] about the joint's frame (Wensing, Kim and Slotine,
+    RA-L 2018); S is symmetric, so that the mass stays positive and the inertia possible.
 
     Args:
-        carried: Mass [kg] and first moments [kg*m]; without a mass the moments alone.
+        body: Before.
+        strain: Of S the entries xx, yy, zz, mm, xy, xz, yz, xm, ym, zm.
     """
-    mass, *moments = carried
-    m = np.array(moments)
-    turning = (m @ m * np.eye(3) - np.outer(m, m)) / mass if mass else np.zeros((3, 3))
-    return np.array([mass, *m, *turning[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+    S = np.zeros((4, 4))
+    S[_ROWS, _COLUMNS] = strain
+    S[_COLUMNS, _ROWS] = strain
+    P = pseudo_inertia(np.asarray(body.toDynamicParameters()))
+    size, axes = np.linalg.eigh(P)
+    L = axes * np.sqrt(np.maximum(size, 0.0))
+    # A planar or point-like body has no extent that could change.
+    P = P + L @ (scipy.linalg.expm(S) - np.eye(4)) @ L.T
+    inertia = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
+    ten = [P[3, 3], *P[:3, 3], *inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]]
+    return pin.Inertia.FromDynamicParameters(np.array(ten))
+
+
+def pseudo_inertia(ten: Array) -> Array:
+    """Pseudo-inertia (4, 4) of ten inertial parameters in Pinocchio's order."""
+    m, c = ten[0], ten[1:4]
+    xx, xy, yy, xz, yz, zz = ten[4:]
+    inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    P = np.zeros((4, 4))
+    P[:3, :3] = 0.5 * np.trace(inertia) * np.eye(3) - inertia
+    P[:3, 3] = P[3, :3] = c
+    P[3, 3] = m
+    return P
 
 
 class RigidBodies:

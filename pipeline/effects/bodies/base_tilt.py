@@ -16,6 +16,7 @@ class BaseTilt(Effect):
     """Gravity that does not point along the ground's normal."""
 
     name = "base_tilt"
+    additive = True
     place_kind = "ground"
     parameters: ClassVar = (
         Parameter("roll", "rad", -0.6, 0.6),

@@ -20,6 +20,7 @@ class CenterOfMassOffset(Effect):
     """Displacement of a link's centre of mass in the frame of its joint."""
 
     name = "center_of_mass_offset"
+    additive = True
     place_kind = "link"
     parameters: ClassVar = tuple(Parameter(axis, "m", -0.5, 0.5) for axis in "xyz")
     coordinates: ClassVar = tuple(

@@ -16,6 +16,7 @@ class InternalFootForce(Effect):
     """A lateral force pair between the standing feet of either side; positive spreads the feet."""
 
     name = "internal_foot_force"
+    additive = True
     place_kind = "ground"
     parameters: ClassVar = (Parameter("lateral", "N", -1e5, 1e5),)
     coordinates: ClassVar = (Coordinate("lateral", 1.0, signed=True),)

@@ -8,6 +8,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
+from pipeline.effects.bodies.rigid_body_parameters import NAMES
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -21,6 +22,7 @@ class LinkMass(Effect):
     """A point mass more, at the link's centre of mass or where it is said to be."""
 
     name = "link_mass"
+    additive = True
     place_kind = "link"
     parameters: ClassVar = (
         Parameter("mass", "kg", -1e4, 1e4),
@@ -41,14 +43,15 @@ class LinkMass(Effect):
         joint = model.carrier(place[0])
         body = model.bodies.body(joint)
         if any(axis in shape for axis in AXES):
-            mass = x["mass"]
-            far = [mass * shape.get(axis, 0.0) for axis in AXES]
-            return carrying(model, joint, (mass, far[0], far[1], far[2]))
+            place = np.array([shape.get(axis, 0.0) for axis in AXES])
+            return carrying(model, joint, point_mass(x["mass"], place))
         changed = replace(body, payload=body.payload + x["mass"])
         return model.with_bodies(model.bodies.with_body(joint, changed))
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
-        """Something of the link is left, and the payload is no multiple of the robot."""
+        """Something of the link is left, and the payload is within reach and no second robot."""
+        if max((abs(shape.get(axis, 0.0)) for axis in AXES), default=0.0) > FARTHEST:
+            return False
         total = sum(i.mass for i in model.rigid.inertias)
         return bool(-0.9 * own_mass(model, place[0]) < x["mass"] < 2.0 * total)
 
@@ -59,46 +62,34 @@ class LinkMass(Effect):
         return {"mass": MASS_TOLERANCE * own_mass(model, place[0])}
 
 
-class PlacedPayload(LinkMass):
-    """A payload at the end of a chain of links, its place not known: linear in m and m c."""
+class AddedBody:
+    """Ten inertial parameters more at a link, in which joint torques are linear."""
 
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (
-        Coordinate("mass", 1e-2),
-        *(Coordinate(f"m{axis}", 1e-3, signed=True, required=False) for axis in AXES),
-    )
-    kinds_absorbed: ClassVar[tuple[str, ...]] = ("mass", "com_x", "com_y", "com_z")
-
-    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """Last links."""
-        carriers = {model.rigid.getJointId(joint) for joint in model.links.values()}
-        inner = {int(p) for k, p in enumerate(model.rigid.parents) if k in carriers}
-        ids = {link: model.rigid.getJointId(joint) for link, joint in model.links.items()}
-        return [p for p in super().places(model, m) if ids[p[0]] not in inner]
+    coordinates: ClassVar = tuple(Coordinate(name, 1e-2, signed=True) for name in NAMES)
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
-        """Add the mass and its moments."""
-        moments = (x["mass"], x["mx"], x["my"], x["mz"])
-        return carrying(model, model.carrier(place[0]), moments)
-
-    def physical(self, x: Values, shape: Values) -> dict[str, float]:
-        """Mass and place."""
-        mass = x["mass"]
-        far = {axis: x[f"m{axis}"] / mass if mass else 0.0 for axis in AXES}
-        return {"mass": mass, **{axis: min(max(v, -1e6), 1e6) for axis, v in far.items()}}
-
-    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
-        """No multiple of the robot, and within reach."""
-        far = max(abs(self.physical(x, shape)[axis]) for axis in AXES)
-        return super().plausible(model, place, x, shape) and far <= FARTHEST
+        """Add them."""
+        return carrying(model, model.carrier(place[0]), np.array([x[n] for n in NAMES]))
 
 
-def carrying(
-    model: MachineModel, joint: str, more: tuple[float, float, float, float]
-) -> MachineModel:
-    """A machine whose body at a joint carries a point mass more, by mass and first moments."""
+def last_links(model: MachineModel) -> list[str]:
+    """Links that carry no other."""
+    carriers = {link: model.rigid.getJointId(joint) for link, joint in model.links.items()}
+    inner = {int(p) for k, p in enumerate(model.rigid.parents) if k in carriers.values()}
+    return [link for link, k in carriers.items() if k not in inner]
+
+
+def point_mass(mass: float, place: np.ndarray) -> np.ndarray:
+    """Ten inertial parameters of a point mass [kg] at a place (3,) [m]."""
+    turning = mass * (place @ place * np.eye(3) - np.outer(place, place))
+    return np.array([mass, *(mass * place), *turning[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+
+
+def carrying(model: MachineModel, joint: str, more: np.ndarray) -> MachineModel:
+    """A machine whose body at a joint carries ten inertial parameters more."""
     body = model.bodies.body(joint)
-    first, x, y, z = (a + b for a, b in zip(body.carried, more, strict=True))
-    return model.with_bodies(model.bodies.with_body(joint, replace(body, carried=(first, x, y, z))))
+    carried = tuple((np.array(body.carried or (0.0,) * len(more)) + more).tolist())
+    return model.with_bodies(model.bodies.with_body(joint, replace(body, carried=carried)))
 
 
 def own_mass(model: MachineModel, link: str) -> float:

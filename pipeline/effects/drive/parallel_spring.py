@@ -14,6 +14,7 @@ class ParallelSpring(Effect):
     """Torque in proportion to the distance from a rest position."""
 
     name = "parallel_spring"
+    additive = True
     parameters: ClassVar = (
         Parameter("stiffness", "N*m/rad", -1e4, 1e4),
         Parameter("rest", "rad", -1e3, 1e3),

@@ -13,6 +13,7 @@ class RotorInertia(Effect):
     """Inertia added at the motor's shaft (at the joint's, where there is no gear)."""
 
     name = "rotor_inertia"
+    additive = True
     parameters: ClassVar = (Parameter("added", "kg*m^2", 0.0, 1e3),)
     coordinates: ClassVar = (Coordinate("added", 1e-7),)
     signature = "acceleration"

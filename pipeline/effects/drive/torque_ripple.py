@@ -26,6 +26,7 @@ class TorqueRipple(Effect):
     """
 
     name = "torque_ripple"
+    additive = True
     parameters: ClassVar = (
         Parameter("amplitude", "N*m", 0.0, 1e3),
         Parameter("order", "1", 0.0, 1e6),

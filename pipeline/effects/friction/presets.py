@@ -40,6 +40,7 @@ class CoulombFriction(FrictionPreset):
     """Friction that has one level at every speed and load."""
 
     name = "coulomb_friction"
+    additive = True
     parameters: ClassVar = (Parameter("torque", "N*m", 0.0, 1e3),)
     coordinates: ClassVar = (Coordinate("torque", 1e-2),)
     terms: ClassVar = {"torque": "coulomb"}
@@ -50,6 +51,7 @@ class ViscousFriction(FrictionPreset):
     """Friction of grease and bearings that grows with the speed."""
 
     name = "viscous_friction"
+    additive = True
     parameters: ClassVar = (Parameter("coefficient", "N*m*s/rad", 0.0, 1e3),)
     coordinates: ClassVar = (Coordinate("coefficient", 1e-2),)
     terms: ClassVar = {"coefficient": "viscous"}
@@ -60,6 +62,7 @@ class StribeckFriction(FrictionPreset):
     """Dry friction that falls from break-away to Coulomb level with speed."""
 
     name = "stribeck_friction"
+    additive = True
     parameters: ClassVar = (
         Parameter("coulomb", "N*m", 0.0, 1e3),
         Parameter("excess", "N*m", 0.0, 1e3),
@@ -124,6 +127,7 @@ class DirectionDependentFriction(Effect):
     """
 
     name = "direction_dependent_friction"
+    additive = True
     parameters: ClassVar = (
         Parameter("positive", "N*m", 0.0, 1e3),
         Parameter("negative", "N*m", 0.0, 1e3),

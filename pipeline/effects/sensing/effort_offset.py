@@ -13,6 +13,7 @@ class EffortOffset(Effect):
     """A constant added by the effort sensor."""
 
     name = "effort_offset"
+    additive = True
     parameters: ClassVar = (Parameter("offset", "channel", -1e4, 1e4),)
     coordinates: ClassVar = (Coordinate("offset", 1e-3, signed=True),)
     signature = "time"

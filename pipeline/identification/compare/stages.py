@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pipeline.identification.compare.circumstances import gap_of
 from pipeline.identification.compare.long import LongLogs
-from pipeline.identification.selection.weigh import floor_of
+from pipeline.identification.regression.floor import floor_of
 from pipeline.logs.prepared.measurement import CHOOSE, PROVE, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator

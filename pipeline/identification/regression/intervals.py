@@ -15,15 +15,20 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from pipeline.effects.bodies.rigid_body_parameters import NAMES, UNITS
 from pipeline.identification.regression.normal_equations import BlockSums, inverse_spd, solve_spd
 from pipeline.identification.regression.problem import Accepted, Problem
+from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.identification.results import Estimate
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
 from pipeline.machine.machine import MachineModel
-from pipeline.regression.laws.friction import LAW
+from pipeline.simulation.rigid_bodies import strained
+
+LAW: Final = 0.01  # share to which a law holds at best
 
 Array = NDArray[np.float64]
 SAMPLES: Final = 300
@@ -142,3 +147,29 @@ def _draws(sums: BlockSums) -> Array:
     # The largest growth of an effect's directions would distort its shape; each on its own.
     result: Array = out * grow
     return result
+
+
+def bodies_of(problem: Problem) -> dict[str, tuple[Estimate, ...]]:
+    """Ten inertial parameters of every link whose body is open, with intervals."""
+    sums = problem.sums()
+    draws = _draws(sums)
+    out: dict[str, tuple[Estimate, ...]] = {}
+    links = dict.fromkeys(n.place for n in problem.tolerances if n.kind in STRAINS)
+    for link in links:
+        at = [k for k, n in enumerate(problem.tolerances) if n.place == link and n.kind in STRAINS]
+        sigma = np.array([problem.tolerances[k].sigma for k in at])
+        held = problem.held[at]
+        joint = problem.model.carrier(link)
+        body = problem.model.rigid.inertias[problem.model.rigid.getJointId(joint)]
+
+        def ten(strain: Array, body: pin.Inertia = body) -> Array:
+            return np.asarray(strained(body, strain.tolist()).toDynamicParameters())
+
+        best = ten(held * sigma)
+        spread = np.array([ten((held + draw) * sigma) for draw in draws[:, at]])
+        low, high = np.quantile(spread, _COVERED, axis=0)
+        out[link] = tuple(
+            Estimate(n, float(b), float(min(lo, b)), float(max(hi, b)), u)
+            for n, u, b, lo, hi in zip(NAMES, UNITS, best, low, high, strict=True)
+        )
+    return out

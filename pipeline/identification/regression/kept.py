@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.effects.base import Place
+from pipeline.effects.registry import EFFECTS
+from pipeline.identification.regression.tolerances import STRAINS
 
 Array = NDArray[np.float64]
 
@@ -31,9 +33,9 @@ class EffectKey:
     coordinates: tuple[str, ...]
 
     @property
-    def of_body(self) -> bool:
+    def additive(self) -> bool:
         """Whether effects of a joint hardly change it."""
-        return self.effect in ("link_mass", "center_of_mass_offset", "base_tilt")
+        return EFFECTS[self.effect].additive
 
 
 @dataclass(frozen=True)
@@ -51,9 +53,9 @@ class ToleranceKey:
     place: str
 
     @property
-    def of_body(self) -> bool:
+    def additive(self) -> bool:
         """Whether effects of a joint hardly change it."""
-        return self.kind in ("mass", "com_x", "com_y", "com_z", "inertia")
+        return self.kind in STRAINS
 
 
 #: Columns in one log, each by the joints on which it acts.

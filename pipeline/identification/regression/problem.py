@@ -23,6 +23,8 @@ from pipeline.identification.regression.normal_equations import (
     make_stack,
 )
 from pipeline.identification.regression.tolerances import (
+    STRAINS,
+    UNCERTAINTY,
     Nuisance,
     grouped,
     nuisance_columns,
@@ -121,6 +123,7 @@ class Problem:
         tolerances: Always free within their priors.
         held: What the present model holds of each tolerance, in its sigmas.
         floor: Standard deviation of the noise, shape (J, C).
+        uncertainty: Of the URDF's bodies [1].
     """
 
     model: MachineModel
@@ -130,6 +133,7 @@ class Problem:
     tolerances: tuple[Nuisance, ...] = ()
     held: Array = field(default_factory=lambda: np.zeros(0))
     floor: Array = field(default_factory=lambda: np.zeros(0))
+    uncertainty: float = UNCERTAINTY
     _columns: Kept = field(default_factory=dict)
     _computed: _Computed = field(default_factory=_Computed)
 
@@ -213,7 +217,7 @@ class Problem:
         touched |= self._shifted(self.held, other.held)
         for key, per_log in self._columns.items():
             joints = {j for column in per_log for j in column}
-            if joints & scaled or (joints & touched and not key.of_body):
+            if joints & scaled or (joints & touched and not key.additive):
                 del other._columns[key]
         return other
 
@@ -224,6 +228,15 @@ class Problem:
             for n, before, after in zip(self.tolerances, old, new, strict=True)
             if n.kind in ("torque_constant", "resistance") and abs(after - before) > _STALE
         }
+
+    def at_uncertainty(self, uncertainty: float) -> Problem:
+        """The problem at another uncertainty of the URDF's bodies; all columns are kept."""
+        return replace(
+            self,
+            uncertainty=uncertainty,
+            _columns=dict(self._columns),
+            _computed=_Computed(start=self._computed.start, near=self.predictions()),
+        )
 
     def with_model(self, model: MachineModel) -> Problem:
         """The same logs with another model of the machine, no effect and no tolerance taken up.
@@ -254,7 +267,7 @@ class Problem:
         touched |= self._shifted(self.held, np.zeros_like(self.held))
         for key, per_log in self._columns.items():
             joints = {j for column in per_log for j in column}
-            if joints & scaled or (joints & touched and not key.of_body):
+            if joints & scaled or (joints & touched and not key.additive):
                 del other._columns[key]
         return other
 
@@ -294,7 +307,8 @@ class Problem:
             for p in group
         ]
 
-    def _tolerance_columns(self, log: int) -> list[dict[int, Array]]:
+    def tolerance_columns(self, log: int) -> list[dict[int, Array]]:
+        """Columns of the tolerances, per standard deviation of each."""
         bench = self.benches[log]
         keys = {id(n): ToleranceKey(log, n.kind, n.place) for n in self.tolerances}
         for group in grouped(self.model, bench.measurement, self.tolerances):
@@ -305,7 +319,7 @@ class Problem:
                     self._columns[keys[id(n)]] = [column]
         return [self._columns[keys[id(n)]][0] for n in self.tolerances]
 
-    def _accepted_columns(self, log: int) -> list[dict[int, Array]]:
+    def accepted_columns(self, log: int) -> list[dict[int, Array]]:
         """Columns of the accepted effects at their estimates, without the effect applied twice."""
         out: list[dict[int, Array]] = []
         bench, predictions = self.benches[log], self.predictions()
@@ -325,7 +339,7 @@ class Problem:
             self._computed.stacks = [
                 make_stack(
                     bench,
-                    [*self._tolerance_columns(k), *self._accepted_columns(k)],
+                    [*self.tolerance_columns(k), *self.accepted_columns(k)],
                     residual(bench, self.predictions()[k], self.sigma),
                 )
                 for k, bench in enumerate(self.benches)
@@ -336,7 +350,8 @@ class Problem:
     def precision(self) -> Array:
         """Prior precision of the unknowns: one for tolerances, which count in sigmas; else none."""
         out = np.zeros(self.names)
-        out[: len(self.tolerances)] = 1.0
+        of_bodies = np.array([n.kind in STRAINS for n in self.tolerances])
+        out[: len(self.tolerances)] = np.where(of_bodies, (UNCERTAINTY / self.uncertainty) ** 2, 1)
         for a in self.accepted:
             out[self.absorbed(a.effect, a.place)] = FIXED
         return out

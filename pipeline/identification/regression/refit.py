@@ -7,18 +7,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.identification import results as limits
-from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Accepted, Problem
+from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
 
 Array = NDArray[np.float64]
 _NEWTON = 6  # refits after an acceptance, at most
 _HELD = 3.0  # sigmas
-_CONTRIBUTION = 3.0  # largest part of an effort one effect may have, in its RMS
 _BEND = 0.3  # largest relative change of a nonlinear parameter in one step
 #: Tolerances in which the prediction bends enough to be taken up into the model.
-_RELINEARISED = ("torque_constant", "resistance", "encoder", "mass", "inertia", "skew")
+_RELINEARISED = ("torque_constant", "resistance", "encoder", "skew", *STRAINS)
 
 
 def refit(problem: Problem) -> Problem:
@@ -36,6 +34,7 @@ def refit(problem: Problem) -> Problem:
         count = len(problem.tolerances)
         # Beyond a few sigmas a tolerance only stands in for an effect not yet found.
         reach = np.array([_HELD if n.kind in _RELINEARISED else 0.0 for n in problem.tolerances])
+        reach /= np.sqrt(problem.precision[:count])
         lowest = np.array([n.lowest / n.sigma for n in problem.tolerances])
         held = np.clip(problem.held + theta[:count], np.maximum(-reach, lowest), reach)
         largest = max(largest, 0.02 * float(np.abs(held - problem.held).max(initial=0.0)))
@@ -71,58 +70,3 @@ def _stepped(problem: Problem, a: Accepted, step: Array, bend: Array) -> Accepte
         if seen and a.effect.plausible(problem.model, a.place, x, shape):
             return replace(a, x=x, shape=shape)
     return a
-
-
-def pruned(problem: Problem) -> Problem:
-    """Without effects that the others have made superfluous, one after another."""
-    while len(problem.accepted) > 1:
-        losses = [_needed(problem, number) for number in range(len(problem.accepted))]
-        weakest = int(np.argmin([loss / least for loss, least in losses]))
-        if losses[weakest][0] > losses[weakest][1]:
-            break
-        kept = [a for k, a in enumerate(problem.accepted) if k != weakest]
-        problem = refit(problem.with_accepted(kept))
-    return problem
-
-
-def _needed(problem: Problem, number: int) -> tuple[float, float]:
-    """Rise of the penalised misfit without one effect, and the least that keeps it."""
-    own = problem.accepted[number]
-    if all(own.x[c.name] == 0.0 for c in own.effect.coordinates):
-        return 0.0, 1.0
-    sums = problem.sums()
-    both = sums.blocks(FIT, CHOOSE)
-    a, span = problem.accepted[number], problem.span(number)
-    x0 = np.array([a.x[c.name] for c in a.effect.coordinates])
-    theta = sums.solve(both)
-    # At the estimate the residual contains the effect: without it, its step is minus its size.
-    rest = np.setdiff1d(np.arange(problem.names), np.arange(span.start, span.stop))
-    A = sums.H[both].sum(axis=0) + np.diag(sums.precision)
-    b = sums.h[both].sum(axis=0) + sums.precision * sums.mean
-    fixed = np.zeros(problem.names)
-    fixed[span] = -x0
-    fixed[rest] = solve_spd(
-        A[np.ix_(rest, rest)], b[rest] - A[np.ix_(rest, np.arange(problem.names))] @ fixed
-    )
-    rise = sums.objective(fixed, both) - sums.objective(theta, both)
-    if a.effect.is_tolerance:
-        return rise, limits.TOLERANCE_SIGMAS**2
-    scale = float(sums.loss(theta, both).sum()) / max(float(sums.count[both].sum()), 1.0)
-    return rise, limits.LEAST_GAIN * scale
-
-
-def runs_away(problem: Problem) -> bool:
-    """Whether some effect takes what another gives: a direction that the log does not hold."""
-    for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
-        m = bench.measurement
-        said = np.isin(m.part, (FIT, CHOOSE))
-        if not said.any():
-            continue
-        size = np.sqrt(np.mean(m.effort[said] ** 2, axis=0))  # (J, C)
-        for k in range(len(problem.accepted)):
-            change = bench.simulator.difference(prediction, problem.without(k))
-            for column, j in enumerate(change.joints):
-                part = np.sqrt(np.mean(change.effort[said, column] ** 2, axis=0))
-                if (part > _CONTRIBUTION * size[j]).any():
-                    return True
-    return False

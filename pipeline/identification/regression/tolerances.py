@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.elements.friction import Friction
-from pipeline.effects.bodies.center_of_mass_offset import CenterOfMassOffset
-from pipeline.effects.bodies.link_mass import MASS_TOLERANCE, felt
+from pipeline.effects.bodies.link_mass import felt
 from pipeline.effects.drive.joint_elasticity import COMPLIANCE_TOLERANCE
 from pipeline.effects.drive.torque_constant_error import CONSTANT_TOLERANCE
 from pipeline.effects.sensing.position_offset import ENCODER_TOLERANCE
@@ -28,13 +27,20 @@ from pipeline.simulation.rigid_bodies import legs_are_separate
 
 Array = NDArray[np.float64]
 
-INERTIA_TOLERANCE: Final = 0.10  # of a link's rotational inertia [1]
+#: Entries of a body's strain (`BodyChange.strain`) and their standard deviation at an uncertainty
+#: of 1 of the URDF: a rotation of the axes in which a body is measured leaves this as it is.
+STRAINS: Final = {
+    **dict.fromkeys(("xx", "yy", "zz", "mm"), 1.0),
+    **dict.fromkeys(("xy", "xz", "yz", "xm", "ym", "zm"), 0.5**0.5),
+}
+#: Uncertainty of the URDF in which strains are counted [1].
+UNCERTAINTY: Final = 0.01
 #: Of a winding, where its file states no wider interval [1].
 RESISTANCE_TOLERANCE: Final = 0.02
 #: Friction that the actuator's files state already [1].
 FRICTION_TOLERANCE: Final = 0.005
 #: Tolerances that are shares of what they scale.
-SCALES: Final = ("mass", "inertia", "friction", "torque_constant", "resistance")
+SCALES: Final = ("friction", "torque_constant", "resistance")
 #: Tolerances beyond this many sigmas would stand in for something else.
 MOST_SIGMAS: Final = 4.0
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
@@ -67,11 +73,11 @@ class Nuisance:
     @property
     def of_body(self) -> bool:
         """Whether inverse dynamics has to be run again."""
-        return self.kind in ("mass", "com_x", "com_y", "com_z", "inertia", "encoder")
+        return self.kind in STRAINS or self.kind == "encoder"
 
     def edit(self, model: MachineModel, value: float) -> MachineModel:
         """The machine with this tolerance at a value."""
-        if self.kind in ("mass", "inertia") or self.kind.startswith("com_"):
+        if self.kind in STRAINS:
             return self._body(model, value)
         if self.kind == "skew":
             late = tuple(replace(a, delay=a.delay + value) for a in model.actuators)
@@ -106,14 +112,9 @@ class Nuisance:
     def _body(self, model: MachineModel, value: float) -> MachineModel:
         joint = model.carrier(self.place)
         body = model.bodies.body(joint)
-        if self.kind == "mass":
-            body = replace(body, scale=body.scale * (1.0 + value))
-        elif self.kind == "inertia":
-            body = replace(body, inertia_scale=body.inertia_scale * (1.0 + value))
-        else:
-            shift = list(body.shift)
-            shift["xyz".index(self.kind[-1])] += value
-            body = replace(body, shift=(shift[0], shift[1], shift[2]))
+        strain = list(body.strain or (0.0,) * len(STRAINS))
+        strain[list(STRAINS).index(self.kind)] += value
+        body = replace(body, strain=tuple(strain))
         return model.with_bodies(model.bodies.with_body(joint, body))
 
 
@@ -138,14 +139,9 @@ def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple
     """
     m = measurements[0]
     out = []
-    com = CenterOfMassOffset()
     for link, joint in model.links.items():
-        if link in model.identified or not felt(model, m, joint):
-            continue
-        lever = com.tolerance(model, (link,))
-        out.append(Nuisance("mass", link, MASS_TOLERANCE, "1"))
-        out += [Nuisance(f"com_{axis}", link, lever[axis], "m") for axis in "xyz"]
-        out.append(Nuisance("inertia", link, INERTIA_TOLERANCE, "1"))
+        if felt(model, m, joint):
+            out += [Nuisance(k, link, UNCERTAINTY * s, "1") for k, s in STRAINS.items()]
     electrical = "torque" not in m.channels
     for k, actuator in enumerate(model.actuators):
         out.append(Nuisance("encoder", actuator.name, ENCODER_TOLERANCE, "rad"))

@@ -1,100 +1,109 @@
-"""Step 3 in one call: name what is missing, with values, intervals, rivals and doubts.
+"""Step 3 in one call: name what is missing, with values, intervals, rivals and how sure.
 
 All of it rests on *fit* and *choose*. What only proves (*prove*) has no say in any of it and is not
-looked at here: `weigh` holds the model that came of it against those rows.
+looked at here: `written` holds the model file that came of it against those rows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.effects.base import CHANNEL_UNITS, Place
+from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification import results as limits
 from pipeline.identification.regression.design_matrix import make_benches
-from pipeline.identification.regression.intervals import estimates
-from pipeline.identification.regression.normal_equations import BlockSums
+from pipeline.identification.regression.floor import floor_of, left_open
+from pipeline.identification.regression.intervals import bodies_of, estimates
+from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.refit import refit, tolerances_of
-from pipeline.identification.results import Candidate, Found, Naming
-from pipeline.identification.selection.residual import errors
-from pipeline.identification.selection.screen import Score
-from pipeline.identification.selection.select import Selection, select
-from pipeline.identification.selection.weigh import floor_of
+from pipeline.identification.results import UNCERTAINTIES, Candidate, Found, Member, Naming
+from pipeline.identification.selection.pool import Index, Key, Term
+from pipeline.identification.selection.search import Search, State
+from pipeline.identification.selection.settle import Settled, settle
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, Measurement
 from pipeline.machine.machine import MachineModel
+from pipeline.progress import Progress
 
 Array = NDArray[np.float64]
+BODIES = "rigid_body_parameters"
+
+
+@dataclass(frozen=True)
+class Rival:
+    """What may stand in the place of a name.
+
+    Attributes:
+        key: Effect and place; None for nothing, or the URDF's bodies.
+        behind: Logarithm of how much less likely the log is with it.
+        sure: How many standard errors over blocks worse it predicts.
+        richer: Whether it has more coordinates, so that it may predict as well by having the name
+            in it.
+    """
+
+    key: Key | None
+    behind: float
+    sure: float
+    richer: bool = False
+
+    @property
+    def excluded(self) -> bool:
+        """Whether the log excludes it."""
+        return self.behind > limits.EXCLUDED and (self.richer or self.sure > limits.SURE)
 
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """Naming with the model it leads to.
+    """Naming with what it leads to.
 
     Attributes:
         naming: Results.
-        model: With the accepted effects, tolerances as the files state them.
-        problem: The least-squares problem at the end.
-        enough: Whether no more effects than were allowed are needed.
+        settled: The set of names at its estimates.
     """
 
     naming: Naming
-    model: MachineModel
-    problem: Problem
-    enough: bool = True
+    settled: Settled
 
     @property
-    def excess(self) -> Array:
-        """What is left on *choose*, by joint and channel, in noise floors, (J, C)."""
-        squares, rows = errors(self.problem, (CHOOSE,))
-        excess = np.sqrt(squares) / self.problem.floor
-        return np.where(rows[:, None] > 0, excess, 0.0)
+    def noise(self) -> Array:
+        """Noise that no motion makes, by what everything together leaves, (J, C)."""
+        return noise_of(self.settled)
 
 
 def identify(
-    model: MachineModel,
-    measurements: Sequence[Measurement],
-    *,
-    most: int | None = None,
-    without: Collection[str] = (),
+    model: MachineModel, measurements: Sequence[Measurement], progress: Progress | None = None
 ) -> Identified:
     """Name what the model lacks.
 
     Args:
         model: What the engineer has.
         measurements: Logs with parts, from `observe`.
-        most: Effects at most; where more are needed the answer says so and is not worked out.
-        without: Names of effects that do not compete.
+        progress: To tell how far it is.
 
     Raises:
         NamingError: A part of the data has no usable row.
         ModelError: Model and logs do not fit.
     """
     start = Problem(model, make_benches(measurements), floor_of(measurements))
-    selection = select(start, most=most, without=without)
+    settled = settle(start, progress)
     channel = measurements[0].channels[0]
-    if not selection.enough:
-        naming = Naming((), (), {}, selection.tried, channel, CHANNEL_UNITS[channel])
-        return Identified(naming, model, selection.problem, enough=False)
-    found = _found(selection, channel)
-    if selection.nearest and found[-1].valid_after > limits.IDLE * found[-1].valid_before:
-        selection, found = selection.without_nearest(), found[:-1]
-    problem = selection.problem
+    judged = Judgement(settled)
+    found = tuple(_found(judged, channel))
     naming = Naming(
         found=found,
-        candidates=_candidates(start, selection),
-        tolerances=tolerances_of(problem),
-        tried=selection.tried,
+        candidates=tuple(_candidates(judged, found)),
+        tolerances=tolerances_of(settled.problem),
+        tried=len({t.key for t in settled.first.pool.terms}) + 1,
         channel=channel,
         unit=CHANNEL_UNITS[channel],
+        notes=tuple(judged.notes()),
     )
-    plain = model
-    for a in problem.accepted:
-        plain = a.apply(plain)
-    return Identified(naming, plain, problem)
+    return Identified(naming, settled)
 
 
 def estimated_alone(named: Identified, found: Sequence[Found]) -> tuple[Found, ...]:
@@ -107,267 +116,320 @@ def estimated_alone(named: Identified, found: Sequence[Found]) -> tuple[Found, .
         named: From `identify`.
         found: Some of what was found, in its order.
     """
-    keys = [(f.effect, f.place) for f in found]
-    kept = [a for a in named.problem.accepted if (a.effect.name, a.place) in keys]
-    if len(kept) == len(named.problem.accepted):
+    problem = named.settled.problem
+    keys = {f.key for f in found}
+    bodies = any(f.effect == BODIES for f in found)
+    kept = [a for a in problem.accepted if (a.effect.name, a.place) in keys]
+    if len(kept) == len(problem.accepted) and bodies == (problem.uncertainty > UNCERTAINTIES[0]):
         return tuple(found)
-    sized = estimates(refit(named.problem.with_accepted(kept)), named.naming.channel)
-    return tuple(replace(f, parameters=s.parameters) for f, s in zip(found, sized, strict=True))
-
-
-def _found(selection: Selection, channel: str) -> tuple[Found, ...]:
-    """Accepted effects in order, each with what it closes on *choose* by estimates from *fit*."""
-    problem = selection.problem
-    intervals = estimates(problem, channel)
-    rivals = {r.winner: r.rivals for r in selection.rounds}
-    out = []
-    bare = Problem(
-        problem.model,
-        problem.benches,
-        problem.sigma,
-        tolerances=problem.tolerances,
-        floor=problem.floor,
-    )
-    before = refit(bare)
-    for number, a in enumerate(problem.accepted):
-        after = refit(bare.with_accepted(problem.accepted[: number + 1]))
-        touched = _touched(problem, number)
-        old, rows = errors(before, (CHOOSE,), by=(FIT,))
-        new, _ = errors(after, (CHOOSE,), by=(FIT,))
-        judged = [j for j in touched if rows[j]]
-        gain = ((old - new) / problem.sigma**2)[judged].sum(axis=0)
-        c = int(np.argmax(gain))
-        # What a tolerance would have taken up is its own merit: the gap alone does not show it.
-        idle = bool(judged) and gain.sum() <= 0.0 and not a.effect.is_tolerance
-        unit = CHANNEL_UNITS[problem.benches[0].measurement.channels[c]]
-        key = (a.effect.name, a.place)
-        out.append(
-            Found(
-                order=number + 1,
-                effect=a.effect.name,
-                place=a.place,
-                parameters=intervals[number].parameters,
-                rivals=tuple(rivals.get(key, ())) + _unseen(problem, number),
-                valid_before=_rms(old, judged, c),
-                valid_after=_rms(new, judged, c),
-                unit=unit,
-                noise_floor=_rms(problem.floor**2, touched, c),
-                excitation=a.effect.excitation,
-                reason=(
-                    limits.NEAREST
-                    if key == selection.nearest
-                    else _doubt(problem, number, intervals[number].certain)
-                    or (limits.IDLE_NAME if idle else "")
-                ),
-            )
+    spread = problem.uncertainty if bodies else UNCERTAINTIES[0]
+    again = refit(problem.at_uncertainty(spread).with_accepted(kept))
+    sized = dict(
+        zip(
+            [(a.effect.name, a.place) for a in again.accepted],
+            estimates(again, named.naming.channel),
+            strict=True,
         )
-        before = after
-    return _second_thoughts(problem, out)
-
-
-def _rms(squares: Array, joints: Sequence[int], channel: int) -> float:
-    """Over those of some joints that are known; NaN without any."""
-    known = squares[list(joints), channel]
-    known = known[np.isfinite(known)]
-    return float(np.sqrt(known.mean())) if known.size else float("nan")
-
-
-def _touched(problem: Problem, number: int) -> list[int]:
-    """Joints that an accepted effect changes."""
-    a, without = problem.accepted[number], problem.without(number)
-    out: set[int] = set()
-    for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
-        out |= set(bench.simulator.difference(prediction, without).joints)
-    named = [problem.model.index(p) for p in a.place if p in problem.model.joints]
-    return named or sorted(out)
-
-
-def _unseen(problem: Problem, number: int) -> tuple[tuple[str, Place], ...]:
-    """More general effects whose own part this motion cannot show: the name may be theirs."""
-    from pipeline.effects.registry import EFFECTS
-
-    a = problem.accepted[number]
+    )
     out = []
-    for effect in EFFECTS.values():
-        if a.effect.name not in effect.contains or effect.name not in limits.WORTH_NAMING:
-            continue
-        worth = limits.WORTH_NAMING[effect.name]
-        coordinate = next(c for c in effect.coordinates if c.name == worth[0])
-        information = 0.0
-        shapes = effect.shapes(problem.model, problem.benches[0].measurement, a.place)
-        for k in range(len(problem.benches)):
-            columns = problem.columns(k, effect, a.place, shapes[0])
-            column = columns[effect.coordinates.index(coordinate)]
-            head = problem.head(k)
-            information += sum(float(np.sum(x[head] ** 2)) for x in column.values())
-        if information * worth[1] ** 2 < limits.LEAST_GAIN:
-            out.append((effect.name, a.place))
+    for f in found:
+        if f.effect == BODIES:
+            out.append(replace(f, members=_members(again, f.level)))
+        else:
+            out.append(replace(f, parameters=sized[f.key].parameters))
     return tuple(out)
 
 
-def _doubt(problem: Problem, number: int, certain: bool) -> str:
-    """Whether the blocks contradict each other about an effect's size: a wrong law.
+@dataclass(eq=False)
+class Judgement:
+    """How sure every name of a settled set is."""
 
-    The scatter of the gradient over blocks is compared with what noise of the final misfit gives.
-    """
-    a = problem.accepted[number]
-    further = {name: 1.1 * value for name, value in a.x.items()}
-    if not a.effect.plausible(problem.model, a.place, further, a.shape):
-        return limits.BOUND
-    if not certain:
-        return limits.NOTHING
-    ratio, excess = fit_quality(problem, number)
-    contradicts = ratio > limits.LARGEST_SCATTER and excess > limits.LARGEST_EXCESS
-    suspect = ratio > limits.SUSPECT_SCATTER and excess > limits.UNEXPLAINED
-    if (contradicts or suspect) and not _dwarfs(problem, number):
-        return (
-            f"parts of the log contradict one another about its size {ratio:.0f} times more than "
-            f"noise allows, and {excess:.1f} times the noise is left: its law is not that of the "
-            "machine"
-        )
-    return ""
+    settled: Settled
 
+    @property
+    def search(self) -> Search:
+        """On columns about the estimates."""
+        return self.settled.search
 
-def _second_thoughts(problem: Problem, found: list[Found]) -> tuple[Found, ...]:
-    """Doubt names that share a joint with what is doubtful or has closed nothing."""
-    out = []
-    for number, f in enumerate(found):
-        effect = problem.accepted[number].effect
-        idle = f.valid_after > limits.IDLE * f.valid_before and not effect.is_tolerance
-        _, excess = fit_quality(problem, number)
-        if not f.reason and idle and excess > limits.UNEXPLAINED:
-            f = replace(f, reason=limits.IDLE_NAME)
-        out.append(f)
-    doubted = [k for k, f in enumerate(out) if f.reason not in ("", limits.IDLE_NAME)]
-    shaken = {j for k in doubted for j in _touched(problem, k)}
-    for k, f in enumerate(out):
-        _, excess = fit_quality(problem, k)
-        near = shaken & set(_touched(problem, k))
-        small = excess > limits.UNEXPLAINED and not _dwarfs(problem, k)
-        if near and not f.reason and small:
-            joints = ", ".join(problem.model.joints[j] for j in sorted(near))
-            out[k] = replace(f, reason=f"what else was found in {joints} is doubtful itself")
-    return tuple(replace(f, level=_level(f)) for f in out)
+    @property
+    def state(self) -> State:
+        """The set."""
+        return self.settled.state
 
+    @property
+    def refitted(self) -> bool:
+        """Whether the URDF's bodies are not its own."""
+        return self.state.uncertainty > UNCERTAINTIES[0]
 
-def _level(f: Found) -> str:
-    """How far a finding is to be trusted, by why it is not sure and what it closes.
+    @cached_property
+    def losses(self) -> Array:
+        """Of every block by estimates from others, (B,)."""
+        return self.search.block_losses(self.state)
 
-    What may be nothing, stands at a bound or closes nothing is no part of a model.
-    """
-    if not f.reason:
-        return limits.CONFIRMED
-    if f.reason in (limits.NOTHING, limits.BOUND, limits.IDLE_NAME):
-        return limits.SUSPECTED
-    closes = 1.0 - (f.valid_after / f.valid_before) ** 2 if f.valid_before > 0 else 0.0
-    return limits.APPROXIMATE if closes > limits.NEAREST_SHARE else limits.SUSPECTED
+    @cached_property
+    def shapeless(self) -> dict[int, Index]:
+        """Joints at which shapes without a name explain more, to their columns."""
+        flexible = self.settled.pool.flexible
+        return {
+            j: columns
+            for j, columns in enumerate(flexible)
+            if self.search.gain_of(self.state, columns) > 0.0
+        }
 
-
-def _dwarfs(problem: Problem, number: int) -> bool:
-    """Whether an effect is so much larger than what is left that its law holds well enough.
-
-    No law is the machine's to within a quiet sensor's noise: what is left is held against what the
-    effect itself does to the joints it touches, both in noise floors.
-    """
-    without, touched = problem.without(number), _touched(problem, number)
-    own, rows = 0.0, 0.0
-    for bench, prediction in zip(problem.benches, problem.predictions(), strict=True):
-        change = bench.simulator.difference(prediction, without)
-        columns = bench.whitened(change.effort, change.joints, problem.floor)
-        said = slice(bench.parts[FIT].start, bench.parts[CHOOSE].stop)
-        own += sum(float(np.sum(x[said] ** 2)) for j, x in columns.items() if j in touched)
-        rows += float(bench.measurement.mask[bench.rows[said]][:, touched].sum()) * bench.weight**2
-    squares, _ = errors(problem, (FIT, CHOOSE))
-    left = float((squares / problem.floor**2)[touched].sum(axis=1).mean())
-    return left < limits.DWARFED**2 * own / max(rows, 1.0)
-
-
-def fit_quality(problem: Problem, number: int) -> tuple[float, float]:
-    """Scatter of an effect's size over blocks over that of noise, and error over noise floor."""
-    sums: BlockSums = problem.sums()
-    blocks = sums.blocks(FIT, CHOOSE)
-    theta = sums.solve(blocks)
-    span = problem.span(number)
-    index = np.arange(span.start, span.stop)
-    gradient = (sums.h[blocks] - np.einsum("bij,j->bi", sums.H[blocks], theta))[:, index]
-    own = np.array([np.diag(sums.H[b])[index] for b in blocks])
-    scatter = (gradient**2).sum(axis=0) / np.maximum(own.sum(axis=0), 1e-300)
-    squares, _ = errors(problem, (FIT, CHOOSE))
-    excess = np.sqrt((squares / problem.floor**2)[_touched(problem, number)].mean(axis=0)).max()
-    return float(scatter.max()), float(excess)
-
-
-def _candidates(start: Problem, selection: Selection) -> tuple[Candidate, ...]:
-    """Every candidate once, accepted ones first."""
-    accepted = {(a.effect.name, a.place) for a in selection.problem.accepted}
-    rivals: dict[tuple[str, Place], list[str]] = {}
-    for r in selection.rounds:
-        for key in r.rivals:
-            rivals.setdefault(key, []).append(f"{r.winner[0]} at {', '.join(r.winner[1])}")
-    base = refit(start)
-    last = {(s.effect.name, s.place): s for s in selection.last}
-    old, rows = errors(base, (CHOOSE,), by=(FIT,))
-    new, _ = errors(selection.problem, (CHOOSE,), by=(FIT,))
-    old[rows == 0], new[rows == 0] = np.nan, np.nan
-    best: dict[tuple[str, Place], Score] = {}
-    for s in selection.first:  # an effect may compete in several forms
-        best.setdefault((s.effect.name, s.place), s)
-    out = [
-        _candidate(start, s, accepted, rivals, last, selection, (old, new)) for s in best.values()
-    ]
-    return tuple(sorted(out, key=lambda c: c.verdict != limits.ACCEPTED))
-
-
-def _candidate(
-    problem: Problem,
-    s: Score,
-    accepted: set[tuple[str, Place]],
-    rivals: dict[tuple[str, Place], list[str]],
-    last: dict[tuple[str, Place], Score],
-    selection: Selection,
-    gaps: tuple[Array, Array],
-) -> Candidate:
-    key = (s.effect.name, s.place)
-    m = problem.benches[0].measurement
-    joints = [problem.model.index(p) for p in s.place if p in problem.model.joints]
-    joints = joints or list(range(len(problem.model.joints)))
-    before = _rms(gaps[0], joints, 0)
-    trial = selection.trials.get(key)
-    # What was not tried in earnest has no estimate to judge by.
-    after = before * np.sqrt(max(1.0 - trial.held_share, 0.0)) if trial else float("nan")
-    identifiable = s.alone > limits.LEAST_ALONE
-    if key in accepted:
-        after = _rms(gaps[1], joints, 0)
-        verdict, reason = limits.ACCEPTED, "explains the log with the fewest parameters"
-    elif key in rivals:
-        verdict = limits.INDISTINGUISHABLE + "; ".join(rivals[key])
-        reason = f"explains the log as well; a motion that {s.effect.excitation} would decide"
-    elif not identifiable:
-        verdict = limits.NOT_IDENTIFIABLE
-        reason = f"tolerances explain its signature; a motion that {s.effect.excitation} is needed"
-    else:
-        verdict = limits.REJECTED
-        now = last.get(key)
-        left = now.gain if now else 0.0
-        if s.gain < limits.LEAST_GAIN and trial is None:
-            reason = (
-                f"explains no more than noise ({s.gain:.2g} noise variances; "
-                f"{limits.LEAST_GAIN:.0f} are asked)"
-            )
-        elif after > before:
-            reason = "makes validation data worse"
-        elif left < limits.LEAST_GAIN:
-            reason = "the accepted effects explain what it would have explained"
+    def rivals(self, number: int | None) -> list[Rival]:
+        """What may stand in the place of a term, or of refitted bodies (None), nothing first."""
+        search, state = self.search, self.state
+        if number is None:
+            rest = search.at(state, UNCERTAINTIES[0])
         else:
-            reason = "what it explains does not hold over all blocks, or not on those that choose"
-    return Candidate(
-        effect=s.effect.name,
-        place=s.place,
-        before=before,
-        after=after,
-        unit=CHANNEL_UNITS[m.channels[0]],
-        identifiable=identifiable,
-        verdict=verdict,
-        reason=reason,
-        gain=s.gain,
-    )
+            rest = search.without(state, number)
+        out = [self._rival(None, rest)]
+        own = None if number is None else search.pool.terms[number]
+        if number is not None:
+            for u in UNCERTAINTIES:
+                if u > state.uncertainty:
+                    other = search.at(rest, u)
+                    if state.evidence - other.evidence < limits.EXCLUDED + 5.0:
+                        key = (BODIES, ())
+                        out.append(self._rival(key, other))
+        gains = search.gains(rest)
+        for k in np.argsort(-gains)[: limits.RIVALS]:
+            term = search.pool.terms[k]
+            if rest.evidence + gains[k] < state.evidence - limits.EXCLUDED - 5.0:
+                break
+            known = own is not None and _related(own, term)
+            if not known and term.key not in [r.key for r in out]:
+                out.append(self._rival(term.key, search.with_term(rest, int(k))))
+        return out
+
+    def _rival(self, key: Key | None, other: State) -> Rival:
+        """How a set does against the one found."""
+        d = self.search.block_losses(other) - self.losses
+        error = float(np.sqrt(d.size) * d.std(ddof=1)) if d.size > 1 else np.inf
+        sure = float(d.sum()) / max(error, 1e-12)
+        richer = sum(len(u) for _, u in other.terms) > sum(len(u) for _, u in self.state.terms)
+        return Rival(key, self.state.evidence - other.evidence, sure, richer)
+
+    def beside_shapes(self, term: Term) -> bool:
+        """Whether a name at a joint with a shape of no name is needed beside that shape."""
+        joints = [j for j in self.shapeless if self.settled.problem.model.joints[j] in owners(term)]
+        if not joints:
+            return True
+        shapes = np.concatenate([self.shapeless[j] for j in joints])
+        without = self.search.without(self.state, self._number(term))
+        return self.search.gain_of(self.state, shapes) + self.state.evidence > (
+            self.search.gain_of(without, shapes) + without.evidence
+        )
+
+    def _number(self, term: Term) -> int:
+        return next(t for t in self.state.numbers if self.settled.pool.terms[t] is term)
+
+    def notes(self) -> Iterator[str]:
+        """What has no name, in words."""
+        names = [self.settled.problem.model.joints[j] for j in self.shapeless]
+        if names:
+            yield (
+                f"in {', '.join(names)} friction or a torque over position is left whose law is "
+                "not in the catalogue"
+            )
+
+
+def owners(term: Term) -> tuple[str, ...]:
+    """Joints that a term names."""
+    return tuple(p.partition("__")[0] for p in term.place)
+
+
+def _related(a: Term, b: Term) -> bool:
+    """Whether one is a special case of the other at the same place."""
+    names = a.effect.name, b.effect.name
+    related = names[0] in b.effect.contains or names[1] in a.effect.contains
+    return a.key == b.key or (related and a.place == b.place)
+
+
+def _found(judged: Judgement, channel: str) -> Iterator[Found]:
+    """The names of a set, those that do most first."""
+    problem, search, state = judged.settled.problem, judged.search, judged.state
+    sized = estimates(problem, channel)
+    numbers: list[int | None] = [*state.numbers]
+    if judged.refitted:
+        numbers.append(None)
+    rivals = {n: judged.rivals(n) for n in numbers}
+    order = sorted(numbers, key=lambda n: -rivals[n][0].behind)
+    present = State((), UNCERTAINTIES[0])
+    before = _errors(search, present)
+    for place, number in enumerate(order, start=1):
+        if number is None:
+            present = replace(present, uncertainty=state.uncertainty)
+        else:
+            used = next(u for t, u in state.terms if t == number)
+            present = replace(present, terms=(*present.terms, (number, used)))
+        after = _errors(search, present)
+        joints = _joints(judged, number)
+        level, reason = _level(judged, number, rivals[number], joints)
+        if number is not None and not sized[number].certain:
+            level, reason = limits.SUSPECTED, limits.NOTHING
+        open_ = tuple(r.key for r in rivals[number] if r.key is not None and not r.excluded)
+        a = None if number is None else problem.accepted[number]
+        effect = effect_named(BODIES) if a is None else a.effect
+        yield Found(
+            order=place,
+            effect=effect.name,
+            place=tuple(problem.model.links) if a is None else a.place,
+            parameters=() if number is None else sized[number].parameters,
+            rivals=open_,
+            valid_before=_rms(before, joints),
+            valid_after=_rms(after, joints),
+            unit=CHANNEL_UNITS[channel],
+            noise_floor=float(np.sqrt(np.mean(problem.floor[joints, 0] ** 2))),
+            excitation=effect.excitation,
+            level=level,
+            reason=reason,
+            members=_members(problem, level) if number is None else (),
+        )
+        before = after
+
+
+def _level(
+    judged: Judgement,
+    number: int | None,
+    rivals: Sequence[Rival],
+    joints: Sequence[int],
+) -> tuple[str, str]:
+    """How far a name is to be trusted, and why not further."""
+    nothing, *others = rivals
+    if nothing.sure < limits.SURE:
+        search, state = judged.search, judged.state
+        less = (
+            search.at(state, UNCERTAINTIES[0]) if number is None else search.without(state, number)
+        )
+        if _rms(_errors(search, state), joints) > _rms(_errors(search, less), joints):
+            return limits.SUSPECTED, limits.IDLE_NAME
+    open_ = [r for r in others if not r.excluded]
+    if open_:
+        words = "; ".join(_words(r.key) for r in open_ if r.key)
+        return limits.APPROXIMATE, f"{words} would explain the log as well"
+    if not nothing.excluded:
+        return limits.APPROXIMATE, "parts of the log disagree whether it is there"
+    if number is not None and not judged.beside_shapes(judged.settled.pool.terms[number]):
+        return limits.APPROXIMATE, limits.SHAPELESS
+    return limits.CONFIRMED, ""
+
+
+def _words(key: Key) -> str:
+    effect, place = key
+    return f"{effect} at {' with '.join(place)}" if place else effect
+
+
+def _joints(judged: Judgement, number: int | None) -> list[int]:
+    """Joints at which a name acts, of those with rows."""
+    model, pool = judged.settled.problem.model, judged.settled.pool
+    seen = sorted({c.joint for c in pool.channels})
+    if number is None:
+        return seen
+    named = [model.index(p) for p in owners(pool.terms[number]) if p in model.joints]
+    columns = set(pool.terms[number].columns.tolist())
+    touched = sorted({c.joint for c in pool.channels if columns & set(c.ids.tolist())})
+    return [j for j in named if j in seen] or touched or seen
+
+
+def _errors(search: Search, state: State) -> Array:
+    """RMS error of the first channel on *choose* by estimates from *fit*, (J,); NaN without rows."""
+    pool = search.pool
+    columns = search.columns(state)
+    H, h = pool.blocks(columns, search.weights)
+    part = pool.channels[0].part
+    fit, prior = part == FIT, np.diag(search.precision(columns, state.uncertainty))
+    x = solve_spd(H[fit].sum(axis=0) + prior, h[fit].sum(axis=0))
+    full = np.zeros(pool.size)
+    full[columns] = x
+    out = np.full(len(pool.problem.model.joints), np.nan)
+    for c in pool.channels:
+        rows = c.part == CHOOSE
+        if c.number or c.count[rows].sum() == 0:
+            continue
+        own = full[c.ids]
+        loss = c.s[rows].sum() - 2.0 * c.h[rows].sum(axis=0) @ own
+        loss += own @ c.H[rows].sum(axis=0) @ own
+        out[c.joint] = np.sqrt(max(loss, 0.0) / c.count[rows].sum())
+    return out * pool.problem.sigma[:, 0]
+
+
+def _rms(errors: Array, joints: Sequence[int]) -> float:
+    """Over those of some joints that are known; NaN without any."""
+    known = errors[list(joints)]
+    known = known[np.isfinite(known)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
+
+def _members(problem: Problem, level: str) -> tuple[Member, ...]:
+    """Refitted bodies, link by link."""
+    nan = float("nan")
+    return tuple(Member((link,), ten, level, nan) for link, ten in bodies_of(problem).items())
+
+
+def _candidates(judged: Judgement, found: Sequence[Found]) -> Iterator[Candidate]:
+    """Every name once: those found, what comes close to one of them, then all others."""
+    first, search, state = judged.settled.first, judged.search, judged.state
+    nothing = first.valid(State((), UNCERTAINTIES[0]))
+    alone = _best_by_name(first, first.gains(nothing))
+    beside = _best_by_name(search, search.gains(state))
+    kept = {f.key: f for f in found}
+    close = {r: f for f in found for r in f.rivals}
+    unit = CHANNEL_UNITS[judged.settled.problem.benches[0].measurement.channels[0]]
+    base = _errors(first, nothing)
+    names = dict.fromkeys([*kept, *(r for r in close if r[1] or r[0] == BODIES), *alone])
+    for key in names:
+        effect, place = key
+        f = kept.get(key)
+        gain = alone.get(key, float("nan"))
+        if f is not None:
+            verdict, reason = limits.ACCEPTED, f.reason or "nothing else explains the log as well"
+        elif key in close:
+            verdict = limits.INDISTINGUISHABLE + _words(close[key].key)
+            reason = f"a motion that {EFFECTS[effect].excitation} would decide"
+        elif gain == -np.inf:
+            verdict, reason = limits.NOT_IDENTIFIABLE, "its estimate is nothing that can be"
+        else:
+            verdict = limits.REJECTED
+            reason = _rejected(gain, beside.get(key, -np.inf))
+        joints = [j for j, n in enumerate(judged.settled.problem.model.joints) if n in place]
+        yield Candidate(
+            effect=effect,
+            place=place,
+            before=f.valid_before if f else _rms(base, joints or range(base.size)),
+            after=f.valid_after if f else float("nan"),
+            unit=unit,
+            identifiable=gain != -np.inf,
+            verdict=verdict,
+            reason=reason,
+            gain=gain if np.isfinite(gain) else 0.0,
+        )
+
+
+def _rejected(gain: float, beside: float) -> str:
+    if gain <= 0.0:
+        return "the log is no more likely with it"
+    if beside == -np.inf:
+        return "the effects found leave nothing for it"
+    return f"with the effects found it makes the log less likely, by {-beside:.1f} (ln)"
+
+
+def _best_by_name(search: Search, gains: Array) -> Mapping[Key, float]:
+    out: dict[Key, float] = {}
+    for term, gain in zip(search.pool.terms, gains, strict=True):
+        out[term.key] = max(out.get(term.key, -np.inf), float(gain))
+    return out
+
+
+def noise_of(settled: Settled) -> Array:
+    """Standard deviation of what no effect explains, (J, C): noise and what is left open.
+
+    Noise is the sensors' own, or what a fit of everything together leaves at the highest
+    frequencies where that is more.
+    """
+    floor = settled.problem.floor
+    out = floor.copy()
+    for c in settled.first.pool.channels:
+        if np.isfinite(c.noise):
+            out[c.joint, c.number] = max(1.0, c.noise) * floor[c.joint, c.number]
+    return np.hypot(out, left_open(settled.problem))

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import apply_edits
-from pipeline.identification.selection.weigh import Weighing
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
@@ -65,9 +64,8 @@ def forward(given: Setup, where: Whereabouts, options: Options) -> tuple[Drive, 
         label = f"{edit.effect} at {place_text(edit.place)}"
         models.append((label, apply_edits(models[-1][1], [edit])))
     out = []
-    weighing = Weighing(given.bare, where.measurements)
     for label, model in models:
-        machine = ForwardSimulator(weighing.calibrated(model))
+        machine = ForwardSimulator(model)
         out += [
             Drive(log, label, machine.run(servo)) for log, servo in zip(logs, servos, strict=True)
         ]

@@ -71,6 +71,13 @@ def model_text(file: ModelFile, beside: Path) -> str:
         edits.append(_edit(edit))
     if file.edits:
         document["edit"] = edits
+    if file.noise:
+        noise = tomlkit.table()
+        for channel, joints in file.noise.items():
+            table = tomlkit.table()
+            table.update({joint: float(f"{value:.6g}") for joint, value in joints.items()})
+            noise[channel] = table
+        document["noise"] = noise
     return tomlkit.dumps(document)
 
 

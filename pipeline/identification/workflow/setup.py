@@ -142,7 +142,8 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         bare = machine_of_robot(robot, actuators if alternative else None)
         sources = (*robot.spec.sources, *(() if robot.spec.build else (robot.spec.urdf,)))
     edits = given_file.edits if given_file else ()
-    file = replace(new_model_file(path, alternative, parts.folder), edits=edits)
+    noise = given_file.noise if given_file else {}
+    file = replace(new_model_file(path, alternative, parts.folder), edits=edits, noise=noise)
     return Setup(
         path=path,
         sources=(*sources, *(_catalog_files(parts.folder) if alternative else ())),

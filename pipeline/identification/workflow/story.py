@@ -12,16 +12,16 @@ import numpy as np
 from pipeline.effects.model_file import Edit, apply_edits, edits_in
 from pipeline.errors import GaitError, StanceError
 from pipeline.identification.compare.stages import Stage, noise_floor, overall
+from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Found, Naming, named
 from pipeline.identification.selection.deciding_motion import Deciding
-from pipeline.identification.whole.fit import with_found
 from pipeline.identification.workflow.deciding import decide
 from pipeline.identification.workflow.explain import explain
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
-from pipeline.identification.workflow.written import Weighed, weigh_found
+from pipeline.identification.workflow.written import Weighed, weigh_found, with_found
 from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.machine.machine import MachineModel
 from pipeline.progress import Progress
@@ -154,7 +154,13 @@ def added(
     edits = edits_of(found, logs)
     if not edits and not given.file.edits:
         return "", ()
-    text = model_text(given.file.with_edits(edits), out)
+    first = where.measurements[0]
+    floor = floor_of(where.measurements)
+    noise = {
+        channel: dict(zip(first.joints, floor[:, c].tolist(), strict=True))
+        for c, channel in enumerate(first.channels)
+    }
+    text = model_text(replace(given.file.with_edits(edits), noise=noise), out)
     return text, edits_in(text)[len(given.file.edits) :]
 
 
@@ -226,5 +232,5 @@ def gathered(
         story=story,
         deciding=decided[0] if decided else None,
         model_file=weighed.text,
-        shown=most_improved(weighed.stages[1], weighed.stages[-1], columns),
+        shown=most_improved(weighed.stages[0], weighed.stages[-1], columns),
     )

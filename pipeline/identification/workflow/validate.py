@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.model_file import Edit
 from pipeline.effects.registry import effect_named
+from pipeline.identification.regression.floor import with_noise
 from pipeline.identification.results import (
     APPROXIMATE,
     CONFIRMED,
@@ -22,7 +24,8 @@ from pipeline.identification.workflow.written import weigh_edits
 
 
 def check(given: Setup, where: Whereabouts) -> Told:
-    """Gap with and without the model file's effects, tolerances estimated anew for every model."""
+    """Gap with and without the model file's effects, by the noise that the file states."""
+    where = replace(where, measurements=with_noise(where.measurements, given.file.noise))
     channel = where.measurements[0].channels[0]
     unit = CHANNEL_UNITS[channel]
     groups = together(given.file.edits)

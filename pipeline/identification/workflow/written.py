@@ -1,14 +1,15 @@
 """The model file that a run writes, held against rows that had no say: the gap that is quoted.
 
 What is quoted, drawn and decides the exit code is the gap of the model *as written*: the edits are
-read back from the file's text, put into the machine, its tolerances estimated beside them, and the
-whole is simulated. Names that the file leaves out are listed with what each would close beside it.
+read back from the file's text, put into the machine, and the whole is simulated, with nothing
+estimated anew. Names that the file leaves out are listed with what each would close beside it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,18 +18,16 @@ from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.stages import Stage, noise_floor, stages
+from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Remainder, named
 from pipeline.identification.selection.residual import remainders
-from pipeline.identification.selection.weigh import Weighing, floor_of
-from pipeline.identification.whole.fit import with_found
-from pipeline.identification.whole.sides import READ_OFF
+from pipeline.identification.selection.two_positions import READ_OFF
 from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.logs.prepared.measurement import PROVE
 from pipeline.machine.machine import MachineModel
 
 Array = NDArray[np.float64]
 AS_IT_WAS = "model as it was"
-TOLERANCES = "tolerances of its parts"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +36,7 @@ class Weighed:
 
     Attributes:
         found: Effects, with what each closes on *prove* and whether the file holds it.
-        stages: The model as it was, with tolerances, with one effect of the file after another.
+        stages: The model as it was, with one effect of the file after another.
         pairs: Per effect, the stage without it and the stage with it.
         joints: Per effect, the column at which it shows.
         left: What the model as written leaves.
@@ -72,26 +71,24 @@ def weigh_found(
         written: From effects to the same with the values that the model file gives them, its text,
             and the edits in it that are theirs, read back.
     """
-    weighing = Weighing(model, where.measurements)
     while True:
         told, text, edits = written(found)
         kept = [f for f in told if f.kept]
         groups = list(_dealt(edits, [len(f.each) for f in kept]))
-        seen = stages(_models(weighing, model, kept, groups), where.measurements)
-        worse = _worse(model, kept, seen)
-        if not worse:
+        worse = _worst(model, where, kept, groups)
+        if worse is None:
             found = told
             break
         found = [
-            replace(f, level=SUSPECTED, reason=IDLE_NAME) if f.key in worse else f for f in found
+            replace(f, level=SUSPECTED, reason=IDLE_NAME) if f.key == worse else f for f in found
         ]
     last = apply_edits(model, edits)
     others = [f for f in found if not f.kept]
-    beside = [(named(f), weighing.calibrated(with_found(last, f))) for f in others]
-    models = [(AS_IT_WAS, model), *_models(weighing, model, kept, groups), *beside]
+    beside = [(named(f), with_found(last, f)) for f in others]
+    models = [*_models(model, kept, groups), *beside]
     seen = stages(models, where.measurements, where.intake.long)
-    first = 1 + len(kept)
-    pairs = {f.key: (seen[k + 1], seen[k + 2]) for k, f in enumerate(kept)}
+    first = len(kept)
+    pairs = {f.key: (seen[k], seen[k + 1]) for k, f in enumerate(kept)}
     pairs |= {f.key: (seen[first], seen[first + 1 + k]) for k, f in enumerate(others)}
     return gathered(model, where, found, seen[: first + 1], pairs, text)
 
@@ -110,11 +107,9 @@ def weigh_edits(
         groups: Edits of the file, those together that are told as one.
         found: One per group.
     """
-    weighing = Weighing(model, where.measurements)
-    models = [(AS_IT_WAS, model), *_models(weighing, model, found, groups)]
-    seen = stages(models, where.measurements, where.intake.long)
+    seen = stages(_models(model, found, groups), where.measurements, where.intake.long)
     # A file may hold an effect twice: each edit has a pair of its own.
-    pairs = [(seen[k + 1], seen[k + 2]) for k in range(len(groups))]
+    pairs = [(seen[k], seen[k + 1]) for k in range(len(groups))]
     joints = [effect_column(model, f, *pair) for f, pair in zip(found, pairs, strict=True)]
     floor = noise_floor(where.measurements)
     told = tuple(
@@ -172,43 +167,48 @@ def _left(where: Whereabouts, last: Stage) -> tuple[Remainder, ...]:
 
 
 def _models(
-    weighing: Weighing,
     model: MachineModel,
     found: Sequence[Found],
     groups: Sequence[Sequence[Edit]],
 ) -> list[tuple[str, MachineModel]]:
-    """Labels and models: with tolerances, then with one group of edits after another."""
-    out = [(TOLERANCES, weighing.calibrated(model))]
-    edited = model
+    """Labels and models: as it was, then with one group of edits after another."""
+    out, edited = [(AS_IT_WAS, model)], model
     for f, group in zip(found, groups, strict=True):
         edited = apply_edits(edited, group)
-        out.append((named(f), weighing.calibrated(edited)))
+        out.append((named(f), edited))
     return out
 
 
-def _worse(
-    model: MachineModel, found: Sequence[Found], seen: Sequence[Stage]
-) -> set[tuple[str, tuple[str, ...]]]:
-    """Names to be written with which the simulated gap on *choose* is larger than without.
+def _worst(
+    model: MachineModel,
+    where: Whereabouts,
+    found: Sequence[Found],
+    groups: Sequence[Sequence[Edit]],
+) -> tuple[str, tuple[str, ...]] | None:
+    """The name without which the simulated gap on *choose* is smallest, if smaller than with it.
 
-    Naming judges by a linear step. What a tolerance would have taken up is its own merit.
+    Naming judges by a linear step; what two positions tell, the torque hardly shows.
     """
-    out: set[tuple[str, tuple[str, ...]]] = set()
-    for k, f in enumerate(found):
-        # What is fitted together for a whole machine is judged together; what two positions told
-        # has shown itself.
-        if (
-            f.members
-            or f.law == READ_OFF
-            or not effect_named(f.effect).competes
-            or effect_named(f.effect).is_tolerance
-        ):
-            continue
-        before, after = seen[k], seen[k + 1]
-        j = effect_column(model, f, before, after)
-        if after.valid[j] > before.valid[j]:
-            out.add(f.key)
-    return out
+    judged = [k for k, f in enumerate(found) if f.law != READ_OFF]
+    whole = [edit for group in groups for edit in group]
+    models = [("", apply_edits(model, whole))]
+    for k in judged:
+        rest = [edit for i, group in enumerate(groups) if i != k for edit in group]
+        models.append(("", apply_edits(model, rest)))
+    first, *others = stages(models, where.measurements)
+    worst, least = None, 0.0
+    for k, less in zip(judged, others, strict=True):
+        change = np.nan_to_num(less.valid**2 - first.valid**2)
+        share = float(change.sum() / max(np.nansum(first.valid**2), 1e-300))
+        if share < least:
+            worst, least = found[k].key, share
+    return worst
+
+
+def with_found(model: MachineModel, found: Found) -> MachineModel:
+    """A machine with a finding, all its members."""
+    effect = effect_named(found.effect)
+    return reduce(lambda m, one: effect.apply(m, one.place, one.values), found.each, model)
 
 
 def effect_column(model: MachineModel, found: Found, before: Stage, after: Stage) -> int:

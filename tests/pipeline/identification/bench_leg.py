@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from actuators.loading.build import load_catalog
+from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Remainder
 from pipeline.identification.selection.residual import remainders
-from pipeline.identification.selection.weigh import Weighing, floor_of
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement, near_rest
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import load_robot
@@ -94,7 +94,6 @@ def only(log: Measurement, channels: tuple[str, ...]) -> Measurement:
 
 
 def left_by(model: MachineModel, logs: Sequence[Measurement]) -> tuple[Remainder, ...]:
-    """What a model leaves once the tolerances of its parts are estimated."""
-    calibrated = Weighing(model, logs).calibrated(model)
-    predictions = [Simulator(m).predict(calibrated) for m in logs]
+    """What a model leaves."""
+    predictions = [Simulator(m).predict(model) for m in logs]
     return remainders(logs, predictions, floor_of(logs, PROVE))

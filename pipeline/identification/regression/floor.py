@@ -1,0 +1,75 @@
+"""Noise floor of several logs together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.identification.regression.problem import Problem
+from pipeline.identification.regression.tolerances import STRAINS
+from pipeline.identification.results import UNCERTAINTIES
+from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
+
+Array = NDArray[np.float64]
+
+
+def floor_of(measurements: Sequence[Measurement], *parts: int) -> Array:
+    """Standard deviation of the noise, shape (J, C), of the logs with rows in some parts.
+
+    Args:
+        measurements: One per log.
+        parts: *fit* and *choose* by default: logs that only prove have no say, in this neither.
+    """
+    own = [m for m in measurements if np.isin(m.part, parts or (FIT, CHOOSE)).any()]
+    return np.asarray(np.sqrt(np.mean([m.noise**2 for m in own or measurements], axis=0)))
+
+
+def with_noise(
+    measurements: Sequence[Measurement], noise: Mapping[str, Mapping[str, float]]
+) -> tuple[Measurement, ...]:
+    """Measurements whose noise is at least that of a model file, channel to joint to value."""
+    out = []
+    for m in measurements:
+        level = m.noise.copy()
+        for c, channel in enumerate(m.channels):
+            for j, joint in enumerate(m.joints):
+                level[j, c] = max(level[j, c], noise.get(channel, {}).get(joint, 0.0))
+        out.append(replace(m, noise=level))
+    return tuple(out)
+
+
+def left_open(problem: Problem) -> Array:
+    """Effort that may be otherwise by what no log has told, one standard deviation, (J, C).
+
+    Of what was estimated and is written (effects, refitted bodies) by the scatter of the estimates
+    over blocks, of every other tolerance of a part by its stated size. On rows that prove, where
+    there are any: another motion may ask for what the first did not show.
+    """
+    sums = problem.sums()
+    blocks = sums.blocks(FIT, CHOOSE)
+    spread = sums.covariance(sums.solve(blocks), blocks)
+    count, precision = len(problem.tolerances), problem.precision
+    refitted = problem.uncertainty > UNCERTAINTIES[0]
+    known = np.array(
+        [n.kind in STRAINS and refitted for n in problem.tolerances]
+        + [True] * (problem.names - count)
+    )
+    spread[~known, :] = spread[:, ~known] = 0.0
+    prior = 1.0 / np.maximum(precision[:count], 1e-12)
+    spread[np.arange(count), np.arange(count)] += np.where(known[:count], 0.0, prior)
+    proves = any((b.measurement.part == PROVE).any() for b in problem.benches)
+    variance, rows = np.zeros(problem.sigma.shape), np.zeros(problem.sigma.shape)
+    for stack in problem.stacks():
+        bench = stack.bench
+        part = bench.parts[PROVE] if proves else problem.head(problem.benches.index(bench))
+        good = bench.measurement.mask[bench.rows[part]]
+        for j, X in stack.X.items():
+            own = spread[np.ix_(stack.ids[j], stack.ids[j])]
+            for c in range(variance.shape[1]):
+                x = X[:, part, c]
+                variance[j, c] += float(np.sum(x * (own @ x))) / bench.weight**2
+            rows[j] += good[:, j].sum()
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0) / np.maximum(rows, 1.0)) * problem.sigma)

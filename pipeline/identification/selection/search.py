@@ -1,0 +1,380 @@
+"""Which names explain a log best: sets of names compared by their evidence.
+
+With columns X whitened by the noise, prior N(mu, Lambda^-1) and H = X^T X + Lambda, a set of
+unknowns has the evidence
+
+    ln E = b^T H^-1 b / 2 - ln det H / 2 + ln det Lambda / 2 + const,   b = X^T r + Lambda mu
+
+(MacKay, "Bayesian interpolation", Neural Computation 4, 1992). A tolerance has the prior of its
+stated size, the bodies that of the URDF's uncertainty u, which is one more unknown; an effect's
+coordinate may be as large as makes its torque as large as what is measured, and every name is as
+likely as any other before the log is seen. So ten parameters per link, or a name of two, cost what
+they are worth, and nothing else decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+import scipy.linalg
+from numpy.typing import NDArray
+
+from pipeline.effects.base import REACH
+from pipeline.identification.regression.normal_equations import solve_spd
+from pipeline.identification.regression.tolerances import STRAINS, UNCERTAINTY
+from pipeline.identification.results import UNCERTAINTIES
+from pipeline.identification.selection.pool import Pool, Term, saturated
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+#: How much likelier a set has to be with a name than without it, beyond even odds of all names
+#: (logarithm).
+MARGIN: Final = 3.0
+#: From this uncertainty of the URDF on, one link's centre of mass is a part of the bodies.
+COARSE: Final = 0.1
+IN_BODIES: Final = ("center_of_mass_offset",)
+#: Parts of a log's blocks, each judged by estimates from the others.
+FOLDS: Final = 8
+_RIDGE: Final = 1e-10
+
+
+@dataclass(frozen=True)
+class State:
+    """A set of names.
+
+    Attributes:
+        terms: Numbers of the pool's terms with the coordinates in use.
+        uncertainty: Of the URDF's bodies [1].
+        evidence: Its logarithm, priors of the names in it; up to a constant of the pool.
+    """
+
+    terms: tuple[tuple[int, tuple[int, ...]], ...]
+    uncertainty: float
+    evidence: float = -np.inf
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """Of the terms."""
+        return tuple(t for t, _ in self.terms)
+
+
+class Search:
+    """Evidence of sets of names on one pool."""
+
+    def __init__(self, pool: Pool, weights: Array | None = None) -> None:
+        self.pool = pool
+        self.weights = noise_weights(pool) if weights is None else weights
+        self.H, self.h = pool.total(self.weights)
+        self.bodies = np.array(
+            [k for k, n in enumerate(pool.problem.tolerances) if n.kind in STRAINS], dtype=np.intp
+        )
+        self._tolerances = pool.problem.precision[: pool.base].copy()
+        self._tolerances[self.bodies] = 1.0
+        self._wide = self._widths()
+        names = len({t.key for t in pool.terms}) + 1
+        # A nonlinear parameter costs what a coordinate that many rows tell does.
+        rows = 0.5 * np.log(max(np.mean([c.count.sum() for c in pool.channels]), 1.0))
+        bent = [len([n for n in t.shape if n != REACH]) for t in pool.terms]
+        self._name = -np.log(names) - MARGIN
+        self._prior = np.array([self._name - rows * b for b in bent])
+        sums = [w * c.s.sum() for c, w in zip(pool.channels, self.weights, strict=True)]
+        counts = [
+            np.log(w) * c.count.sum() for c, w in zip(pool.channels, self.weights, strict=True)
+        ]
+        self._open = np.ones(len(pool.terms), dtype=np.bool_)
+        self._index(pool)
+        self._none = 0.5 * float(np.sum(counts) - np.sum(sums))
+
+    def _index(self, pool: Pool) -> None:
+        """Terms by their number of coordinates."""
+        names = list(dict.fromkeys(t.key for t in pool.terms))
+        self._keys = np.array([names.index(t.key) for t in pool.terms], dtype=np.intp)
+        self._in_bodies = np.array([t.effect.name in IN_BODIES for t in pool.terms], dtype=np.bool_)
+        counts = np.array([t.columns.size for t in pool.terms], dtype=np.intp)
+        self._by_count = {int(n): np.flatnonzero(counts == n) for n in np.unique(counts)}
+        self._own = {
+            n: np.array([pool.terms[t].columns for t in own]) for n, own in self._by_count.items()
+        }
+        self._signed = {
+            n: np.array([[c.signed for c in pool.terms[t].effect.coordinates] for t in own])
+            for n, own in self._by_count.items()
+        }
+        every = [t.columns for t in pool.terms]
+        self._offered = np.unique(np.concatenate([_none(), *every]))
+
+    def _widths(self) -> Array:
+        """Prior precision of coordinates: a torque as large as the effort it touches, (P,)."""
+        energy, square = np.zeros(self.pool.size), np.zeros(self.pool.size)
+        for channel, w in zip(self.pool.channels, self.weights, strict=True):
+            own = np.einsum("bii->i", channel.H)
+            energy[channel.ids] += w * own
+            square[channel.ids] += np.where(own > 0, channel.effort * channel.count.sum() * w, 0)
+        return energy / np.maximum(square, 1e-300)
+
+    def columns(self, state: State) -> Index:
+        """Tolerances and the coordinates of its terms."""
+        own = [self.pool.terms[t].columns[list(used)] for t, used in state.terms]
+        return np.concatenate([np.arange(self.pool.base), *own]).astype(np.intp)
+
+    def precision(self, columns: Index, uncertainty: float) -> Array:
+        """Prior precision of some columns, tolerances among them."""
+        every = np.concatenate([self._tolerances, self._wide[self.pool.base :]])
+        every[self.bodies] = (UNCERTAINTY / uncertainty) ** 2
+        return np.maximum(every[columns], 1e-12 * np.maximum(np.diag(self.H)[columns], 1e-300))
+
+    def solve(self, state: State) -> tuple[Index, Array, Array, float]:
+        """Columns in use, Cholesky factor of H, estimate, and the evidence."""
+        columns = self.columns(state)
+        prior = self.precision(columns, state.uncertainty)
+        A = self.H[np.ix_(columns, columns)] + np.diag(prior)
+        scale = np.sqrt(np.diag(A))
+        L = np.linalg.cholesky(A / np.outer(scale, scale) + _RIDGE * np.eye(columns.size))
+        L = scale[:, None] * L
+        y = scipy.linalg.solve_triangular(L, self.h[columns], lower=True)
+        x = scipy.linalg.solve_triangular(L, y, lower=True, trans=1)
+        evidence = self._none + 0.5 * y @ y - np.log(np.diag(L)).sum() + 0.5 * np.log(prior).sum()
+        evidence += sum(self._prior[t] for t in state.numbers)
+        if state.uncertainty > UNCERTAINTIES[0]:
+            evidence += self._name
+        return columns, L, x, float(evidence)
+
+    def valid(self, state: State) -> State:
+        """A state with its evidence, coordinates against their sign left out."""
+        while True:
+            _, _, x, evidence = self.solve(state)
+            at, kept, changed = self.pool.base, [], False
+            for t, used in state.terms:
+                own = x[at : at + len(used)]
+                at += len(used)
+                effect = self.pool.terms[t].effect
+                stays = tuple(
+                    k
+                    for k, value in zip(used, own, strict=True)
+                    if effect.coordinates[k].signed or value > 0.0
+                )
+                changed |= stays != used
+                needed = [k for k, c in enumerate(effect.coordinates) if c.required]
+                possible = self._plausible(t, dict(zip(used, own, strict=True)))
+                possible &= set(needed) <= set(used)
+                possible &= state.uncertainty < COARSE or effect.name not in IN_BODIES
+                changed |= not possible
+                if stays and set(needed) <= set(stays) and possible:
+                    kept.append((t, stays))
+            if not changed:
+                return replace(state, evidence=evidence)
+            state = replace(state, terms=tuple(kept))
+
+    def _plausible(self, number: int, x: Mapping[int, float]) -> bool:
+        term = self.pool.terms[number]
+        names = [c.name for c in term.effect.coordinates]
+        full = {name: x.get(k, 0.0) for k, name in enumerate(names)}
+        if any(full[c.name] < 0 and not c.signed for c in term.effect.coordinates):
+            return True  # its sign is judged by itself
+        return term.effect.plausible(self.pool.problem.model, term.place, full, term.shape)
+
+    def gains(self, state: State) -> Array:
+        """Rise of the evidence with each further term, (T,); minus infinity where it cannot be."""
+        pool = self.pool
+        columns, L, x, _ = self.solve(state)
+        rest = np.setdiff1d(self._offered, columns)
+        W = scipy.linalg.solve_triangular(L, self.H[np.ix_(columns, rest)], lower=True)
+        where = np.full(pool.size, -1)
+        where[rest] = np.arange(rest.size)
+        g = self.h[rest] - self.H[np.ix_(rest, columns)] @ x
+        prior = self.precision(rest, state.uncertainty)
+        held = [pool.terms[t] for t in state.numbers]
+        out = np.full(len(pool.terms), -np.inf)
+        open_ = self._open & ~np.isin(self._keys, [self._keys[t] for t in state.numbers])
+        if state.uncertainty >= COARSE:
+            open_ &= ~self._in_bodies
+        for count, numbers in self._by_count.items():
+            tried = np.array([n for n in numbers[open_[numbers]] if self._allowed(n, held)], int)
+            if not tried.size:
+                continue
+            at = self._own[count][np.searchsorted(numbers, tried)]  # columns (T, p)
+            w = where[at]
+            V = W[:, w]  # (n, T, p)
+            S = self.H[at[:, :, None], at[:, None, :]] - np.einsum("ntp,ntq->tpq", V, V)
+            out[tried] = self._gains(tried, S, g[w], prior[w]) + self._prior[tried]
+        return out
+
+    def _allowed(self, number: int, held: Sequence[Term]) -> bool:
+        term = self.pool.terms[number]
+        return term.effect.place_kind != "joint pair" or not any(_excludes(term, h) for h in held)
+
+    def _gains(self, numbers: Index, S: Array, g: Array, prior: Array) -> Array:
+        """Rise of the evidence with terms of as many coordinates each, (T,)."""
+        M = S + prior[:, None, :] * np.eye(g.shape[1])
+        M = M + _RIDGE * M * np.eye(g.shape[1])
+        sound = np.linalg.eigvalsh(M)[:, 0] > 0.0
+        M[~sound] = np.eye(g.shape[1])
+        x = np.linalg.solve(M, g[:, :, None])[:, :, 0]
+        out = 0.5 * np.sum(g * x, axis=1) - 0.5 * np.linalg.slogdet(M)[1]
+        out += 0.5 * np.log(prior).sum(axis=1)
+        out[~sound] = -np.inf
+        for k in np.flatnonzero(
+            sound
+            & (
+                (x < 0.0)
+                & ~self._signed[g.shape[1]][np.searchsorted(self._by_count[g.shape[1]], numbers)]
+            ).any(axis=1)
+        ):
+            out[k] = self._gain(self.pool.terms[numbers[k]], S[k], g[k], prior[k])
+        return out
+
+    def _gain(self, term: Term, S: Array, g: Array, prior: Array) -> float:
+        """The same of one term, coordinates against their sign left out."""
+        coordinates = term.effect.coordinates
+        free = list(range(len(coordinates)))
+        while free:
+            M = S[np.ix_(free, free)] + np.diag(prior[free])
+            x = np.linalg.solve(M, g[free])
+            wrong = [k for k, v in zip(free, x, strict=True) if v < 0 and not coordinates[k].signed]
+            if not wrong:
+                size = np.linalg.slogdet(M)[1] - np.log(prior[free]).sum()
+                return float(0.5 * g[free] @ x - 0.5 * size)
+            if any(coordinates[k].required for k in wrong):
+                return -np.inf
+            free = [k for k in free if k not in wrong]
+        return -np.inf
+
+    def gain_of(self, state: State, further: Index, beside: Index | None = None) -> float:
+        """Rise of the evidence with columns that are no term.
+
+        Args:
+            state: A set of names.
+            further: The columns.
+            beside: Such columns that it has already.
+        """
+        return self._with(
+            state, np.concatenate([_none() if beside is None else beside, further])
+        ) - (self._with(state, _none() if beside is None else beside))
+
+    def _with(self, state: State, more: Index) -> float:
+        columns = np.concatenate([self.columns(state), more])
+        prior = self.precision(columns, state.uncertainty)
+        live = np.diag(self.H)[columns] > 0.0
+        columns, prior = columns[live], prior[live]
+        A = self.H[np.ix_(columns, columns)] + np.diag(prior)
+        scale = np.sqrt(np.diag(A))
+        L = np.linalg.cholesky(A / np.outer(scale, scale) + _RIDGE * np.eye(columns.size))
+        y = scipy.linalg.solve_triangular(L, self.h[columns] / scale, lower=True)
+        size = np.log(np.diag(L)).sum() + np.log(scale).sum()
+        return float(0.5 * y @ y - size + 0.5 * np.log(prior).sum())
+
+    def block_losses(self, state: State) -> Array:
+        """Squared error of every block by estimates from other blocks, in noise variances, (B,)."""
+        columns = self.columns(state)
+        H, h = self.pool.blocks(columns, self.weights)
+        s = np.sum([w * c.s for c, w in zip(self.pool.channels, self.weights, strict=True)], axis=0)
+        prior = np.diag(self.precision(columns, state.uncertainty))
+        whole_H, whole_h = H.sum(axis=0) + prior, h.sum(axis=0)
+        out = np.empty(len(s))
+        for fold in range(min(FOLDS, len(s))):
+            own = np.arange(fold, len(s), FOLDS)
+            x = solve_spd(whole_H - H[own].sum(axis=0), whole_h - h[own].sum(axis=0))
+            out[own] = s[own] - 2.0 * h[own] @ x + np.einsum("i,bij,j->b", x, H[own], x)
+        return out
+
+    def with_term(self, state: State, number: int) -> State:
+        """A state with one term more."""
+        every = tuple(range(len(self.pool.terms[number].effect.coordinates)))
+        return self.valid(replace(state, terms=(*state.terms, (number, every))))
+
+    def without(self, state: State, number: int) -> State:
+        """A state with one term less."""
+        kept = tuple((t, used) for t, used in state.terms if t != number)
+        return self.valid(replace(state, terms=kept))
+
+    def at(self, state: State, uncertainty: float) -> State:
+        """A state at another uncertainty of the URDF."""
+        return self.valid(replace(state, uncertainty=uncertainty))
+
+    def _freed(self, state: State, uncertainties: Sequence[float]) -> State:
+        every = [self.at(state, u) for u in uncertainties if u != state.uncertainty]
+        return max([state, *every], key=lambda s: s.evidence)
+
+    def climbed(self, state: State, uncertainties: Sequence[float]) -> State:
+        """The best state that steps of one name reach; couplings bring a shaft and come last."""
+        self._open = np.array([t.effect.place_kind != "joint pair" for t in self.pool.terms])
+        state = self._climbed(state, uncertainties)
+        self._open[:] = True
+        return self._climbed(state, uncertainties)
+
+    def _climbed(self, state: State, uncertainties: Sequence[float]) -> State:
+        state = self.valid(state)
+        while True:
+            better = self._pruned(self._freed(self._grown(state), uncertainties))
+            better = self._swapped(better)
+            better = self._freed(better, uncertainties)
+            if better.evidence <= state.evidence + 1e-6:
+                return state
+            state = better
+
+    def _grown(self, state: State) -> State:
+        while True:
+            gains = self.gains(state)
+            for number in np.argsort(-gains)[:3]:
+                if gains[number] <= 0.0:
+                    return state
+                more = self._pruned(self.with_term(state, int(number)))
+                if more.evidence > state.evidence + 1e-6:
+                    state = more
+                    break
+            else:
+                return state
+
+    def _pruned(self, state: State) -> State:
+        while state.terms:
+            less = [self.without(state, t) for t in state.numbers]
+            best = max(less, key=lambda s: s.evidence)
+            if best.evidence <= state.evidence:
+                return state
+            state = best
+        return state
+
+    def _swapped(self, state: State) -> State:
+        """Each term against what may stand in its place."""
+        for t in state.numbers:
+            rest = self.without(state, t)
+            gains = self.gains(rest)
+            best = int(np.argmax(gains))
+            if best != t and rest.evidence + gains[best] > state.evidence + 1e-6:
+                other = self._pruned(self.with_term(rest, best))
+                if other.evidence > state.evidence + 1e-6:
+                    return self._swapped(other)
+        return state
+
+
+def _none() -> Index:
+    return np.zeros(0, dtype=np.intp)
+
+
+def _excludes(a: Term, b: Term) -> bool:
+    """Whether two terms cannot be in one set: forms of a name, or couplings that share a joint."""
+    both = a.effect.place_kind == b.effect.place_kind == "joint pair"
+    return a.key == b.key or (both and bool(set(a.place) & set(b.place)))
+
+
+def noise_weights(pool: Pool) -> Array:
+    """Weight of every channel: noise is what everything together leaves, with its memory.
+
+    The residual of all columns over the samples it has left, at least the sensor's noise; where
+    its gradient scatters more over blocks than independent samples would, samples count for less.
+    """
+    out = np.empty(len(pool.channels))
+    for k, channel in enumerate(pool.channels):
+        h = channel.h.sum(axis=0)
+        x, rank = saturated(channel.H.sum(axis=0), h)
+        n = channel.count.sum()
+        left = channel.s.sum() - x @ h
+        variance = max(left / max(n - rank, 0.1 * n), 1.0)
+        g = channel.h - channel.H @ x
+        own = np.einsum("bii->bi", channel.H)
+        live = own.sum(axis=0) > 0
+        scatter = (g[:, live] ** 2).sum(axis=0) / (variance * own[:, live].sum(axis=0))
+        out[k] = 1.0 / (variance * max(1.0, float(np.median(scatter)) if live.any() else 1.0))
+    return out

@@ -1,0 +1,129 @@
+"""The set of names that explains a log best, at its own estimates.
+
+A search on columns about the files' model says where to look. Each of its answers is estimated
+anew with all nonlinearities (Gauss-Newton), the columns are made about that point, and the search
+goes on from there until nothing changes. Of all points visited the one with the most evidence, each
+judged with columns of its own, is the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from pipeline.effects.base import REACH
+from pipeline.identification.regression.problem import Accepted, Problem
+from pipeline.identification.regression.refit import refit
+from pipeline.identification.results import UNCERTAINTIES
+from pipeline.identification.selection.pool import Pool, make_pool
+from pipeline.identification.selection.search import Search, State
+from pipeline.progress import Progress
+
+#: Times an answer is looked at again about its own estimates, at most.
+_ROUNDS: Final = 4
+#: Evidence below which two points are the same.
+_SAME: Final = 1e-3
+#: Answers of the first search that are estimated in full.
+_STARTS: Final = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """A set of names at its estimates.
+
+    Attributes:
+        problem: With the names as accepted effects and the uncertainty of the URDF.
+        search: On columns about these estimates.
+        state: The names there.
+        first: The search about the files' model.
+    """
+
+    problem: Problem
+    search: Search
+    state: State
+    first: Search
+
+    @property
+    def pool(self) -> Pool:
+        """The columns."""
+        return self.search.pool
+
+
+def settle(problem: Problem, progress: Progress | None = None) -> Settled:
+    """The best set of names of all that a log was compared with.
+
+    Args:
+        problem: Without effects.
+        progress: To tell how far it is.
+    """
+    if progress:
+        progress.step("letting all names compete")
+    first = Search(make_pool(problem))
+    starts = sorted(dict.fromkeys(_starts(first)), key=lambda s: -first.valid(s).evidence)
+    points: list[Settled] = []
+    for state in starts[:_STARTS]:
+        if progress:
+            progress.step(f"estimating {len(state.terms)} effects together")
+        points.append(_best_near(problem, first, state))
+    weights = np.max([p.search.weights for p in points], axis=0)
+    judged = [(Search(p.pool, weights), p) for p in points]
+    evidence = [search.valid(p.state).evidence for search, p in judged]
+    return points[int(np.argmax(evidence))]
+
+
+def _starts(search: Search) -> Iterator[State]:
+    """Answers about the files' model, from bodies that are known to bodies that may be anything."""
+    for u in UNCERTAINTIES[::2]:
+        held = search.climbed(State((), u), ())
+        state = search.climbed(held, UNCERTAINTIES)
+        yield State(tuple(sorted(state.terms)), state.uncertainty)
+        if u == UNCERTAINTIES[0]:
+            yield State(tuple(sorted(held.terms)), held.uncertainty)
+
+
+def _best_near(problem: Problem, search: Search, state: State) -> Settled:
+    """The best point that an answer leads to."""
+    best: Settled | None = None
+    first = search
+    for _ in range(_ROUNDS):
+        problem = problem.at_uncertainty(state.uncertainty)
+        problem = refit(problem.with_accepted(accepted_of(search, state)))
+        search = Search(make_pool(problem))
+        here = search.valid(as_accepted(search))
+        if best is not None and here.evidence < best.state.evidence - _SAME:
+            break
+        best = Settled(problem, search, here, first)
+        state = search.climbed(here, UNCERTAINTIES)
+        if state.evidence <= here.evidence + _SAME:
+            break
+    assert best is not None
+    return best
+
+
+def as_accepted(search: Search) -> State:
+    """The set of a problem's accepted effects."""
+    problem = search.pool.problem
+    terms = tuple((k, _used(a)) for k, a in enumerate(problem.accepted))
+    return State(tuple((k, used) for k, used in terms if used), problem.uncertainty)
+
+
+def _used(a: Accepted) -> tuple[int, ...]:
+    return tuple(k for k, c in enumerate(a.effect.coordinates) if c.signed or a.x[c.name] != 0.0)
+
+
+def accepted_of(search: Search, state: State) -> list[Accepted]:
+    """Effects of a state with the estimates of its linear problem."""
+    _, _, x, _ = search.solve(state)
+    out, at = [], search.pool.base
+    for number, used in state.terms:
+        term = search.pool.terms[number]
+        values = dict.fromkeys((c.name for c in term.effect.coordinates), 0.0)
+        for k in used:
+            values[term.effect.coordinates[k].name] = float(x[at])
+            at += 1
+        shape = {name: value for name, value in term.shape.items() if name != REACH}
+        out.append(Accepted(term.effect, term.place, values, shape))
+    return out

@@ -1,0 +1,118 @@
+"""Elasticity and backlash of joints whose log holds motor and joint position, read off the two."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+
+from pipeline.effects.base import CHANNEL_UNITS
+from pipeline.effects.registry import effect_named
+from pipeline.identification import results as limits
+from pipeline.identification.results import Estimate, Found
+from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.logs.prepared.parts import Parts
+from pipeline.logs.prepared.prepare import Prepared
+from pipeline.logs.prepared.read_off import two_sides
+from pipeline.logs.signals.two_sides import TwoSides
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Simulator
+
+#: Why the gap in torque has no say: the torque hardly shows it.
+READ_OFF: Final = "read off two positions"
+#: Standard errors in half of a 95 % interval.
+_COVER: Final = 1.96
+#: Stiffness of what does not bend [N*m/rad].
+_RIGID: Final = 1e12
+#: Torque over which a joint passes from one flank to the other, of the largest seen [1].
+_CROSSING: Final = 0.05
+
+
+def read_off_two(
+    model: MachineModel,
+    prepared: Sequence[Prepared],
+    parts: Parts,
+    measurements: Sequence[Measurement],
+    first: int,
+) -> tuple[Found, ...]:
+    """Findings of the logs that may be learnt from; rows that prove are not looked at.
+
+    Args:
+        model: With all that was named: friction does not deflect what lies behind it.
+        prepared: Logs.
+        parts: Of them.
+        measurements: Of the same logs.
+        first: Number of the first finding.
+    """
+    out: dict[str, Found] = {}
+    for one, part, m in zip(prepared, parts.part, measurements, strict=True):
+        known = (part >= 0) & (part != PROVE)
+        if one.channel != "torque" or not known.any() or one.other.get("motor_position") is None:
+            continue
+        learnt = replace(one, mask=one.mask & known[:, None])
+        plain, behind = two_sides(learnt), two_sides(_behind_friction(learnt, model, m))
+        for joint, seen in behind.items():
+            largest = float(np.nanmax(np.abs(one.effort[known, one.joints.index(joint)])))
+            found = _found(joint, _wider(seen, plain.get(joint, seen)), largest)
+            if found is not None and joint not in out:
+                out[joint] = found
+    return tuple(replace(f, order=first + k) for k, f in enumerate(out.values()))
+
+
+def _behind_friction(one: Prepared, model: MachineModel, m: Measurement) -> Prepared:
+    """A log whose torques are those behind the friction in them."""
+    prediction = Simulator(m).predict(model)
+    friction = prediction.effort[..., 0] - prediction.torque
+    series = np.column_stack([np.interp(one.time, m.time, x) for x in friction.T])
+    return replace(one, effort=one.effort - one.lowpass(series))
+
+
+def _wider(seen: TwoSides, plain: TwoSides) -> TwoSides:
+    """With half of what friction changes as an error, too: its law is none that holds exactly."""
+    (c, c_error), (w, w_error) = seen.compliance, seen.width
+    c_error = float(np.hypot(c_error, 0.5 * abs(c - plain.compliance[0]) / _COVER))
+    if np.isfinite(plain.width[0]):
+        w_error = float(np.hypot(w_error, 0.5 * abs(w - plain.width[0]) / _COVER))
+    return replace(seen, compliance=(c, c_error), width=(w, w_error))
+
+
+def _found(joint: str, seen: TwoSides, largest: float) -> Found | None:
+    if not (seen.plays or seen.elastic):
+        return None
+    name, parameters = "joint_elasticity", tuple(_stiffness(seen))
+    if seen.plays:
+        width, error = seen.width
+        half, crossing = _COVER * error, _CROSSING * largest
+        name = "backlash"
+        stiffness = (
+            parameters
+            if seen.elastic
+            else (Estimate("stiffness", _RIGID, _RIGID, _RIGID, "N*m/rad"),)
+        )
+        parameters = (
+            Estimate("width", float(width), max(width - half, 0.0), float(width + half), "rad"),
+            *stiffness,
+            Estimate("crossing", crossing, crossing, crossing, "N*m"),
+        )
+    nan = float("nan")
+    return Found(
+        order=0,
+        effect=name,
+        place=(joint,),
+        parameters=parameters,
+        rivals=(),
+        valid_before=nan,
+        valid_after=nan,
+        unit=CHANNEL_UNITS["torque"],
+        noise_floor=nan,
+        excitation=effect_named(name).excitation,
+        level=limits.CONFIRMED,
+        law=READ_OFF,
+    )
+
+
+def _stiffness(seen: TwoSides) -> Iterator[Estimate]:
+    value, low, high = seen.stiffness
+    yield Estimate("stiffness", max(value, 1.0), max(low, 1.0), min(high, _RIGID), "N*m/rad")

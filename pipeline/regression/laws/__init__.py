@@ -1,1 +1,0 @@
-"""What torque may depend on: bodies, friction, couplings, as columns."""

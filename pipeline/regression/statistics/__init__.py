@@ -1,1 +1,0 @@
-"""Weights, sums over blocks, choices and intervals."""
