@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 _BLOCK = 2048
 #: Entries of a strain, in this order.
 _ROWS, _COLUMNS = (0, 1, 2, 3, 0, 0, 1, 0, 1, 2), (0, 1, 2, 3, 1, 2, 2, 3, 3, 3)
+#: Least share of a direction in a body's scaled pseudo-inertia.
+_LEAST = 1e-6
 _MANY = 8192  # rows from which a second thread pays
 
 
@@ -79,9 +81,23 @@ def strained(body: pin.Inertia, strain: Sequence[float]) -> pin.Inertia:
     L = axes * np.sqrt(np.maximum(size, 0.0))
     # A planar or point-like body has no extent that could change.
     P = P + L @ (scipy.linalg.expm(S) - np.eye(4)) @ L.T
+    return pin.Inertia.FromDynamicParameters(_ten(P))
+
+
+def possible(ten: Array) -> Array:
+    """Ten inertial parameters of the nearest body: no direction with less than nothing in it."""
+    P = pseudo_inertia(ten)
+    scale = np.sqrt(np.maximum(np.diag(P), 1e-12 * np.trace(P)))
+    size, axes = np.linalg.eigh(P / np.outer(scale, scale))
+    if size[0] > _LEAST:
+        return ten
+    P = (axes * np.maximum(size, 2.0 * _LEAST)) @ axes.T * np.outer(scale, scale)
+    return _ten(P)
+
+
+def _ten(P: Array) -> Array:
     inertia = np.trace(P[:3, :3]) * np.eye(3) - P[:3, :3]
-    ten = [P[3, 3], *P[:3, 3], *inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]]
-    return pin.Inertia.FromDynamicParameters(np.array(ten))
+    return np.array([P[3, 3], *P[:3, 3], *inertia[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
 
 
 def pseudo_inertia(ten: Array) -> Array:

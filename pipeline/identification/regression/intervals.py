@@ -26,7 +26,7 @@ from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.identification.results import Estimate
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.rigid_bodies import strained
+from pipeline.simulation.rigid_bodies import possible, strained
 
 LAW: Final = 0.01  # share to which a law holds at best
 
@@ -163,7 +163,7 @@ def bodies_of(problem: Problem) -> dict[str, tuple[Estimate, ...]]:
         body = problem.model.rigid.inertias[problem.model.rigid.getJointId(joint)]
 
         def ten(strain: Array, body: pin.Inertia = body) -> Array:
-            return np.asarray(strained(body, strain.tolist()).toDynamicParameters())
+            return possible(np.asarray(strained(body, strain.tolist()).toDynamicParameters()))
 
         best = ten(held * sigma)
         spread = np.array([ten((held + draw) * sigma) for draw in draws[:, at]])
