@@ -176,11 +176,10 @@ def answer(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
     return tuple(filter(None, said))
 
 
-def _whole(story: Story) -> tuple[float, float, float]:
-    """Gap of all joints of the model as it was, with tolerances, and as written."""
-    first, tolerances, *_ = story.weighed.stages
-    last = story.weighed.stages[-1]
-    return overall(first.gap), overall(tolerances.gap), overall(last.gap)
+def _whole(story: Story) -> tuple[float, float]:
+    """Gap of all joints of the model as it was and as written."""
+    stages = story.weighed.stages
+    return overall(stages[0].gap), overall(stages[-1].gap)
 
 
 def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
@@ -262,7 +261,7 @@ def _candidates(story: Story) -> TableBlock:
         ("effect", "place", "validation without", "with", "unit", "verdict", "why"),
         rows,
         f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried. "
-        "Without and with: gap on rows that choose, by estimates from others, tolerances anew "
+        "Without and with: gap on rows that choose, by estimates from others "
         "for either, so that what they take up speaks for no candidate; a dash: left out after "
         "screening.",
         "candidates.csv",
@@ -272,17 +271,15 @@ def _candidates(story: Story) -> TableBlock:
 
 
 def _smaller(story: Story, folder: Path) -> Section:
-    first, parts, *_ = story.weighed.stages
-    last = story.weighed.stages[-1]
+    first, last = story.weighed.stages[0], story.weighed.stages[-1]
     floor = noise_floor(story.where.measurements)
     joints = story.given.model.joints
     unit = story.naming.unit
-    order = np.argsort(-np.nan_to_num(parts.gap - last.gap))
+    order = np.argsort(-np.nan_to_num(first.gap - last.gap))
     rows = tuple(
         (
             joints[j],
             float(first.gap[j]),
-            float(parts.gap[j]),
             float(last.gap[j]),
             float(floor[j]),
             unit,
@@ -296,11 +293,10 @@ def _smaller(story: Story, folder: Path) -> Section:
             "Measured and predicted, and what is left, without and with what the model file holds.",
         ),
         TableBlock(
-            ("joint", "as it was", "with tolerances", "as written", "noise floor", "unit"),
+            ("joint", "as it was", "as written", "noise floor", "unit"),
             rows,
-            "Gap, root mean square, on held-out data. Tolerances are what every machine "
-            "differs in from its files: masses, torque constants, encoder zeros, each within its "
-            "stated uncertainty. As written: with the effects of the model file, read back.",
+            "Gap, root mean square, on held-out data. As written: with the effects of the model "
+            "file, read back, nothing estimated anew.",
             digits=3,
         ),
     ]

@@ -141,7 +141,7 @@ def _unit(unit: str) -> str:
 def smaller_words(
     found: Sequence[Found],
     joints: Sequence[str],
-    whole: tuple[float, float, float],
+    whole: tuple[float, float],
     unit: str,
     noise: float,
 ) -> str:
@@ -150,7 +150,7 @@ def smaller_words(
     Args:
         found: Effects, validated.
         joints: Per effect, the joint at which it shows.
-        whole: Gap of all joints of the model as it was, with tolerances, and as written.
+        whole: Gap of all joints of the model as it was and as written.
         unit: Of the gap.
         noise: Noise floor of all joints.
     """

@@ -38,9 +38,10 @@ def decide(
         None where nothing is undecided, or no motion inside the limits decides.
     """
     for f in found:
-        if not f.rivals:
+        # Bodies have no size of their own that a motion could be planned for.
+        rivals = [Rival(effect_named(name), place) for name, place in f.rivals if place]
+        if not rivals or f.members:
             continue
-        rivals = [Rival(effect_named(name), place) for name, place in f.rivals]
         named = Rival(effect_named(f.effect), f.place, f.values)
         m = measurements[0]
         posture, movable, stance = None, None, None
