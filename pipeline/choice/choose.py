@@ -23,7 +23,7 @@ from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.search import Account, Demanded, Feedback
 from pipeline.machine.drivetrains import Drivetrains
-from pipeline.machine.joint import joints_of
+from pipeline.machine.joint import JointModel, joints_of
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
@@ -157,7 +157,8 @@ def through(
         account: What is counted; drivers that are on are, the hotel load is not.
     """
     mode, names = load.mode, load.series.joints
-    models, locks = {}, {}
+    models: dict[str, JointModel] = {}
+    locks: dict[str, bool] = {}
     for joints, design in built.values():
         engaged = not mode.stands or mode.hold == "brake"
         chain = design.chain(0, engaged=engaged)

@@ -217,7 +217,7 @@ class Shelf:
         """
         names = {name for row in combinations for name in row if name}
         known = {name: self._converted(name, drawn or {}) for name in names}
-        none = dict.fromkeys(known and next(iter(known.values())), 0.0)
+        none = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0)
         none |= {"gear_speed": np.inf, "gear_continuous": np.inf, "gear_peak": np.inf}
         none |= {"ratio": 1.0}
         columns = [[known.get(row[k], none) for row in combinations] for k in range(3)]

@@ -230,7 +230,7 @@ def _day_row(
     total: float,
     sums: Mapping[str, float],
     transport: float | None,
-    limits: Mapping[str, float],
+    limits: Mapping[str, float | None],
 ) -> DayRow:
     energy, none = power * load.mode.hours, dict.fromkeys(_LIMITS)
     more: dict[str, Any] = {**none, **limits}
