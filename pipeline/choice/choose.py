@@ -14,7 +14,7 @@ from actuators.chain import ChainResult
 from actuators.energy.regeneration import supply
 from actuators.errors import CatalogError, closest
 from actuators.loading.parts import PARTS, Part, load_parts
-from pipeline.choice.designs import GEARS, Designs, Shelf, combinations
+from pipeline.choice.designs import Designs
 from pipeline.choice.doubt import Doubt, doubt
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.fronts import merged
@@ -22,6 +22,7 @@ from pipeline.choice.group import Found, groups_of, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.search import Account, Demanded, Feedback
+from pipeline.choice.shelf import GEARS, Shelf, combinations
 from pipeline.machine.drivetrains import Drivetrains
 from pipeline.machine.joint import JointModel, joints_of
 from pipeline.progress import Progress

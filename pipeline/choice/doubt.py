@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from scipy.stats.qmc import LatinHypercube
 
 from actuators.loading.data_sheet import Number
-from pipeline.choice.designs import Designs, Shelf
+from pipeline.choice.designs import Designs
 from pipeline.choice.search import Account, Demanded, Feedback
+from pipeline.choice.shelf import Shelf
 
 Array = NDArray[np.float64]
 DRAWS: Final = 256

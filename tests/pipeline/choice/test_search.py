@@ -12,12 +12,13 @@ import pipeline as lw
 from actuators.energy.limits import limit_rows
 from actuators.energy.regeneration import supply
 from actuators.loading.parts import load_parts
-from pipeline.choice.designs import Designs, Shelf, combinations
+from pipeline.choice.designs import Designs
 from pipeline.choice.fronts import front, merged
 from pipeline.choice.group import search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import read_mission
 from pipeline.choice.search import Account, Demanded
+from pipeline.choice.shelf import Shelf, combinations
 
 ACCOUNT = Account(idle=0.672)
 MISSION = """mode,share,gait,hold,drivers,payload
@@ -139,3 +140,20 @@ def test_mission_that_ships_is_read() -> None:
 
     modes = read_mission(Path(module.__file__).parent / "missions" / "day.csv")
     assert sum(mode.hours for mode in modes) == pytest.approx(24.0)
+
+
+def test_a_part_that_says_less_is_filled_from_its_class() -> None:
+    """A strain wave gear stripped of what it may leave out has the ranges of its class."""
+    parts = load_parts()
+    whole = parts["maxon_gp_42_c_126"]
+    kept = {name: whole.printed[name] for name in ("gear_ratio", "gear_continuous_torque")}
+    bare = replace(whole, name="bare", printed=kept)
+    shelf = Shelf.of({"bare": bare, "worm": replace(parts["hpc_m1_120"], name="worm")})
+    own = shelf.numbers["bare"]
+    for entry in ("mass", "gear_inertia", "gear_max_speed", "gear_starting_torque"):
+        assert 0.0 < own[entry].low < own[entry].high, entry
+        assert own[entry].low / 3 < whole.printed[entry].value < own[entry].high * 3, entry
+    assert own["gear_efficiency"].low < own["gear_efficiency"].high < 1.0
+    # 2 to 50 % of what the worm loses at 40 N*m: 40 / 120 (1 / 0.25 - 1) = 1 N*m at its input.
+    start = shelf.numbers["worm"]["gear_starting_torque"]
+    assert (start.low, start.high) == pytest.approx((0.02, 0.5))
