@@ -36,7 +36,7 @@ Which = NDArray[np.bool_]
 SPEED = 3  # the series w among the five
 #: Numbers of a block of designs times samples: 16 MB.
 BLOCK = 2_000_000
-_MANY = 50  # samples from which on their hull is worth finding
+_MANY = 50  # samples, or designs, from which on a hull is worth finding
 
 
 @dataclass(frozen=True)
@@ -200,18 +200,24 @@ class Demanded:
     @cached_property
     def hull(self) -> Array:
         """Samples at which a linear function of the five series can be extreme, (H, 5)."""
-        return extreme(np.concatenate([t.x[:, ~t.rest].T for t in self.tracks]))
+        return extreme(self.samples)
+
+    @property
+    def samples(self) -> Array:
+        """The five series of every mode where a joint moves, (N, 5)."""
+        return np.concatenate([t.x[:, ~t.rest].T for t in self.tracks])
 
     def limits(self, designs: Designs) -> dict[str, Array]:
         """Share of each limit that is used, by its name, (D,)."""
         theta, k, n = designs.theta, designs.torque_constant, designs.ratio
-        fastest = np.abs(self.hull[:, SPEED]).max(initial=0.0)
+        points = self.hull if len(designs) > _MANY else self.samples
+        fastest = np.abs(points[:, SPEED]).max(initial=0.0)
         peak, volts = np.zeros(len(designs)), np.zeros(len(designs))
-        for rows in _blocks(len(designs), max(len(self.hull), 1)):
-            torque = theta[rows] @ self.hull.T
+        for rows in _blocks(len(designs), max(len(points), 1)):
+            torque = theta[rows] @ points.T
             peak[rows] = np.abs(torque).max(axis=1, initial=0.0)
             torque *= (designs.resistance[rows] / k[rows])[:, None]
-            torque += (k[rows] * n[rows])[:, None] * self.hull[:, SPEED]
+            torque += (k[rows] * n[rows])[:, None] * points[:, SPEED]
             volts[rows] = np.abs(torque).max(axis=1, initial=0.0)
         rms = np.zeros(len(designs))
         for track in self.tracks:
