@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from pathlib import Path
@@ -18,8 +18,7 @@ from actuators.loading.parts import PARTS, Part, load_parts
 from pipeline.choice.designs import Designs
 from pipeline.choice.doubt import Design, Doubt, doubt, drawn
 from pipeline.choice.errors import ChoiceError
-from pipeline.choice.fronts import merged
-from pipeline.choice.group import Found, groups_of, search
+from pipeline.choice.group import Found, groups_of, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.search import Account, Demanded, Feedback
@@ -36,7 +35,7 @@ Array = NDArray[np.float64]
 #: Rounds of mass fed back, at most; two or three settle it.
 _ROUNDS: Final = 5
 _POOL: Final = 8  # designs of each search, by score and by mass, among which a robot is settled
-_SEARCHES: Final = 6  # of all designs, each with drawn values of all parts
+_SEARCHES: Final = 4  # of all designs, each with drawn values of all parts
 _FEW: Final = 8  # draws of a design while it is settled
 
 
@@ -82,7 +81,7 @@ class Chosen:
         loads: The mission's modes, with the answer's masses in the robot.
         found: The search of each group.
         candidates: Designs of each group that are drawn: the answer, the best by the middle of
-            every range, and the best in some draws of all parts.
+            every range, and those among which the answer settled.
         doubts: Draws over the candidates of each group.
         answer: Design of each group.
         first: What the first search, before mass was fed back, took the answer's power for [W].
@@ -92,7 +91,7 @@ class Chosen:
 
     machine: Machine
     wanted: Wanted
-    loads: tuple[Load, ...]
+    loads: Sequence[Load]
     found: Mapping[str, Found]
     candidates: Mapping[str, list[Design]]
     doubts: Mapping[str, Doubt]
@@ -182,9 +181,8 @@ def choose(
     shelf = Shelf.of(filtered(load_parts(wanted.parts), wanted))
     every = combinations(shelf, brakes=wanted.brakes, voltage=wanted.voltage)
     designs = shelf.designs(every)
-    present = wanted.present
-    if present is None:
-        present = machine.ready.motors.mass[0]
+    held = machine.ready.motors.mass[0]
+    present = held if wanted.present is None else wanted.present
     told("the mission's demand")
     asked = _Asked(machine, modes, groups, shelf, wanted.account, present)
     robots = asked.robots(dict.fromkeys(groups, present))
@@ -197,7 +195,10 @@ def choose(
         found = asked.searched(designs, robots.loads, price)
         first = first or {g: float(f.power[f.finalists[0]]) for g, f in found.items()}
         for g, f in found.items():
-            pool[g] |= dict.fromkeys([*_named(f, f.finalists[:_POOL]), *_named(f, f.front[:_POOL])])
+            pool[g] |= dict.fromkeys(_named(f, [*f.finalists[:_POOL], *f.front[:_POOL]]))
+        if turn == 1:  # with masses that are near
+            for g, f in asked.drawn(every, robots.loads, price):
+                pool[g] |= dict.fromkeys(_named(f, f.finalists[:_POOL]))
         start = answer or {g: _named(f, f.finalists)[0] for g, f in found.items()}
         better = robots.settled(start, pool)
         if better == answer:
@@ -208,13 +209,15 @@ def choose(
     asked.check(answer, robots)
     found = asked.searched(designs, robots.loads, price)
     told("draws over what no sheet prints")
-    candidates = asked.candidates(every, answer, found, robots.loads, price)
-    doubts = {
-        g: doubt(f.demanded, shelf, candidates[g], wanted.account, price[g], draws=wanted.draws)
-        for g, f in found.items()
-    }
-    loads = tuple(robots.loads)
-    return Chosen(machine, wanted, loads, found, candidates, doubts, answer, first, present, shelf)
+    candidates = {g: _candidates(answer[g], f, pool[g]) for g, f in found.items()}
+    doubts = asked.doubts(found, candidates, price, wanted.draws)
+    return Chosen(
+        machine, wanted, robots.loads, found, candidates, doubts, answer, first, present, shelf
+    )
+
+
+def _candidates(answer: Design, found: Found, pool: Iterable[Design]) -> list[Design]:
+    return list(dict.fromkeys([answer, *_named(found, found.finalists), *pool]))
 
 
 def _named(found: Found, which: Sequence[int] | NDArray[np.intp]) -> list[Design]:
@@ -275,21 +278,25 @@ class _Asked:
         """Of one actuator of each group [kg]."""
         return {g: float(self.shelf.designs([answer[g]]).mass[0]) for g in self.groups}
 
-    def candidates(
-        self,
-        every: Sequence[Design],
-        answer: Mapping[str, Design],
-        found: Mapping[str, Found],
-        loads: Sequence[Load],
-        price: Mapping[str, Feedback],
-    ) -> dict[str, list[Design]]:
-        """The answer, the best by the middle of every range, and those of some draws of all."""
-        out = {g: [answer[g], *_named(f, f.finalists)] for g, f in found.items()}
+    def drawn(
+        self, every: Sequence[Design], loads: Sequence[Load], price: Mapping[str, Feedback]
+    ) -> Iterator[tuple[str, Found]]:
+        """Every group's search in some draws of all parts."""
         for sheet in drawn(self.shelf, every, _SEARCHES, seed=1)[2]:
-            other = self.searched(self.shelf.designs(every, sheet), loads, price)
-            for g, f in other.items():
-                out[g] += _named(f, f.finalists[:_POOL])
-        return {g: list(dict.fromkeys(each)) for g, each in out.items()}
+            yield from self.searched(self.shelf.designs(every, sheet), loads, price).items()
+
+    def doubts(
+        self,
+        found: Mapping[str, Found],
+        candidates: Mapping[str, Sequence[Design]],
+        price: Mapping[str, Feedback],
+        draws: int,
+    ) -> dict[str, Doubt]:
+        """Every group's candidates in draws of what is not printed of them."""
+        return {
+            g: doubt(f.demanded, self.shelf, candidates[g], self.account, price[g], draws=draws)
+            for g, f in found.items()
+        }
 
     def robots(self, mass: Mapping[str, float]) -> Robots:
         """All robots about masses of one actuator of each group [kg]."""

@@ -51,6 +51,11 @@ class Designs:
         brake_torque: With which the brake holds; 0 for none [N*m].
         brake_power: That keeps it open [W].
         mass: Of motor, gear and brake [kg].
+        winding_to_housing: [K/W].
+        housing_to_ambient: [K/W].
+        winding_time: Thermal time constant [s].
+        housing_time: Likewise [s].
+        winding_limit: Permitted temperature [K].
     """
 
     parts: tuple[tuple[str, str, str], ...]
@@ -71,6 +76,11 @@ class Designs:
     brake_torque: Array
     brake_power: Array
     mass: Array
+    winding_to_housing: Array
+    housing_to_ambient: Array
+    winding_time: Array
+    housing_time: Array
+    winding_limit: Array
 
     def __len__(self) -> int:
         return len(self.parts)

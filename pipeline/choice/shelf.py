@@ -38,6 +38,14 @@ _OF_BRAKES: Final = {
     "inertia": ("kg*m^2", 5 / 3),
     "release_power": ("W", 2 / 3),
 }
+#: Heat leaves through a surface and is stored in a volume.
+_OF_MOTORS: Final = {
+    "winding_to_housing": ("K/W", -2 / 3),
+    "housing_to_ambient": ("K/W", -2 / 3),
+    "winding_time": ("s", 1 / 3),
+    "housing_time": ("s", 1 / 3),
+    "winding_limit": ("K", 0.0),
+}
 #: Motor by which a gear's sheet is converted: none of the gear's numbers depends on it.
 _ANY: Final = {
     **dict.fromkeys(("current_of", "resistance_of", "torque_constant", "resistance"), 1.0),
@@ -118,7 +126,7 @@ class Shelf:
                 key: motor[key]
                 for key in (
                     *("torque_constant", "resistance", "voltage", "continuous_current"),
-                    *("peak_current", "max_speed"),
+                    *("peak_current", "max_speed", *_OF_MOTORS),
                 )
             },
         )
@@ -147,6 +155,7 @@ class Shelf:
             out[law] += found.get(f"rotor.{law}", 0.0)
         for key in ("torque_constant", "resistance", "continuous_current", "max_speed"):
             out[key] = found[f"motor.{key}"]
+        out |= {entry: x[entry] for entry in _OF_MOTORS}
         out["peak_current"] = max(found["motor.peak_current"], out["continuous_current"])
         return out | {"voltage": found["motor.supply_voltage"]}
 
@@ -194,6 +203,9 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
     where = f"{part.kind}/{part.name}.toml"
     if part.kind == "motor" and "mass" not in own:
         raise ChoiceError(f"{where}: no mass; a motor's has to be stated")
+    if part.kind == "motor":
+        for entry in sorted(_OF_MOTORS.keys() - own.keys()):
+            own[entry] = _class(known, ("motor",), entry, _OF_MOTORS[entry], _torque(own))
     if part.kind == "brake":
         if "holding_torque" not in own:
             raise ChoiceError(f"{where}: no holding_torque; it has to be stated")
@@ -232,11 +244,20 @@ def _class(
     (unit, power), each = grows, []
     for part in known.values():
         printed = part.printed
-        torque = printed.get("gear_continuous_torque", printed.get("holding_torque"))
-        if part.kind in kinds and entry in printed and torque is not None:
-            each.append(printed[entry].value / torque.value**power)
+        if part.kind in kinds and entry in printed and (torque := _torque(printed)):
+            each.append(printed[entry].value / torque**power)
     low, high = np.quantile(each, [0.1, 0.9]).tolist()
     return _range(low, high, size**power, unit)
+
+
+def _torque(x: Sheet) -> float:
+    """By which parts of a kind are of equal size; 0 where it is not printed [N*m]."""
+    for name in ("gear_continuous_torque", "holding_torque"):
+        if name in x:
+            return x[name].value
+    if {"torque_constant", "continuous_current"} <= x.keys():
+        return x["torque_constant"].value * x["continuous_current"].value
+    return _motor_torque(x)
 
 
 @cache
@@ -253,10 +274,19 @@ def _range(low: float, high: float, size: float, unit: str) -> Number:
 _ONE: Final = Number(1.0, 1.0, 1.0, "1", "1")
 
 
+def _motor_torque(x: Sheet) -> float:
+    """Continuous torque of a motor whose sheet states it otherwise; 0 for other parts [N*m]."""
+    if "continuous_current" not in x and "continuous_torque" not in x:
+        return 0.0
+    found = {k: v for k, (v, _) in converted({n: v.value for n, v in x.items()}).items()}
+    return found["motor.torque_constant"] * found["motor.continuous_current"]
+
+
 def _sheet(part: Part) -> dict[str, Number]:
     """A motor's entries with what follows without being said."""
     words = {name: text for name, text in part.words.items() if name in ENTRIES}
+    others = {name: x for name, x in part.printed.items() if name not in ENTRIES}
     try:
-        return dict(read_sheet({"gear_ratio": "1"} | words))
+        return dict(read_sheet({"gear_ratio": "1"} | words)) | others
     except DataSheetError as error:
         raise ChoiceError(f"motor/{part.name}.toml: {error}") from None

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.chain import ChainResult
 from actuators.energy.energy import integral
 from actuators.energy.regeneration import supply
 from actuators.loading.build import WINDING
 from actuators.units import from_si
+from pipeline.choice import heat
 from pipeline.choice.choose import Chosen
 from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
@@ -21,6 +23,8 @@ from reports.tables.choice import AnswerRow, BestRow, DayRow, ExcludedRow, Front
 
 Array = NDArray[np.float64]
 ROBOT = "robot"
+ZERO_CELSIUS = 273.15  # [K]
+_WARM = ("warming_W", "winding_degC", "winding_peak_degC", "winding_limit_degC")
 
 
 def tables_of(chosen: Chosen) -> list[Table]:
@@ -193,7 +197,8 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
     total = sum(
         load.mode.hours * (float(power.sum()) + account.hotel) for load, _, power, _ in full
     )
-    for load, result, power, on in full:
+    warm = {group: _warm(chosen, group, full) for group in chosen.found}
+    for k, (load, result, power, on) in enumerate(full):
         joints, time = load.series.joints, load.series.time
         means: dict[str, Array] = {
             "mechanical_W": integral(time, result.joint.power) / load.duration,
@@ -213,14 +218,40 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
         for group, found in chosen.found.items():
             at = [joints.index(joint) for joint in found.demanded.joints]
             sums = {name: float(mean[at].sum()) for name, mean in means.items()}
-            yield _day_row(
-                load, group, float(power[at].sum()), total, sums, None, _limits(chosen, load, group)
-            )
+            limits = _limits(chosen, load, group) | warm[group][k]
+            yield _day_row(load, group, float(power[at].sum()), total, sums, None, limits)
         sums = {name: float(mean.sum()) for name, mean in means.items()}
         sums["idle_W"] += account.hotel
         own = float(power.sum()) + account.hotel
         transport = own / (load.weight * load.speed) if load.speed else None
         yield _day_row(load, ROBOT, own, total, sums, transport, {})
+
+
+def _warm(
+    chosen: Chosen, group: str, full: Sequence[tuple[Load, ChainResult, Array, Array]]
+) -> list[dict[str, float | None]]:
+    """Temperature of a group's windings in every mode, through the full chains."""
+    at = [full[0][0].series.joints.index(j) for j in chosen.found[group].demanded.joints]
+    copper = np.stack(
+        [
+            integral(load.series.time, result.losses[WINDING])[at] / load.duration
+            for load, result, _, _ in full
+        ],
+        axis=1,
+    )
+    design = chosen.designs(group)
+    found = heat.day(design, [load.mode.hours for load, *_ in full], copper)
+    more = (copper * (found.resistance - 1.0)).sum(axis=0)
+    peak, limit = (x - ZERO_CELSIUS for x in (found.peak.max(), design.winding_limit[0]))
+    return [
+        {
+            "warming_W": float(more[k]),
+            "winding_degC": float(found.winding[:, k].max() - ZERO_CELSIUS),
+            "winding_peak_degC": float(peak),
+            "winding_limit_degC": float(limit),
+        }
+        for k in range(len(full))
+    ]
 
 
 def _day_row(
@@ -232,7 +263,7 @@ def _day_row(
     transport: float | None,
     limits: Mapping[str, float | None],
 ) -> DayRow:
-    energy, none = power * load.mode.hours, dict.fromkeys(_LIMITS)
+    energy, none = power * load.mode.hours, dict.fromkeys((*_LIMITS, *_WARM))
     more: dict[str, Any] = {**none, **limits}
     return DayRow(
         mode=load.mode.name,

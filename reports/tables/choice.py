@@ -100,7 +100,13 @@ class DayRow:
     brakes_W: float = column("coils of the brakes", "W")
     returned_W: float = column("flows back and is lost", "W")
     idle_W: float = column("drivers, and for the robot the hotel load", "W")
+    warming_W: float | None = column(
+        "more heat of the windings by their temperature; not in power_W", "W"
+    )
     cost_of_transport: float | None = column("power over weight times speed; robot only", "1")
+    winding_degC: float | None = column("mean in the mode, of the warmest joint", "degC")
+    winding_peak_degC: float | None = column("over the day, of the warmest joint", "degC")
+    winding_limit_degC: float | None = column("limit of it", "degC")
     rms_current_A: float | None = column("of the worst joint", "A")
     continuous_current_A: float | None = column("limit of it", "A")
     peak_current_A: float | None = column("of the worst joint", "A")

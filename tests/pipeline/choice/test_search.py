@@ -13,8 +13,7 @@ from actuators.energy.limits import limit_rows
 from actuators.energy.regeneration import supply
 from actuators.loading.parts import load_parts
 from pipeline.choice.designs import Designs
-from pipeline.choice.fronts import front, merged
-from pipeline.choice.group import search
+from pipeline.choice.group import front, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import read_mission
 from pipeline.choice.search import Account, Demanded

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import pipeline as lw
+from actuators.elements.two_body import REFERENCE_K
 from actuators.loading.parts import load_parts
+from pipeline.choice import heat
 from pipeline.choice.choose import _Asked
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.group import groups_of
@@ -68,3 +70,20 @@ def test_what_exceeds_a_limit_with_its_own_mass_is_one_line(asked: _Asked, robot
     with pytest.raises(ChoiceError, match=r"own actuators' mass: group .* 10 kg a joint") as caught:
         asked.check(dict.fromkeys(asked.groups, weak), heavy)
     assert "\n" not in str(caught.value)
+
+
+def test_winding_temperature_is_that_of_the_closed_form_and_runs_away_beyond() -> None:
+    """RE 40: in the end (R_wh + R_ha) c P, with c = 1 + 0.00393 dT: a closed form of one mode."""
+    shelf = Shelf.of({"maxon_148867": load_parts()["maxon_148867"]})
+    design = shelf.designs([("maxon_148867", "", "")])
+    current = np.array([2.0, 3.0, 12.0])
+    copper = design.resistance * current**2
+    found = heat.day(design, [24.0], copper[:, None])
+    cold = (1.93 + 4.65) * copper[:2]
+    assert found.peak[:2] - REFERENCE_K == pytest.approx(cold / (1 - 0.00393 * cold), rel=1e-3)
+    use = heat.share(design, [24.0], copper[:, None])
+    assert use[:2] == pytest.approx((found.peak[:2] - REFERENCE_K) / (155.0 - 25.0), rel=1e-9)
+    assert np.isinf(use[2])
+    # One minute of it in an hour is borne.
+    spent = np.stack([copper[2:], 0.0 * copper[2:]], axis=1)
+    assert np.isfinite(heat.share(design, [1 / 60, 1.0], spent)).all()
