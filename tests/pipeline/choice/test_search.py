@@ -95,8 +95,11 @@ def test_bound_is_below_and_net_where_all_is_used_again(
     assert np.allclose(net, demanded.power(designs, replace(ACCOUNT, recovered=1.0)), rtol=1e-9)
 
 
-def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...]) -> None:
-    """Least mean square torque at n^4 = k2 / (J^2 k1): Roos, Johansson, Wikander 2006, eta = 1.
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) -> None:
+    """Least mean square torque at n^4 = k2 / (J^2 k1): Roos, Johansson, Wikander 2006.
+
+    With an efficiency below 1 tau is that before the gear, tau (1 + c) driving, (1 - c) driven.
 
     With T = n J a + tau / n the mean square is n^2 J^2 k1 + k2 / n^2 + 2 J mean(a tau).
     """
@@ -110,11 +113,12 @@ def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...]) -> None:
     designs = replace(
         plain,
         **{"ratio": ratios, "inertia": zero + inertia},
-        **dict.fromkeys(("load", "coulomb", "viscous"), zero),
+        **{"load": zero + friction, "coulomb": zero, "viscous": zero},
     )
     net = demanded.net(designs, Account())
     k1 = float(track.weight @ track.series.acceleration[:, 0] ** 2)
-    k2 = float(track.weight @ track.series.torque[:, 0] ** 2)
+    tau, s = track.series.torque[:, 0], track.series.direction[:, 0]
+    k2 = float(track.weight @ (tau + friction * np.abs(tau) * s) ** 2)
     assert ratios[net.argmin()] == pytest.approx((k2 / (inertia**2 * k1)) ** 0.25, rel=2e-3)
 
 
