@@ -151,14 +151,23 @@ def cost(
         built = {g: (f.demanded.joints, chosen.designs(g)) for g, f in chosen.found.items()}
         _, power, on = through(load, built, Account())
         return Cost(float(power[counted].sum()), float(on[counted].sum()))
-    known = machine.ready.catalog.alternatives
-    if name not in known:
-        raise CatalogError(f"--compare: no alternative '{name}': {closest(name, [*known, ANSWER])}")
+    known_candidate(machine, name)
     chain = machine.ready.chain(name)
     result = chain.moving(load.series)
     power = supply(result).supplied_energy / load.duration
     idle = load.mode.stands & _locks(chain, load) & (result.current == 0.0).all(axis=0)
     return Cost(float(power[counted].sum()), float((~idle)[counted].sum()))
+
+
+def known_candidate(machine: Machine, name: str) -> None:
+    """Whether a candidate can be compared.
+
+    Raises:
+        CatalogError: No such alternative.
+    """
+    known = [*machine.ready.catalog.alternatives, ANSWER]
+    if name not in known:
+        raise CatalogError(f"--compare: no alternative '{name}': {closest(name, known)}")
 
 
 def _locks(chain: Actuators, load: Load) -> NDArray[np.bool_]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
@@ -14,28 +15,28 @@ from actuators.chain import ChainResult
 from actuators.energy.regeneration import supply
 from actuators.errors import CatalogError, closest
 from actuators.loading.parts import PARTS, Part, load_parts
-from pipeline.choice.designs import GEARS, Designs, Shelf, combinations
-from pipeline.choice.doubt import Doubt, doubt
+from pipeline.choice.designs import Designs
+from pipeline.choice.doubt import Design, Doubt, doubt, drawn
 from pipeline.choice.errors import ChoiceError
-from pipeline.choice.fronts import merged
-from pipeline.choice.group import Found, groups_of, search
+from pipeline.choice.group import Found, groups_of, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
 from pipeline.choice.search import Account, Demanded, Feedback
+from pipeline.choice.settle import NUDGE, Robots
+from pipeline.choice.shelf import GEARS, Shelf, combinations
 from pipeline.machine.drivetrains import Drivetrains
-from pipeline.machine.joint import joints_of
+from pipeline.machine.joint import JointModel, joints_of
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
 
 Array = NDArray[np.float64]
-Design = tuple[str, str, str]
 #: Rounds of mass fed back, at most; two or three settle it.
-_ROUNDS: Final = 4
-#: Share by which a round has to be better than the one before.
-_SETTLED: Final = 1e-3
-_NUDGE: Final = 0.1  # [kg], by which what a kilogram costs is found; demand is affine in it
+_ROUNDS: Final = 5
+_POOL: Final = 8  # designs of each search, by score and by mass, among which a robot is settled
+_SEARCHES: Final = 4  # of all designs, each with drawn values of all parts
+_FEW: Final = 8  # draws of a design while it is settled
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,9 @@ class Chosen:
         wanted: What was asked.
         loads: The mission's modes, with the answer's masses in the robot.
         found: The search of each group.
-        doubts: Draws over the finalists of each group.
+        candidates: Designs of each group that are drawn: the answer, the best by the middle of
+            every range, and those among which the answer settled.
+        doubts: Draws over the candidates of each group.
         answer: Design of each group.
         first: What the first search, before mass was fed back, took the answer's power for [W].
         present: Mass of an actuator that the bodies hold already [kg].
@@ -88,8 +91,9 @@ class Chosen:
 
     machine: Machine
     wanted: Wanted
-    loads: tuple[Load, ...]
+    loads: Sequence[Load]
     found: Mapping[str, Found]
+    candidates: Mapping[str, list[Design]]
     doubts: Mapping[str, Doubt]
     answer: Mapping[str, Design]
     first: Mapping[str, float]
@@ -104,28 +108,6 @@ class Chosen:
     def designs(self, group: str) -> Designs:
         """The answer of one group, as one design."""
         return self.shelf.designs([self.answer[group]])
-
-    def drawn(self, group: str) -> Array:
-        """Power of the answer of one group in every draw, its mass in the robot, (S,) [W]."""
-        demanded = Demanded.of(group, self.found[group].demanded.joints, self.loads)
-        drawn = doubt(
-            demanded,
-            self.shelf,
-            [self.answer[group]],
-            self.wanted.account,
-            Feedback(),
-            draws=self.wanted.draws,
-        )
-        return drawn.power[:, 0]
-
-    def place(self, group: str) -> int | None:
-        """Of the answer among the finalists of its group; None where the search did not settle.
-
-        Then the answer is the best that was recomputed in full, and the draws speak of others.
-        """
-        first = self.doubts[group].order[0]
-        settled = _finalists(self.found[group])[first] == self.answer[group]
-        return int(first) if settled else None
 
     def battery_hours(self, power: float) -> float | None:
         """On one charge [h]."""
@@ -157,7 +139,8 @@ def through(
         account: What is counted; drivers that are on are, the hotel load is not.
     """
     mode, names = load.mode, load.series.joints
-    models, locks = {}, {}
+    models: dict[str, JointModel] = {}
+    locks: dict[str, bool] = {}
     for joints, design in built.values():
         engaged = not mode.stands or mode.hold == "brake"
         chain = design.chain(0, engaged=engaged)
@@ -198,42 +181,47 @@ def choose(
     shelf = Shelf.of(filtered(load_parts(wanted.parts), wanted))
     every = combinations(shelf, brakes=wanted.brakes, voltage=wanted.voltage)
     designs = shelf.designs(every)
-    present = wanted.present
-    if present is None:
-        present = machine.ready.motors.mass[0]
+    held = machine.ready.motors.mass[0]
+    present = held if wanted.present is None else wanted.present
     told("the mission's demand")
-    loads = loads_of(machine, modes)
     asked = _Asked(machine, modes, groups, shelf, wanted.account, present)
+    robots = asked.robots(dict.fromkeys(groups, present))
     price = dict.fromkeys(groups, Feedback())
+    answer: dict[str, Design] = {}
+    pool: dict[str, dict[Design, None]] = {g: {} for g in groups}
     first: dict[str, float] = {}
-    least, kept = np.inf, {}
     for turn in range(_ROUNDS):
         told(f"{len(every)} designs for each of {len(groups)} groups, round {turn + 1}")
-        found = asked.searched(designs, loads, price)
+        found = asked.searched(designs, robots.loads, price)
         first = first or {g: float(f.power[f.finalists[0]]) for g, f in found.items()}
-        answer = {g: _finalists(f)[0] for g, f in found.items()}
-        heavier = loads_of(machine, modes, asked.added(answer))
-        power, dearer = asked.prices(answer, heavier)
-        if power > least * (1.0 - _SETTLED):
+        for g, f in found.items():
+            pool[g] |= dict.fromkeys(_named(f, [*f.finalists[:_POOL], *f.front[:_POOL]]))
+        if turn == 1:  # with masses that are near
+            for g, f in asked.drawn(every, robots.loads, price):
+                pool[g] |= dict.fromkeys(_named(f, f.finalists[:_POOL]))
+        start = answer or {g: _named(f, f.finalists)[0] for g, f in found.items()}
+        better = robots.settled(start, pool)
+        if better == answer:
             break
-        least, loads, price, kept = power, heavier, dearer, answer
-    found = asked.searched(designs, loads, price)
+        answer = better
+        robots = asked.robots(asked.masses(answer))
+        price = robots.prices(answer)
+    asked.check(answer, robots)
+    found = asked.searched(designs, robots.loads, price)
     told("draws over what no sheet prints")
-    doubts = {
-        g: doubt(f.demanded, shelf, _finalists(f), wanted.account, price[g], draws=wanted.draws)
-        for g, f in found.items()
-    }
-    answer = {g: _finalists(f)[doubts[g].order[0]] for g, f in found.items()}
-    heavier = loads_of(machine, modes, asked.added(answer))
-    if kept and asked.power(answer, heavier) > least:
-        answer = kept
-    else:
-        loads = heavier
-    return Chosen(machine, wanted, loads, found, doubts, answer, first, present, shelf)
+    candidates = {g: _candidates(answer[g], f, pool[g]) for g, f in found.items()}
+    doubts = asked.doubts(found, candidates, price, wanted.draws)
+    return Chosen(
+        machine, wanted, robots.loads, found, candidates, doubts, answer, first, present, shelf
+    )
 
 
-def _finalists(found: Found) -> list[Design]:
-    return [found.designs.parts[i] for i in found.looked[found.finalists]]
+def _candidates(answer: Design, found: Found, pool: Iterable[Design]) -> list[Design]:
+    return list(dict.fromkeys([answer, *_named(found, found.finalists), *pool]))
+
+
+def _named(found: Found, which: Sequence[int] | NDArray[np.intp]) -> list[Design]:
+    return [found.designs.parts[i] for i in found.looked[which]]
 
 
 def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
@@ -286,48 +274,69 @@ class _Asked:
             for g, joints in self.groups.items()
         }
 
-    def added(self, answer: Mapping[str, Design]) -> dict[str, float]:
-        """Mass at every joint beside what the bodies hold already [kg]."""
-        mass = {g: float(self.shelf.designs([answer[g]]).mass[0]) for g in self.groups}
-        return {j: mass[g] - self.present for g, joints in self.groups.items() for j in joints}
+    def masses(self, answer: Mapping[str, Design]) -> dict[str, float]:
+        """Of one actuator of each group [kg]."""
+        return {g: float(self.shelf.designs([answer[g]]).mass[0]) for g in self.groups}
 
-    def prices(
-        self, answer: Mapping[str, Design], loads: Sequence[Load]
-    ) -> tuple[float, dict[str, Feedback]]:
-        """Power of an answer [W], and what the mass at a group's joints costs.
+    def drawn(
+        self, every: Sequence[Design], loads: Sequence[Load], price: Mapping[str, Feedback]
+    ) -> Iterator[tuple[str, Found]]:
+        """Every group's search in some draws of all parts."""
+        for sheet in drawn(self.shelf, every, _SEARCHES, seed=1)[2]:
+            yield from self.searched(self.shelf.designs(every, sheet), loads, price).items()
 
-        Args:
-            answer: Design of each group.
-            loads: With its masses; their motions are kept, along which demand is affine in mass.
+    def doubts(
+        self,
+        found: Mapping[str, Found],
+        candidates: Mapping[str, Sequence[Design]],
+        price: Mapping[str, Feedback],
+        draws: int,
+    ) -> dict[str, Doubt]:
+        """Every group's candidates in draws of what is not printed of them."""
+        return {
+            g: doubt(f.demanded, self.shelf, candidates[g], self.account, price[g], draws=draws)
+            for g, f in found.items()
+        }
+
+    def robots(self, mass: Mapping[str, float]) -> Robots:
+        """All robots about masses of one actuator of each group [kg]."""
+        added = {j: mass[g] - self.present for g, joints in self.groups.items() for j in joints}
+        loads = loads_of(self.machine, self.modes, added)
+        nudged = {
+            g: loads_of(
+                self.machine,
+                self.modes,
+                {j: m + NUDGE * (j in joints) for j, m in added.items()},
+                along=loads,
+            )
+            for g, joints in self.groups.items()
+        }
+        return Robots(self.groups, mass, loads, nudged, self.account, self.draws)
+
+    @cached_property
+    def draws(self) -> Callable[[Design], Designs]:
+        """A design in the middle of its ranges and in some draws of them."""
+
+        @cache
+        def made(design: Design) -> Designs:
+            sheets = drawn(self.shelf, [design], _FEW)[2]
+            return Designs.together([self.shelf.designs([design], x) for x in ({}, *sheets)])
+
+        return made
+
+    def check(self, answer: Mapping[str, Design], robots: Robots) -> None:
+        """An answer's limits with its own masses and motions.
+
+        Raises:
+            ChoiceError: One is exceeded: none was found that stays within all.
         """
-        built = {g: (joints, self.shelf.designs([answer[g]])) for g, joints in self.groups.items()}
-        added = self.added(answer)
-
-        hours = sum(load.mode.hours for load in loads)
-
-        def total(some: Sequence[Load], without: Sequence[str] = ()) -> float:
-            out = 0.0
-            for load in some:
-                counted = [joint not in without for joint in load.series.joints]
-                power = through(load, built, self.account)[1][counted].sum()
-                out += float(power) * load.mode.hours / hours
-            return out
-
-        out = {}
         for g, joints in self.groups.items():
-            nudged = {j: m + _NUDGE * (j in joints) for j, m in added.items()}
-            more = loads_of(self.machine, self.modes, nudged, along=loads)
-            others = (total(more, joints) - total(loads, joints)) / _NUDGE
-            mass = added[joints[0]] + self.present
-            out[g] = Feedback(mass, others, Demanded.of(g, joints, more), _NUDGE)
-        return self.power(answer, loads), out
-
-    def power(self, answer: Mapping[str, Design], loads: Sequence[Load]) -> float:
-        """Of an answer in full, infinite where a limit is exceeded [W]."""
-        built = {g: (joints, self.shelf.designs([answer[g]])) for g, joints in self.groups.items()}
-        for g, (joints, design) in built.items():
-            if max(use[0] for use in Demanded.of(g, joints, loads).limits(design).values()) > 1.0:
-                return np.inf
-        hours = sum(load.mode.hours for load in loads)
-        each = [through(load, built, self.account)[1].sum() * load.mode.hours for load in loads]
-        return float(sum(each)) / hours
+            demanded = Demanded.of(g, joints, robots.loads)
+            limits = demanded.limits(self.shelf.designs([answer[g]]))
+            worst = max(limits, key=lambda name: float(limits[name][0]))
+            if limits[worst][0] > 1.0:
+                raise ChoiceError(
+                    f"no robot found that stays within limits with its own actuators' mass: group "
+                    f"'{g}' with {robots.mass[g]:.3g} kg a joint takes {limits[worst][0]:.3g} "
+                    f"of its {worst}; add lighter or stronger parts, or state --present"
+                )

@@ -8,10 +8,9 @@ friction has, and stands still without current from c = 1 on.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from types import MappingProxyType
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,26 +23,9 @@ from actuators.elements.hypoid import Hypoid
 from actuators.elements.inertia import Inertia
 from actuators.elements.motor import DCMotor
 from actuators.elements.ratio import Ratio
-from actuators.errors import DataSheetError
 from actuators.loading.build import WINDING
-from actuators.loading.converted import converted
-from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
-from actuators.loading.parts import Part
-from pipeline.choice.errors import ChoiceError
 
 Array = NDArray[np.float64]
-GEARS: Final = ("strain_wave", "planetary", "self_locking")
-#: What a brake weighs per torque to the power 2/3; no maker's table at hand prints it.
-BRAKE_MASS: Final = (0.15, 0.45)
-#: The same of gears, where none of a folder's prints its own; as of those that come here.
-GEAR_MASS: Final = (0.05, 0.15)
-#: Motor by which a gear's sheet is converted: none of the gear's numbers depends on it.
-_ANY: Final = {
-    **dict.fromkeys(("current_of", "resistance_of", "torque_constant", "resistance"), 1.0),
-    **dict.fromkeys(("supply_voltage", "continuous_current", "peak_current", "rotor_inertia"), 1.0),
-    **dict.fromkeys(("back_drive_torque", "shaft"), 0.0),
-}
-Drawn = Mapping[tuple[str, str], float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +51,11 @@ class Designs:
         brake_torque: With which the brake holds; 0 for none [N*m].
         brake_power: That keeps it open [W].
         mass: Of motor, gear and brake [kg].
+        winding_to_housing: [K/W].
+        housing_to_ambient: [K/W].
+        winding_time: Thermal time constant [s].
+        housing_time: Likewise [s].
+        winding_limit: Permitted temperature [K].
     """
 
     parts: tuple[tuple[str, str, str], ...]
@@ -89,6 +76,11 @@ class Designs:
     brake_torque: Array
     brake_power: Array
     mass: Array
+    winding_to_housing: Array
+    housing_to_ambient: Array
+    winding_time: Array
+    housing_time: Array
+    winding_limit: Array
 
     def __len__(self) -> int:
         return len(self.parts)
@@ -159,168 +151,3 @@ class Designs:
         )
         name = " + ".join(part for part in self.parts[i] if part)
         return Chain(name, elements, motor, MappingProxyType({"m": "rotor"}))
-
-
-@dataclass(frozen=True)
-class Shelf:
-    """Parts that designs are made of, and what is known of each.
-
-    Attributes:
-        parts: By name.
-        numbers: Part to its entries; what it does not print is a range of its class.
-    """
-
-    parts: Mapping[str, Part]
-    numbers: Mapping[str, Mapping[str, Number]]
-
-    @classmethod
-    def of(cls, parts: Mapping[str, Part]) -> Shelf:
-        """The motors, gears and brakes among parts; a mass that no sheet prints is filled in."""
-        sized = [
-            part.printed["mass"].value / part.printed["gear_continuous_torque"].value ** (2 / 3)
-            for part in parts.values()
-            if part.kind in GEARS and {"mass", "gear_continuous_torque"} <= part.printed.keys()
-        ]
-        low, high = np.quantile(sized, [0.1, 0.9]).tolist() if sized else GEAR_MASS
-        numbers = {}
-        for name, part in parts.items():
-            own = _sheet(part) if part.kind == "motor" else dict(part.printed)
-            if part.kind in GEARS and "mass" not in own:
-                torque = own.get("gear_continuous_torque", own.get("gear_rated_torque"))
-                size = torque.value ** (2 / 3) if torque else 1.0
-                own["mass"] = _range(low * size, high * size, "kg")
-            elif part.kind == "brake" and "mass" not in own:
-                size = own["holding_torque"].value ** (2 / 3)
-                own["mass"] = _range(BRAKE_MASS[0] * size, BRAKE_MASS[1] * size, "kg")
-            numbers[name] = own
-        return cls(parts, numbers)
-
-    def unknown(self, design: Sequence[str]) -> Iterator[tuple[str, str, Number]]:
-        """Part, entry and range of what no sheet of a design prints."""
-        for part in design:
-            for entry, number in self.numbers.get(part, {}).items():
-                if number.low < number.high:
-                    yield part, entry, number
-
-    def not_printed(self, design: Sequence[str]) -> str:
-        """The same in words."""
-        return ", ".join(f"{part}.{entry}" for part, entry, _ in self.unknown(design))
-
-    def designs(
-        self, combinations: Sequence[tuple[str, str, str]], drawn: Drawn | None = None
-    ) -> Designs:
-        """Their numbers.
-
-        Args:
-            combinations: Motor, gear and brake of each; empty for none.
-            drawn: Entries that differ from the middle of their range, by part and entry.
-        """
-        names = {name for row in combinations for name in row if name}
-        known = {name: self._converted(name, drawn or {}) for name in names}
-        none = dict.fromkeys(known and next(iter(known.values())), 0.0)
-        none |= {"gear_speed": np.inf, "gear_continuous": np.inf, "gear_peak": np.inf}
-        none |= {"ratio": 1.0}
-        columns = [[known.get(row[k], none) for row in combinations] for k in range(3)]
-        motor, gear, brake = (
-            {key: np.array([x[key] for x in rows], dtype=np.float64) for key in none}
-            for rows in columns
-        )
-        own = motor["ratio"] * gear["ratio"]
-        return Designs(
-            tuple(combinations),
-            ratio=own,
-            load=motor["load"] + gear["load"],
-            coulomb=motor["coulomb"] + gear["coulomb"],
-            viscous=motor["viscous"] + gear["viscous"],
-            inertia=motor["inertia"] + gear["inertia"] + brake["inertia"],
-            gear_speed=gear["gear_speed"],
-            gear_continuous=np.minimum(gear["gear_continuous"], motor["gear_continuous"]),
-            gear_peak=np.minimum(gear["gear_peak"], motor["gear_peak"]),
-            brake_torque=brake["brake_torque"],
-            brake_power=brake["brake_power"],
-            mass=motor["mass"] + gear["mass"] + brake["mass"],
-            **{
-                key: motor[key]
-                for key in (
-                    *("torque_constant", "resistance", "voltage", "continuous_current"),
-                    *("peak_current", "max_speed"),
-                )
-            },
-        )
-
-    def _converted(self, name: str, drawn: Drawn) -> dict[str, float]:
-        """One part's numbers by the names of `Designs`."""
-        kind = self.parts[name].kind
-        x = {e: drawn.get((name, e), number.value) for e, number in self.numbers[name].items()}
-        out = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0) | {"ratio": 1.0}
-        out |= dict.fromkeys(("gear_speed", "gear_continuous", "gear_peak"), np.inf)
-        out["mass"] = x.get("mass", 0.0)
-        if kind == "brake":
-            out |= {"brake_torque": x["holding_torque"], "brake_power": x["release_power"]}
-            return out | {"inertia": x.get("inertia", 0.0)}
-        sheet = x if kind == "motor" else _ANY | x
-        found = {key: value for key, (value, _) in converted(sheet).items()}
-        for law in ("load", "coulomb", "viscous", "inertia"):
-            out[law] = found.get(f"gear.{law}", 0.0)
-        out["ratio"] = found["gear.ratio"]
-        if kind != "motor":
-            out["gear_speed"] = x.get("gear_max_speed", np.inf)
-            out["gear_continuous"] = x.get("gear_continuous_torque", np.inf)
-            out["gear_peak"] = x.get("gear_peak_torque", out["gear_continuous"])
-            return out
-        for law in ("coulomb", "viscous", "inertia"):
-            out[law] += found.get(f"rotor.{law}", 0.0)
-        for key in ("torque_constant", "resistance", "continuous_current", "max_speed"):
-            out[key] = found[f"motor.{key}"]
-        out["peak_current"] = max(found["motor.peak_current"], out["continuous_current"])
-        return out | {"voltage": found["motor.supply_voltage"]}
-
-
-def combinations(
-    shelf: Shelf, *, brakes: bool = True, voltage: float | None = None
-) -> list[tuple[str, str, str]]:
-    """Every compatible motor, gear and brake.
-
-    Args:
-        shelf: The parts.
-        brakes: Whether designs with a brake are among them; a gear that locks needs none.
-        voltage: Of the robot's supply: motors for less are left out [V]; None for any.
-
-    Raises:
-        ChoiceError: No motor is left.
-    """
-    by: dict[str, list[str]] = {}
-    for name, part in shelf.parts.items():
-        kind = "gear" if part.kind in GEARS else part.kind
-        if kind == "gear" and shelf.numbers[name]["gear_ratio"].value == 1.0:
-            continue  # a screw: what lever it has at a joint, no sheet says
-        by.setdefault(kind, []).append(name)
-    motors = [
-        name
-        for name in by.get("motor", [])
-        if voltage is None or shelf.numbers[name]["supply_voltage"].value >= 0.999 * voltage
-    ]
-    if not motors:
-        raise ChoiceError("no motor is left: widen --only, --without, --kind or --voltage")
-    none = [""]
-    held = [*none, *(by.get("brake", []) if brakes else [])]
-    out = []
-    for motor in motors:
-        geared = shelf.numbers[motor]["gear_ratio"].value != 1.0
-        for gear in none if geared else [*none, *by.get("gear", [])]:
-            locks = gear and shelf.parts[gear].kind == "self_locking"
-            out += [(motor, gear, brake) for brake in (none if locks else held)]
-    return out
-
-
-def _range(low: float, high: float, unit: str) -> Number:
-    return Number(0.5 * (low + high), low, high, unit, f"{low:.3g} to {high:.3g} {unit}")
-
-
-def _sheet(part: Part) -> dict[str, Number]:
-    """A motor's entries with what follows without being said."""
-    words = {name: text for name, text in part.words.items() if name in ENTRIES}
-    try:
-        return dict(read_sheet({"gear_ratio": "1"} | words))
-    except DataSheetError as error:
-        raise ChoiceError(f"motor/{part.name}.toml: {error}") from None

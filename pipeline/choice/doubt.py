@@ -2,7 +2,7 @@
 
 Every unprinted entry is drawn from its range, uniformly and apart from others, in a Latin
 hypercube; designs that share a part share its draw. With P the score of a design in a draw, and *
-the design of least mean,
+the answer,
 
     regret            mean P* - mean min P
     worth of knowing u    min mean P - mean over u of min mean(P | u)
@@ -22,17 +22,20 @@ from numpy.typing import NDArray
 from scipy.stats.qmc import LatinHypercube
 
 from actuators.loading.data_sheet import Number
-from pipeline.choice.designs import Designs, Shelf
+from pipeline.choice.designs import Designs
 from pipeline.choice.search import Account, Demanded, Feedback
+from pipeline.choice.shelf import Drawn, Shelf
 
 Array = NDArray[np.float64]
+Design = tuple[str, str, str]
+Unknown = tuple[str, str, Number]
 DRAWS: Final = 256
 _BINS: Final = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """Designs of one group over the draws.
+    """Designs of one group over the draws; the first is the answer.
 
     Attributes:
         power: (S, D) [W].
@@ -45,7 +48,7 @@ class Doubt:
     power: Array
     score: Array
     within: NDArray[np.bool_]
-    unknowns: tuple[tuple[str, str, Number], ...]
+    unknowns: tuple[Unknown, ...]
     values: Array
 
     @property
@@ -55,8 +58,9 @@ class Doubt:
 
     @property
     def order(self) -> NDArray[np.intp]:
-        """From the best expected score on; those that keep limits in half of the draws first."""
-        return np.lexsort((self.expected, self.within.mean(axis=0) < 0.5))
+        """The answer, then from the best expected score on; those within limits first."""
+        order = np.lexsort((self.expected, self.within.mean(axis=0) < 0.5))
+        return np.concatenate([[0], order[order != 0]])
 
     @property
     def _held(self) -> Array:
@@ -70,9 +74,9 @@ class Doubt:
 
     @property
     def regret(self) -> float:
-        """Of the best expected one [W]."""
+        """Of the answer [W]."""
         least = self._held.min(axis=1)
-        own = self.score[:, self.order[0]]
+        own = self.score[:, 0]
         return float(np.mean(own - np.where(np.isfinite(least), np.minimum(least, own), own)))
 
     def worth(self) -> Array:
@@ -86,8 +90,8 @@ class Doubt:
         return out
 
     def moves(self) -> Array:
-        """Slope of the best one's power over each unknown's range, (U,) [W]."""
-        own = self.power[:, self.order[0]]
+        """Slope of the answer's power over each unknown's range, (U,) [W]."""
+        own = self.power[:, 0]
         out = np.zeros(len(self.unknowns))
         for u, (_, _, number) in enumerate(self.unknowns):
             centred = self.values[:, u] - self.values[:, u].mean()
@@ -99,7 +103,7 @@ class Doubt:
 def doubt(
     demanded: Demanded,
     shelf: Shelf,
-    combinations: Sequence[tuple[str, str, str]],
+    combinations: Sequence[Design],
     account: Account,
     feedback: Feedback,
     *,
@@ -117,17 +121,9 @@ def doubt(
         draws: How many.
         seed: Of the draws.
     """
-    unknowns = tuple(dict.fromkeys(u for row in combinations for u in shelf.unknown(row)))
     count = len(combinations)
-    values = np.zeros((draws, len(unknowns)))
-    if unknowns:
-        low, high = (np.array([getattr(n, end) for _, _, n in unknowns]) for end in ("low", "high"))
-        values = low + LatinHypercube(len(unknowns), rng=seed).random(draws) * (high - low)
-    keys = [(part, entry) for part, entry, _ in unknowns]
-    made = [
-        shelf.designs(combinations, dict(zip(keys, row, strict=True))) for row in values.tolist()
-    ]
-    designs = Designs.together(made)
+    unknowns, values, sheets = drawn(shelf, combinations, draws, seed)
+    designs = Designs.together([shelf.designs(combinations, sheet) for sheet in sheets])
     power = demanded.power(designs, account)
     within = np.all([share <= 1.0 for share in demanded.limits(designs).values()], axis=0)
     score = power + feedback.cost(demanded, designs, account)
@@ -135,3 +131,27 @@ def doubt(
     return Doubt(
         power.reshape(shape), score.reshape(shape), within.reshape(shape), unknowns, values
     )
+
+
+def drawn(
+    shelf: Shelf, combinations: Sequence[Design], draws: int, seed: int = 0
+) -> tuple[tuple[Unknown, ...], Array, list[Drawn]]:
+    """Values of what the parts of some designs do not print.
+
+    Args:
+        shelf: The parts.
+        combinations: Motor, gear and brake of each design.
+        draws: How many, a Latin hypercube.
+        seed: Of the draws.
+
+    Returns:
+        What was drawn, U of them; its values (S, U); the same as `Shelf.designs` takes them.
+    """
+    parts = dict.fromkeys(part for row in combinations for part in row)
+    unknowns = tuple(shelf.unknown(list(parts)))
+    values = np.zeros((draws, len(unknowns)))
+    if unknowns:
+        low, high = (np.array([getattr(n, end) for _, _, n in unknowns]) for end in ("low", "high"))
+        values = low + LatinHypercube(len(unknowns), rng=seed).random(draws) * (high - low)
+    keys = [(part, entry) for part, entry, _ in unknowns]
+    return unknowns, values, [dict(zip(keys, row, strict=True)) for row in values.tolist()]

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from actuators.errors import closest
 from pipeline.choice.designs import Designs
 from pipeline.choice.errors import ChoiceError
-from pipeline.choice.fronts import front
 from pipeline.choice.search import Account, Demanded, Feedback
 from pipeline.robot.robot_file import RobotSpec
 
@@ -164,3 +163,40 @@ def _alike(names: Sequence[str]) -> str:
     """What names begin with alike."""
     same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
     return "".join(letters[0] for letters in same)
+
+
+def front(power: Array, mass: Array) -> Index:
+    """Designs that none beats in power and mass, from the least power on.
+
+    Args:
+        power: (D,) [W].
+        mass: (D,) [kg].
+    """
+    order = np.lexsort((mass, power))
+    lightest = np.minimum.accumulate(mass[order])
+    first = np.ones(len(order), dtype=np.bool_)
+    first[1:] = mass[order][1:] < lightest[:-1]
+    return np.asarray(order[first])
+
+
+def merged(fronts: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, Index]:
+    """The front of all sums of one design of each group.
+
+    Groups share nothing but power and mass, which add: a sum that holds a design beaten in its own
+    group is beaten itself, so that sums of fronts, pair by pair, lose nothing.
+
+    Args:
+        fronts: Of each group, power (F,) [W] and mass (F,) [kg].
+
+    Returns:
+        Power (P,), mass (P,), and which design of each group's front a point takes (P, groups).
+    """
+    power, mass = np.zeros(1), np.zeros(1)
+    taken = np.zeros((1, 0), dtype=np.intp)
+    for p, m in fronts:
+        both = (power[:, None] + p).ravel(), (mass[:, None] + m).ravel()
+        kept = front(*both)
+        before, own = np.unravel_index(kept, (len(power), len(p)))
+        power, mass = both[0][kept], both[1][kept]
+        taken = np.column_stack([taken[before], own])
+    return power, mass, taken

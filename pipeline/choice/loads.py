@@ -130,7 +130,7 @@ def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> 
         own = mode.motion is not None
         speed = 0.0 if own else gait_of(spec).speed
         if motion is not None:
-            moved = machine.walking(walks=False)
+            moved = machine.ready.walking(walks=False)
             parts = demand_along(moved.machine, motion, adjust=moved.adjust, forces=moved.ground)
             return Load(mode, joint_series(parts), weight, speed, motion)
         asked = demand(machine, mode.motion, samples=SAMPLES if own else samples)

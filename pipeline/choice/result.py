@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING
 from actuators.loading.parts import load_parts
 from pipeline.api.result import Result, by_name
 from pipeline.api.tables import inputs_of, metadata
-from pipeline.choice.break_even import rows
+from pipeline.choice.break_even import known_candidate, rows
 from pipeline.choice.choose import Chosen, Wanted, choose
 from pipeline.choice.mission import read_mission
 from pipeline.choice.tables import ROBOT, tables_of, words
@@ -59,7 +58,8 @@ class Choice(Result):
         )
         each = [
             f"{group}: {words((row['motor'], row['gear'], row['brake']))} at {row['ratio']:.4g}:1 "
-            f"({row['power_W']:.3g} W, {_sure(row['chance_best'])})"
+            f"({row['power_W']:.3g} W, "
+            f"best in {100 * row['chance_best']:.0f} % of draws)"
             for group, row in rows.items()
         ]
         unknown = self.table("unknowns").frame()
@@ -100,6 +100,8 @@ def choice(
     """
     path = Path(mission)
     wanted = wanted or Wanted()
+    for name in compare:
+        known_candidate(machine, name)  # before the search: nothing is lost by a misspelt name
     chosen = choose(machine, read_mission(path), wanted, progress)
     tables = tables_of(chosen)
     if compare:
@@ -109,10 +111,3 @@ def choice(
     given = machine.ready
     inputs: Sequence[Path] = (*inputs_of(given), path)
     return Choice("choose", by_name(tables), lambda: metadata(given), tuple(inputs), chosen)
-
-
-def _sure(chance: float | None) -> str:
-    """Chance of being the best in words; none where mass fed back did not settle."""
-    if chance is None or math.isnan(chance):
-        return "best of those recomputed in full; mass did not settle"
-    return f"best in {100 * chance:.0f} % of draws"

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
 from actuators.shaft import ShaftSeries
+from pipeline.choice import heat
 from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
 
@@ -36,7 +37,7 @@ Which = NDArray[np.bool_]
 SPEED = 3  # the series w among the five
 #: Numbers of a block of designs times samples: 16 MB.
 BLOCK = 2_000_000
-_MANY = 50  # samples from which on their hull is worth finding
+_MANY = 50  # samples, or designs, from which on a hull is worth finding
 
 
 @dataclass(frozen=True)
@@ -129,8 +130,7 @@ class Track:
 
     def power(self, designs: Designs, torque: Array) -> Array:
         """Electrical, with the brakes' coils, (D, N, J) [W]."""
-        heat = (designs.resistance / designs.torque_constant**2)[:, None, None]
-        out = torque * heat
+        out = torque * (designs.resistance / designs.torque_constant**2)[:, None, None]
         out += designs.ratio[:, None, None] * self.series.velocity * ~self.rest
         out *= torque
         if designs.brake_power.any():
@@ -200,22 +200,29 @@ class Demanded:
     @cached_property
     def hull(self) -> Array:
         """Samples at which a linear function of the five series can be extreme, (H, 5)."""
-        return extreme(np.concatenate([t.x[:, ~t.rest].T for t in self.tracks]))
+        return extreme(self.samples)
+
+    @property
+    def samples(self) -> Array:
+        """The five series of every mode where a joint moves, (N, 5)."""
+        return np.concatenate([t.x[:, ~t.rest].T for t in self.tracks])
 
     def limits(self, designs: Designs) -> dict[str, Array]:
         """Share of each limit that is used, by its name, (D,)."""
         theta, k, n = designs.theta, designs.torque_constant, designs.ratio
-        fastest = np.abs(self.hull[:, SPEED]).max(initial=0.0)
+        points = self.hull if len(designs) > _MANY else self.samples
+        fastest = np.abs(points[:, SPEED]).max(initial=0.0)
         peak, volts = np.zeros(len(designs)), np.zeros(len(designs))
-        for rows in _blocks(len(designs), max(len(self.hull), 1)):
-            torque = theta[rows] @ self.hull.T
+        for rows in _blocks(len(designs), max(len(points), 1)):
+            torque = theta[rows] @ points.T
             peak[rows] = np.abs(torque).max(axis=1, initial=0.0)
             torque *= (designs.resistance[rows] / k[rows])[:, None]
-            torque += (k[rows] * n[rows])[:, None] * self.hull[:, SPEED]
+            torque += (k[rows] * n[rows])[:, None] * points[:, SPEED]
             volts[rows] = np.abs(torque).max(axis=1, initial=0.0)
-        rms = np.zeros(len(designs))
+        rms, means = np.zeros(len(designs)), []
         for track in self.tracks:
             mean = _rms(track, designs)
+            means.append(mean)
             rms = np.maximum(rms, mean)
             if track.rest.any():
                 held = self._held(track, designs)
@@ -223,7 +230,7 @@ class Demanded:
                 volts = np.maximum(volts, designs.resistance * held / k)
         tau = [np.abs(track.series.torque).max() for track in self.tracks]
         lasting = [np.sqrt((track.weight @ track.series.torque**2).max()) for track in self.tracks]
-        return {
+        use = {
             "peak current": peak / k / designs.peak_current,
             "continuous current": rms / k / designs.continuous_current,
             "voltage": volts / designs.voltage,
@@ -232,6 +239,13 @@ class Demanded:
             "gear's peak torque": max(tau) / designs.gear_peak,
             "gear's continuous torque": max(lasting) / designs.gear_continuous,
         }
+        # Heat counts where nothing else is exceeded, at the joint of most current.
+        left = np.flatnonzero(np.all([x <= 1.0 for x in use.values()], axis=0))
+        copper = designs.resistance / k**2 * np.stack(means) ** 2  # (M, D) [W]
+        use["winding temperature"] = np.zeros(len(designs))
+        hours = [track.load.mode.hours for track in self.tracks]
+        use["winding temperature"][left] = heat.share(designs.taken(left), hours, copper[:, left].T)
+        return use
 
     @staticmethod
     def _held(track: Track, designs: Designs) -> Array:
@@ -243,7 +257,7 @@ class Demanded:
     def net(self, designs: Designs, account: Account) -> Array:
         """A lower bound of `power`: what flows back is all used again, (D,) [W]."""
         theta = designs.theta
-        heat = designs.resistance / designs.torque_constant**2
+        loss = designs.resistance / designs.torque_constant**2
         out = np.zeros(len(designs))
         for track in self.tracks:
             if track.rest.any():
@@ -252,7 +266,7 @@ class Demanded:
                 continue
             gram = track.grams
             each = designs.ratio * (theta @ gram[SPEED])
-            each += heat * np.einsum("di,di->d", theta @ gram, theta)
+            each += loss * np.einsum("di,di->d", theta @ gram, theta)
             each += len(self.joints) * (designs.brake_power + account.idle)
             out += track.share * each
         return out

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.chain import ChainResult
 from actuators.energy.energy import integral
 from actuators.energy.regeneration import supply
 from actuators.loading.build import WINDING
 from actuators.units import from_si
+from pipeline.choice import heat
 from pipeline.choice.choose import Chosen
-from pipeline.choice.group import Found
+from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
 from pipeline.choice.search import Demanded
 from reports.table import Table, table_of
@@ -21,6 +23,8 @@ from reports.tables.choice import AnswerRow, BestRow, DayRow, ExcludedRow, Front
 
 Array = NDArray[np.float64]
 ROBOT = "robot"
+ZERO_CELSIUS = 273.15  # [K]
+_WARM = ("warming_W", "winding_degC", "winding_peak_degC", "winding_limit_degC")
 
 
 def tables_of(chosen: Chosen) -> list[Table]:
@@ -41,11 +45,11 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
     rows = []
     for group, found in chosen.found.items():
         doubt = chosen.doubts[group]
-        best, joints = chosen.place(group), len(found.demanded.joints)
+        joints = len(found.demanded.joints)
         power = sum(row.energy_Wh for row in day if row.group == group) / chosen.hours
         motor, gear, brake = chosen.answer[group]
         design = chosen.designs(group)
-        low, high = np.quantile(chosen.drawn(group), [0.05, 0.95])
+        low, high = np.quantile(doubt.power[:, 0], [0.05, 0.95])
         rows.append(
             AnswerRow(
                 group=group,
@@ -58,7 +62,7 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
                 energy_Wh_per_day=power * chosen.hours,
                 battery_h=None,
                 actuator_mass_kg=float(design.mass[0]) * joints,
-                chance_best=None if best is None else float(doubt.chance[best]),
+                chance_best=float(doubt.chance[0]),
                 power_low_W=float(low),
                 power_high_W=float(high),
                 regret_W=doubt.regret,
@@ -67,7 +71,6 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
             )
         )
     hotel = chosen.wanted.account.hotel
-    told = [row.chance_best for row in rows if row.chance_best is not None]
     totals = {
         name: sum(getattr(row, name) for row in rows)
         for name in ("joints", "actuator_mass_kg", "regret_W")
@@ -87,7 +90,7 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
             brake="",
             energy_Wh_per_day=energy,
             battery_h=hours,
-            chance_best=float(np.prod(told)) if len(told) == len(rows) else None,
+            chance_best=float(np.prod([row.chance_best for row in rows])),
             not_printed="",
             **totals,
             **powers,
@@ -121,12 +124,14 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
     """The ten best of each group, and why nine of them lost."""
     for group, found in chosen.found.items():
         doubt = chosen.doubts[group]
-        losses = _losses(found)
+        designs = chosen.shelf.designs(chosen.candidates[group])
+        nominal = found.demanded.power(designs, chosen.wanted.account)
+        losses = _losses(found.demanded, designs, nominal)
+        limits = found.demanded.limits(designs)
         best = doubt.order[0]
         for rank, k in enumerate(doubt.order[:10], start=1):
-            at = found.looked[found.finalists[k]]
-            motor, gear, brake = found.designs.parts[at]
-            use = {name: float(share[at]) for name, share in found.use.items()}
+            motor, gear, brake = designs.parts[k]
+            use = {name: float(share[k]) for name, share in limits.items()}
             limit = max(use, key=lambda name: use[name])
             more = {n: each[k] - each[best] for n, each in losses.items()}
             more["mass"] = float(
@@ -138,12 +143,12 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
                 rank=rank,
                 motor=motor,
                 gear=gear,
-                ratio=float(found.designs.ratio[at]),
+                ratio=float(designs.ratio[k]),
                 brake=brake,
                 power_W=float(doubt.power[:, k].mean()),
-                nominal_power_W=float(found.power[found.finalists[k]]),
+                nominal_power_W=float(nominal[k]),
                 more_than_best_W=float(doubt.expected[k] - doubt.expected[best]),
-                actuator_mass_kg=float(found.designs.mass[at]) * len(found.demanded.joints),
+                actuator_mass_kg=float(designs.mass[k]) * len(found.demanded.joints),
                 chance_best=float(doubt.chance[k]),
                 chance_within=float(doubt.within[:, k].mean()),
                 nearest_limit=limit,
@@ -153,11 +158,10 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
             )
 
 
-def _losses(found: Found) -> dict[str, Array]:
-    """Where the power of the finalists goes, mean over the mission, by kind (F,) [W]."""
-    designs = found.designs.taken(found.looked[found.finalists])
+def _losses(demanded: Demanded, designs: Designs, power: Array) -> dict[str, Array]:
+    """Where the power of designs goes, mean over the mission, by kind (D,) [W]."""
     out = {name: np.zeros(len(designs)) for name in ("windings", "friction and returns", "brakes")}
-    for track in found.demanded.tracks:
+    for track in demanded.tracks:
         torque = track.torque(designs)
         heat = (designs.resistance / designs.torque_constant**2)[:, None, None] * torque**2
         copper = track.share * np.einsum("dnj,n->d", heat, track.weight)
@@ -166,7 +170,7 @@ def _losses(found: Found) -> dict[str, Array]:
         out["windings"] += copper
         out["brakes"] += brakes
         out["friction and returns"] -= copper + brakes
-    out["friction and returns"] += found.power[found.finalists]
+    out["friction and returns"] += power
     return out
 
 
@@ -193,7 +197,8 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
     total = sum(
         load.mode.hours * (float(power.sum()) + account.hotel) for load, _, power, _ in full
     )
-    for load, result, power, on in full:
+    warm = {group: _warm(chosen, group, full) for group in chosen.found}
+    for k, (load, result, power, on) in enumerate(full):
         joints, time = load.series.joints, load.series.time
         means: dict[str, Array] = {
             "mechanical_W": integral(time, result.joint.power) / load.duration,
@@ -213,14 +218,40 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
         for group, found in chosen.found.items():
             at = [joints.index(joint) for joint in found.demanded.joints]
             sums = {name: float(mean[at].sum()) for name, mean in means.items()}
-            yield _day_row(
-                load, group, float(power[at].sum()), total, sums, None, _limits(chosen, load, group)
-            )
+            limits = _limits(chosen, load, group) | warm[group][k]
+            yield _day_row(load, group, float(power[at].sum()), total, sums, None, limits)
         sums = {name: float(mean.sum()) for name, mean in means.items()}
         sums["idle_W"] += account.hotel
         own = float(power.sum()) + account.hotel
         transport = own / (load.weight * load.speed) if load.speed else None
         yield _day_row(load, ROBOT, own, total, sums, transport, {})
+
+
+def _warm(
+    chosen: Chosen, group: str, full: Sequence[tuple[Load, ChainResult, Array, Array]]
+) -> list[dict[str, float | None]]:
+    """Temperature of a group's windings in every mode, through the full chains."""
+    at = [full[0][0].series.joints.index(j) for j in chosen.found[group].demanded.joints]
+    copper = np.stack(
+        [
+            integral(load.series.time, result.losses[WINDING])[at] / load.duration
+            for load, result, _, _ in full
+        ],
+        axis=1,
+    )
+    design = chosen.designs(group)
+    found = heat.day(design, [load.mode.hours for load, *_ in full], copper)
+    more = (copper * (found.resistance - 1.0)).sum(axis=0)
+    peak, limit = (x - ZERO_CELSIUS for x in (found.peak.max(), design.winding_limit[0]))
+    return [
+        {
+            "warming_W": float(more[k]),
+            "winding_degC": float(found.winding[:, k].max() - ZERO_CELSIUS),
+            "winding_peak_degC": float(peak),
+            "winding_limit_degC": float(limit),
+        }
+        for k in range(len(full))
+    ]
 
 
 def _day_row(
@@ -230,9 +261,9 @@ def _day_row(
     total: float,
     sums: Mapping[str, float],
     transport: float | None,
-    limits: Mapping[str, float],
+    limits: Mapping[str, float | None],
 ) -> DayRow:
-    energy, none = power * load.mode.hours, dict.fromkeys(_LIMITS)
+    energy, none = power * load.mode.hours, dict.fromkeys((*_LIMITS, *_WARM))
     more: dict[str, Any] = {**none, **limits}
     return DayRow(
         mode=load.mode.name,

@@ -24,10 +24,7 @@ class AnswerRow:
     energy_Wh_per_day: float = column("out of the supply in a day of the mission", "W*h")
     battery_h: float | None = column("hours on one charge; robot only", "h")
     actuator_mass_kg: float = column("motors, gears and brakes of the group", "kg")
-    chance_best: float | None = column(
-        "share of the draws in which nothing is better; empty where mass fed back did not settle",
-        "1",
-    )
+    chance_best: float = column("share of the draws in which nothing is better", "1")
     power_low_W: float = column("exceeded in 95 % of the draws", "W")
     power_high_W: float = column("exceeded in 5 % of the draws", "W")
     regret_W: float = column("expected power above the best of each draw", "W")
@@ -61,7 +58,9 @@ class BestRow:
     brake: str = column("part; empty for none")
     power_W: float = column("expected over the draws", "W")
     nominal_power_W: float = column("with every range at its middle", "W")
-    more_than_best_W: float = column("above the first", "W")
+    more_than_best_W: float = column(
+        "expected above the answer; below 0 by what its own mass, counted in full, adds", "W"
+    )
     actuator_mass_kg: float = column("of the group", "kg")
     chance_best: float = column("share of the draws in which nothing is better", "1")
     chance_within: float = column("share of the draws in which it keeps every limit", "1")
@@ -101,7 +100,13 @@ class DayRow:
     brakes_W: float = column("coils of the brakes", "W")
     returned_W: float = column("flows back and is lost", "W")
     idle_W: float = column("drivers, and for the robot the hotel load", "W")
+    warming_W: float | None = column(
+        "more heat of the windings by their temperature; not in power_W", "W"
+    )
     cost_of_transport: float | None = column("power over weight times speed; robot only", "1")
+    winding_degC: float | None = column("mean in the mode, of the warmest joint", "degC")
+    winding_peak_degC: float | None = column("over the day, of the warmest joint", "degC")
+    winding_limit_degC: float | None = column("limit of it", "degC")
     rms_current_A: float | None = column("of the worst joint", "A")
     continuous_current_A: float | None = column("limit of it", "A")
     peak_current_A: float | None = column("of the worst joint", "A")

@@ -33,7 +33,12 @@ from pipeline.logs.reading.plan import plan_reading
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.motors import Motors, motors_of
-from pipeline.machine.own_actuators import OwnActuators, actuator_folder, own_actuators
+from pipeline.machine.own_actuators import (
+    OwnActuators,
+    actuator_folder,
+    own_actuators,
+    without_folder,
+)
 from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
@@ -192,6 +197,7 @@ def _parts(path: Path, options: Options) -> _Parts:
         _, catalog, _ = changed(None, load_catalog(folder), options.changes)
         return _Parts(None, folder, catalog, OwnActuators(), tuple(told))
     folder = options.actuators or actuator_folder(spec) or CATALOG
+    spec = without_folder(spec) if options.actuators else spec
     spec, catalog, remarks = changed(spec, load_catalog(folder), options.changes)
     own = own_actuators(spec, catalog)
     return _Parts(spec, folder, own.catalog(catalog), own, (*told, *remarks))

@@ -94,6 +94,8 @@ def _slope(speed: Array, rest: Array) -> tuple[float, float] | None:
     if np.ptp(x) <= 0:
         return None
     scale = np.abs(design).max(axis=0)
+    if not np.isfinite(scale).all() or not np.isfinite(y / sigma).all():
+        return None  # numbers whose squares are beyond any
     covariance = np.linalg.pinv((design / scale).T @ (design / scale))
     solution = covariance @ ((design / scale).T @ (y / sigma)) / scale
     return float(solution[1]), float(np.sqrt(covariance[1, 1]) / scale[1])

@@ -13,7 +13,7 @@ from pipeline.logs.signals.derivatives import LowPass
 from pipeline.logs.signals.noise import sign_unsure
 from pipeline.logs.signals.orders import strongest_order
 from pipeline.logs.signals.spacing import interpolated, own_spacing
-from pipeline.logs.signals.stamps import stamp_error
+from pipeline.logs.signals.stamps import _slope, stamp_error
 from pipeline.logs.signals.two_sides import read_off
 from tests.pipeline.logs.made import made_log, motion
 
@@ -230,3 +230,9 @@ def test_a_log_with_both_positions_says_what_its_gears_do() -> None:
     checks = {(f.column, f.check) for f in signal_findings(one)}
     assert ("a__motor_position_rad", "elasticity") in checks
     assert ("b__motor_position_rad", "rigid") in checks
+
+
+def test_misfits_beyond_any_number_tell_nothing() -> None:
+    speed = np.random.default_rng(0).random(5000) * 1e200
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        assert _slope(speed, np.zeros(5000)) is None

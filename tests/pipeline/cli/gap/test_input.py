@@ -464,7 +464,7 @@ def test_a_scaled_log_is_never_called_explained_without_a_name(
     bare = {k: v for k, v in simulated_leg.items() if not k.endswith("voltage_V")}
     log, out = write_log(tmp_path / "log.csv", bare | currents), tmp_path / "out"
     _gap("name", [log], out, robot=root / "urdf" / "leg.toml")
-    (row,) = rows_of(out / "found.csv")
+    row = rows_of(out / "found.csv")[0]
     assert (row["effect"], row["written"]) == ("effort_gain", "true")
     assert float(row["value"]) == pytest.approx(5.0, rel=0.05)
     said = capsys.readouterr().out

@@ -1,0 +1,292 @@
+"""Parts that designs are made of, and what stands where a sheet says nothing.
+
+Nothing wins by saying less: a loss, inertia, mass or speed limit that a sheet does not print is the
+range of its class, that of 10 to 90 % of the parts that print it, at equal size. Size is torque T
+by geometric similarity (lengths as T^(1/3)): mass T^(2/3), inertia T^(5/3), speed at equal speed
+of the surfaces T^(-1/3). A gear's torque without load is a share of its loss at rated torque, as
+`actuators/components/README.md` has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Final
+
+import numpy as np
+
+from actuators.errors import DataSheetError
+from actuators.loading.converted import converted
+from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
+from actuators.loading.parts import Part, load_parts
+from pipeline.choice.designs import Designs
+from pipeline.choice.errors import ChoiceError
+
+GEARS: Final = ("strain_wave", "planetary", "self_locking")
+#: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
+BRAKE_MASS: Final = (0.15, 0.45)
+#: Torque without load over loss by load, both at rated torque, of gears that do not print it.
+IDLE_SHARE: Final = (0.02, 0.5)
+#: What a class has to tell: entry, its unit, and the power of torque by which it grows with size.
+_OF_GEARS: Final = {
+    "mass": ("kg", 2 / 3),
+    "gear_inertia": ("kg*m^2", 5 / 3),
+    "gear_max_speed": ("rad/s", -1 / 3),
+}
+_OF_BRAKES: Final = {
+    "inertia": ("kg*m^2", 5 / 3),
+    "release_power": ("W", 2 / 3),
+}
+#: Heat leaves through a surface and is stored in a volume.
+_OF_MOTORS: Final = {
+    "winding_to_housing": ("K/W", -2 / 3),
+    "housing_to_ambient": ("K/W", -2 / 3),
+    "winding_time": ("s", 1 / 3),
+    "housing_time": ("s", 1 / 3),
+    "winding_limit": ("K", 0.0),
+}
+#: Motor by which a gear's sheet is converted: none of the gear's numbers depends on it.
+_ANY: Final = {
+    **dict.fromkeys(("current_of", "resistance_of", "torque_constant", "resistance"), 1.0),
+    **dict.fromkeys(("supply_voltage", "continuous_current", "peak_current", "rotor_inertia"), 1.0),
+    **dict.fromkeys(("back_drive_torque", "shaft"), 0.0),
+}
+Drawn = Mapping[tuple[str, str], float]
+Sheet = Mapping[str, Number]
+
+
+@dataclass(frozen=True)
+class Shelf:
+    """Parts that designs are made of, and what is known of each.
+
+    Attributes:
+        parts: By name.
+        numbers: Part to its entries; what it does not print is a range of its class.
+    """
+
+    parts: Mapping[str, Part]
+    numbers: Mapping[str, Mapping[str, Number]]
+
+    @classmethod
+    def of(cls, parts: Mapping[str, Part]) -> Shelf:
+        """The motors, gears and brakes among parts, with ranges of their class.
+
+        Raises:
+            ChoiceError: A size or a mass is not stated without which no class is comparable.
+        """
+        known = {**_shipped(), **parts}
+        return cls(parts, {name: _filled(part, known) for name, part in parts.items()})
+
+    def unknown(self, design: Sequence[str]) -> Iterator[tuple[str, str, Number]]:
+        """Part, entry and range of what no sheet of a design prints."""
+        for part in design:
+            for entry, number in self.numbers.get(part, {}).items():
+                if number.low < number.high:
+                    yield part, entry, number
+
+    def not_printed(self, design: Sequence[str]) -> str:
+        """The same in words."""
+        return ", ".join(f"{part}.{entry}" for part, entry, _ in self.unknown(design))
+
+    def designs(
+        self, combinations: Sequence[tuple[str, str, str]], drawn: Drawn | None = None
+    ) -> Designs:
+        """Their numbers.
+
+        Args:
+            combinations: Motor, gear and brake of each; empty for none.
+            drawn: Entries that differ from the middle of their range, by part and entry.
+        """
+        names = {name for row in combinations for name in row if name}
+        known = {name: self._converted(name, drawn or {}) for name in names}
+        none = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0)
+        none |= {"gear_speed": np.inf, "gear_continuous": np.inf, "gear_peak": np.inf}
+        none |= {"ratio": 1.0}
+        columns = [[known.get(row[k], none) for row in combinations] for k in range(3)]
+        motor, gear, brake = (
+            {key: np.array([x[key] for x in rows], dtype=np.float64) for key in none}
+            for rows in columns
+        )
+        own = motor["ratio"] * gear["ratio"]
+        return Designs(
+            tuple(combinations),
+            ratio=own,
+            load=motor["load"] + gear["load"],
+            coulomb=motor["coulomb"] + gear["coulomb"],
+            viscous=motor["viscous"] + gear["viscous"],
+            inertia=motor["inertia"] + gear["inertia"] + brake["inertia"],
+            gear_speed=gear["gear_speed"],
+            gear_continuous=np.minimum(gear["gear_continuous"], motor["gear_continuous"]),
+            gear_peak=np.minimum(gear["gear_peak"], motor["gear_peak"]),
+            brake_torque=brake["brake_torque"],
+            brake_power=brake["brake_power"],
+            mass=motor["mass"] + gear["mass"] + brake["mass"],
+            **{
+                key: motor[key]
+                for key in (
+                    *("torque_constant", "resistance", "voltage", "continuous_current"),
+                    *("peak_current", "max_speed", *_OF_MOTORS),
+                )
+            },
+        )
+
+    def _converted(self, name: str, drawn: Drawn) -> dict[str, float]:
+        """One part's numbers by the names of `Designs`."""
+        kind = self.parts[name].kind
+        x = {e: drawn.get((name, e), number.value) for e, number in self.numbers[name].items()}
+        out = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0) | {"ratio": 1.0}
+        out |= dict.fromkeys(("gear_speed", "gear_continuous", "gear_peak"), np.inf)
+        out["mass"] = x.get("mass", 0.0)
+        if kind == "brake":
+            out |= {"brake_torque": x["holding_torque"], "brake_power": x["release_power"]}
+            return out | {"inertia": x.get("inertia", 0.0)}
+        sheet = x if kind == "motor" else _ANY | x
+        found = {key: value for key, (value, _) in converted(sheet).items()}
+        for law in ("load", "coulomb", "viscous", "inertia"):
+            out[law] = found.get(f"gear.{law}", 0.0)
+        out["ratio"] = found["gear.ratio"]
+        if kind != "motor":
+            out["gear_speed"] = x.get("gear_max_speed", np.inf)
+            out["gear_continuous"] = x.get("gear_continuous_torque", np.inf)
+            out["gear_peak"] = x.get("gear_peak_torque", out["gear_continuous"])
+            return out
+        for law in ("coulomb", "viscous", "inertia"):
+            out[law] += found.get(f"rotor.{law}", 0.0)
+        for key in ("torque_constant", "resistance", "continuous_current", "max_speed"):
+            out[key] = found[f"motor.{key}"]
+        out |= {entry: x[entry] for entry in _OF_MOTORS}
+        out["peak_current"] = max(found["motor.peak_current"], out["continuous_current"])
+        return out | {"voltage": found["motor.supply_voltage"]}
+
+
+def combinations(
+    shelf: Shelf, *, brakes: bool = True, voltage: float | None = None
+) -> list[tuple[str, str, str]]:
+    """Every compatible motor, gear and brake.
+
+    Args:
+        shelf: The parts.
+        brakes: Whether designs with a brake are among them; a gear that locks needs none.
+        voltage: Of the robot's supply: motors for less are left out [V]; None for any.
+
+    Raises:
+        ChoiceError: No motor is left.
+    """
+    by: dict[str, list[str]] = {}
+    for name, part in shelf.parts.items():
+        kind = "gear" if part.kind in GEARS else part.kind
+        if kind == "gear" and shelf.numbers[name].get("gear_ratio", _ONE).value == 1.0:
+            continue  # a screw: what lever it has at a joint, no sheet says
+        by.setdefault(kind, []).append(name)
+    motors = [
+        name
+        for name in by.get("motor", [])
+        if voltage is None or shelf.numbers[name]["supply_voltage"].value >= 0.999 * voltage
+    ]
+    if not motors:
+        raise ChoiceError("no motor is left: widen --only, --without, --kind or --voltage")
+    none = [""]
+    held = [*none, *(by.get("brake", []) if brakes else [])]
+    out = []
+    for motor in motors:
+        geared = shelf.numbers[motor]["gear_ratio"].value != 1.0
+        for gear in none if geared else [*none, *by.get("gear", [])]:
+            locks = gear and shelf.parts[gear].kind == "self_locking"
+            out += [(motor, gear, brake) for brake in (none if locks else held)]
+    return out
+
+
+def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
+    """A part's entries, and ranges of its class for what it does not print."""
+    own = dict(_sheet(part) if part.kind == "motor" else part.printed)
+    where = f"{part.kind}/{part.name}.toml"
+    if part.kind == "motor" and "mass" not in own:
+        raise ChoiceError(f"{where}: no mass; a motor's has to be stated")
+    if part.kind == "motor":
+        for entry in sorted(_OF_MOTORS.keys() - own.keys()):
+            own[entry] = _class(known, ("motor",), entry, _OF_MOTORS[entry], _torque(own))
+    if part.kind == "brake":
+        if "holding_torque" not in own:
+            raise ChoiceError(f"{where}: no holding_torque; it has to be stated")
+        size = own["holding_torque"].value
+        own.setdefault("mass", _range(BRAKE_MASS[0], BRAKE_MASS[1], size ** (2 / 3), "kg"))
+        for entry in sorted(_OF_BRAKES.keys() - own.keys()):
+            own[entry] = _class(known, ("brake",), entry, _OF_BRAKES[entry], size)
+    if part.kind not in GEARS or own.get("gear_ratio", _ONE).value == 1.0:
+        return own  # a screw: what lever it has at a joint, no sheet says
+    torque = own.get("gear_rated_torque", own.get("gear_continuous_torque"))
+    if torque is None:
+        raise ChoiceError(f"{where}: no gear_continuous_torque; it has to be stated")
+    own.setdefault("gear_rated_torque", torque)
+    own.setdefault("gear_continuous_torque", torque)
+    for entry in sorted(_OF_GEARS.keys() - own.keys()):
+        own[entry] = _class(known, GEARS, entry, _OF_GEARS[entry], torque.value)
+    if not {"gear_efficiency", "gear_load"} & own.keys():
+        entry = "gear_load" if part.kind == "strain_wave" else "gear_efficiency"
+        own[entry] = _class(known, (part.kind,), entry, ("1", 0.0), 1.0)
+    if "gear_starting_torque" not in own:
+        load = own["gear_load"].value if "gear_load" in own else None
+        load = 1.0 / own["gear_efficiency"].value - 1.0 if load is None else load
+        lost = load * torque.value / own["gear_ratio"].value  # [N*m]
+        own["gear_starting_torque"] = _range(*IDLE_SHARE, lost, "N*m")
+    return own
+
+
+def _class(
+    known: Mapping[str, Part],
+    kinds: Sequence[str],
+    entry: str,
+    grows: tuple[str, float],
+    size: float,
+) -> Number:
+    """Range of an entry among the parts of some kinds that print it, at one size."""
+    (unit, power), each = grows, []
+    for part in known.values():
+        printed = part.printed
+        if part.kind in kinds and entry in printed and (torque := _torque(printed)):
+            each.append(printed[entry].value / torque**power)
+    low, high = np.quantile(each, [0.1, 0.9]).tolist()
+    return _range(low, high, size**power, unit)
+
+
+def _torque(x: Sheet) -> float:
+    """By which parts of a kind are of equal size; 0 where it is not printed [N*m]."""
+    for name in ("gear_continuous_torque", "holding_torque"):
+        if name in x:
+            return x[name].value
+    if {"torque_constant", "continuous_current"} <= x.keys():
+        return x["torque_constant"].value * x["continuous_current"].value
+    return _motor_torque(x)
+
+
+@cache
+def _shipped() -> Mapping[str, Part]:
+    """The project's own parts: the classes do not depend on which are searched."""
+    return load_parts()
+
+
+def _range(low: float, high: float, size: float, unit: str) -> Number:
+    low, high = low * size, high * size
+    return Number(0.5 * (low + high), low, high, unit, f"{low:.3g} to {high:.3g} {unit}")
+
+
+_ONE: Final = Number(1.0, 1.0, 1.0, "1", "1")
+
+
+def _motor_torque(x: Sheet) -> float:
+    """Continuous torque of a motor whose sheet states it otherwise; 0 for other parts [N*m]."""
+    if "continuous_current" not in x and "continuous_torque" not in x:
+        return 0.0
+    found = {k: v for k, (v, _) in converted({n: v.value for n, v in x.items()}).items()}
+    return found["motor.torque_constant"] * found["motor.continuous_current"]
+
+
+def _sheet(part: Part) -> dict[str, Number]:
+    """A motor's entries with what follows without being said."""
+    words = {name: text for name, text in part.words.items() if name in ENTRIES}
+    others = {name: x for name, x in part.printed.items() if name not in ENTRIES}
+    try:
+        return dict(read_sheet({"gear_ratio": "1"} | words)) | others
+    except DataSheetError as error:
+        raise ChoiceError(f"motor/{part.name}.toml: {error}") from None

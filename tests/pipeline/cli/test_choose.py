@@ -1,0 +1,83 @@
+"""The verb `choose` on few parts: the hexapod, a motion of one's own, and what cannot be used."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from pipeline.api.machine import load
+from pipeline.cli.main import main
+
+FEW = ["--only", "maxon_634043", "--only", "maxon_496661", "--only", "maxon_gp_62_a"]
+QUICK = ["--no-brakes", "--draws", "16"]
+
+
+def written(folder: Path, text: str) -> str:
+    path = folder / "day.csv"
+    path.write_text(text)
+    return str(path)
+
+
+def test_answer_of_few_parts_balances_and_names_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    day = written(tmp_path, "mode,share,gait\nwalk,0.4,\nstand,0.6,stand\n")
+    out = tmp_path / "out"
+    assert main(["choose", "--mission", day, "--out", str(out), *FEW, *QUICK]) == 0
+    told = capsys.readouterr().out.splitlines()
+    assert told[0].startswith("hexapod: ")
+    answer = pd.read_csv(out / "answer.csv").set_index("group")
+    groups = answer.drop("robot")
+    assert groups.power_W.sum() == pytest.approx(answer.power_W["robot"])
+    assert groups.motor.isin(["maxon_634043", "maxon_496661"]).all()
+    assert (groups.power_low_W < groups.power_W).all()
+    assert (groups.power_W < groups.power_high_W).all()
+    modes = pd.read_csv(out / "day.csv")
+    own = modes[modes.group != "robot"]
+    assert (own.winding_degC >= 25.0).all()
+    assert (own.winding_degC <= own.winding_peak_degC + 1e-9).all()
+    assert (own.winding_peak_degC <= own.winding_limit_degC).all()
+    assert (own.warming_W <= 0.5 * own.winding_W).all()
+    assert (out / "index.html").exists()
+
+
+def test_own_motion_is_a_mode(tmp_path: Path) -> None:
+    """A leg on a stand that swings; its power is the sum of its groups."""
+    robot = load("urdf/leg.toml").ready.robot.spec
+    time = np.linspace(0.0, 4.0, 201)
+    swing = 0.1 * (1.0 - np.cos(0.5 * np.pi * time))
+    columns = {f"{joint}__position_rad": swing for joint in robot.joints}
+    pd.DataFrame({"time_s": time} | columns).to_csv(tmp_path / "move.csv", index=False)
+    day = written(tmp_path, "mode,share,motion\nmove,1,move.csv\n")
+    out = tmp_path / "out"
+    given = ["--robot", "urdf/leg.toml", "--mission", day, "--out", str(out)]
+    assert main(["choose", *given, *FEW, *QUICK]) == 0
+    modes = pd.read_csv(out / "day.csv").set_index("group")
+    assert (modes.power_W > 0.0).all()
+    assert modes.drop("robot").power_W.sum() == pytest.approx(modes.power_W["robot"])
+    assert modes.hours.eq(24.0).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--only", "maxon_63404X"], "no part 'maxon_63404X'"),
+        (["--kind", "strain"], "strain_wave"),
+        (["--compare", "answer", "irreversibel"], "irreversible"),
+        (["--draws", "1"], "at least 8"),
+        (["--regeneration", "bus"], "groups would share it"),
+        (["--idle", "2 V"], "idle"),
+    ],
+)
+def test_what_cannot_be_used_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], told: str
+) -> None:
+    out = tmp_path / "out"
+    assert main(["choose", "--out", str(out), *options]) == 2
+    error = capsys.readouterr().err.strip()
+    assert told in error
+    assert "\n" not in error
+    assert not out.exists()
