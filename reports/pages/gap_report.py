@@ -113,7 +113,7 @@ def report(
 
 def _numbers(story: Story) -> tuple[Number, ...]:
     """The gap before and after, the noise, and how much was found."""
-    before, _, after = _whole(story)
+    before, after = _whole(story)
     unit, found = story.naming.unit, story.naming.found
     ended = "bad" if story.weighed.unexplained else "good"
     listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
@@ -131,7 +131,7 @@ def _numbers(story: Story) -> tuple[Number, ...]:
 
 def _first(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
     """One sentence each: where, what is fitted, what it predicts, what it costs, whose motors."""
-    naming, (before, _, after) = story.naming, _whole(story)
+    naming, (before, after) = story.naming, _whole(story)
     levels = Counter(f.level for f in naming.found)
     said = (
         WORDS("where_short", whole_joints(story.where.rows)),

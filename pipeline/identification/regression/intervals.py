@@ -58,11 +58,9 @@ def estimates(problem: Problem, channel: str) -> list[Sized]:
     """
     if not problem.accepted:
         return []
-    sums, spans = problem.with_shapes()
-    draws = _draws(sums)
+    draws = _draws(problem.sums())
     out = []
-    for number, a in enumerate(problem.accepted):
-        coordinates, shapes = problem.span(number), spans[number]
+    for a, (coordinates, shapes) in zip(problem.accepted, problem.spans(), strict=True):
         names = [c.name for c in a.effect.coordinates]
         samples = []
         for draw in draws:

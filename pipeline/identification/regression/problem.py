@@ -12,7 +12,6 @@ from pipeline.effects.base import Effect, Place
 from pipeline.identification.regression.design_matrix import (
     Bench,
     effect_columns,
-    make_bench,
     residual,
 )
 from pipeline.identification.regression.kept import EffectKey, Kept, ToleranceKey
@@ -30,7 +29,7 @@ from pipeline.identification.regression.tolerances import (
     nuisance_columns,
     nuisances,
 )
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, near_rest
+from pipeline.logs.prepared.measurement import CHOOSE, FIT
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction
 from pipeline.simulation.rigid_bodies import legs_are_separate
@@ -98,6 +97,8 @@ class _Computed:
 
     Attributes:
         start: Model with the tolerances as they are held.
+        before: Models with the first 0, 1, ... accepted effects.
+        own: Columns of accepted effects' coordinates, by log and effect.
         near: Predictions of a problem that it was made from.
         predictions: Of the present model.
         stacks: Columns of all unknowns.
@@ -105,6 +106,8 @@ class _Computed:
     """
 
     start: MachineModel | None = None
+    before: list[MachineModel] | None = None
+    own: dict[tuple[int, int], list[dict[int, Array]]] = field(default_factory=dict)
     near: list[Prediction] | None = None
     predictions: list[Prediction] | None = None
     stacks: list[Stack] | None = None
@@ -147,22 +150,23 @@ class Problem:
 
     @property
     def names(self) -> int:
-        """Number of unknowns: tolerances, then the coordinates of accepted effects."""
-        return len(self.tolerances) + sum(len(a.effect.coordinates) for a in self.accepted)
+        """Number of unknowns: tolerances, then coordinates and shape of every accepted effect."""
+        return len(self.tolerances) + sum(
+            len(a.effect.coordinates) + len(a.shape) for a in self.accepted
+        )
 
-    def span(self, number: int) -> slice:
-        """Unknowns of one accepted effect."""
-        start = len(self.tolerances)
-        for a in self.accepted[:number]:
-            start += len(a.effect.coordinates)
-        return slice(start, start + len(self.accepted[number].effect.coordinates))
+    def spans(self) -> list[tuple[slice, slice]]:
+        """Unknowns of every accepted effect: its coordinates, its nonlinear parameters."""
+        out, at = [], len(self.tolerances)
+        for a in self.accepted:
+            middle = at + len(a.effect.coordinates)
+            out.append((slice(at, middle), slice(middle, middle + len(a.shape))))
+            at = middle + len(a.shape)
+        return out
 
     def current(self) -> MachineModel:
         """The model with tolerances as they are held and all accepted effects."""
-        model = self._start()
-        for a in self.accepted:
-            model = a.apply(model)
-        return model
+        return self._before(len(self.accepted))
 
     def without(self, number: int) -> MachineModel:
         """The present model without one of the accepted effects."""
@@ -238,39 +242,6 @@ class Problem:
             _computed=_Computed(start=self._computed.start, near=self.predictions()),
         )
 
-    def with_model(self, model: MachineModel) -> Problem:
-        """The same logs with another model of the machine, no effect and no tolerance taken up.
-
-        Columns at untouched joints are kept.
-        """
-        before, tolerances = self.model, self.tolerances
-        if model.identified != before.identified:
-            tolerances = nuisances(model, [b.measurement for b in self.benches])
-        other = replace(
-            self,
-            model=model,
-            accepted=(),
-            tolerances=tolerances,
-            held=np.zeros(len(tolerances)),
-            _columns=dict(self._columns),
-            _computed=_Computed(near=self.predictions()),
-        )
-        moved = model.rigid is not before.rigid or model.bodies != before.bodies
-        pairs = zip(before.actuators, model.actuators, strict=True)
-        touched = {k for k, (old, new) in enumerate(pairs) if moved or old is not new}
-        pairs = zip(before.actuators, model.actuators, strict=True)
-        scaled = {
-            k
-            for k, (old, new) in enumerate(pairs)
-            if old.motor is not new.motor or old.gains != new.gains
-        }
-        touched |= self._shifted(self.held, np.zeros_like(self.held))
-        for key, per_log in self._columns.items():
-            joints = {j for column in per_log for j in column}
-            if joints & scaled or (joints & touched and not key.additive):
-                del other._columns[key]
-        return other
-
     def _touched(self, a: Accepted) -> set[int]:
         owners = [p.partition("__")[0] for p in a.place]  # of a column of the log
         if owners and all(p in self.model.joints for p in owners):
@@ -320,18 +291,45 @@ class Problem:
         return [self._columns[keys[id(n)]][0] for n in self.tolerances]
 
     def accepted_columns(self, log: int) -> list[dict[int, Array]]:
-        """Columns of the accepted effects at their estimates, without the effect applied twice."""
-        out: list[dict[int, Array]] = []
-        bench, predictions = self.benches[log], self.predictions()
-        for number, a in enumerate(self.accepted):
-            for c in a.effect.coordinates:
-                moved = replace(a, x={**a.x, c.name: a.x[c.name] + c.step})
-                model = self._start()
-                for k, other in enumerate(self.accepted):
-                    model = (moved if k == number else other).apply(model)
-                change = bench.simulator.difference(predictions[log], model)
-                out.append(bench.whitened(change.effort / c.step, change.joints, self.sigma))
+        """Columns of the accepted effects' coordinates at their estimates."""
+        return [column for number in range(len(self.accepted)) for column in self._own(log, number)]
+
+    def _own(self, log: int, number: int) -> list[dict[int, Array]]:
+        """Columns of the coordinates of an accepted effect."""
+        a, kept = self.accepted[number], self._computed.own
+        if (log, number) not in kept:
+            steps = [(c.name, c.step) for c in a.effect.coordinates]
+            kept[log, number] = [
+                self._moved(log, number, replace(a, x={**a.x, name: a.x[name] + step}), step)
+                for name, step in steps
+            ]
+        return kept[log, number]
+
+    def _bent(self, log: int, number: int) -> list[dict[int, Array]]:
+        """Columns of the nonlinear parameters of an accepted effect."""
+        a, out = self.accepted[number], []
+        for name, value in a.shape.items():
+            step = SHAPE_STEP * max(abs(value), 1e-3)
+            moved = replace(a, shape={**a.shape, name: value + step})
+            out.append(self._moved(log, number, moved, step))
         return out
+
+    def _moved(self, log: int, number: int, a: Accepted, step: float) -> dict[int, Array]:
+        """Column of a change of one accepted effect."""
+        bench, model = self.benches[log], self._before(number)
+        for other in (a, *self.accepted[number + 1 :]):
+            model = other.apply(model)
+        change = bench.simulator.difference(self.predictions()[log], model)
+        return bench.whitened(change.effort / step, change.joints, self.sigma)
+
+    def _before(self, number: int) -> MachineModel:
+        """The model with the accepted effects that come before one."""
+        done = self._computed
+        if done.before is None:
+            done.before = [self._start()]
+            for a in self.accepted:
+                done.before.append(a.apply(done.before[-1]))
+        return done.before[number]
 
     def stacks(self) -> list[Stack]:
         """Columns of all unknowns and the residual of the present model."""
@@ -339,12 +337,18 @@ class Problem:
             self._computed.stacks = [
                 make_stack(
                     bench,
-                    [*self.tolerance_columns(k), *self.accepted_columns(k)],
+                    self._unknown_columns(k),
                     residual(bench, self.predictions()[k], self.sigma),
                 )
                 for k, bench in enumerate(self.benches)
             ]
         return self._computed.stacks
+
+    def _unknown_columns(self, log: int) -> list[dict[int, Array]]:
+        out = self.tolerance_columns(log)
+        for number in range(len(self.accepted)):
+            out += [*self._own(log, number), *self._bent(log, number)]
+        return out
 
     @property
     def precision(self) -> Array:
@@ -374,142 +378,14 @@ class Problem:
             self._computed.sums = block_sums(self.stacks(), self.precision, self.mean)
         return self._computed.sums
 
-    def extended(self, candidate: Sequence[Columns], absorbed: Sequence[int] = ()) -> BlockSums:
-        """Normal equations with the columns of a candidate appended.
-
-        Args:
-            candidate: Per log, its columns.
-            absorbed: Tolerances that stand back for it.
-        """
-        base = self.sums()
-        n, p = base.precision.size, len(candidate[0])
-        B = base.s.size
-        H, h = np.zeros((B, n + p, n + p)), np.zeros((B, n + p))
-        H[:, :n, :n], h[:, :n] = base.H, base.h
-        at = 0
-        for stack, columns in zip(self.stacks(), candidate, strict=True):
-            bench = stack.bench
-            for j in sorted({j for column in columns for j in column}):
-                mine = [k for k, column in enumerate(columns) if j in column]
-                X = np.stack([columns[k][j] for k in mine])
-                target = n + np.array(mine)
-                ids = stack.ids[j]
-                for b in range(bench.block_part.size):
-                    rows = slice(int(bench.edges[b]), int(bench.edges[b + 1]))
-                    part = X[:, rows].reshape(len(mine), -1)
-                    old = stack.X[j][:, rows].reshape(ids.size, -1)
-                    cross = part @ old.T
-                    H[at + b][np.ix_(target, ids)] += cross
-                    H[at + b][np.ix_(ids, target)] += cross.T
-                    H[at + b][np.ix_(target, target)] += part @ part.T
-                    h[at + b, target] += part @ stack.r[j][rows].ravel()
-            at += bench.block_part.size
-        precision = np.concatenate([base.precision, np.zeros(p)])
-        precision[list(absorbed)] = FIXED
-        mean = np.concatenate([base.mean, np.zeros(p)])
-        return BlockSums(H, h, base.s, base.count, base.part, precision, mean)
-
-    def with_shapes(self) -> tuple[BlockSums, list[slice]]:
-        """Normal equations with a column for every nonlinear parameter of accepted effects.
-
-        Returns:
-            The sums, and for each accepted effect where its nonlinear parameters stand.
-        """
-        per_log: list[list[dict[int, Array]]] = [[] for _ in self.benches]
-        spans, at = [], self.names
-        for number, a in enumerate(self.accepted):
-            spans.append(slice(at, at + len(a.shape)))
-            at += len(a.shape)
-            for name, value in a.shape.items():
-                step = SHAPE_STEP * max(abs(value), 1e-3)
-                moved = replace(a, shape={**a.shape, name: value + step})
-                model = self._start()
-                for k, other in enumerate(self.accepted):
-                    model = (moved if k == number else other).apply(model)
-                for k, bench in enumerate(self.benches):
-                    change = bench.simulator.difference(self.predictions()[k], model)
-                    per_log[k].append(
-                        bench.whitened(change.effort / step, change.joints, self.sigma)
-                    )
-        if at == self.names:
-            return self.sums(), spans
-        return self.extended(per_log), spans
-
-    def rescaled(self, sigma: Array) -> Problem:
-        """The problem at another noise level; columns are scaled, not computed anew."""
-        share = self.sigma / sigma
-        columns: Kept = {
-            key: [{j: x * share[j] for j, x in column.items()} for column in per_log]
-            for key, per_log in self._columns.items()
-        }
-        done = _Computed(near=self.predictions())
-        return replace(self, sigma=sigma, _columns=columns, _computed=done)
-
-    def richest(self) -> Array:
-        """Noise level that even all candidates together would leave, shape (J, C).
-
-        Each joint's residual is fitted with every column computed so far. Where that leaves more
-        than the noise floor, the rest is taken for the machine's own scatter: what explains less
-        than this is not worth a name.
-        """
-        out = self.sigma.copy()
-        for j in range(out.shape[0]):
-            for c in range(out.shape[1]):
-                out[j, c] *= max(1.0, self._left(j, c))
-        return out
-
-    def _left(self, j: int, c: int) -> float:
-        """Root mean square of what is left of one channel, in sigmas."""
-        total = np.zeros((0, 0))
-        moment, square, rows = np.zeros(0), 0.0, 0
-        for log, stack in enumerate(self.stacks()):
-            head = self.head(log)
-            own = [stack.X[j][k][head, c] for k in range(stack.ids[j].size)]
-            for key, per_log in self._columns.items():
-                if isinstance(key, EffectKey) and key.log == log:
-                    own += [column[j][head, c] for column in per_log if j in column]
-            X = np.stack(own) if own else np.empty((0, head.stop - head.start))
-            r = stack.r[j][head, c]
-            if log == 0:
-                total, moment = np.zeros((len(own), len(own))), np.zeros(len(own))
-            if len(own) == moment.size:
-                total += X @ X.T
-                moment += X @ r
-                square += float(r @ r)
-                good = stack.bench.measurement.mask[stack.bench.rows[head], j]
-                rows += int(good.sum() * stack.bench.weight**2)
-        if rows <= 2 * moment.size or rows == 0:
-            return 1.0
-        scale = np.sqrt(np.maximum(np.diag(total), 1e-300))
-        values, vectors = np.linalg.eigh(total / np.outer(scale, scale))
-        kept = values > 1e-7 * max(float(values.max(initial=0.0)), 1e-300)
-        along = vectors[:, kept].T @ (moment / scale)
-        left = square - float(np.sum(along**2 / values[kept]))
-        return float(np.sqrt(max(left, 0.0) / max(rows - int(kept.sum()), 1)))
-
-    def remasked(self) -> Problem:
-        """Without rows in which a coupled motor turns back, where its joint does not."""
-        model = self.current()
-        benches, changed = [], False
-        for bench in self.benches:
-            m = bench.measurement
-            mask = m.mask.copy()
-            for k, a in enumerate(model.actuators):
-                if a.coupled_to:
-                    speed = model.drivetrains.turned(k, m.v)
-                    turning = near_rest(
-                        speed[:, None], m.rest_speed[k : k + 1], m.pieces, m.rate, m.bandwidth
-                    )[:, 0]
-                    mask[turning, k] = False
-                    mask[turning, model.index(a.coupled_to)] = False
-            if (mask != m.mask).any():
-                changed = True
-                benches.append(make_bench(replace(m, mask=mask)))
-            else:
-                benches.append(bench)
-        if not changed:
-            return self
-        return replace(self, benches=tuple(benches), _columns={}, _computed=_Computed())
+    def gradient(self, stacks: Sequence[Stack]) -> Array:
+        """X^T r (n,) on *fit* and *choose*, of this problem's residual with columns of another."""
+        h = np.zeros(self.names)
+        for k, stack in enumerate(stacks):
+            rest, rows = residual(stack.bench, self.predictions()[k], self.sigma), self.head(k)
+            for j, r in rest.items():
+                h[stack.ids[j]] += np.tensordot(stack.X[j][:, rows], r[rows], axes=2)
+        return h
 
     def head(self, log: int) -> slice:
         """Rows of *fit* and *choose* of one log's bench."""

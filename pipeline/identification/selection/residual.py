@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.compare.circumstances import gap_of
-from pipeline.identification.regression.problem import Problem
 from pipeline.identification.results import Remainder
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
 from pipeline.simulation.predict import Prediction
@@ -20,48 +19,6 @@ Array = NDArray[np.float64]
 _BINS: Final = 12
 #: Share of the remaining variance that a variable's curve explains, to be worth a word.
 _TELLING: Final = 0.08
-
-
-def remaining(problem: Problem, theta: Array) -> list[Array]:
-    """Residual with tolerances at their estimate, in sigmas, per log (R, J, C); NaN where masked.
-
-    Args:
-        problem: With all accepted effects.
-        theta: Estimate of its unknowns.
-    """
-    out = []
-    for stack in problem.stacks():
-        bench = stack.bench
-        m = bench.measurement
-        rest = np.full((bench.rows.size, len(m.joints), len(m.channels)), np.nan)
-        for j, r in stack.r.items():
-            value = r - np.tensordot(theta[stack.ids[j]], stack.X[j], axes=1)
-            good = m.mask[bench.rows, j]
-            rest[good, j] = value[good] / bench.weight
-        out.append(rest)
-    return out
-
-
-def errors(
-    problem: Problem, parts: Sequence[int], by: Sequence[int] = (FIT, CHOOSE)
-) -> tuple[Array, Array]:
-    """Mean square error by joint and channel (J, C), and rows (J,), unknowns at their estimate.
-
-    Args:
-        problem: With some effects accepted.
-        parts: Parts of the data to judge on.
-        by: Parts that estimate.
-    """
-    sums = problem.sums()
-    theta = sums.solve(sums.blocks(*by))
-    squares = np.zeros(problem.sigma.shape)
-    rows = np.zeros(problem.sigma.shape)
-    for rest, bench in zip(remaining(problem, theta), problem.benches, strict=True):
-        for part in parts:
-            values = rest[bench.parts[part]] * problem.sigma
-            squares += np.nansum(values**2, axis=0)
-            rows += np.isfinite(values).sum(axis=0)
-    return squares / np.maximum(rows, 1), rows[:, 0]
 
 
 def remainders(
