@@ -55,7 +55,7 @@ class FrictionLaw(Element):
         require_non_negative(self.name, rise=self.rise, travel=self.travel)
 
     @abstractmethod
-    def free(self, velocity: FloatArray, sense: FloatArray) -> FloatArray:
+    def free(self, side: ShaftSeries, sense: FloatArray) -> FloatArray:
         """Return the friction torque that no load changes, (N, J) [N*m]."""
 
     @abstractmethod
@@ -80,7 +80,7 @@ class FrictionLaw(Element):
         """Return the friction torque, (N, J) [N*m]."""
         sense = self.sense(side)
         share = self.share(side.velocity, side.torque * sense > 0.0)
-        return self.free(side.velocity, sense) + share * np.abs(side.torque) * sense
+        return self.free(side, sense) + share * np.abs(side.torque) * sense
 
     def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Subtract the friction torque; as shares are below 1, the load has the sign of the rest.
@@ -88,7 +88,7 @@ class FrictionLaw(Element):
         With x = torque on the motor side less the free part, x = torque + share s |torque|.
         """
         sense = self.sense(motor_side)
-        x = motor_side.torque - self.free(motor_side.velocity, sense)
+        x = motor_side.torque - self.free(motor_side, sense)
         along = sense * np.sign(x)
         share = self.share(motor_side.velocity, along > 0.0)
         return motor_side.with_torque(x / (1.0 + share * along))
@@ -168,8 +168,9 @@ class Friction(FrictionLaw):
         rare = ("skew", "excess", "asymmetry", "quadratic", "saturating")
         return frozenset(name for name in rare if np.any(getattr(self, name)))
 
-    def free(self, velocity: FloatArray, sense: FloatArray) -> FloatArray:
+    def free(self, side: ShaftSeries, sense: FloatArray) -> FloatArray:
         """Return all terms but those of the load, (N, J) [N*m]."""
+        velocity = side.velocity
         v, terms = velocity, self._terms
         torque = self.coulomb * sense + self.viscous * v
         if "skew" in terms:

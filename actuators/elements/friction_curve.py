@@ -1,7 +1,8 @@
-"""Friction of a joint as curves over its speed, where no law has a name for it.
+"""Friction of a joint as curves over speed and position, where no law has a name for it.
 
-Levels, their asymmetry and shares of the load stand at knots of the speed; between knots they are
-straight lines, beyond the last one the last line goes on as long as it takes energy out.
+Levels, their asymmetry and shares of the load stand at knots of the speed, dry friction more at
+knots of the position. Between knots they are straight lines; beyond the last speed the last line
+goes on as long as it takes energy out, beyond the last position its level stays.
 """
 
 from dataclasses import dataclass
@@ -11,13 +12,14 @@ from numpy.typing import NDArray
 
 from actuators.arrays import FloatArray, Scalars, require, require_non_negative
 from actuators.elements.friction import FrictionLaw
+from actuators.shaft import ShaftSeries
 
 _MOST_SHARE = 0.99  # of the load: at 1 no load could drive the shaft
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionCurve(FrictionLaw):
-    """Friction over speed and load, for one joint.
+    """Friction over speed, load and position, for one joint.
 
     Attributes:
         speeds: Knots, ascending from 0, (K,) [rad/s].
@@ -25,6 +27,8 @@ class FrictionCurve(FrictionLaw):
         asymmetries: By which it is larger forward and smaller backward, (K,) [N*m].
         shares: Friction per transmitted torque at the knots, (K,), dimensionless.
         viscous: Per speed, in addition to the curves [N*m*s/rad].
+        places: Knots of the position, ascending, (P,) [rad]; none by default.
+        spots: Dry friction more at those, (P,) [N*m].
 
     Raises:
         UnphysicalElementError: Knots do not ascend, or the curves would give energy at a knot.
@@ -35,6 +39,8 @@ class FrictionCurve(FrictionLaw):
     asymmetries: tuple[float, ...] = (0.0, 0.0)
     shares: tuple[float, ...] = (0.0, 0.0)
     viscous: float = 0.0
+    places: tuple[float, ...] = ()
+    spots: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -42,7 +48,9 @@ class FrictionCurve(FrictionLaw):
         require(lengths == {len(self.speeds)} and len(self.speeds) > 1, self.name, "one per knot")
         ascending = self.speeds[0] == 0.0 and (np.diff(self.speeds) > 0.0).all()
         require(ascending, self.name, "speeds must ascend from 0")
-        require_non_negative(self.name, viscous=self.viscous)
+        require_non_negative(self.name, viscous=self.viscous, spots=np.array(self.spots))
+        sorted_ = len(self.places) == len(self.spots) and (np.diff(self.places) > 0.0).all()
+        require(sorted_, self.name, "places must ascend, with a spot at each")
         passive = np.array(self.levels) + self.viscous * np.array(self.speeds)
         slack = 1e-9 * (1.0 + np.abs(passive).max())  # sums of terms that cancel leave rounding
         out = passive - np.abs(self.asymmetries) >= -slack
@@ -56,13 +64,15 @@ class FrictionCurve(FrictionLaw):
         beyond = np.maximum(speed - x[-1], 0.0) * (y[-1] - y[-2]) / (x[-1] - x[-2])
         return np.asarray(np.interp(speed, x, y) + beyond)
 
-    def free(self, velocity: FloatArray, sense: FloatArray) -> FloatArray:
+    def free(self, side: ShaftSeries, sense: FloatArray) -> FloatArray:
         """Return levels and asymmetry, (N, J) [N*m]; they take energy out at every speed."""
-        speed = np.abs(velocity)
+        velocity, speed = side.velocity, np.abs(side.velocity)
         level = np.maximum(self.at(self.levels, speed), -self.viscous * speed)
         most = level + self.viscous * speed
         skew = np.clip(self.at(self.asymmetries, speed), -most, most)
         # Towards standstill the asymmetry goes with the sense of motion, as dry friction does.
+        if self.places:
+            level = level + np.interp(side.position, self.places, self.spots)
         return np.asarray(level * sense + skew * np.abs(sense) + self.viscous * velocity)
 
     def share(self, velocity: FloatArray, drives: NDArray[np.bool_]) -> FloatArray:
@@ -70,6 +80,7 @@ class FrictionCurve(FrictionLaw):
         return np.clip(self.at(self.shares, np.abs(velocity)), 0.0, _MOST_SHARE)
 
     def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
-        """Return the curves at standstill."""
-        level, skew, share = self.levels[0], self.asymmetries[0], self.shares[0]
+        """Return the curves at standstill, at the place with the most friction."""
+        skew, share = self.asymmetries[0], self.shares[0]
+        level = self.levels[0] + max(self.spots, default=0.0)
         return max(level - skew, 0.0), max(level + skew, 0.0), share, share

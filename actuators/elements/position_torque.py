@@ -1,4 +1,4 @@
-"""Torques that depend on a shaft's position alone: parallel spring and ripple.
+"""Torques that depend on a shaft's position alone: parallel spring, ripple and any curve.
 
 They are conservative: what they take on one half of a closed path they give back on the other.
 """
@@ -92,3 +92,25 @@ class Ripple(PositionTorque):
         """Return the ripple torque [N*m]."""
         result: FloatArray = self.amplitude * np.sin(self.order * position + self.phase)
         return result
+
+
+@dataclass(frozen=True, eq=False)
+class PositionCurve(PositionTorque):
+    """Torque over position that has no law: straight lines between knots, even beyond them.
+
+    Attributes:
+        places: Knots, ascending, (P,) [rad].
+        levels: There, (P,) [N*m].
+    """
+
+    places: tuple[float, ...] = (0.0,)
+    levels: tuple[float, ...] = (0.0,)
+
+    def __post_init__(self) -> None:
+        ascending = len(self.places) == len(self.levels) and (np.diff(self.places) > 0.0).all()
+        require(ascending, self.name, "places must ascend, with a level at each")
+        require(np.isfinite(self.levels), self.name, "values must be finite")
+
+    def torque(self, position: FloatArray) -> FloatArray:
+        """Return the curve's torque [N*m]."""
+        return np.interp(position, self.places, self.levels)

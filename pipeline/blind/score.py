@@ -37,8 +37,8 @@ EQUIVALENT: Final[Mapping[str, frozenset[str]]] = {
     "effort_gain": frozenset({"torque_constant_error"}),
     "load_dependent_friction": frozenset({"backdrive_loss"}),
 }
-#: Flexible members: drawn where a joint's friction has no simpler law, no name.
-FLEXIBLE: Final = frozenset({"friction_curve"})
+#: Flexible members: drawn where a joint's friction or torque has no simpler law, no name.
+FLEXIBLE: Final = frozenset({"friction_curve", "position_curve"})
 #: All bodies at once; written link by link.
 WHOLE: Final = "rigid_body_parameters"
 #: Names of bodies; right where the machine's are not the URDF's.

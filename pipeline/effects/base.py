@@ -101,6 +101,8 @@ class Effect(ABC):
         kinds_absorbed: Kinds of tolerances at its place that are this effect in small.
         additive: Whether what it adds does not depend on what else acts at the joint.
         halved: Nonlinear parameter that is refined by factors; empty for none.
+        has_law: Whether it is a law; curves without one are drawn and never more than approximate.
+        fixed: Nonlinear parameters that are not estimated: the knots of curves.
     """
 
     name: ClassVar[str]
@@ -118,6 +120,8 @@ class Effect(ABC):
     kinds_absorbed: ClassVar[tuple[str, ...]] = ()
     additive: ClassVar[bool] = False
     halved: ClassVar[str] = ""
+    has_law: ClassVar[bool] = True
+    fixed: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
         """Refuse a signature that nothing can be drawn against, where the effect is written."""
@@ -170,7 +174,7 @@ class Effect(ABC):
 
     def law(self, values: Values) -> str:
         """Which of its laws it is at some parameters, in words; empty where it has but one."""
-        return ""
+        return "" if self.has_law else "not in the catalogue"
 
     def amounts_to(self, values: Values) -> tuple[str, ...]:
         """Effects of the catalogue that it is the sum of; empty where it is one by itself."""

@@ -21,7 +21,8 @@ from pipeline.effects.drive.torque_constant_error import TorqueConstantError
 from pipeline.effects.drive.torque_ripple import TorqueRipple
 from pipeline.effects.drive.transmission_coupling import BareCoupling, TransmissionCoupling
 from pipeline.effects.drive.winding_heating import SensedHeating, WindingHeating
-from pipeline.effects.friction.friction_curve import FrictionCurveEffect
+from pipeline.effects.flexible.friction_curve import FrictionCurveEffect
+from pipeline.effects.flexible.position_curve import PositionCurveEffect
 from pipeline.effects.friction.joint_friction import JointFrictionLaw
 from pipeline.effects.friction.presets import (
     BackdriveLoss,
@@ -50,6 +51,7 @@ EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
             BackdriveLoss(),
             JointFrictionLaw(),
             FrictionCurveEffect(),
+            PositionCurveEffect(),
             RotorInertia(),
             RigidBodyParameters(),
             LinkMass(),

@@ -30,10 +30,7 @@ EXCLUDED: Final = 5.0
 SURE: Final = 2.0
 #: Rivals of a name that are looked at.
 RIVALS: Final = 6
-SHAPELESS: Final = (
-    "a shape of friction or of a torque over position that is not in the catalogue explains the "
-    "log without it"
-)
+SHAPELESS: Final = "it is a curve, drawn where no law of the catalogue fits"
 #: What a model leaves over the noise floor, in any channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
 IDLE_NAME: Final = "it closes none of the gap on validation data"

@@ -67,9 +67,8 @@ def estimates(problem: Problem, channel: str) -> list[Sized]:
             x = {n: a.x[n] + float(d) for n, d in zip(names, draw[coordinates], strict=True)}
             for c in a.effect.coordinates:
                 x[c.name] = x[c.name] if c.signed else max(x[c.name], 0.0)
-            shape = {
-                n: v + float(d) for (n, v), d in zip(a.shape.items(), draw[shapes], strict=True)
-            }
+            bent = zip(a.bends.items(), draw[shapes], strict=True)
+            shape = {**a.shape, **{n: v + float(d) for (n, v), d in bent}}
             samples.append(a.effect.physical(x, shape))
         best = a.effect.physical(a.x, a.shape)
         parameters = tuple(_estimate(a, n, best, samples, channel, problem.model) for n in best)
@@ -134,7 +133,9 @@ def _draws(sums: BlockSums) -> Array:
         out[k] = inverse @ ((weight - 1.0) @ gradient)
     count = float(sums.count[blocks].sum())
     scale = float(sums.loss(centre, blocks).sum()) / max(count, 1.0)
-    least = np.sqrt(np.maximum(np.diag(inverse), 0.0) * max(scale, 1.0))
+    # The noise is as large as what is left; what a prior alone holds is none the wider for it.
+    noisy = inverse_spd(H.sum(axis=0) / max(scale, 1.0) + prior)
+    least = np.sqrt(np.maximum(np.diag(noisy), 0.0))
     spread = out.std(axis=0)
     # As for a t-distribution: few blocks know their own scatter badly.
     grow = np.maximum(1.0, least / np.maximum(spread, 1e-300)) * (1.0 + 2.0 / blocks.size)

@@ -35,7 +35,8 @@ class EffectKey:
     @property
     def additive(self) -> bool:
         """Whether effects of a joint hardly change it."""
-        return EFFECTS[self.effect].additive
+        effect = EFFECTS[self.effect]
+        return effect.additive or effect.rescales
 
 
 @dataclass(frozen=True)

@@ -146,11 +146,12 @@ def make_stack(
     return Stack(bench, ids, X, r)
 
 
-def block_sums(stacks: Sequence[Stack], precision: Array, mean: Array) -> BlockSums:
+def block_sums(stacks: Sequence[Stack], weights: Array, precision: Array, mean: Array) -> BlockSums:
     """Sum up the columns of several logs by block.
 
     Args:
         stacks: One per log, the same unknowns in each.
+        weights: Of squared residuals, shape (J, C).
         precision: Prior precision, shape (n,).
         mean: Where the prior is centred, shape (n,).
     """
@@ -167,8 +168,9 @@ def block_sums(stacks: Sequence[Stack], precision: Array, mean: Array) -> BlockS
         for b in range(bench.block_part.size):
             rows = slice(int(bench.edges[b]), int(bench.edges[b + 1]))
             for j, r in stack.r.items():
-                ids, flat_r = stack.ids[j], r[rows].ravel()
-                flat_X = stack.X[j][:, rows].reshape(ids.size, -1)
+                ids, root = stack.ids[j], np.sqrt(weights[j])
+                flat_r = (r[rows] * root).ravel()
+                flat_X = (stack.X[j][:, rows] * root).reshape(ids.size, -1)
                 H[at, ids[:, None], ids[None, :]] += flat_X @ flat_X.T
                 h[at, ids] += flat_X @ flat_r
                 s[at] += float(flat_r @ flat_r)

@@ -42,6 +42,8 @@ Columns = Sequence[Mapping[int, Array]]
 _STALE = 0.1
 #: Relative step of a nonlinear parameter for its column.
 SHAPE_STEP = 1e-4
+#: Largest of a tolerance, in its sigmas.
+_HELD = 3.0
 #: Prior precision of what is not free.
 FIXED = 1e9
 #: Effects whose like at another leg leaves this leg alone, where legs are separate.
@@ -86,6 +88,11 @@ class Accepted:
     x: Mapping[str, float]
     shape: Mapping[str, float]
 
+    @property
+    def bends(self) -> dict[str, float]:
+        """Nonlinear parameters that are estimated."""
+        return {n: v for n, v in self.shape.items() if n not in self.effect.fixed}
+
     def apply(self, model: MachineModel) -> MachineModel:
         """The model with the effect."""
         return self.effect.edit(model, self.place, self.x, self.shape)
@@ -127,6 +134,8 @@ class Problem:
         held: What the present model holds of each tolerance, in its sigmas.
         floor: Standard deviation of the noise, shape (J, C).
         uncertainty: Of the URDF's bodies [1].
+        weights: Of the squared residuals, shape (J, C): one over the variance of what is taken for
+            noise, in floors.
     """
 
     model: MachineModel
@@ -137,7 +146,9 @@ class Problem:
     held: Array = field(default_factory=lambda: np.zeros(0))
     floor: Array = field(default_factory=lambda: np.zeros(0))
     uncertainty: float = UNCERTAINTY
+    weights: Array = field(default_factory=lambda: np.zeros(0))
     _columns: Kept = field(default_factory=dict)
+    _files: list[Prediction] = field(default_factory=list)
     _computed: _Computed = field(default_factory=_Computed)
 
     def __post_init__(self) -> None:
@@ -147,12 +158,14 @@ class Problem:
             self.floor = self.sigma
         if self.held.size == 0:
             self.held = np.zeros(len(self.tolerances))
+        if self.weights.size == 0:
+            self.weights = np.ones_like(self.sigma)
 
     @property
     def names(self) -> int:
         """Number of unknowns: tolerances, then coordinates and shape of every accepted effect."""
         return len(self.tolerances) + sum(
-            len(a.effect.coordinates) + len(a.shape) for a in self.accepted
+            len(a.effect.coordinates) + len(a.bends) for a in self.accepted
         )
 
     def spans(self) -> list[tuple[slice, slice]]:
@@ -160,8 +173,8 @@ class Problem:
         out, at = [], len(self.tolerances)
         for a in self.accepted:
             middle = at + len(a.effect.coordinates)
-            out.append((slice(at, middle), slice(middle, middle + len(a.shape))))
-            at = middle + len(a.shape)
+            out.append((slice(at, middle), slice(middle, middle + len(a.bends))))
+            at = middle + len(a.bends)
         return out
 
     def current(self) -> MachineModel:
@@ -196,6 +209,16 @@ class Problem:
                 for b, start in zip(self.benches, starts, strict=True)
             ]
         return done.predictions
+
+    def files(self) -> list[Prediction]:
+        """Of the model before any effect, one per log.
+
+        What multiplies a channel is counted in multiples of these: (1 + g) (p + F x) is linear in
+        g and in (1 + g) x, so that leaving out F does not leave it in what g multiplies.
+        """
+        if not self._files:
+            self._files += [b.simulator.predict(self.model) for b in self.benches]
+        return self._files
 
     def with_accepted(self, accepted: Sequence[Accepted], held: Array | None = None) -> Problem:
         """The problem at other effects; columns at untouched joints are kept.
@@ -233,11 +256,12 @@ class Problem:
             if n.kind in ("torque_constant", "resistance") and abs(after - before) > _STALE
         }
 
-    def at_uncertainty(self, uncertainty: float) -> Problem:
-        """The problem at another uncertainty of the URDF's bodies; all columns are kept."""
+    def judged(self, uncertainty: float, weights: Array) -> Problem:
+        """The problem at another uncertainty of the URDF's bodies and with other weights (J, C)."""
         return replace(
             self,
             uncertainty=uncertainty,
+            weights=weights,
             _columns=dict(self._columns),
             _computed=_Computed(start=self._computed.start, near=self.predictions()),
         )
@@ -263,7 +287,8 @@ class Problem:
         self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
     ) -> list[tuple[Place, list[dict[int, Array]]]]:
         """Columns of a candidate; of the like ones of all legs where one prediction serves all."""
-        bench, base = self.benches[log], self.predictions()[log]
+        bench = self.benches[log]
+        base = self.files()[log] if effect.rescales else self.predictions()[log]
         if effect.name not in _OF_ONE_LEG or not legs_are_separate(self.model, bench.measurement):
             return [(place, effect_columns(bench, base, effect, place, shape, self.sigma))]
         places = effect.places(base.model, bench.measurement)
@@ -291,8 +316,16 @@ class Problem:
         return [self._columns[keys[id(n)]][0] for n in self.tolerances]
 
     def accepted_columns(self, log: int) -> list[dict[int, Array]]:
-        """Columns of the accepted effects' coordinates at their estimates."""
-        return [column for number in range(len(self.accepted)) for column in self._own(log, number)]
+        """Columns of the accepted effects' coordinates at their estimates, scales at the files."""
+        return [
+            column
+            for number, a in enumerate(self.accepted)
+            for column in (
+                self.columns(log, a.effect, a.place, a.shape)
+                if a.effect.rescales
+                else self._own(log, number)
+            )
+        ]
 
     def _own(self, log: int, number: int) -> list[dict[int, Array]]:
         """Columns of the coordinates of an accepted effect."""
@@ -308,7 +341,7 @@ class Problem:
     def _bent(self, log: int, number: int) -> list[dict[int, Array]]:
         """Columns of the nonlinear parameters of an accepted effect."""
         a, out = self.accepted[number], []
-        for name, value in a.shape.items():
+        for name, value in a.bends.items():
             step = SHAPE_STEP * max(abs(value), 1e-3)
             moved = replace(a, shape={**a.shape, name: value + step})
             out.append(self._moved(log, number, moved, step))
@@ -360,6 +393,15 @@ class Problem:
             out[self.absorbed(a.effect, a.place)] = FIXED
         return out
 
+    def inside(self, held: Array) -> Array:
+        """Tolerances (n,) in their sigmas inside the bounds of what one can be.
+
+        Beyond a few sigmas it only stands in for an effect not yet found.
+        """
+        reach = _HELD / np.sqrt(self.precision[: held.size])
+        lowest = np.array([n.lowest / n.sigma for n in self.tolerances])
+        return np.asarray(np.clip(held, np.maximum(-reach, lowest), reach))
+
     def absorbed(self, effect: Effect, place: Place) -> list[int]:
         """Numbers of the tolerances that stand back where an effect is."""
         keys = effect.absorbs(place)
@@ -375,17 +417,27 @@ class Problem:
     def sums(self) -> BlockSums:
         """Normal equations of the present problem."""
         if self._computed.sums is None:
-            self._computed.sums = block_sums(self.stacks(), self.precision, self.mean)
+            self._computed.sums = block_sums(self.stacks(), self.weights, self.precision, self.mean)
         return self._computed.sums
 
     def gradient(self, stacks: Sequence[Stack]) -> Array:
-        """X^T r (n,) on *fit* and *choose*, of this problem's residual with columns of another."""
-        h = np.zeros(self.names)
+        """X^T W r (n,) on *fit* and *choose*, of this residual with columns of another estimate."""
+        h = self.precision * self.mean
         for k, stack in enumerate(stacks):
             rest, rows = residual(stack.bench, self.predictions()[k], self.sigma), self.head(k)
             for j, r in rest.items():
-                h[stack.ids[j]] += np.tensordot(stack.X[j][:, rows], r[rows], axes=2)
+                weighted = r[rows] * self.weights[j]
+                h[stack.ids[j]] += np.tensordot(stack.X[j][:, rows], weighted, axes=2)
         return h
+
+    def cost(self) -> float:
+        """Twice the negative logarithm of likelihood and prior of what the model holds."""
+        out = float(self.precision @ self.mean**2)
+        for k, bench in enumerate(self.benches):
+            rest = residual(bench, self.predictions()[k], self.sigma)
+            for j, r in rest.items():
+                out += float(np.sum(r[self.head(k)] ** 2 * self.weights[j]))
+        return out
 
     def head(self, log: int) -> slice:
         """Rows of *fit* and *choose* of one log's bench."""

@@ -9,69 +9,60 @@ from numpy.typing import NDArray
 
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Accepted, Problem
-from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
 
 Array = NDArray[np.float64]
 #: Times the columns are computed, at most, and steps that are made with the same.
-_COLUMNS, _STEPS = 3, 6
-#: Largest change that is none: of a coordinate relative to it, of a tolerance in fifty sigmas.
-_SMALL, _NEAR = 2e-3, 2e-2
-#: Share of the last step beyond which columns are computed anew.
-_SLOW = 0.7
-_HELD = 3.0  # sigmas
+_COLUMNS, _STEPS = 4, 6
+#: Rise of twice the logarithm of the likelihood that is none.
+_NOTHING = 0.1
+#: Damping, relative to the matrix's diagonal: where a step fails; above it columns are renewed.
+_DAMPED, _MOST_DAMPED = 0.01, 10.0
 _BEND = 0.3  # largest relative change of a nonlinear parameter in one step
-#: Tolerances in which the prediction bends enough to be taken up into the model.
-_RELINEARISED = ("torque_constant", "resistance", "encoder", "skew", *STRAINS)
 
 
 def refit(problem: Problem) -> Problem:
     """Estimate all accepted effects together with the tolerances on *fit* and *choose*.
 
-    Gauss-Newton with columns that are kept over several steps, of which only the residual is
-    computed anew: the predictions cost little, the columns much.
+    Levenberg's damped Gauss-Newton steps (Marquardt 1963) with columns that are kept over several
+    of them: a prediction costs little, the columns much. No step makes the log less likely.
     """
+    cost = problem.cost()
     for _ in range(_COLUMNS):
-        problem, first = _with_one_jacobian(problem)
-        if first < _NEAR:
+        before = cost
+        problem, cost = _with_these_columns(problem, cost)
+        if before - cost < 10.0 * _NOTHING:
             break
     return problem
 
 
-def _with_one_jacobian(problem: Problem) -> tuple[Problem, float]:
-    """Steps with the columns of where they start, and how large the first of them was."""
+def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
     stacks, sums = problem.stacks(), problem.sums()
     A = sums.H[sums.blocks(FIT, CHOOSE)].sum(axis=0) + np.diag(sums.precision)
-    sizes: list[float] = []
-    while len(sizes) < _STEPS:
-        theta = solve_spd(A, problem.gradient(stacks) + problem.precision * problem.mean)
-        after, size = _stepped(problem, theta)
-        if sizes and size > _SLOW * sizes[-1]:
+    damping = 0.0
+    for _ in range(_STEPS):
+        D = np.diag(damping * np.diag(A))
+        after = _stepped(problem, solve_spd(A + D, problem.gradient(stacks)))
+        reached = after.cost()
+        if reached >= cost:
+            damping = max(_DAMPED, 10.0 * damping)
+            if damping > _MOST_DAMPED:
+                break
+            continue
+        gain, problem, cost, damping = cost - reached, after, reached, 0.1 * damping
+        if gain < _NOTHING:
             break
-        problem = after
-        sizes.append(size)
-        if size < _SMALL:
-            break
-    return problem, sizes[0]
+    return problem, cost
 
 
-def _stepped(problem: Problem, theta: Array) -> tuple[Problem, float]:
-    """The problem after a step (n,), and the largest relative change in it."""
-    moved, largest = [], 0.0
-    for a, (coordinates, shape) in zip(problem.accepted, problem.spans(), strict=True):
-        after = _effect_stepped(problem, a, theta[coordinates], theta[shape])
-        for c in a.effect.coordinates:
-            change = abs(after.x[c.name] - a.x[c.name])
-            largest = max(largest, change / (abs(after.x[c.name]) + c.step))
-        moved.append(after)
-    count = len(problem.tolerances)
-    # Beyond a few sigmas a tolerance only stands in for an effect not yet found.
-    reach = np.array([_HELD if n.kind in _RELINEARISED else 0.0 for n in problem.tolerances])
-    reach /= np.sqrt(problem.precision[:count])
-    lowest = np.array([n.lowest / n.sigma for n in problem.tolerances])
-    held = np.clip(problem.held + theta[:count], np.maximum(-reach, lowest), reach)
-    largest = max(largest, 0.02 * float(np.abs(held - problem.held).max(initial=0.0)))
-    return problem.with_accepted(moved, held), largest
+def _stepped(problem: Problem, theta: Array) -> Problem:
+    """The problem after a step (n,)."""
+    moved = [
+        _effect_stepped(problem, a, theta[coordinates], theta[shape])
+        for a, (coordinates, shape) in zip(problem.accepted, problem.spans(), strict=True)
+    ]
+    held = problem.held + theta[: len(problem.tolerances)]
+    return problem.with_accepted(moved, problem.inside(held))
 
 
 def tolerances_of(problem: Problem) -> dict[tuple[str, str], tuple[float, float]]:
@@ -92,8 +83,8 @@ def _effect_stepped(problem: Problem, a: Accepted, step: Array, bend: Array) -> 
         for c, d in zip(a.effect.coordinates, step, strict=True):
             value = a.x[c.name] + share * float(d)
             x[c.name] = value if c.signed else max(value, 0.0)
-        shape = {}
-        for (name, value), d in zip(a.shape.items(), bend, strict=True):
+        shape = dict(a.shape)
+        for (name, value), d in zip(a.bends.items(), bend, strict=True):
             most = _BEND * abs(value)
             shape[name] = value + share * float(np.clip(d, -most, most))
         seen = any(a.effect.shown(b.measurement, a.place, shape) for b in problem.benches)

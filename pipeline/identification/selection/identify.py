@@ -23,7 +23,7 @@ from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.refit import refit, tolerances_of
 from pipeline.identification.results import UNCERTAINTIES, Candidate, Found, Member, Naming
-from pipeline.identification.selection.pool import Index, Key, Term
+from pipeline.identification.selection.pool import Key, Term
 from pipeline.identification.selection.search import Search, State
 from pipeline.identification.selection.settle import Settled, settle
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, Measurement
@@ -123,7 +123,7 @@ def estimated_alone(named: Identified, found: Sequence[Found]) -> tuple[Found, .
     if len(kept) == len(problem.accepted) and bodies == (problem.uncertainty > UNCERTAINTIES[0]):
         return tuple(found)
     spread = problem.uncertainty if bodies else UNCERTAINTIES[0]
-    again = refit(problem.at_uncertainty(spread).with_accepted(kept))
+    again = refit(problem.judged(spread, problem.weights).with_accepted(kept))
     sized = dict(
         zip(
             [(a.effect.name, a.place) for a in again.accepted],
@@ -166,16 +166,6 @@ class Judgement:
         """Of every block by estimates from others, (B,)."""
         return self.search.block_losses(self.state)
 
-    @cached_property
-    def shapeless(self) -> dict[int, Index]:
-        """Joints at which shapes without a name explain more, to their columns."""
-        flexible = self.settled.pool.flexible
-        return {
-            j: columns
-            for j, columns in enumerate(flexible)
-            if self.search.gain_of(self.state, columns) > 0.0
-        }
-
     def rivals(self, number: int | None) -> list[Rival]:
         """What may stand in the place of a term, or of refitted bodies (None), nothing first."""
         search, state = self.search, self.state
@@ -210,23 +200,10 @@ class Judgement:
         richer = sum(len(u) for _, u in other.terms) > sum(len(u) for _, u in self.state.terms)
         return Rival(key, self.state.evidence - other.evidence, sure, richer)
 
-    def beside_shapes(self, term: Term) -> bool:
-        """Whether a name at a joint with a shape of no name is needed beside that shape."""
-        joints = [j for j in self.shapeless if self.settled.problem.model.joints[j] in owners(term)]
-        if not joints:
-            return True
-        shapes = np.concatenate([self.shapeless[j] for j in joints])
-        without = self.search.without(self.state, self._number(term))
-        return self.search.gain_of(self.state, shapes) + self.state.evidence > (
-            self.search.gain_of(without, shapes) + without.evidence
-        )
-
-    def _number(self, term: Term) -> int:
-        return next(t for t in self.state.numbers if self.settled.pool.terms[t] is term)
-
     def notes(self) -> Iterator[str]:
         """What has no name, in words."""
-        names = [self.settled.problem.model.joints[j] for j in self.shapeless]
+        terms = [self.settled.pool.terms[t] for t in self.state.numbers]
+        names = dict.fromkeys(t.place[0] for t in terms if not t.effect.has_law)
         if names:
             yield (
                 f"in {', '.join(names)} friction or a torque over position is left whose law is "
@@ -310,7 +287,7 @@ def _level(
         return limits.APPROXIMATE, f"{words} would explain the log as well"
     if not nothing.excluded:
         return limits.APPROXIMATE, "parts of the log disagree whether it is there"
-    if number is not None and not judged.beside_shapes(judged.settled.pool.terms[number]):
+    if number is not None and not judged.settled.pool.terms[number].effect.has_law:
         return limits.APPROXIMATE, limits.SHAPELESS
     return limits.CONFIRMED, ""
 
@@ -333,7 +310,7 @@ def _joints(judged: Judgement, number: int | None) -> list[int]:
 
 
 def _errors(search: Search, state: State) -> Array:
-    """RMS error of the first channel on *choose* by estimates from *fit*, (J,); NaN without rows."""
+    """RMS error of the first channel on *choose* by estimates from *fit*, (J,); NaN: no rows."""
     pool = search.pool
     columns = search.columns(state)
     H, h = pool.blocks(columns, search.weights)

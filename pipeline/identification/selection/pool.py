@@ -20,7 +20,6 @@ from pipeline.effects.registry import catalogue
 from pipeline.identification.regression.design_matrix import Bench, effect_columns, residual
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Problem
-from pipeline.identification.selection.flexible import flexible_columns
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
 
 Array = NDArray[np.float64]
@@ -95,7 +94,6 @@ class Pool:
         size: Number of columns; tolerances first.
         channels: Normal equations of what may be learnt from.
         held: Values of tolerances and of accepted effects' coordinates in the present model.
-        flexible: Columns of each joint's shapes without a name.
     """
 
     problem: Problem
@@ -103,7 +101,6 @@ class Pool:
     size: int
     channels: tuple[Channel, ...]
     held: Array
-    flexible: tuple[Index, ...]
 
     @property
     def base(self) -> int:
@@ -174,17 +171,10 @@ def make_pool(problem: Problem, effects: Sequence[Effect] | None = None) -> Pool
             for j, joint in enumerate(problem.model.joints):
                 for shape in _orders(problem, effect, j, rests):
                     at = _offer(problem, effect, (joint,), shape, columns, terms, at)
-    shapes: list[Index] = []
-    for j in range(len(problem.model.joints)):
-        own = flexible_columns(problem, j)
-        for per_log, more in zip(columns, own, strict=True):
-            per_log += more
-        shapes.append(np.arange(at, at + len(own[0])))
-        at += len(own[0])
     full = np.zeros(at)
     full[: held.size] = held
     channels = tuple(_channels(problem, columns, full))
-    return Pool(problem, tuple(terms), at, channels, full, tuple(shapes))
+    return Pool(problem, tuple(terms), at, channels, full)
 
 
 def _forms(problem: Problem, effect: Effect) -> Iterator[tuple[Place, dict[str, float]]]:

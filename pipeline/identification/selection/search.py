@@ -77,7 +77,7 @@ class Search:
         names = len({t.key for t in pool.terms}) + 1
         # A nonlinear parameter costs what a coordinate that many rows tell does.
         rows = 0.5 * np.log(max(np.mean([c.count.sum() for c in pool.channels]), 1.0))
-        bent = [len([n for n in t.shape if n != REACH]) for t in pool.terms]
+        bent = [len([n for n in t.shape if n not in (REACH, *t.effect.fixed)]) for t in pool.terms]
         self._name = -np.log(names) - MARGIN
         self._prior = np.array([self._name - rows * b for b in bent])
         sums = [w * c.s.sum() for c, w in zip(pool.channels, self.weights, strict=True)]
@@ -113,6 +113,14 @@ class Search:
             energy[channel.ids] += w * own
             square[channel.ids] += np.where(own > 0, channel.effort * channel.count.sum() * w, 0)
         return energy / np.maximum(square, 1e-300)
+
+    @property
+    def noise(self) -> Array:
+        """Weights of squared residuals by joint and channel, (J, C)."""
+        out = np.ones_like(self.pool.problem.sigma)
+        for channel, w in zip(self.pool.channels, self.weights, strict=True):
+            out[channel.joint, channel.number] = w
+        return out
 
     def columns(self, state: State) -> Index:
         """Tolerances and the coordinates of its terms."""
@@ -240,30 +248,6 @@ class Search:
                 return -np.inf
             free = [k for k in free if k not in wrong]
         return -np.inf
-
-    def gain_of(self, state: State, further: Index, beside: Index | None = None) -> float:
-        """Rise of the evidence with columns that are no term.
-
-        Args:
-            state: A set of names.
-            further: The columns.
-            beside: Such columns that it has already.
-        """
-        return self._with(
-            state, np.concatenate([_none() if beside is None else beside, further])
-        ) - (self._with(state, _none() if beside is None else beside))
-
-    def _with(self, state: State, more: Index) -> float:
-        columns = np.concatenate([self.columns(state), more])
-        prior = self.precision(columns, state.uncertainty)
-        live = np.diag(self.H)[columns] > 0.0
-        columns, prior = columns[live], prior[live]
-        A = self.H[np.ix_(columns, columns)] + np.diag(prior)
-        scale = np.sqrt(np.diag(A))
-        L = np.linalg.cholesky(A / np.outer(scale, scale) + _RIDGE * np.eye(columns.size))
-        y = scipy.linalg.solve_triangular(L, self.h[columns] / scale, lower=True)
-        size = np.log(np.diag(L)).sum() + np.log(scale).sum()
-        return float(0.5 * y @ y - size + 0.5 * np.log(prior).sum())
 
     def block_losses(self, state: State) -> Array:
         """Squared error of every block by estimates from other blocks, in noise variances, (B,)."""

@@ -9,10 +9,11 @@ judged with columns of its own, is the answer.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.effects.base import REACH
 from pipeline.identification.regression.problem import Accepted, Problem
@@ -22,10 +23,13 @@ from pipeline.identification.selection.pool import Pool, make_pool
 from pipeline.identification.selection.search import Search, State
 from pipeline.progress import Progress
 
+Array = NDArray[np.float64]
 #: Times an answer is looked at again about its own estimates, at most.
 _ROUNDS: Final = 4
 #: Evidence below which two points are the same.
 _SAME: Final = 1e-3
+#: Shares of linear estimates that a nonlinear fit may start from.
+_SHARES: Final = (1.0, 0.3, 0.1)
 #: Answers of the first search that are estimated in full.
 _STARTS: Final = 3
 
@@ -89,8 +93,8 @@ def _best_near(problem: Problem, search: Search, state: State) -> Settled:
     best: Settled | None = None
     first = search
     for _ in range(_ROUNDS):
-        problem = problem.at_uncertainty(state.uncertainty)
-        problem = refit(problem.with_accepted(accepted_of(search, state)))
+        problem = problem.judged(state.uncertainty, search.noise)
+        problem = refit(_started(problem, search, state))
         search = Search(make_pool(problem))
         here = search.valid(as_accepted(search))
         if best is not None and here.evidence < best.state.evidence - _SAME:
@@ -101,6 +105,16 @@ def _best_near(problem: Problem, search: Search, state: State) -> Settled:
             break
     assert best is not None
     return best
+
+
+def _started(problem: Problem, search: Search, state: State) -> Problem:
+    """The problem at linear estimates, or a share of them where all of them lead astray."""
+    held, accepted = estimated(search, state)
+    tried = []
+    for share in _SHARES:
+        shortened = [replace(a, x={k: share * v for k, v in a.x.items()}) for a in accepted]
+        tried.append(problem.with_accepted(shortened, problem.inside(share * held)))
+    return min(tried, key=Problem.cost)
 
 
 def as_accepted(search: Search) -> State:
@@ -114,8 +128,8 @@ def _used(a: Accepted) -> tuple[int, ...]:
     return tuple(k for k, c in enumerate(a.effect.coordinates) if c.signed or a.x[c.name] != 0.0)
 
 
-def accepted_of(search: Search, state: State) -> list[Accepted]:
-    """Effects of a state with the estimates of its linear problem."""
+def estimated(search: Search, state: State) -> tuple[Array, list[Accepted]]:
+    """Tolerances (n,) in their sigmas and effects of a state, by its linear problem."""
     _, _, x, _ = search.solve(state)
     out, at = [], search.pool.base
     for number, used in state.terms:
@@ -126,4 +140,4 @@ def accepted_of(search: Search, state: State) -> list[Accepted]:
             at += 1
         shape = {name: value for name, value in term.shape.items() if name != REACH}
         out.append(Accepted(term.effect, term.place, values, shape))
-    return out
+    return x[: search.pool.base], out

@@ -1,0 +1,1 @@
+"""Curves for what has no law in the catalogue."""
