@@ -321,7 +321,8 @@ def read_model_file(path: Path, catalog: Path | None = None) -> ModelFile:
     model = checked(_Model, table, where, ModelFileError)
     robot, hashes = path.parent / model.robot.file, model.actuators.sha256
     edits, alternative = tuple(map(_as_edit, model.edit)), model.actuators.alternative
-    file = ModelFile(robot, model.robot.sha256, alternative, hashes, edits, model.noise)
+    noise: dict[str, Mapping[str, float]] = {str(c): own for c, own in model.noise.items()}
+    file = ModelFile(robot, model.robot.sha256, alternative, hashes, edits, noise)
     return replace(file, changed=_changed(file, where, catalog))
 
 

@@ -43,8 +43,8 @@ class LinkMass(Effect):
         joint = model.carrier(place[0])
         body = model.bodies.body(joint)
         if any(axis in shape for axis in AXES):
-            place = np.array([shape.get(axis, 0.0) for axis in AXES])
-            return carrying(model, joint, point_mass(x["mass"], place))
+            centre = np.array([shape.get(axis, 0.0) for axis in AXES])
+            return carrying(model, joint, point_mass(x["mass"], centre))
         changed = replace(body, payload=body.payload + x["mass"])
         return model.with_bodies(model.bodies.with_body(joint, changed))
 

@@ -68,7 +68,7 @@ def left_open(problem: Problem) -> Array:
         good = bench.measurement.mask[bench.rows[part]]
         for j, X in stack.X.items():
             own = spread[np.ix_(stack.ids[j], stack.ids[j])]
-            for c in range(variance.shape[1]):
+            for c in range(X.shape[2]):
                 x = X[:, part, c]
                 variance[j, c] += float(np.sum(x * (own @ x))) / bench.weight**2
             rows[j] += good[:, j].sum()

@@ -212,7 +212,7 @@ def _absolute(
 ) -> dict[int, Array]:
     """Residual of the model without tolerances and accepted effects, by joint, (R, C)."""
     rest = residual(problem.benches[log], problem.predictions()[log], problem.sigma)
-    for k in np.flatnonzero(held):
+    for k in np.flatnonzero(held).tolist():
         for j, x in columns[k].items():
             rest[j] = rest[j] + held[k] * x
     return rest
@@ -232,10 +232,11 @@ def _payloads(
     full = np.zeros(len(columns[0]))
     full[: held.size] = held
     model = problem.current()
-    prior = np.concatenate([problem.precision[: len(problem.tolerances)], np.zeros(len(beside))])
-    prior = prior[: len(beside)]
+    prior = np.zeros(len(beside))
+    prior[: len(problem.tolerances)] = problem.precision[: len(problem.tolerances)]
     for link in last_links(model):
-        H, h = 0.0, 0.0
+        n = len(beside) + len(AddedBody.coordinates)
+        H, h = np.zeros((n, n)), np.zeros(n)
         for k, (bench, own) in enumerate(zip(problem.benches, columns, strict=True)):
             added = effect_columns(
                 bench, problem.predictions()[k], AddedBody(), (link,), {}, problem.sigma
