@@ -19,7 +19,7 @@ from pipeline.effects.base import REACH
 from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.refit import refit
 from pipeline.identification.results import UNCERTAINTIES
-from pipeline.identification.selection.pool import Pool, make_pool
+from pipeline.identification.selection.pool import Key, Pool, make_pool
 from pipeline.identification.selection.search import Search, State
 from pipeline.progress import Progress
 
@@ -69,6 +69,8 @@ def settle(problem: Problem, progress: Progress | None = None) -> Settled:
     starts = sorted(dict.fromkeys(_starts(first)), key=lambda s: -first.valid(s).evidence)
     points: list[Settled] = []
     for state in starts[:_STARTS]:
+        if any(names_of(first, state) == names_of(p.search, p.state) for p in points):
+            continue
         if progress:
             progress.step(f"estimating {len(state.terms)} effects together")
         points.append(_best_near(problem, first, state))
@@ -101,10 +103,15 @@ def _best_near(problem: Problem, search: Search, state: State) -> Settled:
             break
         best = Settled(problem, search, here, first)
         state = search.climbed(here, UNCERTAINTIES)
-        if state.evidence <= here.evidence + _SAME:
+        if names_of(search, state) == names_of(search, here):
             break
     assert best is not None
     return best
+
+
+def names_of(search: Search, state: State) -> tuple[frozenset[Key], float]:
+    """Names of a state and its uncertainty of the URDF."""
+    return frozenset(search.pool.terms[t].key for t in state.numbers), state.uncertainty
 
 
 def _started(problem: Problem, search: Search, state: State) -> Problem:
