@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -73,15 +74,20 @@ def strained(body: pin.Inertia, strain: Sequence[float]) -> pin.Inertia:
         body: Before.
         strain: Of S the entries xx, yy, zz, mm, xy, xz, yz, xm, ym, zm.
     """
+    ten = tuple(np.asarray(body.toDynamicParameters()).tolist())
+    return pin.Inertia.FromDynamicParameters(np.array(_strained(ten, tuple(strain))))
+
+
+@lru_cache(maxsize=4096)
+def _strained(ten: tuple[float, ...], strain: tuple[float, ...]) -> tuple[float, ...]:
     S = np.zeros((4, 4))
     S[_ROWS, _COLUMNS] = strain
     S[_COLUMNS, _ROWS] = strain
-    P = pseudo_inertia(np.asarray(body.toDynamicParameters()))
+    P = pseudo_inertia(np.array(ten))
     size, axes = np.linalg.eigh(P)
     L = axes * np.sqrt(np.maximum(size, 0.0))
     # A planar or point-like body has no extent that could change.
-    P = P + L @ (scipy.linalg.expm(S) - np.eye(4)) @ L.T
-    return pin.Inertia.FromDynamicParameters(_ten(P))
+    return tuple(_ten(P + L @ (scipy.linalg.expm(S) - np.eye(4)) @ L.T).tolist())
 
 
 def possible(ten: Array) -> Array:

@@ -17,7 +17,7 @@ _QUANTILES: Final = (0.2, 0.45, 0.75, 1.0)
 _SPEEDS: Final = range(1, len(_QUANTILES) + 2)
 _PLACES: Final = range(1, 8)
 #: Travel over which friction builds up after a reversal, at first [rad].
-_TRAVELS: Final = (0.0, 0.02)
+_TRAVELS: Final = (0.0,)
 
 
 class FrictionCurveEffect(Effect):
@@ -28,11 +28,12 @@ class FrictionCurveEffect(Effect):
     """
 
     name = "friction_curve"
+    additive = True
     parameters: ClassVar = (
         *(Parameter(f"speed_{k}", "rad/s", 0.0, 1e4) for k in _SPEEDS),
         *(Parameter(f"forward_{k}", "N*m", 0.0, 1e4) for k in _SPEEDS),
         *(Parameter(f"backward_{k}", "N*m", 0.0, 1e4) for k in _SPEEDS),
-        *(Parameter(f"share_{k}", "1", 0.0, 0.99) for k in _SPEEDS),
+        *(Parameter(f"share_{k}", "1", 0.0, 0.9) for k in _SPEEDS),
         *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _PLACES),
         *(Parameter(f"spot_{k}", "N*m", 0.0, 1e4) for k in _PLACES),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),

@@ -348,11 +348,16 @@ class Problem:
         return out
 
     def _moved(self, log: int, number: int, a: Accepted, step: float) -> dict[int, Array]:
-        """Column of a change of one accepted effect."""
-        bench, model = self.benches[log], self._before(number)
+        """Column of a change of one accepted effect; joints that it leaves alone are as before."""
+        bench, model, now = self.benches[log], self._before(number), self.current()
+        own = self._touched(a)
         for other in (a, *self.accepted[number + 1 :]):
-            model = other.apply(model)
-        change = bench.simulator.difference(self.predictions()[log], model)
+            if own & self._touched(other):
+                model = other.apply(model)
+        pairs = enumerate(zip(now.actuators, model.actuators, strict=True))
+        actuators = tuple(new if k in own else old for k, (old, new) in pairs)
+        moved = replace(now, bodies=model.bodies, actuators=actuators)
+        change = bench.simulator.difference(self.predictions()[log], moved)
         return bench.whitened(change.effort / step, change.joints, self.sigma)
 
     def _before(self, number: int) -> MachineModel:

@@ -13,7 +13,7 @@ from pipeline.logs.prepared.measurement import CHOOSE, FIT
 
 Array = NDArray[np.float64]
 #: Times the columns are computed, at most, and steps that are made with the same.
-_COLUMNS, _STEPS = 4, 6
+_COLUMNS, _STEPS = 3, 6
 #: Rise of twice the logarithm of the likelihood that is none.
 _NOTHING = 0.1
 #: Damping, relative to the matrix's diagonal: where a step fails; above it columns are renewed.

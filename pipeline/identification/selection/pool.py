@@ -195,6 +195,8 @@ def _offer(
     at: int,
 ) -> int:
     """Append a term and its columns, where it changes the prediction; the next free column."""
+    if any((t.effect, t.place, t.shape) == (effect, place, shape) for t in terms):
+        return at  # accepted
     if not any(effect.shown(b.measurement, place, shape) for b in problem.benches):
         return at
     own = [problem.columns(k, effect, place, shape) for k in range(len(problem.benches))]

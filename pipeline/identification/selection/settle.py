@@ -25,13 +25,13 @@ from pipeline.progress import Progress
 
 Array = NDArray[np.float64]
 #: Times an answer is looked at again about its own estimates, at most.
-_ROUNDS: Final = 4
+_ROUNDS: Final = 2
 #: Evidence below which two points are the same.
 _SAME: Final = 1e-3
 #: Shares of linear estimates that a nonlinear fit may start from.
 _SHARES: Final = (1.0, 0.3, 0.1)
 #: Answers of the first search that are estimated in full.
-_STARTS: Final = 3
+_STARTS: Final = 2
 
 
 @dataclass(frozen=True, eq=False)
