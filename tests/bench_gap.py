@@ -15,7 +15,9 @@ from pipeline.effects.registry import catalogue
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.regression.design_matrix import make_benches
 from pipeline.identification.regression.problem import Problem
-from pipeline.identification.selection.screen import Screen, score_all
+from pipeline.identification.results import UNCERTAINTIES
+from pipeline.identification.selection.pool import make_pool
+from pipeline.identification.selection.search import Search, State
 from pipeline.identification.workflow.locate import Whereabouts, find_where
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, setup, take_in
@@ -29,7 +31,7 @@ SHARES = (0.25, 0.5, 1.0)
 
 
 def gap_costs() -> None:
-    """Print quality, where and prove per row, and screening per candidate."""
+    """Print quality, where and prove per row, and what candidates cost."""
     log = leg_logs(5, ["viscous_friction"])["log_1"]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.parquet"
@@ -66,15 +68,18 @@ def _candidates(log: dict[str, np.ndarray], path: Path) -> None:
     given, where = _where(path)
     sigma = np.sqrt(np.mean([m.noise**2 for m in where.measurements], axis=0))
     effects = catalogue(given.model)
-    print(f"naming, one round of screening, {rows} rows: CPU seconds against candidates")
+    print(
+        f"naming, columns of all candidates and what each gains, {rows} rows: "
+        "CPU seconds against candidates"
+    )
     spent_on: list[tuple[int, float]] = []
     for share in (SHARES[0], *SHARES):  # once more to warm up
         some = effects[: max(1, round(share * len(effects)))]
         problem = Problem(given.model, make_benches(where.measurements), sigma)
-        problem.sums()
         start = time.process_time()
-        count = len(score_all(Screen(problem), some))
-        spent_on.append((count, time.process_time() - start))
+        search = Search(make_pool(problem, some))
+        search.gains(State((), UNCERTAINTIES[0]))
+        spent_on.append((len(search.pool.terms), time.process_time() - start))
     fewest, least = spent_on[1]
     for count, spent in spent_on[1:]:
         more, many = spent / least, count / fewest

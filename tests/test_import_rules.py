@@ -23,7 +23,6 @@ ORDER = (
         "blind",
         "paper",
         "identification",
-        "regression",
         "simulation",
         "effects",
         "machine",

@@ -15,7 +15,6 @@ from pipeline.identification.results import (
     SUSPECTED,
     Candidate,
     Found,
-    Naming,
 )
 from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.identification.workflow.forward import Drive, by_model
@@ -99,11 +98,6 @@ def found_table(found: Sequence[Found], model: MachineModel) -> Table:
                 for p in one.parameters
             ]
     return table_of(tables.FoundRow, rows)
-
-
-def base_table(naming: Naming) -> Table:
-    """Rows of `base_parameters.csv`."""
-    return table_of(tables.BaseRow, naming.base)
 
 
 def _known(value: float) -> float | None:

@@ -10,7 +10,6 @@ from typing import Any
 from pipeline.api.gap_bodies import bodies_of, bodies_tables, refuse_own_urdf, write_model
 from pipeline.api.gap_meta import inputs_of, metadata
 from pipeline.api.gap_tables import (
-    base_table,
     candidates_table,
     forward_table,
     found_table,
@@ -351,6 +350,5 @@ def _answer_tables(told: Told, given: Setup) -> list[Table]:
     return [
         candidates_table(naming.candidates, naming.found, given.model),
         found_table(naming.found, given.model),
-        *([base_table(naming)] if naming.base else []),
         *([motion_table(told.deciding, given.model.joints)] if told.deciding else []),
     ]

@@ -213,7 +213,6 @@ class Naming:
         channel: The compared channel.
         unit: Its unit.
         notes: Remarks for the report, in words.
-        base: Base parameters of refitted bodies; empty where bodies were not fitted.
     """
 
     found: tuple[Found, ...]
@@ -223,7 +222,6 @@ class Naming:
     channel: str
     unit: str
     notes: tuple[str, ...] = field(default=())
-    base: tuple[object, ...] = field(default=())
 
 
 def named(found: Found) -> str:

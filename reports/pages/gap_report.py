@@ -223,29 +223,12 @@ def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
                 digits=3,
             )
         )
-    if "base_parameters" in tables:
-        blocks.append(_base(tables["base_parameters"]))
     told = voltage_remarks(story.given.model.actuators, story.naming, story.where.measurements)
     blocks += [Text(sentence) for sentence in told]
     blocks += [FigureBlock(folder / name, caption) for name, caption in story.signatures.items()]
     if story.naming.candidates:
         blocks.append(_candidates(story))
     return Section("What is missing", tuple(blocks))
-
-
-def _base(table: Table) -> TableBlock:
-    """Base parameters, those furthest from the URDF first to be seen."""
-    far = np.abs(np.asarray(table.columns["far"], dtype=float))
-    least = np.sort(far)[::-1][:SHOWN_CANDIDATES][-1]
-    keep = [bool(x >= least) for x in far]
-    return table_block(
-        table,
-        keep=keep,
-        caption=f"Base parameters, the combinations of the bodies' parameters that the motion "
-        f"tells: the {sum(keep)} of {far.size} furthest from the URDF, in units of its "
-        "uncertainty. All of them stand in `base_parameters.csv`.",
-        digits=3,
-    )
 
 
 def _candidates(story: Story) -> TableBlock:
@@ -262,8 +245,7 @@ def _candidates(story: Story) -> TableBlock:
         rows,
         f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried. "
         "Without and with: gap on rows that choose, by estimates from others "
-        "for either, so that what they take up speaks for no candidate; a dash: left out after "
-        "screening.",
+        "for either; a dash: it is not in the set of names that explains the log best.",
         "candidates.csv",
         TONES,
         3,

@@ -112,25 +112,6 @@ class FoundRow:
     )
 
 
-@dataclass(frozen=True)
-class BaseRow:
-    """What a log says of the bodies, beside the URDF."""
-
-    table: ClassVar = "base_parameters"
-    about: ClassVar = "Base parameters of the bodies: URDF and log."
-    name: str = declared(
-        "combination of bodies' parameters that the motion tells", "", "base parameter"
-    )
-    urdf: float = declared("its value by the URDF", "see unit", "URDF")
-    value: float = declared("fitted", "see unit", "fitted")
-    low: float = declared("lower end of the 95 % interval", "see unit", "95 % from")
-    high: float = declared("upper end of the 95 % interval", "see unit", "to")
-    unit: str = declared("of the four")
-    far: float = declared(
-        "fitted less URDF, per the URDF's uncertainty as validation chose it", "1"
-    )
-
-
 _BODY = {"mass_kg": "mass", **{f"center_{axis}_m": f"centre of mass, {axis}" for axis in "xyz"}}
 
 

@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from pipeline.effects.base import Effect, Place
-from pipeline.effects.bodies.link_mass import PlacedPayload
+from pipeline.effects.bodies.link_mass import LinkMass
 from pipeline.effects.drive.transmission_coupling import BareCoupling
 from pipeline.effects.drive.winding_heating import SensedHeating
+from pipeline.effects.flexible.friction_curve import FrictionCurveEffect
+from pipeline.effects.flexible.position_curve import PositionCurveEffect
 from pipeline.effects.model_file import apply_edits, base_model, new_model_file, read_model_file
 from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.identification.results import Estimate, Found
@@ -21,12 +23,7 @@ from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.logs.errors import ModelFileError
 from pipeline.machine.machine import MachineModel
 
-FORMS = (
-    *(e for e in EFFECTS.values() if e.competes),
-    BareCoupling(),
-    SensedHeating(),
-    PlacedPayload(),
-)
+FORMS = (*(e for e in EFFECTS.values() if e.competes), BareCoupling(), SensedHeating())
 EVERY = (*EFFECTS.values(), BareCoupling(), SensedHeating())
 #: Places of the leg, by kind.
 PLACES: Mapping[str, Place] = {
@@ -45,6 +42,13 @@ SHAPES: Mapping[type[Effect], Mapping[str, float]] = {
     type(EFFECTS["winding_heating"]): {"time_constant": 4.0},
     SensedHeating: {"time_constant": 10.0},
     BareCoupling: {"ratio": -1.0},
+    LinkMass: {"x": 0.1, "y": -0.02, "z": 0.3},
+    FrictionCurveEffect: {
+        **{f"speed_{k}": 0.5 * (k - 1) for k in range(1, 6)},
+        **{f"place_{k}": 0.1 * (k - 4) for k in range(1, 8)},
+        "travel": 0.02,
+    },
+    PositionCurveEffect: {f"place_{k}": 0.1 * (k - 5) for k in range(1, 10)},
 }
 
 
