@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,14 +25,15 @@ from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.refit import refit, tolerances_of
 from pipeline.identification.results import UNCERTAINTIES, Candidate, Found, Member, Naming
 from pipeline.identification.selection.pool import Key, Term
-from pipeline.identification.selection.search import Search, State
-from pipeline.identification.selection.settle import Settled, settle
+from pipeline.identification.selection.search import BODIES, Search, State
+from pipeline.identification.selection.settle import Settled, settle, settle_without
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.progress import Progress
 
 Array = NDArray[np.float64]
-BODIES = "rigid_body_parameters"
+#: Times the names compete anew without those that turned out to be idle.
+_RENEWED: Final = 3
 
 
 @dataclass(frozen=True)
@@ -90,10 +92,16 @@ def identify(
         ModelError: Model and logs do not fit.
     """
     start = Problem(model, make_benches(measurements), floor_of(measurements))
-    settled = settle(start, progress)
+    settled, idle = settle(start, progress), frozenset[Key]()
     channel = measurements[0].channels[0]
-    judged = Judgement(settled)
-    found = tuple(_found(judged, channel))
+    for left in reversed(range(_RENEWED + 1)):
+        judged = Judgement(settled)
+        found = tuple(_found(judged, channel))
+        more = {_key(f) for f in found if f.level == limits.SUSPECTED}
+        if not more or not left:
+            break
+        idle |= more
+        settled = settle_without(settled, idle)
     naming = Naming(
         found=found,
         candidates=tuple(_candidates(judged, found)),
@@ -104,6 +112,10 @@ def identify(
         notes=tuple(judged.notes()),
     )
     return Identified(naming, settled)
+
+
+def _key(f: Found) -> Key:
+    return BODIES if f.effect == BODIES[0] else f.key
 
 
 def estimated_alone(named: Identified, found: Sequence[Found]) -> tuple[Found, ...]:
@@ -118,7 +130,7 @@ def estimated_alone(named: Identified, found: Sequence[Found]) -> tuple[Found, .
     """
     problem = named.settled.problem
     keys = {f.key for f in found}
-    bodies = any(f.effect == BODIES for f in found)
+    bodies = any(f.effect == BODIES[0] for f in found)
     kept = [a for a in problem.accepted if (a.effect.name, a.place) in keys]
     if len(kept) == len(problem.accepted) and bodies == (problem.uncertainty > UNCERTAINTIES[0]):
         return tuple(found)
@@ -133,7 +145,7 @@ def estimated_alone(named: Identified, found: Sequence[Found]) -> tuple[Found, .
     )
     out = []
     for f in found:
-        if f.effect == BODIES:
+        if f.effect == BODIES[0]:
             out.append(replace(f, members=_members(again, f.level)))
         else:
             out.append(replace(f, parameters=sized[f.key].parameters))
@@ -180,8 +192,7 @@ class Judgement:
                 if u > state.uncertainty:
                     other = search.at(rest, u)
                     if state.evidence - other.evidence < limits.EXCLUDED + 5.0:
-                        key = (BODIES, ())
-                        out.append(self._rival(key, other))
+                        out.append(self._rival(BODIES, other))
         gains = search.gains(rest)
         for k in np.argsort(-gains)[: limits.RIVALS]:
             term = search.pool.terms[k]
@@ -247,7 +258,7 @@ def _found(judged: Judgement, channel: str) -> Iterator[Found]:
             level, reason = limits.SUSPECTED, limits.NOTHING
         open_ = tuple(r.key for r in rivals[number] if r.key is not None and not r.excluded)
         a = None if number is None else problem.accepted[number]
-        effect = effect_named(BODIES) if a is None else a.effect
+        effect = effect_named(BODIES[0]) if a is None else a.effect
         yield Found(
             order=place,
             effect=effect.name,
@@ -354,7 +365,7 @@ def _candidates(judged: Judgement, found: Sequence[Found]) -> Iterator[Candidate
     close = {r: f for f in found for r in f.rivals}
     unit = CHANNEL_UNITS[judged.settled.problem.benches[0].measurement.channels[0]]
     base = _errors(first, nothing)
-    names = dict.fromkeys([*kept, *(r for r in close if r[1] or r[0] == BODIES), *alone])
+    names = dict.fromkeys([*kept, *(r for r in close if r[1] or r == BODIES), *alone])
     for key in names:
         effect, place = key
         f = kept.get(key)
@@ -369,6 +380,7 @@ def _candidates(judged: Judgement, found: Sequence[Found]) -> Iterator[Candidate
         else:
             verdict = limits.REJECTED
             reason = _rejected(gain, beside.get(key, -np.inf))
+            reason = limits.IDLE if key in search.closed else reason
         joints = [j for j, n in enumerate(judged.settled.problem.model.joints) if n in place]
         yield Candidate(
             effect=effect,

@@ -26,13 +26,15 @@ from pipeline.effects.base import REACH
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.tolerances import STRAINS, UNCERTAINTY
 from pipeline.identification.results import UNCERTAINTIES
-from pipeline.identification.selection.pool import Pool, Term, saturated
+from pipeline.identification.selection.pool import Key, Pool, Term, saturated
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 #: How much likelier a set has to be with a name than without it, beyond even odds of all names
 #: (logarithm).
 MARGIN: Final = 3.0
+#: The bodies of all links as one name.
+BODIES: Final[Key] = ("rigid_body_parameters", ())
 #: From this uncertainty of the URDF on, one link's centre of mass is a part of the bodies.
 COARSE: Final = 0.1
 IN_BODIES: Final = ("center_of_mass_offset",)
@@ -62,10 +64,13 @@ class State:
 
 
 class Search:
-    """Evidence of sets of names on one pool."""
+    """Evidence of sets of names on one pool; names that are closed are not taken up."""
 
-    def __init__(self, pool: Pool, weights: Array | None = None) -> None:
+    def __init__(
+        self, pool: Pool, weights: Array | None = None, closed: frozenset[Key] = frozenset()
+    ) -> None:
         self.pool = pool
+        self.closed = closed
         self.weights = noise_weights(pool) if weights is None else weights
         self.H, self.h = pool.total(self.weights)
         self.bodies = np.array(
@@ -85,6 +90,7 @@ class Search:
             np.log(w) * c.count.sum() for c, w in zip(pool.channels, self.weights, strict=True)
         ]
         self._open = np.ones(len(pool.terms), dtype=np.bool_)
+        self._shut = np.array([t.key in closed for t in pool.terms], dtype=np.bool_)
         self._index(pool)
         self._none = 0.5 * float(np.sum(counts) - np.sum(sums))
 
@@ -112,7 +118,7 @@ class Search:
             own = np.einsum("bii->i", channel.H)
             energy[channel.ids] += w * own
             square[channel.ids] += np.where(own > 0, channel.effort * channel.count.sum() * w, 0)
-        return energy / np.maximum(square, 1e-300)
+        return np.where(energy > 0.0, energy / np.maximum(square, 1e-300), 1.0)
 
     @property
     def noise(self) -> Array:
@@ -195,7 +201,9 @@ class Search:
         prior = self.precision(rest, state.uncertainty)
         held = [pool.terms[t] for t in state.numbers]
         out = np.full(len(pool.terms), -np.inf)
-        open_ = self._open & ~np.isin(self._keys, [self._keys[t] for t in state.numbers])
+        open_ = (
+            self._open & ~self._shut & ~np.isin(self._keys, [self._keys[t] for t in state.numbers])
+        )
         if state.uncertainty >= COARSE:
             open_ &= ~self._in_bodies
         for count, numbers in self._by_count.items():
@@ -280,6 +288,17 @@ class Search:
     def _freed(self, state: State, uncertainties: Sequence[float]) -> State:
         every = [self.at(state, u) for u in uncertainties if u != state.uncertainty]
         return max([state, *every], key=lambda s: s.evidence)
+
+    @property
+    def uncertainties(self) -> tuple[float, ...]:
+        """Of the URDF's bodies that are open."""
+        return UNCERTAINTIES[:1] if BODIES in self.closed else UNCERTAINTIES
+
+    def left(self, state: State) -> State:
+        """A state without what is closed."""
+        kept = tuple((t, used) for t, used in state.terms if not self._shut[t])
+        uncertainty = min(state.uncertainty, self.uncertainties[-1])
+        return self.valid(State(kept, uncertainty))
 
     def climbed(self, state: State, uncertainties: Sequence[float]) -> State:
         """The best state that steps of one name reach; couplings bring a shaft and come last."""

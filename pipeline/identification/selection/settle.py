@@ -93,20 +93,27 @@ def _starts(search: Search) -> Iterator[State]:
 def _best_near(problem: Problem, search: Search, state: State) -> Settled:
     """The best point that an answer leads to."""
     best: Settled | None = None
-    first = search
+    first, closed = search, search.closed
     for _ in range(_ROUNDS):
         problem = problem.judged(state.uncertainty, search.noise)
         problem = refit(_started(problem, search, state))
-        search = Search(make_pool(problem))
+        search = Search(make_pool(problem), closed=closed)
         here = search.valid(as_accepted(search))
         if best is not None and here.evidence < best.state.evidence - _SAME:
             break
         best = Settled(problem, search, here, first)
-        state = search.climbed(here, UNCERTAINTIES)
+        state = search.climbed(here, search.uncertainties)
         if names_of(search, state) == names_of(search, here):
             break
     assert best is not None
     return best
+
+
+def settle_without(settled: Settled, closed: frozenset[Key]) -> Settled:
+    """The best set that the other names lead to where some are closed."""
+    search = Search(settled.pool, settled.search.weights, closed)
+    state = search.climbed(search.left(settled.state), search.uncertainties)
+    return replace(_best_near(settled.problem, search, state), first=settled.first)
 
 
 def names_of(search: Search, state: State) -> tuple[frozenset[Key], float]:
