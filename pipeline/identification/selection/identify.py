@@ -174,6 +174,11 @@ class Judgement:
         return self.state.uncertainty > UNCERTAINTIES[0]
 
     @cached_property
+    def noise(self) -> Array:
+        """Noise of the first channel, (J,)."""
+        return sensor_noise(self.settled)[:, 0]
+
+    @cached_property
     def losses(self) -> Array:
         """Of every block by estimates from others, (B,)."""
         return self.search.block_losses(self.state)
@@ -285,13 +290,11 @@ def _level(
 ) -> tuple[str, str]:
     """How far a name is to be trusted, and why not further."""
     nothing, *others = rivals
-    if nothing.sure < limits.SURE:
-        search, state = judged.search, judged.state
-        less = (
-            search.at(state, UNCERTAINTIES[0]) if number is None else search.without(state, number)
-        )
-        if _rms(_errors(search, state), joints) > _rms(_errors(search, less), joints):
-            return limits.SUSPECTED, limits.IDLE_NAME
+    search, state = judged.search, judged.state
+    less = search.at(state, UNCERTAINTIES[0]) if number is None else search.without(state, number)
+    left, before = (_rms(_errors(search, x), joints) for x in (state, less))
+    if nothing.sure < limits.SURE and left > before:
+        return limits.SUSPECTED, limits.IDLE_NAME
     open_ = [r for r in others if not r.excluded]
     if open_:
         words = "; ".join(_words(r.key) for r in open_ if r.key)
@@ -300,6 +303,9 @@ def _level(
         return limits.APPROXIMATE, "parts of the log disagree whether it is there"
     if number is not None and not judged.settled.pool.terms[number].effect.has_law:
         return limits.APPROXIMATE, limits.SHAPELESS
+    noise = float(np.sqrt(np.mean(judged.noise[joints] ** 2)))
+    if left**2 - noise**2 > before**2 - left**2:
+        return limits.APPROXIMATE, limits.MORE_LEFT
     return limits.CONFIRMED, ""
 
 
@@ -410,15 +416,19 @@ def _best_by_name(search: Search, gains: Array) -> Mapping[Key, float]:
     return out
 
 
-def noise_of(settled: Settled) -> Array:
-    """Standard deviation of what no effect explains, (J, C): noise and what is left open.
+def sensor_noise(settled: Settled) -> Array:
+    """Standard deviation of the noise, (J, C).
 
-    Noise is the sensors' own, or what a fit of everything together leaves at the highest
-    frequencies where that is more.
+    The sensors' own, or what a fit of everything together leaves at the highest frequencies where
+    that is more.
     """
-    floor = settled.problem.floor
-    out = floor.copy()
+    out = settled.problem.floor.copy()
     for c in settled.first.pool.channels:
         if np.isfinite(c.noise):
-            out[c.joint, c.number] = max(1.0, c.noise) * floor[c.joint, c.number]
-    return np.hypot(out, left_open(settled.problem))
+            out[c.joint, c.number] *= max(1.0, c.noise)
+    return out
+
+
+def noise_of(settled: Settled) -> Array:
+    """Standard deviation of what no effect explains, (J, C): noise and what is left open."""
+    return np.hypot(sensor_noise(settled), left_open(settled.problem))
