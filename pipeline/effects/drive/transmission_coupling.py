@@ -14,6 +14,7 @@ from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 
 _FULL = 1.0  # a joint carried along by a bevel or a cable turns one to one
+_LEAST_RATIO: Final = 0.1
 
 
 class TransmissionCoupling(Effect):
@@ -84,6 +85,11 @@ class BareCoupling(TransmissionCoupling):
     def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
         """Ratios to either side."""
         return [{"ratio": shape["ratio"] + 0.3 * e} for e in (-factor, factor)]
+
+    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
+        """With a ratio of next to nothing the shaft is the joint's own."""
+        own = super().plausible(model, place, x, shape)
+        return own and abs(shape["ratio"]) >= _LEAST_RATIO
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Couple them by a shaft with inertia and friction."""
