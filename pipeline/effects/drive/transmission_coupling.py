@@ -14,7 +14,7 @@ from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 
 _FULL = 1.0  # a joint carried along by a bevel or a cable turns one to one
-_LEAST_RATIO: Final = 0.1
+_LEAST_RATIO = 0.1  # below it the shaft is the own joint's
 
 
 class TransmissionCoupling(Effect):
