@@ -328,8 +328,10 @@ class Problem:
         ]
 
     def _own(self, log: int, number: int) -> list[dict[int, Array]]:
-        """Columns of the coordinates of an accepted effect."""
+        """Columns of the coordinates of an accepted effect; what is additive has them at zero."""
         a, kept = self.accepted[number], self._computed.own
+        if a.effect.additive:
+            return self.columns(log, a.effect, a.place, a.shape)
         if (log, number) not in kept:
             steps = [(c.name, c.step) for c in a.effect.coordinates]
             kept[log, number] = [
@@ -420,10 +422,28 @@ class Problem:
         return out
 
     def sums(self) -> BlockSums:
-        """Normal equations of the present problem."""
+        """Normal equations of the present problem; an effect's torque is at most the effort's."""
         if self._computed.sums is None:
-            self._computed.sums = block_sums(self.stacks(), self.weights, self.precision, self.mean)
+            stacks = self.stacks()
+            precision = self.precision + self._widths(stacks)
+            self._computed.sums = block_sums(stacks, self.weights, precision, self.mean)
         return self._computed.sums
+
+    def _widths(self, stacks: Sequence[Stack]) -> Array:
+        """Prior precision of effects' unknowns: a torque as large as the effort it touches, (n,)."""
+        energy, square = np.zeros(self.names), np.zeros(self.names)
+        for k, stack in enumerate(stacks):
+            bench, rows = stack.bench, self.head(k)
+            m = bench.measurement
+            for j, ids in stack.ids.items():
+                seen = m.effort[bench.rows[rows], j] * m.mask[bench.rows[rows], j][:, None]
+                effort = np.sum((seen * bench.weight / self.sigma[j]) ** 2 * self.weights[j])
+                own = np.sum(stack.X[j][:, rows] ** 2 * self.weights[j], axis=(1, 2))
+                energy[ids] += own
+                square[ids] += np.where(own > 0.0, effort, 0.0)
+        out = energy / np.maximum(square, 1e-300)
+        out[: len(self.tolerances)] = 0.0
+        return out
 
     def gradient(self, stacks: Sequence[Stack]) -> Array:
         """X^T W r (n,) on *fit* and *choose*, of this residual with columns of another estimate."""

@@ -33,7 +33,7 @@ from pipeline.progress import Progress
 
 Array = NDArray[np.float64]
 #: Times the names compete anew without those that turned out to be idle.
-_RENEWED: Final = 3
+_RENEWED: Final = 2
 
 
 @dataclass(frozen=True)
@@ -330,10 +330,10 @@ def _errors(search: Search, state: State) -> Array:
     """RMS error of the first channel on *choose* by estimates from *fit*, (J,); NaN: no rows."""
     pool = search.pool
     columns = search.columns(state)
-    H, h = pool.blocks(columns, search.weights)
-    part = pool.channels[0].part
-    fit, prior = part == FIT, np.diag(search.precision(columns, state.uncertainty))
-    x = solve_spd(H[fit].sum(axis=0) + prior, h[fit].sum(axis=0))
+    part = (pool.channels[0].part != FIT).astype(np.intp)
+    H, h = pool.parts(columns, search.weights, part)
+    prior = np.diag(search.precision(columns, state.uncertainty))
+    x = solve_spd(H[0] + prior, h[0])
     full = np.zeros(pool.size)
     full[columns] = x
     out = np.full(len(pool.problem.model.joints), np.nan)

@@ -115,17 +115,20 @@ class Pool:
             h[channel.ids] += w * channel.h.sum(axis=0)
         return H, h
 
-    def blocks(self, columns: Index, weights: Array) -> tuple[Array, Array]:
-        """The same of some columns by block, (B, n, n) and (B, n)."""
+    def parts(self, columns: Index, weights: Array, split: Index) -> tuple[Array, Array]:
+        """The same of some columns by part, (K, n, n) and (K, n); `split` (B,) counts from 0."""
         where = np.full(self.size, -1)
         where[columns] = np.arange(columns.size)
-        B = len(self.channels[0].s)
-        H, h = np.zeros((B, columns.size, columns.size)), np.zeros((B, columns.size))
+        K = int(split.max()) + 1
+        H, h = np.zeros((K, columns.size, columns.size)), np.zeros((K, columns.size))
         for channel, w in zip(self.channels, weights, strict=True):
             mine = np.flatnonzero(where[channel.ids] >= 0)
             at = where[channel.ids[mine]]
-            H[:, at[:, None], at] += w * channel.H[:, mine[:, None], mine]
-            h[:, at] += w * channel.h[:, mine]
+            for k in range(K):
+                rows = split == k
+                whole = channel.H[rows].sum(axis=0)
+                H[k][np.ix_(at, at)] += w * whole[np.ix_(mine, mine)]
+                h[k][at] += w * channel.h[rows].sum(axis=0)[mine]
         return H, h
 
 

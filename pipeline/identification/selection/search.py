@@ -260,15 +260,18 @@ class Search:
     def block_losses(self, state: State) -> Array:
         """Squared error of every block by estimates from other blocks, in noise variances, (B,)."""
         columns = self.columns(state)
-        H, h = self.pool.blocks(columns, self.weights)
-        s = np.sum([w * c.s for c, w in zip(self.pool.channels, self.weights, strict=True)], axis=0)
+        fold = np.arange(len(self.pool.channels[0].s)) % FOLDS
+        H, h = self.pool.parts(columns, self.weights, fold)
         prior = np.diag(self.precision(columns, state.uncertainty))
-        whole_H, whole_h = H.sum(axis=0) + prior, h.sum(axis=0)
-        out = np.empty(len(s))
-        for fold in range(min(FOLDS, len(s))):
-            own = np.arange(fold, len(s), FOLDS)
-            x = solve_spd(whole_H - H[own].sum(axis=0), whole_h - h[own].sum(axis=0))
-            out[own] = s[own] - 2.0 * h[own] @ x + np.einsum("i,bij,j->b", x, H[own], x)
+        full = np.zeros((len(H), self.pool.size))
+        for k in range(len(H)):
+            A = np.delete(H, k, axis=0).sum(axis=0) + prior
+            full[k, columns] = solve_spd(A, np.delete(h, k, axis=0).sum(axis=0))
+        out = np.zeros(fold.size)
+        for channel, w in zip(self.pool.channels, self.weights, strict=True):
+            x = full[fold][:, channel.ids]  # (B, n)
+            Hx = np.matmul(channel.H, x[:, :, None])[:, :, 0]
+            out += w * (channel.s + np.sum(x * (Hx - 2.0 * channel.h), axis=1))
         return out
 
     def with_term(self, state: State, number: int) -> State:
