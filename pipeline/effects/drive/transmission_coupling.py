@@ -81,10 +81,6 @@ class BareCoupling(TransmissionCoupling):
         """One to one, in either sense."""
         return [{"ratio": _FULL}, {"ratio": -_FULL}]
 
-    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
-        """Ratios to either side."""
-        return [{"ratio": shape["ratio"] + 0.3 * e} for e in (-factor, factor)]
-
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Couple them by a shaft with inertia and friction."""
         actuator = replace(model.actuator(place[0]), coupled_to=place[1], coupling=shape["ratio"])
