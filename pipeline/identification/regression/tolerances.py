@@ -48,8 +48,9 @@ class Nuisance:
     """One tolerance of one part of the machine.
 
     Attributes:
-        kind: One of `STRAINS` (of a link's body), ``"torque_constant"``, ``"resistance"``, ``"friction"`` (of the files), ``"encoder"``, ``"effort_zero"``,
-            ``"compliance"`` or ``"skew"`` (of all effort channels).
+        kind: One of `STRAINS` (of a link's body), ``"torque_constant"``, ``"resistance"``,
+            ``"friction"`` (of the files), ``"encoder"``, ``"effort_zero"``, ``"compliance"`` or
+            ``"skew"`` (of all effort channels).
         place: Link or joint.
         sigma: Standard deviation before the log was seen.
         unit: Of it.
