@@ -1,6 +1,7 @@
 """Step `forward`: a model drives itself under its servos' law, and is compared with the machine.
 
-What is simulated are the logs of `--holdout`, or the logs themselves without it; nothing is estimated.
+What is simulated are the logs of `--holdout`, or the logs themselves without it; nothing is
+estimated.
 """
 
 from __future__ import annotations
