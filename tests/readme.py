@@ -139,16 +139,16 @@ def effects(out: Path) -> str:
         special = ", ".join(f"`{word}`" for word in effect.contains)
         return f"`{effect.name}`" + (f", contains {special}" if special else "")
 
-    def place(effect: Effect) -> str:
-        return effect.place_kind + (" (tolerance)" if effect.is_tolerance else "")
-
     def parameters(effect: Effect) -> str:
-        units = {p.name: _written(p.unit) for p in effect.parameters}
+        units: dict[str, str] = {}
+        for p in effect.parameters:  # knots of a curve are told once
+            name, _, number = p.name.rpartition("_")
+            units[f"{name}_k" if number.isdigit() else p.name] = _written(p.unit)
         return ", ".join(f"`{n}`" + (f" [{u}]" if u != "1" else "") for n, u in units.items())
 
     text = table(
         ("effect", "acts at", "parameters", "is shown by a motion that"),
-        [(name(e), place(e), parameters(e), e.excitation) for e in EFFECTS.values()],
+        [(name(e), e.place_kind, parameters(e), e.excitation) for e in EFFECTS.values()],
     )
     return text.replace("---:", "---")
 

@@ -92,15 +92,12 @@ class Effect(ABC):
         coordinates: As fitted.
         signature: Variable against which its residual shows, one of `SIGNATURES`.
         excitation: The motion that shows it, in words.
-        is_tolerance: Whether every machine has it in small, as a tolerance that is always free.
         reaches: Multiples of the coordinates' steps to look across, where the prediction bends.
         contains: Effects that are special cases of this one at the same place.
         rescales: Whether what bodies do to a channel is multiplied by it.
         competes: Whether it is tried by itself; others are fitted together for a whole machine.
-        tolerances: Standard deviation by coordinate, where every machine and place has the same.
         kinds_absorbed: Kinds of tolerances at its place that are this effect in small.
         additive: Whether what it adds does not depend on what else acts at the joint.
-        halved: Nonlinear parameter that is refined by factors; empty for none.
         has_law: Whether it is a law; curves without one are drawn and never more than approximate.
         fixed: Nonlinear parameters that are not estimated: the knots of curves.
     """
@@ -111,15 +108,12 @@ class Effect(ABC):
     coordinates: ClassVar[tuple[Coordinate, ...]]
     signature: ClassVar[str] = "velocity"
     excitation: ClassVar[str]
-    is_tolerance: ClassVar[bool] = False
     reaches: ClassVar[tuple[float, ...]] = (1.0,)
     contains: ClassVar[tuple[str, ...]] = ()
     rescales: ClassVar[bool] = False
     competes: ClassVar[bool] = True
-    tolerances: ClassVar[Mapping[str, float]] = {}
     kinds_absorbed: ClassVar[tuple[str, ...]] = ()
     additive: ClassVar[bool] = False
-    halved: ClassVar[str] = ""
     has_law: ClassVar[bool] = True
     fixed: ClassVar[tuple[str, ...]] = ()
 
@@ -142,12 +136,6 @@ class Effect(ABC):
         """Whether this motion can show the effect at these nonlinear parameters at all."""
         return True
 
-    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
-        """Shapes near one that did well; `factor` shrinks from round to round."""
-        if not self.halved:
-            return []
-        return [{self.halved: shape[self.halved] * 2.0**e} for e in (-factor, factor)]
-
     @abstractmethod
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """The machine with the effect at coordinates `x` and shape `shape`."""
@@ -163,14 +151,6 @@ class Effect(ABC):
             {n: float(v) for n, v in values.items() if n in names},
             {n: float(v) for n, v in values.items() if n not in names},
         )
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """Standard deviation by coordinate that the machine's tolerances explain already.
-
-        Empty where the effect is no tolerance of every machine. An estimate counts only where it
-        exceeds `verdict.TOLERANCE_SIGMAS` of these.
-        """
-        return dict(self.tolerances)
 
     def law(self, values: Values) -> str:
         """Which of its laws it is at some parameters, in words; empty where it has but one."""

@@ -9,8 +9,6 @@ from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
-TILT_TOLERANCE = 2e-3  # [rad]
-
 
 class BaseTilt(Effect):
     """Gravity that does not point along the ground's normal."""
@@ -26,7 +24,6 @@ class BaseTilt(Effect):
         Coordinate(axis, 1e-3, signed=True, required=False) for axis in ("roll", "pitch")
     )
     signature = "position"
-    tolerances: ClassVar = {"roll": TILT_TOLERANCE, "pitch": TILT_TOLERANCE}
     excitation = "holds links outstretched in several directions"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

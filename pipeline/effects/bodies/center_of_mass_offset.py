@@ -5,15 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
-
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.effects.bodies.link_mass import felt
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
-
-LEVER_TOLERANCE = 0.03  # of the lever, one standard deviation [1]
-LEAST_TOLERANCE = 1.5e-3  # [m]
 
 
 class CenterOfMassOffset(Effect):
@@ -27,8 +22,6 @@ class CenterOfMassOffset(Effect):
         Coordinate(axis, 1e-3, signed=True, required=False) for axis in "xyz"
     )
     signature = "position"
-    is_tolerance = True
-    kinds_absorbed: ClassVar = ("com_x", "com_y", "com_z")
     excitation = "holds the link in postures all around its axis"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -42,9 +35,3 @@ class CenterOfMassOffset(Effect):
         moved = tuple(s + x[axis] for s, axis in zip(body.shift, "xyz", strict=True))
         changed = replace(body, shift=(moved[0], moved[1], moved[2]))
         return model.with_bodies(model.bodies.with_body(joint, changed))
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """Three per cent of the lever."""
-        joint = model.rigid.getJointId(model.carrier(place[0]))
-        lever = float(np.linalg.norm(model.rigid.inertias[joint].lever))
-        return dict.fromkeys("xyz", max(LEVER_TOLERANCE * lever, LEAST_TOLERANCE))

@@ -12,7 +12,6 @@ from pipeline.effects.bodies.rigid_body_parameters import NAMES
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
-MASS_TOLERANCE = 0.03  # of the link's mass, one standard deviation [1]
 #: Where a payload is in the frame of its link's joint.
 AXES: Final = ("x", "y", "z")
 FARTHEST: Final = 10.0  # [m]
@@ -30,8 +29,6 @@ class LinkMass(Effect):
     )
     coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("mass", 1e-2, signed=True),)
     signature = "position"
-    is_tolerance = True
-    kinds_absorbed: ClassVar[tuple[str, ...]] = ("mass",)
     excitation = "holds and moves the link in clearly different postures"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -54,12 +51,6 @@ class LinkMass(Effect):
             return False
         total = sum(i.mass for i in model.rigid.inertias)
         return bool(-0.9 * own_mass(model, place[0]) < x["mass"] < 2.0 * total)
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """Three per cent of the link's mass; nothing where a log has shown it."""
-        if place[0] in model.identified:
-            return {}
-        return {"mass": MASS_TOLERANCE * own_mass(model, place[0])}
 
 
 class AddedBody:

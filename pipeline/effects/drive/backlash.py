@@ -11,8 +11,6 @@ from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
-#: Backlash of a gear that counts as free of it, one standard deviation [rad].
-BACKLASH_TOLERANCE = 1e-4
 _SHARES = (0.02, 0.1, 0.3, 1.0)  # of the joint's torque, at which a flank may be seated
 
 
@@ -38,8 +36,6 @@ class Backlash(Effect):
     )
     signature = "load"
     kinds_absorbed: ClassVar = ("compliance",)
-    halved: ClassVar = "crossing"
-    tolerances: ClassVar = {"width": BACKLASH_TOLERANCE}
     excitation = "lets the torque change its sign often, slowly and fast"
     contains: ClassVar = ("joint_elasticity",)
 

@@ -23,10 +23,8 @@ class JointElasticity(Effect):
     parameters: ClassVar = (Parameter("stiffness", "N*m/rad", 1.0, 1e12),)
     coordinates: ClassVar = (Coordinate("compliance", 1e-6),)
     signature = "torque rate"
-    is_tolerance = True
     reaches: ClassVar = (1.0, 100.0, 600.0)
     kinds_absorbed: ClassVar = ("compliance",)
-    tolerances: ClassVar = {"compliance": COMPLIANCE_TOLERANCE}
     excitation = "changes its torque fast: accelerates, brakes and steps hard"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:

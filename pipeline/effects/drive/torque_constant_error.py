@@ -27,7 +27,6 @@ class TorqueConstantError(Effect):
     parameters: ClassVar = (Parameter("relative", "1", -0.99, 99.0),)
     coordinates: ClassVar = (Coordinate("more", 1e-3, signed=True),)
     signature = "load"
-    is_tolerance = True
     rescales = True
     kinds_absorbed: ClassVar = ("torque_constant",)
     excitation = "carries clearly different known loads"
@@ -57,9 +56,3 @@ class TorqueConstantError(Effect):
         """How much more current, or less than nothing: how much more back-EMF."""
         relative = float(values["relative"])
         return {"more": -relative / (1.0 + relative) if relative < 0.0 else -relative}, {}
-
-    def tolerance(self, model: MachineModel, place: Place) -> dict[str, float]:
-        """Two per cent, or what the motor's file states where that is more."""
-        motor = model.actuator(place[0]).motor
-        stated = 0.0 if motor is None else motor.torque_constant_spread
-        return {"more": max(CONSTANT_TOLERANCE, stated)}

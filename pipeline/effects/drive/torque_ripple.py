@@ -63,10 +63,6 @@ class TorqueRipple(Effect):
         travel = float(np.ptp(m.q[:, m.joints.index(place[0])]))
         return shape["order"] >= max(_LEAST_ORDER, _PERIODS * 2 * np.pi / max(travel, 1e-9))
 
-    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
-        """Orders to either side."""
-        return [{"order": shape["order"] + e} for e in (-factor, factor)]
-
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add it at the joint."""
         p = self.physical(x, shape)

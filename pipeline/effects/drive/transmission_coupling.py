@@ -82,10 +82,6 @@ class BareCoupling(TransmissionCoupling):
         """One to one, in either sense."""
         return [{"ratio": _FULL}, {"ratio": -_FULL}]
 
-    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
-        """Ratios to either side."""
-        return [{"ratio": shape["ratio"] + 0.3 * e} for e in (-factor, factor)]
-
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
         """With a ratio of next to nothing the shaft is the joint's own."""
         own = super().plausible(model, place, x, shape)

@@ -29,7 +29,6 @@ class WindingHeating(Effect):
         Coordinate("thermal_resistance", 0.5, required=False),
     )
     signature = "time"
-    halved: ClassVar = "time_constant"
     excitation = "works hard for several thermal time constants, then repeats its first motion"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

@@ -73,7 +73,6 @@ class StribeckFriction(FrictionPreset):
         Coordinate("excess", 1e-2),
     )
     terms: ClassVar = {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"}
-    halved: ClassVar = "velocity"
     excitation = "slow passages through many speeds below the Stribeck speed"
     contains: ClassVar = ("coulomb_friction",)
 

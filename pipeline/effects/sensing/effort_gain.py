@@ -7,7 +7,6 @@ from typing import ClassVar, Final
 
 from pipeline.effects.base import (
     CHANNEL_COLUMNS,
-    REACH,
     Coordinate,
     Effect,
     Parameter,
@@ -18,8 +17,6 @@ from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
-#: Of a sensor of torque, current, voltage or power, one standard deviation [1].
-GAIN_TOLERANCE: Final = 0.02
 #: Stands for every joint: one scale of a whole channel, as of a unit or a driver's setting.
 EVERY: Final = "*"
 
@@ -38,11 +35,9 @@ class EffortGain(Effect):
     parameters: ClassVar = (Parameter("gain", "1", 0.01, 100.0),)
     coordinates: ClassVar = (Coordinate("more", 1e-3, signed=True),)
     signature = "load"
-    is_tolerance = True
     rescales = True
     #: Gains 1, 2, 5, 1/2 and 1/5: what a voltage makes of a wrong current is not linear in it.
     reaches: ClassVar = (1.0, 1000.0, 4000.0, -500.0, -800.0)
-    tolerances: ClassVar = {"more": GAIN_TOLERANCE}
     excitation = "carries clearly different known loads"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
@@ -55,15 +50,6 @@ class EffortGain(Effect):
                 continue
             out += [(f"{joint}__{CHANNEL_COLUMNS[channel]}",) for joint in model.joints]
         return out
-
-    def refined(self, shape: Values, factor: float) -> list[dict[str, float]]:
-        """Other reaches beside one that did well."""
-        reach = shape.get(REACH, 1.0)
-        if abs(reach) <= 1.0:
-            return []
-        gain = 1.0 + self.coordinates[0].step * reach
-        near = (gain * (1.0 + 0.5 * factor), gain / (1.0 + 0.5 * factor))
-        return [{**shape, REACH: (g - 1.0) / self.coordinates[0].step} for g in near if g != 1.0]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Let the column read more."""

@@ -17,7 +17,6 @@ class EffortOffset(Effect):
     parameters: ClassVar = (Parameter("offset", "channel", -1e4, 1e4),)
     coordinates: ClassVar = (Coordinate("offset", 1e-3, signed=True),)
     signature = "time"
-    is_tolerance = True
     kinds_absorbed: ClassVar = ("effort_zero",)
     excitation = "stands still without load, then moves both ways"
 

@@ -18,9 +18,7 @@ class PositionOffset(Effect):
     parameters: ClassVar = (Parameter("angle", "rad", -1.6, 1.6),)
     coordinates: ClassVar = (Coordinate("angle", 1e-3, signed=True),)
     signature = "position"
-    is_tolerance = True
     kinds_absorbed: ClassVar = ("encoder",)
-    tolerances: ClassVar = {"angle": ENCODER_TOLERANCE}
     excitation = "holds the link in postures all around its axis"
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:

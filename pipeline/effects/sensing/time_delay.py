@@ -28,9 +28,7 @@ class TimeDelay(Effect):
     parameters: ClassVar = (Parameter("delay", "s", -0.5, 0.5),)
     coordinates: ClassVar = (Coordinate("delay", 2e-4, signed=True),)
     signature = "effort rate"
-    is_tolerance = True
     reaches: ClassVar = (1.0, 20.0, 60.0, 150.0)
-    tolerances: ClassVar = {"delay": SKEW_TOLERANCE}
     excitation = "changes its torque fast: accelerates, brakes and reverses"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

@@ -1,4 +1,4 @@
-"""The gap step by step: the model as it was, with tolerances, with one effect after another."""
+"""The gap step by step: the model as it was, with one effect after another."""
 
 from __future__ import annotations
 

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from pipeline.effects.bodies.rigid_body_parameters import NAMES, UNITS
+from pipeline.effects.sensing.time_delay import SKEW_TOLERANCE
 from pipeline.identification.regression.normal_equations import BlockSums, inverse_spd, solve_spd
 from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.identification.results import Estimate
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
-from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import possible, strained
 
 LAW: Final = 0.01  # share to which a law holds at best
@@ -71,7 +71,7 @@ def estimates(problem: Problem, channel: str) -> list[Sized]:
             shape = {**a.shape, **{n: v + float(d) for (n, v), d in bent}}
             samples.append(a.effect.physical(x, shape))
         best = a.effect.physical(a.x, a.shape)
-        parameters = tuple(_estimate(a, n, best, samples, channel, problem.model) for n in best)
+        parameters = tuple(_estimate(a, n, best, samples, channel) for n in best)
         size = np.array([a.x[n] for n in names])
         out.append(Sized(parameters, _certain(size, draws[:, coordinates])))
     return out
@@ -93,7 +93,6 @@ def _estimate(
     best: Mapping[str, float],
     samples: list[dict[str, float]],
     channel: str,
-    model: MachineModel,
 ) -> Estimate:
     values = np.array([s[name] for s in samples])
     if name == "phase":
@@ -103,10 +102,8 @@ def _estimate(
     value = float(best[name])
     bounds = next(p for p in a.effect.parameters if p.name == name)
     if name not in a.shape and name != "phase":
-        tolerance = a.effect.tolerance(model, a.place).get(name, 0.0)
-        extra = 1.96 * float(
-            np.hypot(LAW * value, tolerance if a.effect.name == "time_delay" else 0.0)
-        )
+        skew = SKEW_TOLERANCE if a.effect.name == "time_delay" else 0.0
+        extra = 1.96 * float(np.hypot(LAW * value, skew))
         low, high = value - np.hypot(value - low, extra), value + np.hypot(high - value, extra)
     if name != "phase":
         low, high = max(low, bounds.low), min(high, bounds.high)

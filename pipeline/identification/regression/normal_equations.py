@@ -61,14 +61,6 @@ class BlockSums:
         value: Array = self.s[blocks] - 2 * h @ theta + np.einsum("i,bij,j->b", theta, H, theta)
         return np.maximum(value, 0.0)
 
-    def penalty(self, theta: Array) -> float:
-        """What the prior says against an estimate."""
-        return float(np.sum(self.precision * (theta - self.mean) ** 2))
-
-    def objective(self, theta: Array, blocks: NDArray[np.intp]) -> float:
-        """Loss and penalty together."""
-        return float(self.loss(theta, blocks).sum()) + self.penalty(theta)
-
     def covariance(
         self, theta: Array, blocks: NDArray[np.intp], free: NDArray[np.intp] | None = None
     ) -> Array:

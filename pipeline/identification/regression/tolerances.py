@@ -1,12 +1,12 @@
 """What every machine differs in from its files: tolerances that are always estimated.
 
-They compete with no effect: each is free within its stated standard deviation (a Gaussian prior),
-and the part beyond is what a candidate of the same kind is named for.
+Each is free within its stated standard deviation, a Gaussian prior; an effect of the same kind is
+named where that costs more than the name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -39,10 +39,6 @@ UNCERTAINTY: Final = 0.01
 RESISTANCE_TOLERANCE: Final = 0.02
 #: Friction that the actuator's files state already [1].
 FRICTION_TOLERANCE: Final = 0.005
-#: Tolerances that are shares of what they scale.
-SCALES: Final = ("friction", "torque_constant", "resistance")
-#: Tolerances beyond this many sigmas would stand in for something else.
-MOST_SIGMAS: Final = 4.0
 #: Zero of an effort sensor, in standard deviations of its noise inside the bandwidth.
 OFFSET_SIGMAS: Final = 0.75
 
@@ -52,9 +48,9 @@ class Nuisance:
     """One tolerance of one part of the machine.
 
     Attributes:
-        kind: ``"mass"``, ``"com_x"`` (y, z), ``"inertia"``, ``"torque_constant"``,
-            ``"resistance"``, ``"friction"`` (of the files), ``"encoder"``, ``"effort_zero"``,
-            ``"compliance"`` or ``"skew"`` (of all effort channels).
+        kind: One of `STRAINS` (of a link's body), ``"torque_constant"``, ``"resistance"``,
+            ``"friction"`` (of the files), ``"encoder"``, ``"effort_zero"``, ``"compliance"`` or
+            ``"skew"`` (of all effort channels).
         place: Link or joint.
         sigma: Standard deviation before the log was seen.
         unit: Of it.
@@ -116,18 +112,6 @@ class Nuisance:
         strain[list(STRAINS).index(self.kind)] += value
         body = replace(body, strain=tuple(strain))
         return model.with_bodies(model.bodies.with_body(joint, body))
-
-
-def with_tolerances(
-    model: MachineModel, tolerances: Mapping[tuple[str, str], tuple[float, float]]
-) -> MachineModel:
-    """The model with estimated tolerances: (kind, place) to (value, sigma)."""
-    for (kind, place), (value, sigma) in tolerances.items():
-        limit = MOST_SIGMAS * sigma
-        nuisance = Nuisance(kind, place, sigma, "1" if kind in SCALES else "")
-        value = max(min(max(value, -limit), limit), nuisance.lowest)
-        model = nuisance.edit(model, value)
-    return model
 
 
 def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple[Nuisance, ...]:

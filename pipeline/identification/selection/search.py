@@ -258,7 +258,10 @@ class Search:
         return -np.inf
 
     def block_losses(self, state: State) -> Array:
-        """Squared error of every block by estimates from other blocks, in noise variances, (B,)."""
+        """Squared error of every block by estimates from other blocks, in noise variances, (B,).
+
+        With its share of what the prior has against these estimates.
+        """
         columns = self.columns(state)
         fold = np.arange(len(self.pool.channels[0].s)) % FOLDS
         H, h = self.pool.parts(columns, self.weights, fold)
@@ -267,7 +270,8 @@ class Search:
         for k in range(len(H)):
             A = np.delete(H, k, axis=0).sum(axis=0) + prior
             full[k, columns] = solve_spd(A, np.delete(h, k, axis=0).sum(axis=0))
-        out = np.zeros(fold.size)
+        against = np.sum(full[:, columns] ** 2 * np.diag(prior), axis=1)
+        out = against[fold] / fold.size
         for channel, w in zip(self.pool.channels, self.weights, strict=True):
             x = full[fold][:, channel.ids]  # (B, n)
             Hx = np.matmul(channel.H, x[:, :, None])[:, :, 0]

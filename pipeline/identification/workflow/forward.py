@@ -1,7 +1,7 @@
 """Step `forward`: a model drives itself under its servos' law, and is compared with the machine.
 
-Tolerances are estimated on the logs, for each model anew, as for step `shrink`; what is simulated
-are the logs of `--holdout`, or the logs themselves without it.
+What is simulated are the logs of `--holdout`, or the logs themselves without it; nothing is
+estimated.
 """
 
 from __future__ import annotations

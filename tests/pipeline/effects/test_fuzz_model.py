@@ -42,7 +42,8 @@ def bare(root: Path) -> MachineModel:
 
 #: Values in the middle of what can be where those of others decide what can: knots ascend from
 #: none, and a body's inertia has the room that its first moments need.
-MIDDLE = {f"speed_{k}": 0.5 * (k - 1) for k in range(1, 9)}
+MIDDLE = {f"speed_{k}": 0.5 * (k - 1) for k in range(1, 6)}
+MIDDLE |= {f"place_{k}": 0.1 * (k - 5) for k in range(1, 10)}
 MIDDLE |= {"mass": 2.0, "mx": 0.1, "my": 0.1, "mz": 0.1, "Ixy": 0.0, "Ixz": 0.0, "Iyz": 0.0}
 
 

@@ -38,6 +38,7 @@ def test_without_a_place_it_is_at_the_centre_of_mass_and_leaves_it_where_it_is()
     np.testing.assert_allclose(after.lever, before.lever)
 
 
+@pytest.mark.slow
 def test_against_a_machine_whose_bodies_are_known_mass_and_place_are_found() -> None:
     bare = leg.leg_model()
     model = replace(bare, identified=tuple(bare.links))

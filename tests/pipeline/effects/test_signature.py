@@ -47,8 +47,6 @@ def test_a_signature_that_nothing_draws_is_refused_where_the_effect_is_written()
         ("torque_constant_error", ("torque_constant",)),
         ("effort_offset", ("effort_zero",)),
         ("position_offset", ("encoder",)),
-        ("link_mass", ("mass",)),
-        ("center_of_mass_offset", ("com_x", "com_y", "com_z")),
         ("coulomb_friction", ()),
     ],
 )
@@ -56,9 +54,3 @@ def test_tolerances_that_are_an_effect_in_small_are_left_out_at_its_place(
     name: str, kinds: tuple[str, ...]
 ) -> None:
     assert effect_named(name).absorbs(("here",)) == tuple((kind, "here") for kind in kinds)
-
-
-def test_a_nonlinear_parameter_is_refined_by_factors() -> None:
-    near = effect_named("stribeck_friction").refined({"velocity": 0.1}, 1.0)
-    assert near == [{"velocity": 0.05}, {"velocity": 0.2}]
-    assert effect_named("coulomb_friction").refined({}, 1.0) == []

@@ -112,6 +112,7 @@ def test_only_rows_whose_filter_sees_no_drive_count() -> None:
     assert not any(told.mask[k - near : k + near].any() for k in switch)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bridge", ["open", "shorted"])
 def test_free_rows_tell_the_torque_constant_from_viscous_friction(bridge: str) -> None:
     naming = named(bridge)
@@ -122,6 +123,7 @@ def test_free_rows_tell_the_torque_constant_from_viscous_friction(bridge: str) -
     assert constant == pytest.approx(0.34, rel=0.03)
 
 
+@pytest.mark.slow
 def test_the_sum_that_voltage_shows_is_told() -> None:
     seen, naming = measurements("open"), named("open")
     total, *_ = voltage_per_speed(stated().actuator(JOINT), naming)

@@ -37,7 +37,6 @@ def test_the_files_interval_is_the_tolerance(motion: Measurement) -> None:
     assert sigma["resistance", J2] == 0.3
     # No specimen is better than a data sheet's two per cent.
     assert sigma["torque_constant", "rm_joint_1"] == 0.02
-    assert effect_named("torque_constant_error").tolerance(model, (J2,)) == {"more": 0.2}
 
 
 def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant(

@@ -84,9 +84,8 @@ def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) 
     # Listed with what it would close beside the file ...
     assert one.gap_after < 0.2 * one.gap_before
     # ... which is not in the number that is quoted.
-    tolerances, last = result.stages[1], result.stages[-1]
-    assert last is tolerances
-    whole = (overall(result.stages[0].gap), overall(tolerances.gap), overall(last.gap))
+    (as_it_was,) = result.stages
+    whole = (overall(as_it_was.gap), overall(as_it_was.gap))
     words = smaller_words(result.found, [JOINT], whole, "A", 0.004)
     assert "no name is sure enough to be written" in words
     assert "coulomb_friction" not in words
