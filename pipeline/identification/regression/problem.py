@@ -430,7 +430,7 @@ class Problem:
         return self._computed.sums
 
     def _widths(self, stacks: Sequence[Stack]) -> Array:
-        """Prior precision of effects' unknowns: a torque as large as the effort it touches, (n,)."""
+        """Prior precision of effects: a torque as large as the effort it touches, (n,)."""
         energy, square = np.zeros(self.names), np.zeros(self.names)
         for k, stack in enumerate(stacks):
             bench, rows = stack.bench, self.head(k)

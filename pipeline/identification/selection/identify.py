@@ -258,9 +258,8 @@ def _found(judged: Judgement, channel: str) -> Iterator[Found]:
             present = replace(present, terms=(*present.terms, (number, used)))
         after = _errors(search, present)
         joints = _joints(judged, number)
-        level, reason = _level(judged, number, rivals[number], joints)
-        if number is not None and not sized[number].certain:
-            level, reason = limits.SUSPECTED, limits.NOTHING
+        certain = number is None or sized[number].certain
+        level, reason = _level(judged, number, rivals[number], joints, certain)
         open_ = tuple(r.key for r in rivals[number] if r.key is not None and not r.excluded)
         a = None if number is None else problem.accepted[number]
         effect = effect_named(BODIES[0]) if a is None else a.effect
@@ -287,6 +286,7 @@ def _level(
     number: int | None,
     rivals: Sequence[Rival],
     joints: Sequence[int],
+    certain: bool,
 ) -> tuple[str, str]:
     """How far a name is to be trusted, and why not further."""
     nothing, *others = rivals
@@ -295,6 +295,8 @@ def _level(
     left, before = (_rms(_errors(search, x), joints) for x in (state, less))
     if nothing.sure < limits.SURE and left > before:
         return limits.SUSPECTED, limits.IDLE_NAME
+    if nothing.behind <= 0.0 or (nothing.sure < limits.SURE and not certain):
+        return limits.SUSPECTED, limits.NOTHING
     open_ = [r for r in others if not r.excluded]
     if open_:
         words = "; ".join(_words(r.key) for r in open_ if r.key)

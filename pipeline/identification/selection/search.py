@@ -35,9 +35,9 @@ Index = NDArray[np.intp]
 MARGIN: Final = 3.0
 #: The bodies of all links as one name.
 BODIES: Final[Key] = ("rigid_body_parameters", ())
-#: From this uncertainty of the URDF on, one link's centre of mass is a part of the bodies.
+#: From this uncertainty of the URDF on, one link's centre of mass and a scale of all joints are a
+#: part of the bodies.
 COARSE: Final = 0.1
-IN_BODIES: Final = ("center_of_mass_offset",)
 #: Parts of a log's blocks, each judged by estimates from the others.
 FOLDS: Final = 8
 _RIDGE: Final = 1e-10
@@ -98,7 +98,7 @@ class Search:
         """Terms by their number of coordinates."""
         names = list(dict.fromkeys(t.key for t in pool.terms))
         self._keys = np.array([names.index(t.key) for t in pool.terms], dtype=np.intp)
-        self._in_bodies = np.array([t.effect.name in IN_BODIES for t in pool.terms], dtype=np.bool_)
+        self._in_bodies = np.array([self._of_bodies(t) for t in pool.terms], dtype=np.bool_)
         counts = np.array([t.columns.size for t in pool.terms], dtype=np.intp)
         self._by_count = {int(n): np.flatnonzero(counts == n) for n in np.unique(counts)}
         self._own = {
@@ -110,6 +110,12 @@ class Search:
         }
         every = [t.columns for t in pool.terms]
         self._offered = np.unique(np.concatenate([_none(), *every]))
+
+    def _of_bodies(self, term: Term) -> bool:
+        """Whether bodies that may be anything hold it."""
+        one = len(self.pool.problem.model.joints) == 1
+        scale = term.effect.name == "effort_gain" and (one or term.place[0].startswith("*"))
+        return scale or term.effect.name == "center_of_mass_offset"
 
     def _widths(self) -> Array:
         """Prior precision of coordinates: a torque as large as the effort it touches, (P,)."""
@@ -173,7 +179,7 @@ class Search:
                 needed = [k for k, c in enumerate(effect.coordinates) if c.required]
                 possible = self._plausible(t, dict(zip(used, own, strict=True)))
                 possible &= set(needed) <= set(used)
-                possible &= state.uncertainty < COARSE or effect.name not in IN_BODIES
+                possible &= state.uncertainty < COARSE or not self._in_bodies[t]
                 changed |= not possible
                 if stays and set(needed) <= set(stays) and possible:
                     kept.append((t, stays))
