@@ -68,7 +68,9 @@ def test_own_motion_is_a_mode(tmp_path: Path) -> None:
         (["--kind", "strain"], "strain_wave"),
         (["--compare", "answer", "irreversibel"], "irreversible"),
         (["--draws", "1"], "at least 8"),
-        (["--regeneration", "bus"], "groups would share it"),
+        (["--regeneration", "buss"], "expected none, bus or a fraction"),
+        (["--driver", "moteus_x2"], "moteus_x1"),
+        (["--pack", "moteus_x1"], "no battery 'moteus_x1'"),
         (["--idle", "2 V"], "idle"),
     ],
 )

@@ -1,0 +1,47 @@
+"""Break-even of the day: the best that can be driven back against the best that locks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.choice.answer.break_even import Cost, break_even
+from pipeline.choice.answer.tables import words
+from pipeline.choice.choose import Chosen
+from reports.tables.choice import SideRow
+
+
+def side_rows(chosen: Chosen) -> list[SideRow]:
+    """Both, in full chains; none if the day has no standing, no motion, or a side no design.
+
+    The power of all modes that move, and of all that stand, keeps its mean while their shares
+    change; masses are the answer's.
+    """
+    hours = np.array([load.mode.hours for load in chosen.loads])
+    stands = np.array([load.mode.stands for load in chosen.loads])
+    if stands.all() or not stands.any() or len(chosen.sides) < 2:
+        return []
+    costs: list[tuple[Cost, Cost]] = []
+    for robot in chosen.sides.values():
+        power = np.array([full.total for full in chosen.through(robot)])
+        moving, standing = (
+            Cost(float(power[at] @ hours[at] / hours[at].sum()), 0.0) for at in (~stands, stands)
+        )
+        costs.append((moving, standing))
+    even = break_even(costs[0], costs[1], 0.0)
+    share = float(hours[stands].sum() / hours.sum())
+    joints = {g: len(f.demanded.joints) for g, f in chosen.found.items()}
+    return [
+        SideRow(
+            candidate=name,
+            moving_W=moving.power,
+            standing_W=standing.power,
+            power_W=(1.0 - share) * moving.power + share * standing.power,
+            actuator_mass_kg=sum(
+                float(chosen.shelf.designs([robot[g]]).mass[0]) * n for g, n in joints.items()
+            ),
+            standing_share=share,
+            break_even=even,
+            design="; ".join(f"{g}: {words(robot[g])}" for g in joints),
+        )
+        for (name, robot), (moving, standing) in zip(chosen.sides.items(), costs, strict=True)
+    ]
