@@ -51,8 +51,8 @@ class Chosen:
             every range, and those among which the answer settled.
         doubts: Draws over the candidates of each group.
         answer: Design of each group.
-        sides: The best of each group that can be driven back, ``reversible``, and that locks when a
-            gear or a closed brake holds, ``irreversible``; absent if a group has none.
+        sides: The best of each group that can be driven back, ``reversible``, and that locks by a
+            gear or a closed brake, ``irreversible``; the answer's where none is within limits.
         first: What the first search, before mass was fed back, took the answer's power for [W].
         present: Mass of an actuator that the bodies hold already [kg].
         shelf: The parts.
@@ -163,7 +163,8 @@ def choose(
     doubts = asked.doubts(found, candidates, price, wanted.draws)
     return Chosen(
         *(machine, wanted, robots.loads, found, candidates, doubts, answer),
-        *(asked.sides(found, price), first, asked.present, asked.shelf, asked.battery(answer)),
+        *(asked.sides(answer, found, price), first, asked.present, asked.shelf),
+        asked.battery(answer),
     )
 
 
@@ -219,19 +220,19 @@ class _Asked:
         return battery_of(self.pack.name, sheet, energy=self.energy, voltage=bus)
 
     def sides(
-        self, found: Mapping[str, Found], price: Mapping[str, Feedback]
+        self,
+        answer: Mapping[str, Design],
+        found: Mapping[str, Found],
+        price: Mapping[str, Feedback],
     ) -> dict[str, dict[str, Design]]:
-        """The best of each group that can be driven back everywhere, and that locks everywhere."""
-        out = {}
-        for name, locked in (("reversible", False), ("irreversible", True)):
-            best = {
-                g: f.best(f.designs.locks(True) == locked, self.account, price[g])
+        """The best robot that can be driven back, and that locks; see `Chosen`."""
+        return {
+            name: {
+                g: f.best(f.designs.locks(True) == locked, self.account, price[g]) or answer[g]
                 for g, f in found.items()
             }
-            known = {g: design for g, design in best.items() if design}
-            if len(known) == len(best):
-                out[name] = known
-        return out
+            for name, locked in (("reversible", False), ("irreversible", True))
+        }
 
     def masses(self, answer: Mapping[str, Design]) -> dict[str, float]:
         """Of one actuator of each group [kg]."""

@@ -130,7 +130,7 @@ class SideRow:
     """The best robot that can be driven back, and the best that locks, with the answer's masses."""
 
     table: ClassVar = "reversible_or_not"
-    about: ClassVar = "Locks: a gear that cannot be driven back, or a brake, at every joint."
+    about: ClassVar = "Locks: by a gear or a brake, at every joint where one is within limits."
     candidate: str = column("reversible, or irreversible: that locks")
     moving_W: float = column("mean over the modes in which the robot moves", "W")
     standing_W: float = column("mean over those in which it stands", "W")

@@ -11,14 +11,15 @@ from reports.tables.choice import SideRow
 
 
 def side_rows(chosen: Chosen) -> list[SideRow]:
-    """Both, in full chains; none if the day has no standing, no motion, or a side no design.
+    """Both, in full chains; none if the day has no standing or no motion, or both are one.
 
     The power of all modes that move, and of all that stand, keeps its mean while their shares
     change; masses are the answer's.
     """
     hours = np.array([load.mode.hours for load in chosen.loads])
     stands = np.array([load.mode.stands for load in chosen.loads])
-    if stands.all() or not stands.any() or len(chosen.sides) < 2:
+    one, two = chosen.sides.values()
+    if stands.all() or not stands.any() or one == two:
         return []
     costs: list[tuple[Cost, Cost]] = []
     for robot in chosen.sides.values():

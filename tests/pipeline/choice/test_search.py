@@ -9,17 +9,15 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.energy.limits import limit_rows
-from actuators.energy.regeneration import supply_of
 from actuators.loading.data_sheet import read_entry
 from actuators.loading.parts import KINDS, load_parts
-from pipeline.choice.designs import Designs
 from pipeline.choice.group import front, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import read_mission
 from pipeline.choice.search import Demanded
 from pipeline.choice.shelf import Shelf, combinations
 from pipeline.choice.track import Account
+from tests.pipeline.choice.brute import in_full
 
 ACCOUNT = Account()
 MISSION = """mode,share,gait,hold,drivers,payload
@@ -50,32 +48,6 @@ def shelf() -> Shelf:
     return Shelf.of({name: parts[name] for name in names}, idle=idle)
 
 
-def in_full(designs: Designs, i: int, demanded: Demanded, account: Account) -> tuple[float, bool]:
-    """One design through its chain: mean power, and whether its motor is within limits."""
-    power, fits = 0.0, True
-    for track in demanded.tracks:
-        mode = track.load.mode
-        engaged = not mode.stands or mode.hold == "brake"
-        result = designs.chain(i, engaged=engaged).moving(track.series)
-        driver = designs.taken(np.array([i]))
-        lost = driver.driver.loss(result.current, driver.bus) - driver.idle
-        flow = supply_of(result.electrical_power + lost, result.joint.time, demanded.joints)
-        spent = flow.supplied_energy.sum() / track.load.duration
-        idle = not mode.drivers and designs.locks(engaged)[i]
-        on = (result.current != 0).any(axis=0).sum() if idle else len(demanded.joints)
-        power += track.share * (spent + designs.idle[i] * on)
-        fits &= not any(row.breach for row in limit_rows(result))
-        volts = result.current * designs.resistance[i]
-        volts = np.abs(volts + result.motor.velocity * designs.torque_constant[i])
-        left = driver.driver_resistance * np.abs(result.current)
-        fits &= (volts + left).max() <= designs.voltage[i]
-        torque = result.joint.torque
-        fits &= np.abs(torque).max() <= designs.gear_peak[i]
-        fits &= np.sqrt((track.weight @ torque**2).max()) <= designs.gear_continuous[i]
-        fits &= np.abs(result.motor.velocity).max() <= designs.gear_speed[i]
-    return power, bool(fits)
-
-
 @pytest.mark.parametrize("which", ["2", "3"])
 def test_ten_best_are_those_of_brute_force(
     loads: tuple[Load, ...], shelf: Shelf, which: str
@@ -84,7 +56,7 @@ def test_ten_best_are_those_of_brute_force(
     demanded = Demanded.of(which, joints, loads)
     designs = shelf.designs(combinations(shelf))
     found = search(demanded, designs, ACCOUNT)
-    full = [in_full(designs, i, demanded, ACCOUNT) for i in range(len(designs))]
+    full = [in_full(designs, i, demanded) for i in range(len(designs))]
     fits = np.array([ok for _, ok in full])
     assert set(np.flatnonzero(fits)) == set(found.within)
     assert len(found.within) >= 10
