@@ -122,9 +122,9 @@ class Track:
         """Electrical into drivers and the brakes' coils, without idle power, (D, N, J) [W]."""
         out = torque * designs.ohmic[:, None, None]
         out += designs.ratio[:, None, None] * self.series.velocity * ~self.rest
-        out *= torque
         if designs.switching.any():
-            out += np.abs(torque) * designs.switched[:, None, None]
+            out += np.copysign(designs.switched[:, None, None], torque)
+        out *= torque
         if designs.brake_power.any():
             drawn = ~self.rest | (not self.engaged)
             out += designs.brake_power[:, None, None] * drawn
@@ -144,9 +144,8 @@ class Track:
             power: Linear between samples, (D, N, K) [W].
             recovered: The share.
         """
-        net = np.einsum("dnj,n->d", power, self.weight)
         if recovered == 1.0:
-            return net
+            return np.asarray(np.einsum("dnj,n->d", power, self.weight))
         out = np.einsum("dnj,n->d", np.maximum(power, 0.0), self.weight)
         sign = np.signbit(power)
         d, n, j = np.nonzero(sign[:, :-1] != sign[:, 1:])
@@ -154,7 +153,9 @@ class Track:
         both = np.maximum(a + b, 1e-300)
         tip = 0.5 * self.step[n] * (a * (b / both)) / self.load.duration
         out -= np.bincount(d, tip, minlength=len(power))
-        return np.asarray(out - recovered * (out - net))
+        if recovered:
+            out -= recovered * (out - np.einsum("dnj,n->d", power, self.weight))
+        return np.asarray(out)
 
     def drivers(self, designs: Designs, torque: Array) -> Array:
         """How many are on, (D,): where the mode lets them, those of joints that lock are not."""
