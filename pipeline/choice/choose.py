@@ -53,6 +53,7 @@ class Chosen:
         answer: Design of each group.
         sides: The best of each group that can be driven back, ``reversible``, and that locks by a
             gear or a closed brake, ``irreversible``; the answer's where none is within limits.
+            Each with its own demand.
         first: What the first search, before mass was fed back, took the answer's power for [W].
         present: Mass of an actuator that the bodies hold already [kg].
         shelf: The parts.
@@ -66,7 +67,7 @@ class Chosen:
     candidates: Mapping[str, list[Design]]
     doubts: Mapping[str, Doubt]
     answer: Mapping[str, Design]
-    sides: Mapping[str, Mapping[str, Design]]
+    sides: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
     first: Mapping[str, float]
     present: float
     shelf: Shelf
@@ -84,14 +85,14 @@ class Chosen:
     @cached_property
     def day(self) -> list[Full]:
         """Every mode through the chains of the answer."""
-        return self.through(self.answer)
+        return self.through(self.answer, self.loads)
 
-    def through(self, robot: Mapping[str, Design]) -> list[Full]:
+    def through(self, robot: Mapping[str, Design], loads: Sequence[Load]) -> list[Full]:
         """Every mode through full chains."""
         built = {
             g: (f.demanded.joints, self.shelf.designs([robot[g]])) for g, f in self.found.items()
         }
-        return [through(load, built, self.wanted.account) for load in self.loads]
+        return [through(load, built, self.wanted.account) for load in loads]
 
     @property
     def least_voltage(self) -> float:
@@ -163,7 +164,7 @@ def choose(
     doubts = asked.doubts(found, candidates, price, wanted.draws)
     return Chosen(
         *(machine, wanted, robots.loads, found, candidates, doubts, answer),
-        *(asked.sides(answer, found, price), first, asked.present, asked.shelf),
+        *(asked.sides(answer, found, price, robots), first, asked.present, asked.shelf),
         asked.battery(answer),
     )
 
@@ -224,15 +225,17 @@ class _Asked:
         answer: Mapping[str, Design],
         found: Mapping[str, Found],
         price: Mapping[str, Feedback],
-    ) -> dict[str, dict[str, Design]]:
+        robots: Robots,
+    ) -> dict[str, tuple[dict[str, Design], list[Load]]]:
         """The best robot that can be driven back, and that locks; see `Chosen`."""
-        return {
-            name: {
+        out = {}
+        for name, locked in (("reversible", False), ("irreversible", True)):
+            best = {
                 g: f.best(f.designs.locks(True) == locked, self.account, price[g]) or answer[g]
                 for g, f in found.items()
             }
-            for name, locked in (("reversible", False), ("irreversible", True))
-        }
+            out[name] = best, robots.at(self.masses(best))
+        return out
 
     def masses(self, answer: Mapping[str, Design]) -> dict[str, float]:
         """Of one actuator of each group [kg]."""

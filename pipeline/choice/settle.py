@@ -51,8 +51,8 @@ class Robots:
     account: Account
     drawn: Callable[[Design], Designs]
 
-    def demanded(self, mass: Mapping[str, float]) -> dict[str, Demanded]:
-        """Every group's demand with these masses of one actuator [kg]."""
+    def at(self, mass: Mapping[str, float]) -> list[Load]:
+        """The mission's demand with these masses of one actuator of each group [kg]."""
         loads = []
         for k, load in enumerate(self.loads):
             torque = load.series.torque.copy()
@@ -60,6 +60,11 @@ class Robots:
                 slope = (more[k].series.torque - load.series.torque) / NUDGE
                 torque += (mass[g] - self.mass[g]) * slope
             loads.append(replace(load, series=replace(load.series, torque=torque)))
+        return loads
+
+    def demanded(self, mass: Mapping[str, float]) -> dict[str, Demanded]:
+        """Every group's part of it."""
+        loads = self.at(mass)
         return {g: Demanded.of(g, joints, loads) for g, joints in self.groups.items()}
 
     def cost(self, answer: Answer) -> tuple[float, float]:

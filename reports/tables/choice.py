@@ -127,7 +127,7 @@ class DayRow:
 
 @dataclass(frozen=True)
 class SideRow:
-    """The best robot that can be driven back, and the best that locks, with the answer's masses."""
+    """The best robot that can be driven back, and the best that locks, with their own masses."""
 
     table: ClassVar = "reversible_or_not"
     about: ClassVar = "Locks: by a gear or a brake, at every joint where one is within limits."

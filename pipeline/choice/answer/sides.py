@@ -14,16 +14,16 @@ def side_rows(chosen: Chosen) -> list[SideRow]:
     """Both, in full chains; none if the day has no standing or no motion, or both are one.
 
     The power of all modes that move, and of all that stand, keeps its mean while their shares
-    change; masses are the answer's.
+    change; each robot carries its own actuators.
     """
     hours = np.array([load.mode.hours for load in chosen.loads])
     stands = np.array([load.mode.stands for load in chosen.loads])
-    one, two = chosen.sides.values()
+    (one, _), (two, _) = chosen.sides.values()
     if stands.all() or not stands.any() or one == two:
         return []
     costs: list[tuple[Cost, Cost]] = []
-    for robot in chosen.sides.values():
-        power = np.array([full.total for full in chosen.through(robot)])
+    for robot, loads in chosen.sides.values():
+        power = np.array([full.total for full in chosen.through(robot, loads)])
         moving, standing = (
             Cost(float(power[at] @ hours[at] / hours[at].sum()), 0.0) for at in (~stands, stands)
         )
@@ -44,5 +44,5 @@ def side_rows(chosen: Chosen) -> list[SideRow]:
             break_even=even,
             design="; ".join(f"{g}: {words(robot[g])}" for g in joints),
         )
-        for (name, robot), (moving, standing) in zip(chosen.sides.items(), costs, strict=True)
+        for (name, (robot, _)), (moving, standing) in zip(chosen.sides.items(), costs, strict=True)
     ]
