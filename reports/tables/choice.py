@@ -136,6 +136,7 @@ class SideRow:
     standing_W: float = column("mean over those in which it stands", "W")
     power_W: float = column("mean over the day", "W")
     actuator_mass_kg: float = column("all actuators", "kg")
+    limit_use: float = column("share of the nearest limit, with its own mass; above 1 exceeds", "1")
     standing_share: float = column("of the mission's time", "1")
     break_even: float | None = column("share of standing at which both take the same", "1")
     design: str = column("group: motor + gear + brake, by group")

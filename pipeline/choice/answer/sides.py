@@ -7,6 +7,7 @@ import numpy as np
 from pipeline.choice.answer.break_even import Cost, break_even
 from pipeline.choice.answer.tables import words
 from pipeline.choice.choose import Chosen
+from pipeline.choice.search import Demanded
 from reports.tables.choice import SideRow
 
 
@@ -40,9 +41,18 @@ def side_rows(chosen: Chosen) -> list[SideRow]:
             actuator_mass_kg=sum(
                 float(chosen.shelf.designs([robot[g]]).mass[0]) * n for g, n in joints.items()
             ),
+            limit_use=max(
+                float(x[0])
+                for g, f in chosen.found.items()
+                for x in Demanded.of(g, f.demanded.joints, loads)
+                .limits(chosen.shelf.designs([robot[g]]))
+                .values()
+            ),
             standing_share=share,
             break_even=even,
             design="; ".join(f"{g}: {words(robot[g])}" for g in joints),
         )
-        for (name, (robot, _)), (moving, standing) in zip(chosen.sides.items(), costs, strict=True)
+        for (name, (robot, loads)), (moving, standing) in zip(
+            chosen.sides.items(), costs, strict=True
+        )
     ]
