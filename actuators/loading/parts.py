@@ -25,6 +25,9 @@ from actuators.parameters import read_toml
 
 #: The parts that come with the project.
 PARTS: Final = Path(__file__).resolve().parents[1] / "components"
+#: Driver and battery if no other is named.
+DRIVER: Final = "moteus_x1"
+PACK: Final = "aspilsan_13s4p"
 _OF_GEARS: Final = {name: e for name, e in ENTRIES.items() if name.startswith("gear_")}
 _GEAR: Final[Mapping[str, Entry]] = {
     **_OF_GEARS,

@@ -72,24 +72,3 @@ class Driver:
         """
         size = np.abs(current)
         return self.idle + self.resistance * size * size + self.switching * bus * size
-
-    def mean_loss(self, rms: FloatArray, mean: FloatArray, bus: Scalars) -> FloatArray:
-        """Return the mean of `loss` over time, (...) [W].
-
-        Args:
-            rms: Root mean square of the current, (...) [A].
-            mean: Mean of its magnitude, (...) [A].
-            bus: Voltage of the bus [V].
-        """
-        return self.idle + self.resistance * rms * rms + self.switching * bus * mean
-
-    def headroom(self, voltage: FloatArray, current: FloatArray, bus: Scalars) -> FloatArray:
-        """Return the voltage that is left, (...) [V]; negative where the motor lacks it.
-
-        Args:
-            voltage: That the motor needs, either sign, (...) [V].
-            current: At that instant, (...) [A].
-            bus: Voltage of the bus, as the battery's is at that power [V].
-        """
-        available = self.voltage_share * bus - self.resistance * np.abs(current)
-        return np.asarray(available - np.abs(voltage))

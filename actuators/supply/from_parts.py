@@ -1,4 +1,4 @@
-"""Drivers, batteries and thermal models by what data sheets print (`actuators.loading.parts`).
+"""Drivers and batteries by what data sheets print (`actuators.loading.parts`).
 
 Values are SI, one for each entry: printed, or chosen from the range of a part's class.
 """
@@ -6,7 +6,6 @@ Values are SI, one for each entry: printed, or chosen from the range of a part's
 import math
 from collections.abc import Mapping
 
-from actuators.elements.two_body import TwoBody
 from actuators.errors import DataSheetError
 from actuators.supply.battery import HOUR, Battery
 from actuators.supply.driver import Driver
@@ -87,21 +86,6 @@ def battery_of(
         known["returned"],
         mass,
     )
-
-
-def two_body_of(name: str, x: Values) -> TwoBody:
-    """Return a motor's thermal model.
-
-    Args:
-        name: Of the part.
-        x: Entries of its sheet: winding_to_housing, housing_to_ambient, winding_time, housing_time.
-
-    Raises:
-        DataSheetError: An entry is missing; names all that are.
-    """
-    entries = ("winding_to_housing", "housing_to_ambient", "winding_time", "housing_time")
-    _require(name, x, *entries)
-    return TwoBody(*(x[entry] for entry in entries))
 
 
 def _require(name: str, x: Values, *entries: str) -> None:

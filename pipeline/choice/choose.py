@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache, cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.chain import ChainResult
-from actuators.energy.regeneration import supply
-from actuators.errors import CatalogError, closest
-from actuators.loading.parts import PARTS, Part, load_parts
+from actuators.loading.parts import Part, load_parts
+from actuators.supply.battery import Battery
+from actuators.supply.from_parts import battery_of
+from pipeline.choice.answer.full import Full, through
 from pipeline.choice.designs import Designs
 from pipeline.choice.doubt import Design, Doubt, doubt, drawn
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.group import Found, groups_of, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.search import Account, Demanded, Feedback
+from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.settle import NUDGE, Robots
-from pipeline.choice.shelf import GEARS, Shelf, combinations
-from pipeline.machine.drivetrains import Drivetrains
-from pipeline.machine.joint import JointModel, joints_of
+from pipeline.choice.shelf import Shelf, combinations, named
+from pipeline.choice.track import Account
+from pipeline.choice.wanted import Wanted, filtered
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
@@ -37,38 +36,6 @@ _ROUNDS: Final = 5
 _POOL: Final = 8  # designs of each search, by score and by mass, among which a robot is settled
 _SEARCHES: Final = 4  # of all designs, each with drawn values of all parts
 _FEW: Final = 8  # draws of a design while it is settled
-
-
-@dataclass(frozen=True)
-class Wanted:
-    """What is searched, and what is counted.
-
-    Attributes:
-        parts: Folder of parts.
-        kinds: Kinds of gears; all where empty.
-        only: Names of which a design's motors and gears must be, or begin with; all where empty.
-        without: Names that no part may be, or begin with.
-        voltage: Of the supply: motors for less are left out [V].
-        brakes: Whether brakes are among the parts.
-        groups: ``NAME=PATTERN,...``; by default joints that are alike in all legs.
-        account: Idle power, hotel load, returned energy.
-        battery: Energy of the robot's battery [W*h].
-        present: Mass of an actuator that the robot's bodies hold already, each joint's [kg]; by
-            default that of the motors of its actuator files.
-        draws: Over what is not printed.
-    """
-
-    parts: Path = PARTS
-    kinds: tuple[str, ...] = ()
-    only: tuple[str, ...] = ()
-    without: tuple[str, ...] = ()
-    voltage: float | None = None
-    brakes: bool = True
-    groups: tuple[str, ...] = ()
-    account: Account = field(default_factory=Account)
-    battery: float | None = None
-    present: float | None = None
-    draws: int = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +51,13 @@ class Chosen:
             every range, and those among which the answer settled.
         doubts: Draws over the candidates of each group.
         answer: Design of each group.
+        sides: The best of each group that can be driven back, ``reversible``, and that locks by a
+            gear or a closed brake, ``irreversible``; the answer's where none is within limits.
+            Each with its own demand.
         first: What the first search, before mass was fed back, took the answer's power for [W].
         present: Mass of an actuator that the bodies hold already [kg].
         shelf: The parts.
+        battery: Of the answer, at the highest voltage of its groups.
     """
 
     machine: Machine
@@ -96,9 +67,11 @@ class Chosen:
     candidates: Mapping[str, list[Design]]
     doubts: Mapping[str, Doubt]
     answer: Mapping[str, Design]
+    sides: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
     first: Mapping[str, float]
     present: float
     shelf: Shelf
+    battery: Battery
 
     @property
     def hours(self) -> float:
@@ -109,49 +82,34 @@ class Chosen:
         """The answer of one group, as one design."""
         return self.shelf.designs([self.answer[group]])
 
-    def battery_hours(self, power: float) -> float | None:
-        """On one charge [h]."""
-        return self.wanted.battery / power if self.wanted.battery and power > 0 else None
+    @cached_property
+    def day(self) -> list[Full]:
+        """Every mode through the chains of the answer."""
+        return self.through(self.answer, self.loads)
 
-    def full(self, load: Load) -> tuple[ChainResult, Array, Array]:
-        """One mode through the chains of the answer; see `through`."""
-        return through(
-            load,
-            {g: (f.demanded.joints, self.designs(g)) for g, f in self.found.items()},
-            self.wanted.account,
-        )
+    def through(self, robot: Mapping[str, Design], loads: Sequence[Load]) -> list[Full]:
+        """Every mode through full chains."""
+        built = {
+            g: (f.demanded.joints, self.shelf.designs([robot[g]])) for g, f in self.found.items()
+        }
+        return [through(load, built, self.wanted.account) for load in loads]
+
+    @property
+    def least_voltage(self) -> float:
+        """Of the supply, below which a driver stops or gives a motor less than it needs [V]."""
+        sheet = self.shelf.numbers[self.shelf.driver]
+        out = sheet["least_voltage"].value if "least_voltage" in sheet else 0.0
+        for g, f in self.found.items():
+            design = self.designs(g)
+            use = f.demanded.limits(design)["voltage"] * design.bus
+            out = max(out, float(use[0]))
+        return out
 
     def robots(self) -> tuple[Array, Array, NDArray[np.intp]]:
         """Front of robots: power with hotel load [W], mass [kg], design of each group."""
         fronts = [(f.score[f.front], f.mass[f.front]) for f in self.found.values()]
         power, mass, taken = merged(fronts)
         return power + self.wanted.account.hotel, mass, taken
-
-
-def through(
-    load: Load, built: Mapping[str, tuple[tuple[str, ...], Designs]], account: Account
-) -> tuple[ChainResult, Array, Array]:
-    """One mode through full chains: result, mean power out of the supply [W], drivers on, (J,).
-
-    Args:
-        load: The mode.
-        built: Joints of each group, and their one design.
-        account: What is counted; drivers that are on are, the hotel load is not.
-    """
-    mode, names = load.mode, load.series.joints
-    models: dict[str, JointModel] = {}
-    locks: dict[str, bool] = {}
-    for joints, design in built.values():
-        engaged = not mode.stands or mode.hold == "brake"
-        chain = design.chain(0, engaged=engaged)
-        models |= {model.name: model for model in joints_of(chain, joints)}
-        locks |= dict.fromkeys(joints, bool(design.locks(engaged)[0]))
-    result = Drivetrains("answer", tuple(models[j] for j in names)).moving(load.series)
-    share = account.recovered
-    out = supply(result, "fraction" if share else "none", share).supplied_energy / load.duration
-    free = ~np.array([locks[joint] for joint in names])
-    on = np.where(mode.drivers | free | (result.current != 0.0).any(axis=0), 1.0, 0.0)
-    return result, out + account.idle * on, on
 
 
 def choose(
@@ -174,24 +132,17 @@ def choose(
     """
     wanted = wanted or Wanted()
     told = progress.step if progress else lambda words: None
-    robot = machine.ready.robot
-    if robot.sliding_joints:
-        raise ChoiceError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
-    groups = groups_of(robot.spec, wanted.groups)
-    shelf = Shelf.of(filtered(load_parts(wanted.parts), wanted))
-    every = combinations(shelf, brakes=wanted.brakes, voltage=wanted.voltage)
-    designs = shelf.designs(every)
-    held = machine.ready.motors.mass[0]
-    present = held if wanted.present is None else wanted.present
+    asked = _asked(machine, modes, wanted)
+    every = combinations(asked.shelf, brakes=wanted.brakes)
+    designs = asked.shelf.designs(every)
     told("the mission's demand")
-    asked = _Asked(machine, modes, groups, shelf, wanted.account, present)
-    robots = asked.robots(dict.fromkeys(groups, present))
-    price = dict.fromkeys(groups, Feedback())
+    robots = asked.robots(dict.fromkeys(asked.groups, asked.present))
+    price = dict.fromkeys(asked.groups, Feedback())
     answer: dict[str, Design] = {}
-    pool: dict[str, dict[Design, None]] = {g: {} for g in groups}
+    pool: dict[str, dict[Design, None]] = {g: {} for g in asked.groups}
     first: dict[str, float] = {}
     for turn in range(_ROUNDS):
-        told(f"{len(every)} designs for each of {len(groups)} groups, round {turn + 1}")
+        told(f"{len(every)} designs for each of {len(asked.groups)} groups, round {turn + 1}")
         found = asked.searched(designs, robots.loads, price)
         first = first or {g: float(f.power[f.finalists[0]]) for g, f in found.items()}
         for g, f in found.items():
@@ -212,8 +163,25 @@ def choose(
     candidates = {g: _candidates(answer[g], f, pool[g]) for g, f in found.items()}
     doubts = asked.doubts(found, candidates, price, wanted.draws)
     return Chosen(
-        machine, wanted, robots.loads, found, candidates, doubts, answer, first, present, shelf
+        *(machine, wanted, robots.loads, found, candidates, doubts, answer),
+        *(asked.sides(answer, found, price, robots), first, asked.present, asked.shelf),
+        asked.battery(answer),
     )
+
+
+def _asked(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> _Asked:
+    """What stays the same; parts that are named have to be there."""
+    robot = machine.ready.robot
+    if robot.sliding_joints:
+        raise ChoiceError(f"joint '{robot.sliding_joints[0]}' slides; the parts here turn")
+    groups = groups_of(robot.spec, wanted.groups)
+    parts = load_parts(wanted.parts)
+    driver, pack = named(parts, "driver", wanted.driver), named(parts, "battery", wanted.pack)
+    left = filtered(parts, wanted)
+    shelf = Shelf.of(left, driver, idle=wanted.idle, voltage=wanted.voltage)
+    held = machine.ready.motors.mass[0]
+    present = held if wanted.present is None else wanted.present
+    return _Asked(machine, modes, groups, shelf, wanted.account, present, pack, wanted.battery)
 
 
 def _candidates(answer: Design, found: Found, pool: Iterable[Design]) -> list[Design]:
@@ -222,36 +190,6 @@ def _candidates(answer: Design, found: Found, pool: Iterable[Design]) -> list[De
 
 def _named(found: Found, which: Sequence[int] | NDArray[np.intp]) -> list[Design]:
     return [found.designs.parts[i] for i in found.looked[which]]
-
-
-def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
-    """Parts that the options leave.
-
-    Raises:
-        CatalogError: A name is no part's, nor the beginning of one's.
-        ChoiceError: A kind is none of a gear.
-    """
-    for name in (*wanted.only, *wanted.without):
-        if not any(part.startswith(name) for part in parts):
-            raise CatalogError(f"no part '{name}': {closest(name, [*parts])}")
-    for kind in wanted.kinds:
-        if kind not in GEARS:
-            raise ChoiceError(f"--kind {kind}: {closest(kind, GEARS)}")
-    named = {kind: False for kind in ("motor", "gear")}
-    for name, part in parts.items():
-        what = "gear" if part.kind in GEARS else part.kind
-        if what in named and name.startswith(wanted.only or ("\0",)):
-            named[what] = True  # a filter of motors alone leaves all gears
-
-    def kept(name: str, part: Part) -> bool:
-        what = "gear" if part.kind in GEARS else part.kind
-        if what not in (*named, "brake") or (wanted.without and name.startswith(wanted.without)):
-            return False
-        if what == "gear" and wanted.kinds and part.kind not in wanted.kinds:
-            return False
-        return not named.get(what) or name.startswith(wanted.only)
-
-    return {name: part for name, part in parts.items() if kept(name, part)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -264,6 +202,8 @@ class _Asked:
     shelf: Shelf
     account: Account
     present: float
+    pack: Part
+    energy: float | None = None
 
     def searched(
         self, designs: Designs, loads: Sequence[Load], price: Mapping[str, Feedback]
@@ -273,6 +213,29 @@ class _Asked:
             g: search(Demanded.of(g, joints, loads), designs, self.account, price[g])
             for g, joints in self.groups.items()
         }
+
+    def battery(self, answer: Mapping[str, Design]) -> Battery:
+        """At the highest voltage of an answer's groups."""
+        sheet = {entry: number.value for entry, number in self.pack.printed.items()}
+        bus = float(self.shelf.designs([*answer.values()]).bus.max())
+        return battery_of(self.pack.name, sheet, energy=self.energy, voltage=bus)
+
+    def sides(
+        self,
+        answer: Mapping[str, Design],
+        found: Mapping[str, Found],
+        price: Mapping[str, Feedback],
+        robots: Robots,
+    ) -> dict[str, tuple[dict[str, Design], list[Load]]]:
+        """The best robot that can be driven back, and that locks; see `Chosen`."""
+        out = {}
+        for name, locked in (("reversible", False), ("irreversible", True)):
+            best = {
+                g: f.best(f.designs.locks(True) == locked, self.account, price[g]) or answer[g]
+                for g, f in found.items()
+            }
+            out[name] = best, robots.at(self.masses(best))
+        return out
 
     def masses(self, answer: Mapping[str, Design]) -> dict[str, float]:
         """Of one actuator of each group [kg]."""

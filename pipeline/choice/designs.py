@@ -24,6 +24,7 @@ from actuators.elements.inertia import Inertia
 from actuators.elements.motor import DCMotor
 from actuators.elements.ratio import Ratio
 from actuators.loading.build import WINDING
+from actuators.supply.driver import Driver
 
 Array = NDArray[np.float64]
 
@@ -41,9 +42,9 @@ class Designs:
         inertia: [kg*m^2].
         torque_constant: k [N*m/A].
         resistance: R [ohm].
-        voltage: Of the supply [V].
-        continuous_current: [A].
-        peak_current: [A].
+        voltage: That the driver can give to the motor without current [V].
+        continuous_current: Of motor and driver [A].
+        peak_current: Likewise [A].
         max_speed: Of the motor [rad/s].
         gear_speed: Of the gear's input, at most [rad/s].
         gear_continuous: At its output, root mean square [N*m].
@@ -56,6 +57,11 @@ class Designs:
         winding_time: Thermal time constant [s].
         housing_time: Likewise [s].
         winding_limit: Permitted temperature [K].
+        bus: Voltage of the supply [V].
+        bus_use: Share of the driver's range of it that is used [1].
+        driver_resistance: In the motor's ampere [ohm].
+        switching: Of the driver, over bus voltage times current [1].
+        idle: Of the driver while it is on [W].
     """
 
     parts: tuple[tuple[str, str, str], ...]
@@ -81,6 +87,11 @@ class Designs:
     winding_time: Array
     housing_time: Array
     winding_limit: Array
+    bus: Array
+    bus_use: Array
+    driver_resistance: Array
+    switching: Array
+    idle: Array
 
     def __len__(self) -> int:
         return len(self.parts)
@@ -96,6 +107,22 @@ class Designs:
         parts = tuple(row for one in some for row in one.parts)
         names = [f.name for f in fields(cls)[1:]]
         return cls(parts, **{n: np.concatenate([getattr(d, n) for d in some]) for n in names})
+
+    @property
+    def driver(self) -> Driver:
+        """The losses of their drivers."""
+        return Driver("driver", self.driver_resistance, self.idle, self.switching)
+
+    @property
+    def ohmic(self) -> Array:
+        """Loss of winding and driver over the motor's torque squared, (D,) [W/(N*m)^2]."""
+        both = self.resistance + self.driver_resistance
+        return np.asarray(both / self.torque_constant**2)
+
+    @property
+    def switched(self) -> Array:
+        """Switching loss over the magnitude of the motor's torque, (D,) [W/(N*m)]."""
+        return np.asarray(self.switching * self.bus / self.torque_constant)
 
     @property
     def theta(self) -> Array:

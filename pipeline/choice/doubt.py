@@ -23,8 +23,9 @@ from scipy.stats.qmc import LatinHypercube
 
 from actuators.loading.data_sheet import Number
 from pipeline.choice.designs import Designs
-from pipeline.choice.search import Account, Demanded, Feedback
+from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.shelf import Drawn, Shelf
+from pipeline.choice.track import Account
 
 Array = NDArray[np.float64]
 Design = tuple[str, str, str]
@@ -126,7 +127,7 @@ def doubt(
     designs = Designs.together([shelf.designs(combinations, sheet) for sheet in sheets])
     power = demanded.power(designs, account)
     within = np.all([share <= 1.0 for share in demanded.limits(designs).values()], axis=0)
-    score = power + feedback.cost(demanded, designs, account)
+    score = power + feedback.cost(demanded, designs)
     shape = (draws, count)
     return Doubt(
         power.reshape(shape), score.reshape(shape), within.reshape(shape), unknowns, values

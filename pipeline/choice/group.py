@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from actuators.errors import closest
 from pipeline.choice.designs import Designs
 from pipeline.choice.errors import ChoiceError
-from pipeline.choice.search import Account, Demanded, Feedback
+from pipeline.choice.search import Demanded, Feedback
+from pipeline.choice.track import Account
 from pipeline.robot.robot_file import RobotSpec
 
 Array = NDArray[np.float64]
@@ -45,6 +46,16 @@ class Found:
     looked: Index
     power: Array
     score: Array
+
+    def best(
+        self, which: NDArray[np.bool_], account: Account, feedback: Feedback
+    ) -> tuple[str, str, str] | None:
+        """The best by score among some of the designs (D,); None if none is within limits."""
+        own = self.within[which[self.within]]
+        if not len(own):
+            return None
+        found = search(self.demanded, self.designs.taken(own), account, feedback)
+        return found.designs.parts[found.looked[found.finalists[0]]]
 
     @property
     def mass(self) -> Array:
@@ -87,8 +98,8 @@ def search(
             f"removed by {words}"
         )
     own = designs.taken(within)
-    cost = (feedback or Feedback()).cost(demanded, own, account)
-    bound = demanded.net(own, account) + cost
+    cost = (feedback or Feedback()).cost(demanded, own)
+    bound = demanded.net(own) + cost
     score = np.full(len(own), np.inf)
     todo = np.union1d(np.argsort(bound)[:_FIRST], np.argsort(own.mass)[:_FIRST])
     while len(todo):

@@ -11,9 +11,11 @@ k and R its power is P = T n w + (R / k^2) T^2, so that over any weights of the 
 
 exactly as the chain integrates it; the root mean square of T is the same with the weights of a
 piecewise linear series. Peaks of |T| and of |R T / k + k n w| are maxima of linear functions of x:
-they lie on the convex hull of its samples. At rest the chain gives the holding torque of least
-magnitude, sgn(tau) max(0, (1 - c) |tau| / n - C - brake), which is no product: those samples go
-one by one, and so does what flows back and is lost, P < 0. As that only adds, the net energy is a
+they lie on the convex hull of its samples. A driver conducts as its resistance R_d added to R does,
+and takes R_d |I| of the voltage: a sum of magnitudes is convex, too. At rest the chain gives the
+holding torque of least magnitude, sgn(tau) max(0, (1 - c) |tau| / n - C - brake), which is no
+product: those samples go one by one, and so do what flows back and is lost, P < 0, and switching,
+which goes with |T|. The first only adds, and |T| >= sgn(tau) T: so the net energy with that is a
 lower bound by which most designs need not be looked at sample by sample.
 """
 
@@ -27,141 +29,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from actuators.energy.regeneration import BUS
 from actuators.shaft import ShaftSeries
 from pipeline.choice import heat
 from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.track import SPEED, Account, Track
 
 Array = NDArray[np.float64]
-Which = NDArray[np.bool_]
-SPEED = 3  # the series w among the five
 #: Numbers of a block of designs times samples: 16 MB.
 BLOCK = 2_000_000
 _MANY = 50  # samples, or designs, from which on a hull is worth finding
-
-
-@dataclass(frozen=True)
-class Account:
-    """What is counted besides the motors.
-
-    Attributes:
-        idle: Of a driver that is on [W].
-        hotel: Of the robot's electronics [W].
-        recovered: Share of returned power that is used again [1].
-    """
-
-    idle: float = 0.0
-    hotel: float = 0.0
-    recovered: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """One mode at the joints of a group.
-
-    Attributes:
-        load: The mode, of all joints.
-        series: Of the group's joints.
-        share: Of the mission's time.
-    """
-
-    load: Load
-    series: ShaftSeries
-    share: float
-
-    @cached_property
-    def x(self) -> Array:
-        """The five series, (5, N, J)."""
-        one = self.series
-        s = one.direction
-        each = (one.torque, np.abs(one.torque) * s, s, one.velocity, one.acceleration)
-        return np.stack([part * (s != 0.0) for part in each])
-
-    @cached_property
-    def rest(self) -> Which:
-        """Samples at rest, (N, J)."""
-        return self.series.direction == 0.0
-
-    @cached_property
-    def step(self) -> Array:
-        """Between samples, (N - 1,) [s]."""
-        return np.diff(self.series.time)
-
-    @cached_property
-    def weight(self) -> Array:
-        """Of each sample in the mean over the mode, (N,)."""
-        out = np.zeros(self.series.time.size)
-        out[:-1] += 0.5 * self.step
-        out[1:] += 0.5 * self.step
-        return out / self.load.duration
-
-    @cached_property
-    def grams(self) -> Array:
-        """Of the mean of a product, trapezoids, summed over the joints (5, 5)."""
-        flat = self.x.reshape(5, -1)
-        weights = np.repeat(self.weight, self.series.torque.shape[1])
-        return np.asarray((flat * weights) @ flat.T)
-
-    @cached_property
-    def squares(self) -> Array:
-        """Of the mean square of a piecewise linear product, of every joint (J, 5, 5)."""
-        a, b = self.x[:, :-1], self.x[:, 1:]
-        h = self.step / (3.0 * self.load.duration)
-        same = np.einsum("inj,n,knj->jik", a, h, a) + np.einsum("inj,n,knj->jik", b, h, b)
-        cross = np.einsum("inj,n,knj->jik", a, h, b)
-        return np.asarray(same + 0.5 * (cross + cross.transpose(0, 2, 1)))
-
-    @property
-    def engaged(self) -> bool:
-        """Whether brakes hold at rest."""
-        return not self.load.mode.stands or self.load.mode.hold == "brake"
-
-    def torque(self, designs: Designs) -> Array:
-        """Of the motors, (D, N, J) [N*m]."""
-        shape = (len(designs), *self.series.torque.shape)
-        out = np.asarray((designs.theta @ self.x.reshape(5, -1)).reshape(shape))
-        if self.rest.any():
-            tau = self.series.torque[self.rest]
-            free = designs.coulomb + designs.brake_torque * self.engaged
-            passed = np.maximum(1.0 - designs.load, 0.0) / designs.ratio
-            held = np.maximum(np.abs(tau) * passed[:, None] - free[:, None], 0.0)
-            out[:, self.rest] = held * np.sign(tau)
-        return out
-
-    def power(self, designs: Designs, torque: Array) -> Array:
-        """Electrical, with the brakes' coils, (D, N, J) [W]."""
-        out = torque * (designs.resistance / designs.torque_constant**2)[:, None, None]
-        out += designs.ratio[:, None, None] * self.series.velocity * ~self.rest
-        out *= torque
-        if designs.brake_power.any():
-            drawn = ~self.rest | (not self.engaged)
-            out += designs.brake_power[:, None, None] * drawn
-        return out
-
-    def supplied(self, designs: Designs, account: Account) -> Array:
-        """Mean power out of the supply in this mode, with drivers, (D,) [W]."""
-        torque = self.torque(designs)
-        power = self.power(designs, torque)
-        positive = np.maximum(power, 0.0)
-        forward = np.einsum("dnj,n->d", positive, self.weight)
-        sign = np.signbit(power)
-        d, n, j = np.nonzero(sign[:, :-1] != sign[:, 1:])
-        a, b = np.abs(power[d, n, j]), np.abs(power[d, n + 1, j])
-        both = np.maximum(a + b, 1e-300)
-        tip = 0.5 * self.step[n] * (a * (b / both)) / self.load.duration
-        forward -= np.bincount(d, tip, minlength=len(designs))
-        if account.recovered:
-            net = np.einsum("dnj,n->d", power, self.weight)
-            forward -= account.recovered * (forward - net)
-        return np.asarray(forward + account.idle * self.drivers(designs, torque))
-
-    def drivers(self, designs: Designs, torque: Array) -> Array:
-        """How many are on, (D,): where the mode lets them, those of joints that lock are not."""
-        joints = torque.shape[2]
-        if self.load.mode.drivers:
-            return np.full(len(torque), float(joints))
-        current = (torque != 0.0).any(axis=1)
-        return np.asarray((current | ~designs.locks(self.engaged)[:, None]).sum(axis=1) * 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,26 +92,28 @@ class Demanded:
         fastest = np.abs(points[:, SPEED]).max(initial=0.0)
         peak, volts = np.zeros(len(designs)), np.zeros(len(designs))
         for rows in _blocks(len(designs), max(len(points), 1)):
-            torque = theta[rows] @ points.T
-            peak[rows] = np.abs(torque).max(axis=1, initial=0.0)
-            torque *= (designs.resistance[rows] / k[rows])[:, None]
-            torque += (k[rows] * n[rows])[:, None] * points[:, SPEED]
-            volts[rows] = np.abs(torque).max(axis=1, initial=0.0)
+            current = theta[rows] @ points.T / k[rows, None]
+            peak[rows] = np.abs(current).max(axis=1, initial=0.0)
+            dropped = np.abs(current) * designs.driver_resistance[rows, None]
+            current *= designs.resistance[rows, None]
+            current += (k[rows] * n[rows])[:, None] * points[:, SPEED]
+            volts[rows] = (np.abs(current) + dropped).max(axis=1, initial=0.0)
         rms, means = np.zeros(len(designs)), []
         for track in self.tracks:
             mean = _rms(track, designs)
             means.append(mean)
             rms = np.maximum(rms, mean)
             if track.rest.any():
-                held = self._held(track, designs)
+                held = self._held(track, designs) / k
                 peak = np.maximum(peak, held)
-                volts = np.maximum(volts, designs.resistance * held / k)
+                volts = np.maximum(volts, (designs.resistance + designs.driver_resistance) * held)
         tau = [np.abs(track.series.torque).max() for track in self.tracks]
         lasting = [np.sqrt((track.weight @ track.series.torque**2).max()) for track in self.tracks]
         use = {
-            "peak current": peak / k / designs.peak_current,
+            "peak current": peak / designs.peak_current,
             "continuous current": rms / k / designs.continuous_current,
             "voltage": volts / designs.voltage,
+            "driver's supply": designs.bus_use,
             "motor's speed": fastest * n / designs.max_speed,
             "gear's speed": fastest * n / designs.gear_speed,
             "gear's peak torque": max(tau) / designs.gear_peak,
@@ -254,20 +134,20 @@ class Demanded:
         free = designs.coulomb + designs.brake_torque * track.engaged
         return np.maximum(np.maximum(1.0 - designs.load, 0.0) * tau / designs.ratio - free, 0.0)
 
-    def net(self, designs: Designs, account: Account) -> Array:
+    def net(self, designs: Designs) -> Array:
         """A lower bound of `power`: what flows back is all used again, (D,) [W]."""
         theta = designs.theta
-        loss = designs.resistance / designs.torque_constant**2
         out = np.zeros(len(designs))
         for track in self.tracks:
             if track.rest.any():
                 one = Demanded(self.name, self.joints, (track,))
-                out += one.power(designs, Account(account.idle, recovered=1.0))
+                out += one.power(designs, Account(policy=BUS))
                 continue
             gram = track.grams
             each = designs.ratio * (theta @ gram[SPEED])
-            each += loss * np.einsum("di,di->d", theta @ gram, theta)
-            each += len(self.joints) * (designs.brake_power + account.idle)
+            each += designs.ohmic * np.einsum("di,di->d", theta @ gram, theta)
+            each += designs.switched * np.maximum(theta @ track.signs, 0.0)
+            each += len(self.joints) * (designs.brake_power + designs.idle)
             out += track.share * each
         return out
 
@@ -297,12 +177,31 @@ class Feedback:
     heavier: Demanded | None = None
     step: float = 0.1
 
-    def cost(self, demanded: Demanded, designs: Designs, account: Account) -> Array:
+    def cost(self, demanded: Demanded, designs: Designs) -> Array:
         """Of the mass of designs beside `mass`, linear in it, (D,) [W]."""
         if self.heavier is None:
             return np.zeros(len(designs))
-        own = (self.heavier.net(designs, account) - demanded.net(designs, account)) / self.step
+        own = (self.heavier.net(designs) - demanded.net(designs)) / self.step
         return np.asarray((designs.mass - self.mass) * (own + self.others))
+
+
+def shared(groups: Sequence[tuple[Demanded, Designs]], account: Account) -> Array:
+    """Mean over the mission of what a bus of all joints dumps, sample by sample, (D,) [W].
+
+    Args:
+        groups: Each with its D designs: the first of all are one robot, and so on.
+        account: What is counted; the hotel load is on the bus, too.
+    """
+    out = np.zeros(len(groups[0][1]))
+    for k, track in enumerate(groups[0][0].tracks):
+        total = np.full((len(out), len(track.weight), 1), account.hotel)
+        for demanded, designs in groups:
+            own = demanded.tracks[k]
+            torque = own.torque(designs)
+            total[:, :, 0] += own.power(designs, torque).sum(axis=2)
+            total[:, :, 0] += (designs.idle * own.drivers(designs, torque))[:, None]
+        out += track.share * (track.forward(total) - track.forward(total, 1.0))
+    return out
 
 
 def extreme(points: Array) -> Array:

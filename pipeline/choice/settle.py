@@ -17,10 +17,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.energy.regeneration import BUS
 from pipeline.choice.designs import Designs
 from pipeline.choice.doubt import Design
 from pipeline.choice.loads import Load
-from pipeline.choice.search import Account, Demanded, Feedback
+from pipeline.choice.search import Demanded, Feedback, shared
+from pipeline.choice.track import Account
 
 Array = NDArray[np.float64]
 Answer = Mapping[str, Design]
@@ -49,8 +51,8 @@ class Robots:
     account: Account
     drawn: Callable[[Design], Designs]
 
-    def demanded(self, mass: Mapping[str, float]) -> dict[str, Demanded]:
-        """Every group's demand with these masses of one actuator [kg]."""
+    def at(self, mass: Mapping[str, float]) -> list[Load]:
+        """The mission's demand with these masses of one actuator of each group [kg]."""
         loads = []
         for k, load in enumerate(self.loads):
             torque = load.series.torque.copy()
@@ -58,6 +60,11 @@ class Robots:
                 slope = (more[k].series.torque - load.series.torque) / NUDGE
                 torque += (mass[g] - self.mass[g]) * slope
             loads.append(replace(load, series=replace(load.series, torque=torque)))
+        return loads
+
+    def demanded(self, mass: Mapping[str, float]) -> dict[str, Demanded]:
+        """Every group's part of it."""
+        loads = self.at(mass)
         return {g: Demanded.of(g, joints, loads) for g, joints in self.groups.items()}
 
     def cost(self, answer: Answer) -> tuple[float, float]:
@@ -65,6 +72,9 @@ class Robots:
         designs = {g: self.drawn(design) for g, design in answer.items()}
         demanded = self.demanded({g: float(d.mass[0]) for g, d in designs.items()})
         power, use = 0.0, 1.0
+        if self.account.policy == BUS:
+            robots = [(demanded[g], own) for g, own in designs.items()]
+            power += float(shared(robots, self.account)[1:].mean())
         for g, own in designs.items():
             power += float(demanded[g].power(own, self.account)[1:].mean())
             first = own.taken(np.zeros(1, dtype=np.intp))

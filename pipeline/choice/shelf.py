@@ -16,10 +16,11 @@ from typing import Final
 
 import numpy as np
 
-from actuators.errors import DataSheetError
+from actuators.errors import CatalogError, DataSheetError, closest, one_line
 from actuators.loading.converted import converted
 from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
-from actuators.loading.parts import Part, load_parts
+from actuators.loading.parts import DRIVER, Part, load_parts
+from actuators.supply.from_parts import driver_of
 from pipeline.choice.designs import Designs
 from pipeline.choice.errors import ChoiceError
 
@@ -63,24 +64,44 @@ class Shelf:
     Attributes:
         parts: By name.
         numbers: Part to its entries; what it does not print is a range of its class.
+        driver: Name of the part that drives every motor.
+        voltage: Of the supply [V]; None for that of each motor's sheet, as far as the driver goes.
     """
 
     parts: Mapping[str, Part]
     numbers: Mapping[str, Mapping[str, Number]]
+    driver: str
+    voltage: float | None = None
 
     @classmethod
-    def of(cls, parts: Mapping[str, Part]) -> Shelf:
+    def of(
+        cls,
+        parts: Mapping[str, Part],
+        driver: Part | None = None,
+        *,
+        idle: Number | None = None,
+        voltage: float | None = None,
+    ) -> Shelf:
         """The motors, gears and brakes among parts, with ranges of their class.
+
+        Args:
+            parts: By name.
+            driver: Of every motor; the project's own `DRIVER` by default.
+            idle: In place of the driver's own idle power [W].
+            voltage: Of the supply [V].
 
         Raises:
             ChoiceError: A size or a mass is not stated without which no class is comparable.
         """
+        driver = driver or _shipped()[DRIVER]
         known = {**_shipped(), **parts}
-        return cls(parts, {name: _filled(part, known) for name, part in parts.items()})
+        numbers = {name: _filled(part, known) for name, part in parts.items()}
+        numbers[driver.name] = {**driver.printed, **({"idle_power": idle} if idle else {})}
+        return cls({**parts, driver.name: driver}, numbers, driver.name, voltage)
 
     def unknown(self, design: Sequence[str]) -> Iterator[tuple[str, str, Number]]:
         """Part, entry and range of what no sheet of a design prints."""
-        for part in design:
+        for part in (*design, self.driver):
             for entry, number in self.numbers.get(part, {}).items():
                 if number.low < number.high:
                     yield part, entry, number
@@ -127,6 +148,7 @@ class Shelf:
                 for key in (
                     *("torque_constant", "resistance", "voltage", "continuous_current"),
                     *("peak_current", "max_speed", *_OF_MOTORS),
+                    *("bus", "bus_use", "driver_resistance", "switching", "idle"),
                 )
             },
         )
@@ -134,7 +156,7 @@ class Shelf:
     def _converted(self, name: str, drawn: Drawn) -> dict[str, float]:
         """One part's numbers by the names of `Designs`."""
         kind = self.parts[name].kind
-        x = {e: drawn.get((name, e), number.value) for e, number in self.numbers[name].items()}
+        x = self._values(name, drawn)
         out = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0) | {"ratio": 1.0}
         out |= dict.fromkeys(("gear_speed", "gear_continuous", "gear_peak"), np.inf)
         out["mass"] = x.get("mass", 0.0)
@@ -157,18 +179,32 @@ class Shelf:
             out[key] = found[f"motor.{key}"]
         out |= {entry: x[entry] for entry in _OF_MOTORS}
         out["peak_current"] = max(found["motor.peak_current"], out["continuous_current"])
-        return out | {"voltage": found["motor.supply_voltage"]}
+        driver = driver_of(
+            self.driver, self._values(self.driver, drawn), current_of=x["current_of"]
+        )
+        bus = self.voltage or min(x["supply_voltage"], float(driver.most_voltage))
+        for limit in ("continuous_current", "peak_current"):
+            out[limit] = min(out[limit], float(getattr(driver, limit)))
+        for law in ("switching", "idle"):
+            out[law] = float(getattr(driver, law))
+        return out | {
+            "voltage": min(found["motor.supply_voltage"], float(driver.voltage_share) * bus),
+            "driver_resistance": float(driver.resistance),
+            "bus": bus,
+            "bus_use": max(bus / float(driver.most_voltage), float(driver.least_voltage) / bus),
+        }
+
+    def _values(self, name: str, drawn: Drawn) -> dict[str, float]:
+        """One part's entries."""
+        return {e: drawn.get((name, e), x.value) for e, x in self.numbers[name].items()}
 
 
-def combinations(
-    shelf: Shelf, *, brakes: bool = True, voltage: float | None = None
-) -> list[tuple[str, str, str]]:
-    """Every compatible motor, gear and brake.
+def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, str]]:
+    """Every compatible motor, gear and brake; no motor for less than the supply's voltage.
 
     Args:
         shelf: The parts.
         brakes: Whether designs with a brake are among them; a gear that locks needs none.
-        voltage: Of the robot's supply: motors for less are left out [V]; None for any.
 
     Raises:
         ChoiceError: No motor is left.
@@ -182,7 +218,7 @@ def combinations(
     motors = [
         name
         for name in by.get("motor", [])
-        if voltage is None or shelf.numbers[name]["supply_voltage"].value >= 0.999 * voltage
+        if shelf.numbers[name]["supply_voltage"].value >= 0.999 * (shelf.voltage or 0.0)
     ]
     if not motors:
         raise ChoiceError("no motor is left: widen --only, --without, --kind or --voltage")
@@ -195,6 +231,18 @@ def combinations(
             locks = gear and shelf.parts[gear].kind == "self_locking"
             out += [(motor, gear, brake) for brake in (none if locks else held)]
     return out
+
+
+def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:
+    """A part of one kind, of these or the project's own.
+
+    Raises:
+        CatalogError: There is none.
+    """
+    known = {n: part for n, part in ({**_shipped(), **parts}).items() if part.kind == kind}
+    if name not in known:
+        raise CatalogError(f"no {kind} '{one_line(name)}': {closest(name, [*known])}")
+    return known[name]
 
 
 def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:

@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 ANCHOR: Final = "part-"
-_PARTS: Final = ("motor", "gear", "brake", "part")
+_PARTS: Final = ("motor", "gear", "brake", "driver", "battery", "part")
 _LOSSES: Final = {
     "mechanical": "mechanical_W",
     "windings": "winding_W",
     "gears and rotors": "friction_W",
+    "drivers": "driver_W",
     "brakes": "brakes_W",
     "returned and lost": "returned_W",
     "idle and electronics": "idle_W",
@@ -35,6 +36,7 @@ _HEADINGS: Final = {
     "unknowns": "What to measure next",
     "day": "The day, mode by mode",
     "excluded": "What the limits forbid",
+    "reversible_or_not": "Can be driven back, or locks",
     "break_even": "Two candidates by standing, speed and idle power",
 }
 #: Columns that the page leaves to the CSV.

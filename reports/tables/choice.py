@@ -20,9 +20,12 @@ class AnswerRow:
     gear: str = column("part; empty for none or the motor's own")
     ratio: float | None = column("turns of the motor per turn of the joint", "1")
     brake: str = column("part; empty for none")
+    driver: str = column("part")
+    battery: str = column("part; robot only")
     power_W: float = column("mean over the day, recomputed in full", "W")
     energy_Wh_per_day: float = column("out of the supply in a day of the mission", "W*h")
-    battery_h: float | None = column("hours on one charge; robot only", "h")
+    battery_h: float | None = column("hours on one charge in the modes; robot only", "h")
+    battery_kg: float | None = column("mass of the battery; robot only", "kg")
     actuator_mass_kg: float = column("motors, gears and brakes of the group", "kg")
     chance_best: float = column("share of the draws in which nothing is better", "1")
     power_low_W: float = column("exceeded in 95 % of the draws", "W")
@@ -40,7 +43,7 @@ class FrontRow:
     point: int = column("from the least energy to the least mass", "1")
     power_W: float = column("mean over the day", "W")
     energy_Wh_per_day: float = column("out of the supply in a day", "W*h")
-    battery_h: float | None = column("hours on one charge", "h")
+    battery_h: float = column("hours on one charge at the mean power", "h")
     actuator_mass_kg: float = column("all actuators", "kg")
     design: str = column("group: motor + gear + brake, by group")
 
@@ -98,8 +101,9 @@ class DayRow:
     winding_W: float = column("heat of the windings", "W")
     friction_W: float = column("heat of gears and rotors", "W")
     brakes_W: float = column("coils of the brakes", "W")
+    driver_W: float = column("conduction and switching of the drivers", "W")
     returned_W: float = column("flows back and is lost", "W")
-    idle_W: float = column("drivers, and for the robot the hotel load", "W")
+    idle_W: float = column("idle power of drivers, and for the robot the hotel load", "W")
     warming_W: float | None = column(
         "more heat of the windings by their temperature; not in power_W", "W"
     )
@@ -119,6 +123,23 @@ class DayRow:
     gear_continuous_Nm: float | None = column("limit of it", "N*m")
     gear_peak_Nm: float | None = column("at the gear's output", "N*m")
     gear_most_Nm: float | None = column("limit of it", "N*m")
+
+
+@dataclass(frozen=True)
+class SideRow:
+    """The best robot that can be driven back, and the best that locks, with their own masses."""
+
+    table: ClassVar = "reversible_or_not"
+    about: ClassVar = "Locks: by a gear or a brake, at every joint where one is within limits."
+    candidate: str = column("reversible, or irreversible: that locks")
+    moving_W: float = column("mean over the modes in which the robot moves", "W")
+    standing_W: float = column("mean over those in which it stands", "W")
+    power_W: float = column("mean over the day", "W")
+    actuator_mass_kg: float = column("all actuators", "kg")
+    limit_use: float = column("share of the nearest limit, with its own mass; above 1 exceeds", "1")
+    standing_share: float = column("of the mission's time", "1")
+    break_even: float | None = column("share of standing at which both take the same", "1")
+    design: str = column("group: motor + gear + brake, by group")
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from actuators.loading.data_sheet import Entry, read_entry
-from actuators.loading.parts import PARTS
+from actuators.loading.data_sheet import Entry, Number, read_entry
+from actuators.loading.parts import DRIVER, PACK, PARTS
 from pipeline.cli.options import (
     OUT,
     AddVerb,
@@ -24,7 +24,7 @@ DAY = Path(__file__).parents[2] / "choice" / "missions" / "day.csv"
 _NUMBERS = {
     "idle": Entry("power", "of a driver that is on", "0.672 W"),
     "hotel": Entry("power", "of the electronics", "10 W"),
-    "battery": Entry("energy", "when full", "500 Wh"),
+    "battery": Entry("energy", "when full, in place of the pack's", "500 Wh"),
     "voltage": Entry("voltage", "of the supply", "48 V"),
     "present": Entry("mass", "of an actuator that the bodies hold already", "0.48 kg"),
 }
@@ -55,16 +55,18 @@ def add_verb(add: AddVerb) -> None:
         help="joints that are built alike; by default those alike in all legs",
     )
     for name, entry in _NUMBERS.items():
-        usual = "0.672 W" if name == "idle" else "531 Wh" if name == "battery" else None
+        usual = "0.672 W" if name == "idle" else None
         sub.add_argument(
             f"--{name}",
             default=usual,
             metavar="NUMBER",
             help=f"{entry.kind} {entry.words}, such as '{entry.example}'",
         )
-    sub.add_argument(
-        "--regeneration", default="none", metavar="POLICY", help="none, or a fraction used again"
-    )
+    for word, usual in (("driver", DRIVER), ("pack", PACK)):
+        text = f"part that is the {'battery' if word == 'pack' else word}; {usual}"
+        sub.add_argument(f"--{word}", default=usual, metavar="NAME", help=text)
+    text = "none, bus, or a fraction of returned energy that is used again"
+    sub.add_argument("--regeneration", default="none", metavar="POLICY", help=text)
     sub.add_argument(
         "--compare",
         nargs=2,
@@ -84,21 +86,17 @@ def run_choose(options: argparse.Namespace) -> int:
     with folder_held(options), Progress("choose") as progress:
         progress.step("loading")
         from pipeline.api.machine import load
-        from pipeline.choice.choose import Wanted
+        from pipeline.choice.answer.result import choice
         from pipeline.choice.errors import ChoiceError
-        from pipeline.choice.result import choice
-        from pipeline.choice.search import Account
+        from pipeline.choice.track import Account
+        from pipeline.choice.wanted import Wanted
         from pipeline.simulation.settings import regeneration_of
 
         policy = regeneration_of(options.regeneration)
-        if policy.policy == "bus":
-            raise ChoiceError(
-                "--regeneration bus: groups would share it and could not be searched apart; "
-                "expected none or a fraction"
-            )
         if options.draws < 8:
             raise ChoiceError(f"--draws {options.draws}: at least 8")
         numbers = {name: _number(name, getattr(options, name)) for name in _NUMBERS}
+        value = {name: None if x is None else x.value for name, x in numbers.items()}
         machine = load(
             options.robot,
             model=options.model,
@@ -111,12 +109,15 @@ def run_choose(options: argparse.Namespace) -> int:
             kinds=tuple(options.kind),
             only=tuple(options.only),
             without=tuple(options.without),
-            voltage=numbers["voltage"],
+            voltage=value["voltage"],
+            driver=options.driver,
+            idle=numbers["idle"],
             brakes=not options.no_brakes,
             groups=tuple(options.group),
-            account=Account(numbers["idle"] or 0.0, numbers["hotel"] or 0.0, policy.fraction),
-            battery=numbers["battery"],
-            present=numbers["present"],
+            account=Account(value["hotel"] or 0.0, policy.policy, policy.fraction),
+            pack=options.pack,
+            battery=value["battery"],
+            present=value["present"],
             draws=options.draws,
         )
         result = choice(
@@ -134,11 +135,10 @@ def run_choose(options: argparse.Namespace) -> int:
     return 0
 
 
-def _number(name: str, words: str | None) -> float | None:
-    """An option with its unit, SI, energy in watt hours."""
+def _number(name: str, words: str | None) -> Number | None:
+    """An option with its unit, SI."""
     if words is None:
         return None
     if words.strip() in ("0", "0 W"):
-        return 0.0
-    value = read_entry(name, words, _NUMBERS).value
-    return value / 3600.0 if name == "battery" else value
+        return Number(0.0, 0.0, 0.0, "W", "0")
+    return read_entry(name, words, _NUMBERS)

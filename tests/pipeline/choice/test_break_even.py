@@ -6,7 +6,7 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import CatalogError
-from pipeline.choice.break_even import rows
+from pipeline.choice.answer.break_even import rows
 from pipeline.choice.errors import ChoiceError
 from pipeline.paper.omissions.omissions import idle_break_even
 from pipeline.paper.published import PAIR

@@ -7,11 +7,12 @@ from pathlib import Path
 import pytest
 
 import pipeline as lw
-from pipeline.choice.choose import Wanted, choose
+from pipeline.choice.answer.tables import tables_of
+from pipeline.choice.choose import choose
 from pipeline.choice.errors import ChoiceError, MissionError
 from pipeline.choice.loads import loads_of
 from pipeline.choice.mission import read_mission
-from pipeline.choice.tables import tables_of
+from pipeline.choice.wanted import Wanted
 from pipeline.errors import StanceError
 
 WRONG = {
@@ -84,5 +85,6 @@ def test_answer_of_few_parts_is_within_limits_in_full(tmp_path: Path) -> None:
     parts = day[day.group != "robot"]
     assert parts.energy_Wh.sum() == pytest.approx(robot.energy_Wh_per_day)
     kinds = ["mechanical_W", "winding_W", "friction_W", "brakes_W", "idle_W", "returned_W"]
+    kinds += ["driver_W"]
     # Over a cycle no kinetic energy is left.
     assert day[kinds].sum(axis=1).tolist() == pytest.approx(day.power_W.tolist(), rel=0.01)

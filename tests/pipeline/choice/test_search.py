@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.energy.limits import limit_rows
-from actuators.energy.regeneration import supply
-from actuators.loading.parts import load_parts
-from pipeline.choice.designs import Designs
+from actuators.loading.data_sheet import read_entry
+from actuators.loading.parts import KINDS, load_parts
 from pipeline.choice.group import front, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import read_mission
-from pipeline.choice.search import Account, Demanded
+from pipeline.choice.search import Demanded
 from pipeline.choice.shelf import Shelf, combinations
+from pipeline.choice.track import Account
+from tests.pipeline.choice.brute import in_full
 
-ACCOUNT = Account(idle=0.672)
+ACCOUNT = Account()
 MISSION = """mode,share,gait,hold,drivers,payload
 walk,0.3,,,,
 loaded,0.1,,,,2 kg
@@ -44,26 +44,8 @@ def shelf() -> Shelf:
         *("hd_csg_17_80", "hd_csg_25_100", "maxon_gp_62_a_100", "maxon_gp_42_hd_74"),
         *("hpc_m1_40", "hpc_m1_120", "mitsubishi_hc_mf_053b_13b"),
     ]
-    return Shelf.of({name: parts[name] for name in names})
-
-
-def in_full(designs: Designs, i: int, demanded: Demanded, account: Account) -> tuple[float, bool]:
-    """One design through its chain: mean power, and whether its motor is within limits."""
-    power, fits = 0.0, True
-    for track in demanded.tracks:
-        mode = track.load.mode
-        engaged = not mode.stands or mode.hold == "brake"
-        result = designs.chain(i, engaged=engaged).moving(track.series)
-        spent = supply(result).supplied_energy.sum() / track.load.duration
-        idle = not mode.drivers and designs.locks(engaged)[i]
-        on = (result.current != 0).any(axis=0).sum() if idle else len(demanded.joints)
-        power += track.share * (spent + account.idle * on)
-        fits &= not any(row.breach for row in limit_rows(result))
-        torque = result.joint.torque
-        fits &= np.abs(torque).max() <= designs.gear_peak[i]
-        fits &= np.sqrt((track.weight @ torque**2).max()) <= designs.gear_continuous[i]
-        fits &= np.abs(result.motor.velocity).max() <= designs.gear_speed[i]
-    return power, bool(fits)
+    idle = read_entry("idle_power", "0.672 W", KINDS["driver"])
+    return Shelf.of({name: parts[name] for name in names}, idle=idle)
 
 
 @pytest.mark.parametrize("which", ["2", "3"])
@@ -74,7 +56,7 @@ def test_ten_best_are_those_of_brute_force(
     demanded = Demanded.of(which, joints, loads)
     designs = shelf.designs(combinations(shelf))
     found = search(demanded, designs, ACCOUNT)
-    full = [in_full(designs, i, demanded, ACCOUNT) for i in range(len(designs))]
+    full = [in_full(designs, i, demanded) for i in range(len(designs))]
     fits = np.array([ok for _, ok in full])
     assert set(np.flatnonzero(fits)) == set(found.within)
     assert len(found.within) >= 10
@@ -90,9 +72,12 @@ def test_bound_is_below_and_net_where_all_is_used_again(
     joints = [joint for joint in loads[0].series.joints if joint.endswith("3")]
     demanded = Demanded.of("knee", joints, loads)
     designs = shelf.designs(combinations(shelf))
-    net = demanded.net(designs, ACCOUNT)
+    net = demanded.net(designs)
+    assert np.all(net <= demanded.power(designs, Account(policy="bus")) + 1e-9)
     assert np.all(net <= demanded.power(designs, ACCOUNT) + 1e-9)
-    assert np.allclose(net, demanded.power(designs, replace(ACCOUNT, recovered=1.0)), rtol=1e-9)
+    still = replace(designs, switching=np.zeros(len(designs)))
+    net = demanded.net(still)
+    assert np.allclose(net, demanded.power(still, Account(policy="bus")), rtol=1e-9)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
@@ -115,7 +100,7 @@ def test_best_ratio_is_that_of_roos(loads: tuple[Load, ...], friction: float) ->
         **{"ratio": ratios, "inertia": zero + inertia},
         **{"load": zero + friction, "coulomb": zero, "viscous": zero},
     )
-    net = demanded.net(designs, Account())
+    net = demanded.net(replace(designs, switching=zero))
     k1 = float(track.weight @ track.series.acceleration[:, 0] ** 2)
     tau, s = track.series.torque[:, 0], track.series.direction[:, 0]
     k2 = float(track.weight @ (tau + friction * np.abs(tau) * s) ** 2)

@@ -7,16 +7,17 @@ import pytest
 
 import pipeline as lw
 from actuators.elements.two_body import REFERENCE_K
-from actuators.loading.parts import load_parts
+from actuators.loading.parts import PACK, load_parts
 from pipeline.choice import heat
 from pipeline.choice.choose import _Asked
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.group import groups_of
 from pipeline.choice.loads import loads_of
 from pipeline.choice.mission import read_mission
-from pipeline.choice.search import Account, Demanded
+from pipeline.choice.search import Demanded
 from pipeline.choice.settle import Robots
 from pipeline.choice.shelf import Shelf, combinations
+from pipeline.choice.track import Account
 
 PARTS = (
     *("maxon_148867", "maxon_402687", "faulhaber_4221g024bxth", "maxon_496655"),
@@ -32,7 +33,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> _Asked:
     known = load_parts()
     shelf = Shelf.of({name: known[name] for name in PARTS})
     groups = groups_of(machine.ready.robot.spec)
-    return _Asked(machine, read_mission(path), groups, shelf, Account(0.672), 0.0)
+    return _Asked(machine, read_mission(path), groups, shelf, Account(), 0.0, known[PACK])
 
 
 @pytest.fixture(scope="module")

@@ -44,6 +44,25 @@ def test_answer_of_few_parts_balances_and_names_them(
     assert (out / "index.html").exists()
 
 
+def test_what_locks_is_held_against_what_does_not_on_a_shared_bus(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    day = written(tmp_path, "mode,share,gait,drivers\nwalk,0.1,,\nwait,0.9,stand,off\n")
+    out = tmp_path / "out"
+    options = ["--only", "hpc_m1", "--regeneration", "bus", "--idle", "4 W", "--voltage", "24 V"]
+    assert main(["choose", "--mission", day, "--out", str(out), *FEW, *QUICK, *options]) == 0
+    both = pd.read_csv(out / "reversible_or_not.csv").set_index("candidate")
+    even = both.break_even["reversible"]
+    power = (1.0 - even) * both.moving_W + even * both.standing_W
+    assert power["reversible"] == pytest.approx(power["irreversible"])
+    assert both.standing_W["irreversible"] < both.standing_W["reversible"]
+    assert f"takes less above {100 * even:.3g} % of standing" in capsys.readouterr().out
+    modes = pd.read_csv(out / "day.csv").set_index(["mode", "group"])
+    walk = modes.loc["walk"]
+    own = walk.drop("robot").power_W.sum()  # as if the bus used all that each group returns
+    assert walk.power_W["robot"] == pytest.approx(own + walk.returned_W["robot"])
+
+
 def test_own_motion_is_a_mode(tmp_path: Path) -> None:
     """A leg on a stand that swings; its power is the sum of its groups."""
     robot = load("urdf/leg.toml").ready.robot.spec
@@ -68,7 +87,9 @@ def test_own_motion_is_a_mode(tmp_path: Path) -> None:
         (["--kind", "strain"], "strain_wave"),
         (["--compare", "answer", "irreversibel"], "irreversible"),
         (["--draws", "1"], "at least 8"),
-        (["--regeneration", "bus"], "groups would share it"),
+        (["--regeneration", "buss"], "expected none, bus or a fraction"),
+        (["--driver", "moteus_x2"], "moteus_x1"),
+        (["--pack", "moteus_x1"], "no battery 'moteus_x1'"),
         (["--idle", "2 V"], "idle"),
     ],
 )

@@ -8,18 +8,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.chain import ChainResult
 from actuators.energy.energy import integral
-from actuators.energy.regeneration import supply
 from actuators.loading.build import WINDING
 from actuators.units import from_si
 from pipeline.choice import heat
+from pipeline.choice.answer.full import Full, lasting
 from pipeline.choice.choose import Chosen
 from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
 from pipeline.choice.search import Demanded
 from reports.table import Table, table_of
-from reports.tables.choice import AnswerRow, BestRow, DayRow, ExcludedRow, FrontRow, UnknownRow
+from reports.tables.choice import (
+    AnswerRow,
+    BestRow,
+    DayRow,
+    ExcludedRow,
+    FrontRow,
+    UnknownRow,
+)
 
 Array = NDArray[np.float64]
 ROBOT = "robot"
@@ -58,9 +64,12 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
                 gear=gear,
                 ratio=float(design.ratio[0]),
                 brake=brake,
+                driver=chosen.shelf.driver,
+                battery="",
                 power_W=power,
                 energy_Wh_per_day=power * chosen.hours,
                 battery_h=None,
+                battery_kg=None,
                 actuator_mass_kg=float(design.mass[0]) * joints,
                 chance_best=float(doubt.chance[0]),
                 power_low_W=float(low),
@@ -70,33 +79,39 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
                 not_printed=chosen.shelf.not_printed(chosen.answer[group]),
             )
         )
-    hotel = chosen.wanted.account.hotel
+    return [*rows, _robot_row(chosen, rows, day)]
+
+
+def _robot_row(chosen: Chosen, rows: Sequence[AnswerRow], day: Sequence[DayRow]) -> AnswerRow:
+    # A bus dumps what all joints return at once; by itself a group's counts as used.
+    whole = sum(row.energy_Wh for row in day if row.group == ROBOT) / chosen.hours
+    more = whole - sum(row.power_W for row in rows)
     totals = {
         name: sum(getattr(row, name) for row in rows)
         for name in ("joints", "actuator_mass_kg", "regret_W")
     }
     powers = {
-        name: hotel + sum(getattr(row, name) for row in rows)
+        name: more + sum(getattr(row, name) for row in rows)
         for name in ("power_W", "power_low_W", "power_high_W", "searched_power_W")
     }
     energy = powers["power_W"] * chosen.hours
-    hours = chosen.battery_hours(powers["power_W"])
-    rows.append(
-        AnswerRow(
-            group=ROBOT,
-            motor="",
-            gear="",
-            ratio=None,
-            brake="",
-            energy_Wh_per_day=energy,
-            battery_h=hours,
-            chance_best=float(np.prod([row.chance_best for row in rows])),
-            not_printed="",
-            **totals,
-            **powers,
-        )
+    hours = lasting(chosen.battery, chosen.day, chosen.least_voltage)
+    return AnswerRow(
+        group=ROBOT,
+        motor="",
+        gear="",
+        ratio=None,
+        brake="",
+        driver="",
+        battery=chosen.battery.name,
+        energy_Wh_per_day=energy,
+        battery_h=hours,
+        battery_kg=chosen.battery.mass,
+        chance_best=float(np.prod([row.chance_best for row in rows])),
+        not_printed="",
+        **totals,
+        **powers,
     )
-    return rows
 
 
 def words(design: tuple[str, str, str]) -> str:
@@ -109,14 +124,15 @@ def front_rows(chosen: Chosen) -> list[FrontRow]:
     power, mass, taken = chosen.robots()
     groups = list(chosen.found.items())
     rows = []
+    lasts = chosen.battery.hours(power[:, None], np.ones(1))
     for k, (p, m, which) in enumerate(zip(power, mass, taken, strict=True), start=1):
         names = [
             f"{group}: {words(found.designs.parts[found.looked[found.front[i]]])}"
             for (group, found), i in zip(groups, which, strict=True)
         ]
         own = float(p)
-        hours = chosen.battery_hours(own)
-        rows.append(FrontRow(k, own, own * chosen.hours, hours, float(m), "; ".join(names)))
+        energy, hours = own * chosen.hours, float(lasts[k - 1])
+        rows.append(FrontRow(k, own, energy, hours, float(m), "; ".join(names)))
     return rows
 
 
@@ -160,16 +176,22 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
 
 def _losses(demanded: Demanded, designs: Designs, power: Array) -> dict[str, Array]:
     """Where the power of designs goes, mean over the mission, by kind (D,) [W]."""
-    out = {name: np.zeros(len(designs)) for name in ("windings", "friction and returns", "brakes")}
+    kinds = ("windings", "drivers", "brakes", "friction and returns")
+    out = {name: np.zeros(len(designs)) for name in kinds}
     for track in demanded.tracks:
         torque = track.torque(designs)
-        heat = (designs.resistance / designs.torque_constant**2)[:, None, None] * torque**2
-        copper = track.share * np.einsum("dnj,n->d", heat, track.weight)
+        current = torque / designs.torque_constant[:, None, None]
+        square = np.einsum("dnj,n->d", current**2, track.weight)
+        mean = np.einsum("dnj,n->d", np.abs(current), track.weight)
+        copper = track.share * designs.resistance * square
+        driver = designs.driver_resistance * square + designs.switching * designs.bus * mean
+        driver = track.share * (driver + designs.idle * track.drivers(designs, torque))
         held = np.einsum("nj,n->", (~track.rest | (not track.engaged)) * 1.0, track.weight)
         brakes = track.share * designs.brake_power * held
         out["windings"] += copper
+        out["drivers"] += driver
         out["brakes"] += brakes
-        out["friction and returns"] -= copper + brakes
+        out["friction and returns"] -= copper + driver + brakes
     out["friction and returns"] += power
     return out
 
@@ -192,24 +214,19 @@ def excluded_rows(chosen: Chosen) -> Iterator[ExcludedRow]:
 
 def day_rows(chosen: Chosen) -> Iterator[DayRow]:
     """Every mode at every group through the full chains, and the robot's."""
-    account = chosen.wanted.account
-    full = [(load, *chosen.full(load)) for load in chosen.loads]
-    total = sum(
-        load.mode.hours * (float(power.sum()) + account.hotel) for load, _, power, _ in full
-    )
-    warm = {group: _warm(chosen, group, full) for group in chosen.found}
-    for k, (load, result, power, on) in enumerate(full):
+    total = sum(full.load.mode.hours * full.total for full in chosen.day)
+    warm = {group: _warm(chosen, group) for group in chosen.found}
+    for k, full in enumerate(chosen.day):
+        load, result = full.load, full.result
         joints, time = load.series.joints, load.series.time
         means: dict[str, Array] = {
             "mechanical_W": integral(time, result.joint.power) / load.duration,
             "winding_W": integral(time, result.losses[WINDING]) / load.duration,
             "friction_W": np.zeros(len(joints)),
             "brakes_W": np.zeros(len(joints)),
-            "returned_W": supply(
-                result, "fraction" if account.recovered else "none", account.recovered
-            ).dumped_energy
-            / load.duration,
-            "idle_W": account.idle * on,
+            "driver_W": full.driver,
+            "returned_W": full.dumped,
+            "idle_W": full.idle,
         }
         for name, loss in result.losses.items():
             if name != WINDING:
@@ -219,28 +236,27 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
             at = [joints.index(joint) for joint in found.demanded.joints]
             sums = {name: float(mean[at].sum()) for name, mean in means.items()}
             limits = _limits(chosen, load, group) | warm[group][k]
-            yield _day_row(load, group, float(power[at].sum()), total, sums, None, limits)
+            yield _day_row(load, group, float(full.power[at].sum()), total, sums, None, limits)
         sums = {name: float(mean.sum()) for name, mean in means.items()}
-        sums["idle_W"] += account.hotel
-        own = float(power.sum()) + account.hotel
-        transport = own / (load.weight * load.speed) if load.speed else None
-        yield _day_row(load, ROBOT, own, total, sums, transport, {})
+        sums["idle_W"] += chosen.wanted.account.hotel
+        sums["returned_W"] = full.lost
+        transport = full.total / (load.weight * load.speed) if load.speed else None
+        yield _day_row(load, ROBOT, full.total, total, sums, transport, {})
 
 
-def _warm(
-    chosen: Chosen, group: str, full: Sequence[tuple[Load, ChainResult, Array, Array]]
-) -> list[dict[str, float | None]]:
+def _warm(chosen: Chosen, group: str) -> list[dict[str, float | None]]:
     """Temperature of a group's windings in every mode, through the full chains."""
-    at = [full[0][0].series.joints.index(j) for j in chosen.found[group].demanded.joints]
+    day: list[Full] = chosen.day
+    at = [day[0].load.series.joints.index(j) for j in chosen.found[group].demanded.joints]
     copper = np.stack(
         [
-            integral(load.series.time, result.losses[WINDING])[at] / load.duration
-            for load, result, _, _ in full
+            integral(full.load.series.time, full.result.losses[WINDING])[at] / full.load.duration
+            for full in day
         ],
         axis=1,
     )
     design = chosen.designs(group)
-    found = heat.day(design, [load.mode.hours for load, *_ in full], copper)
+    found = heat.day(design, [full.load.mode.hours for full in day], copper)
     more = (copper * (found.resistance - 1.0)).sum(axis=0)
     peak, limit = (x - ZERO_CELSIUS for x in (found.peak.max(), design.winding_limit[0]))
     return [
@@ -250,7 +266,7 @@ def _warm(
             "winding_peak_degC": float(peak),
             "winding_limit_degC": float(limit),
         }
-        for k in range(len(full))
+        for k in range(len(day))
     ]
 
 

@@ -20,16 +20,17 @@ from numpy.typing import NDArray
 
 from actuators.energy.regeneration import supply
 from actuators.errors import CatalogError, closest
-from pipeline.choice.choose import Chosen, through
+from pipeline.choice.answer.full import through
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
-from pipeline.choice.search import Account
+from pipeline.choice.track import Account
 from pipeline.machine.drivetrains import Actuators
 from reports.tables.choice import BreakEvenRow
 
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
+    from pipeline.choice.choose import Chosen
 
 Array = NDArray[np.float64]
 #: The candidate that the search chose, among the names of alternatives.
@@ -148,9 +149,17 @@ def cost(
         CatalogError: No such alternative.
     """
     if name == ANSWER and chosen is not None:
-        built = {g: (f.demanded.joints, chosen.designs(g)) for g, f in chosen.found.items()}
-        _, power, on = through(load, built, Account())
-        return Cost(float(power[counted].sum()), float(on[counted].sum()))
+        # As alternatives have none of a driver's conduction and switching, here neither has it.
+        built = {
+            g: (
+                f.demanded.joints,
+                replace(chosen.designs(g), driver_resistance=np.zeros(1), switching=np.zeros(1)),
+            )
+            for g, f in chosen.found.items()
+        }
+        full = through(load, built, Account())
+        bare = full.power - full.idle
+        return Cost(float(bare[counted].sum()), float(full.on[counted].sum()))
     known_candidate(machine, name)
     chain = machine.ready.chain(name)
     result = chain.moving(load.series)

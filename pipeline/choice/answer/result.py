@@ -7,17 +7,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import pandas as pd
+
 from actuators.loading.parts import load_parts
+from actuators.supply.battery import HOUR
 from pipeline.api.result import Result, by_name
 from pipeline.api.tables import inputs_of, metadata
-from pipeline.choice.break_even import known_candidate, rows
-from pipeline.choice.choose import Chosen, Wanted, choose
+from pipeline.choice.answer.break_even import known_candidate, rows
+from pipeline.choice.answer.sides import side_rows
+from pipeline.choice.answer.tables import ROBOT, tables_of, words
+from pipeline.choice.choose import Chosen, choose
 from pipeline.choice.mission import read_mission
-from pipeline.choice.tables import ROBOT, tables_of, words
+from pipeline.choice.wanted import Wanted
 from pipeline.progress import Progress
 from reports.pages.choice_page import PartSource, write_choice_page
 from reports.table import table_of
-from reports.tables.choice import BreakEvenRow
+from reports.tables.choice import BreakEvenRow, SideRow
 
 if TYPE_CHECKING:
     from pipeline.api.machine import Machine
@@ -47,13 +52,12 @@ class Choice(Result):
         rows = {row["group"]: row for row in self.table("answer").frame().to_dict("records")}
         robot = rows.pop(ROBOT)
         found = next(iter(self.chosen.found.values()))
-        battery = ""
-        if self.chosen.wanted.battery:
-            battery = f", {robot['battery_h']:.3g} h on {self.chosen.wanted.battery:.4g} Wh"
+        battery = self.chosen.battery
+        lasts = f"{robot['battery_h']:.3g} h on {battery.energy / HOUR:.4g} Wh of {battery.name}"
         first = (
             f"{self.chosen.machine.ready.robot.spec.name}: {robot['power_W']:.4g} W "
             f"({robot['power_low_W']:.3g} to {robot['power_high_W']:.3g}), "
-            f"{robot['energy_Wh_per_day']:.4g} Wh a day{battery}, "
+            f"{robot['energy_Wh_per_day']:.4g} Wh a day, {lasts}, "
             f"{robot['actuator_mass_kg']:.3g} kg of actuators; {len(found.designs)} designs a group"
         )
         each = [
@@ -71,7 +75,19 @@ class Choice(Result):
                 f"{top['high']:.3g} {top['unit']}): worth {top['worth_W']:.2g} W of the expected "
                 f"regret of {robot['regret_W']:.2g} W"
             )
-        return [first, "; ".join(each), last]
+        return [first, "; ".join(each), last + self._even]
+
+    @property
+    def _even(self) -> str:
+        """From which share of standing on the best that locks takes less."""
+        if "reversible_or_not" not in self.tables:
+            return ""
+        back, locks = self.table("reversible_or_not").frame().to_dict("records")
+        if pd.isna(even := back["break_even"]):
+            less = "less" if locks["power_W"] < back["power_W"] else "more"
+            return f"; the day's best that locks takes {less} at any share of standing"
+        side = "above" if locks["standing_W"] < back["standing_W"] else "below"
+        return f"; the day's best that locks takes less {side} {100 * even:.3g} % of standing"
 
 
 def choice(
@@ -104,8 +120,10 @@ def choice(
         known_candidate(machine, name)  # before the search: nothing is lost by a misspelt name
     chosen = choose(machine, read_mission(path), wanted, progress)
     tables = tables_of(chosen)
+    if sides := side_rows(chosen):
+        tables.append(table_of(SideRow, sides))
     if compare:
-        idle = wanted.account.idle
+        idle = chosen.shelf.numbers[chosen.shelf.driver]["idle_power"].value
         found = rows(machine, compare, idle=idle, chosen=chosen, joints=compare_joints)
         tables.append(table_of(BreakEvenRow, list(found)))
     given = machine.ready

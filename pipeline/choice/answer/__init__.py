@@ -1,0 +1,1 @@
+"""What a choice tells: full chains, tables, lines, break-even."""
