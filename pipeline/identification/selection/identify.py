@@ -258,7 +258,12 @@ def _found(judged: Judgement, channel: str) -> Iterator[Found]:
             present = replace(present, terms=(*present.terms, (number, used)))
         after = _errors(search, present)
         joints = _joints(judged, number)
-        certain = number is None or sized[number].certain
+        # A curve's coordinates stand in for each other: each may be nothing, not all of them.
+        certain = (
+            number is None
+            or sized[number].certain
+            or not judged.settled.pool.terms[number].effect.has_law
+        )
         level, reason = _level(judged, number, rivals[number], joints, certain)
         open_ = tuple(r.key for r in rivals[number] if r.key is not None and not r.excluded)
         a = None if number is None else problem.accepted[number]
@@ -295,7 +300,7 @@ def _level(
     left, before = (_rms(_errors(search, x), joints) for x in (state, less))
     if nothing.sure < limits.SURE and left > before:
         return limits.SUSPECTED, limits.IDLE_NAME
-    if nothing.behind <= 0.0 or (nothing.sure < limits.SURE and not certain):
+    if nothing.behind <= 0.0 or not certain:
         return limits.SUSPECTED, limits.NOTHING
     open_ = [r for r in others if not r.excluded]
     if open_:
