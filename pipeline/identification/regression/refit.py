@@ -13,7 +13,7 @@ from pipeline.logs.prepared.measurement import CHOOSE, FIT
 
 Array = NDArray[np.float64]
 #: Times the columns are computed, at most, and steps that are made with the same.
-_COLUMNS, _STEPS = 3, 6
+_COLUMNS, _STEPS = 3, 8
 #: Rise of twice the logarithm of the likelihood that is none.
 _NOTHING = 0.1
 #: Damping, relative to the matrix's diagonal: where a step fails; above it columns are renewed.
@@ -49,9 +49,11 @@ def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
             if damping > _MOST_DAMPED:
                 break
             continue
-        gain, problem, cost, damping = cost - reached, after, reached, 0.1 * damping
-        if gain < _NOTHING:
+        gain, problem, cost = cost - reached, after, reached
+        if gain < _NOTHING and not damping:
             break
+        # Damping holds back what the log tells least of: the last step is without.
+        damping = 0.0 if gain < _NOTHING else 0.1 * damping
     return problem, cost
 
 
