@@ -314,8 +314,12 @@ class Search:
         return self.valid(State(kept, uncertainty))
 
     def climbed(self, state: State, uncertainties: Sequence[float]) -> State:
-        """The best state that steps of one name reach; couplings bring a shaft and come last."""
-        self._open = np.array([t.effect.place_kind != "joint pair" for t in self.pool.terms])
+        """The best state that steps of one name reach.
+
+        Couplings, which bring a shaft, and curves, which hold several laws, come last.
+        """
+        simple = [t.effect.place_kind != "joint pair" and t.effect.has_law for t in self.pool.terms]
+        self._open = np.array(simple, dtype=np.bool_)
         state = self._climbed(state, uncertainties)
         self._open[:] = True
         return self._climbed(state, uncertainties)
