@@ -33,6 +33,7 @@ class Made:
     place_kind: str = "joint"
     fixed: tuple[str, ...] = ()
     lowest: float = -np.inf
+    has_law: bool = True
 
     def plausible(self, model: Any, place: Any, x: dict[str, float], shape: Any) -> bool:
         """Whether no coordinate lies below what can be."""
@@ -91,7 +92,7 @@ class Log:
             tolerances=self.tolerances,
             precision=np.ones(len(self.tolerances)),
             sigma=np.ones((len(self.X), 1)),
-            model=None,
+            model=SimpleNamespace(joints=("joint_1", "joint_2")),
             accepted=(),
             uncertainty=UNCERTAINTIES[0],
         )
@@ -284,6 +285,7 @@ def test_a_block_is_judged_by_estimates_from_other_blocks() -> None:
                 w**2 * np.sum((r[own] - estimate @ x[columns][:, own]) ** 2)
                 for x, r, w in zip(log.X, log.r, root, strict=True)
             )
+            expected[k] += estimate @ prior @ estimate / BLOCKS
     np.testing.assert_allclose(search.block_losses(state), expected, rtol=1e-6)
 
 
