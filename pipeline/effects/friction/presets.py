@@ -14,6 +14,7 @@ from pipeline.machine.machine import MachineModel
 
 _STRIBECK_SPEEDS = (0.012, 0.025, 0.05, 0.1, 0.2, 0.4)  # [rad/s]
 _LARGEST_STRIBECK_SPEED = 0.5  # [rad/s]
+_LARGEST_EXCESS = 3.0  # of break-away over Coulomb friction, in Coulomb friction
 
 
 class FrictionPreset(Effect):
@@ -84,9 +85,10 @@ class StribeckFriction(FrictionPreset):
         return [{"velocity": s} for s in _STRIBECK_SPEEDS if slowest <= s <= 0.6 * fastest]
 
     def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
-        """Slow enough to be a Stribeck speed."""
+        """Slow enough to be a Stribeck speed, break-away at most four times Coulomb's level."""
         slow = shape["velocity"] < _LARGEST_STRIBECK_SPEED
-        return slow and super().plausible(model, place, x, shape)
+        small = x["excess"] <= _LARGEST_EXCESS * x["coulomb"]
+        return slow and small and super().plausible(model, place, x, shape)
 
 
 class LoadDependentFriction(FrictionPreset):

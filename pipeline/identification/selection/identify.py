@@ -92,16 +92,9 @@ def identify(
         ModelError: Model and logs do not fit.
     """
     start = Problem(model, make_benches(measurements), floor_of(measurements))
-    settled, idle = settle(start, progress), frozenset[Key]()
     channel = measurements[0].channels[0]
-    for left in reversed(range(_RENEWED + 1)):
-        judged = Judgement(settled)
-        found = tuple(_found(judged, channel))
-        more = {_key(f) for f in found if f.level == limits.SUSPECTED}
-        if not more or not left:
-            break
-        idle |= more
-        settled = settle_without(settled, idle)
+    judged, found = _best_judged(settle(start, progress), channel)
+    settled = judged.settled
     naming = Naming(
         found=found,
         candidates=tuple(_candidates(judged, found)),
@@ -112,6 +105,30 @@ def identify(
         notes=tuple(judged.notes()),
     )
     return Identified(naming, settled)
+
+
+def _best_judged(settled: Settled, channel: str) -> tuple[Judgement, tuple[Found, ...]]:
+    """The names with how sure each is, of the answer whose sure names predict best.
+
+    Names that are suspected are closed and the others compete anew; what that leads to is taken
+    only where it predicts blocks it has not seen better, by the names that would be written.
+    """
+    weights, idle = settled.search.weights, frozenset[Key]()
+    best: tuple[float, Judgement, tuple[Found, ...]] | None = None
+    for left in reversed(range(_RENEWED + 1)):
+        judged = Judgement(settled)
+        found = tuple(_found(judged, channel))
+        more = frozenset(_key(f) for f in found if f.level == limits.SUSPECTED)
+        search = Search(settled.pool, weights, more)
+        loss = float(search.block_losses(search.left(settled.state)).sum())
+        if best is None or loss < best[0]:
+            best = loss, judged, found
+        if not more or not left:
+            break
+        idle |= more
+        settled = settle_without(settled, idle)
+    assert best is not None
+    return best[1], best[2]
 
 
 def _key(f: Found) -> Key:
