@@ -313,13 +313,22 @@ class Search:
         uncertainty = min(state.uncertainty, self.uncertainties[-1])
         return self.valid(State(kept, uncertainty))
 
-    def climbed(self, state: State, uncertainties: Sequence[float]) -> State:
+    def climbed(
+        self, state: State, uncertainties: Sequence[float], laws_first: bool = False
+    ) -> State:
         """The best state that steps of one name reach.
 
-        Couplings, which bring a shaft, and curves, which hold several laws, come last.
+        Couplings, which bring a shaft, come last.
+
+        Args:
+            state: To start from.
+            uncertainties: Of the URDF's bodies, to try.
+            laws_first: Whether curves, which hold several laws, come last, too.
         """
-        simple = [t.effect.place_kind != "joint pair" and t.effect.has_law for t in self.pool.terms]
-        self._open = np.array(simple, dtype=np.bool_)
+        terms = self.pool.terms
+        simple = [t.effect.place_kind != "joint pair" for t in terms]
+        laws = [t.effect.has_law or not laws_first for t in terms]
+        self._open = np.array(simple, dtype=np.bool_) & np.array(laws, dtype=np.bool_)
         state = self._climbed(state, uncertainties)
         self._open[:] = True
         return self._climbed(state, uncertainties)

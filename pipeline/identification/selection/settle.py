@@ -81,13 +81,18 @@ def settle(problem: Problem, progress: Progress | None = None) -> Settled:
 
 
 def _starts(search: Search) -> Iterator[State]:
-    """Answers about the files' model, from bodies that are known to bodies that may be anything."""
-    for u in UNCERTAINTIES[::2]:
-        held = search.climbed(State((), u), ())
-        state = search.climbed(held, UNCERTAINTIES)
-        yield State(tuple(sorted(state.terms)), state.uncertainty)
-        if u == UNCERTAINTIES[0]:
-            yield State(tuple(sorted(held.terms)), held.uncertainty)
+    """Answers about the files' model, from bodies that are known to bodies that may be anything.
+
+    By laws first, and with curves from the start: one name of a curve stands in the way of several
+    laws, and a law far from the machine's in the way of a curve.
+    """
+    for laws_first in (True, False):
+        for u in UNCERTAINTIES[::2]:
+            held = search.climbed(State((), u), (), laws_first)
+            state = search.climbed(held, UNCERTAINTIES, laws_first)
+            yield State(tuple(sorted(state.terms)), state.uncertainty)
+            if u == UNCERTAINTIES[0]:
+                yield State(tuple(sorted(held.terms)), held.uncertainty)
 
 
 def _best_near(problem: Problem, search: Search, state: State) -> Settled:
