@@ -42,7 +42,7 @@ def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
     damping = 0.0
     for _ in range(_STEPS):
         D = np.diag(damping * np.diag(A))
-        after = _stepped(problem, solve_spd(A + D, problem.gradient(stacks)))
+        after = _stepped(problem, _bounded(A + D, problem.gradient(stacks), _lowest(problem)))
         reached = after.cost()
         if reached >= cost:
             damping = max(_DAMPED, 10.0 * damping)
@@ -55,6 +55,31 @@ def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
         # Damping holds back what the log tells least of: the last step is without.
         damping = 0.0 if gain < _NOTHING else 0.1 * damping
     return problem, cost
+
+
+def _lowest(problem: Problem) -> Array:
+    """Least step of every unknown, (n,): what has one sign stops at nothing."""
+    out = np.full(problem.names, -np.inf)
+    for a, (coordinates, _) in zip(problem.accepted, problem.spans(), strict=True):
+        every = a.effect.coordinates
+        out[coordinates] = [-np.inf if c.signed else -a.x[c.name] for c in every]
+    return out
+
+
+def _bounded(A: Array, h: Array, lowest: Array) -> Array:
+    """Least squares step; unknowns that would pass their bound stay there and the rest follows."""
+    held = np.zeros(h.size, dtype=np.bool_)
+    theta = np.zeros_like(h)
+    while True:
+        free = ~held
+        theta[held] = lowest[held]
+        theta[free] = solve_spd(
+            A[np.ix_(free, free)], h[free] - A[np.ix_(free, held)] @ theta[held]
+        )
+        below = free & (theta < lowest)
+        if not below.any():
+            return theta
+        held |= below
 
 
 def _stepped(problem: Problem, theta: Array) -> Problem:
