@@ -169,7 +169,7 @@ def cost(
 
 
 def known_candidate(machine: Machine, name: str) -> None:
-    """Whether a candidate can be compared.
+    """Refuse a candidate that cannot be compared.
 
     Raises:
         CatalogError: No such alternative.
