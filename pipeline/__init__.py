@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from pipeline.api.machine import Machine, load
     from pipeline.api.motion import stand, walk
     from pipeline.api.reports import reports
+    from pipeline.api.supply.power import power
 
 _HOME = {
     **dict.fromkeys(("Machine", "load"), "pipeline.api.machine"),
@@ -30,6 +31,7 @@ _HOME = {
     **dict.fromkeys(
         ("read_log", "compare", "identify", "validate", "forward"), "pipeline.api.logs"
     ),
+    "power": "pipeline.api.supply.power",
     "init": "pipeline.api.init",
     "init_actuator": "actuators.loading.own_folder",
     "reports": "pipeline.api.reports",
@@ -45,6 +47,7 @@ __all__ = [
     "init",
     "init_actuator",
     "load",
+    "power",
     "read_log",
     "reports",
     "stand",

@@ -30,6 +30,7 @@ _BEGUN: Final[dict[str, dict[str, float]]] = {
         "reading foreign files": 0.05,
         "reading and judging the logs": 0.1,
         "simulating the logs' motion": 0.2,
+        "adding up the drives": 0.3,
         "driving the model by its servos": 0.3,
         "weighing the model file's effects": 0.3,
         "letting a few effects compete": 0.3,

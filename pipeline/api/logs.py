@@ -195,7 +195,7 @@ def read_log(
     Raises:
         GapError: The log cannot be used; one line says which row or column and why.
     """
-    result = _analysed("read", machine, [path], mapping=mapping, **options)
+    result = analysed("read", machine, [path], mapping=mapping, **options)
     assert isinstance(result, MeasuredLog)
     return result
 
@@ -211,7 +211,7 @@ def compare(logs: Any, machine: Machine, **options: Any) -> Comparison:
     Raises:
         GapError: A log cannot be used, or does not fit the machine.
     """
-    result = _analysed("where", machine, logs, **options)
+    result = analysed("where", machine, logs, **options)
     assert isinstance(result, Comparison)
     return result
 
@@ -228,7 +228,7 @@ def identify(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> 
     Raises:
         GapError: A log cannot be used, or does not fit the machine.
     """
-    result = _analysed("add", machine, logs, test, **options)
+    result = analysed("add", machine, logs, test, **options)
     assert isinstance(result, Identified)
     return replace(result, machine=machine)
 
@@ -244,7 +244,7 @@ def validate(logs: Any, machine: Machine, **options: Any) -> Identified:
     Raises:
         GapError: A log cannot be used, or the machine has no effects.
     """
-    result = _analysed("shrink", machine, logs, **options)
+    result = analysed("shrink", machine, logs, **options)
     assert isinstance(result, Identified)
     return replace(result, machine=machine)
 
@@ -261,14 +261,15 @@ def forward(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> D
     Raises:
         GapError: A log does not say what drives the servos.
     """
-    result = _analysed("forward", machine, logs, test, **options)
+    result = analysed("forward", machine, logs, test, **options)
     assert isinstance(result, Driven)
     return result
 
 
-def _analysed(
+def analysed(
     step: str, machine: Machine, logs: Any, test: Any = (), *, mapping: Any = None, **options: Any
 ) -> LogResult:
+    """Run one step of `analyse` for a machine and its logs, from `read_log` or by path."""
     several = [[x] if isinstance(x, str | Path | MeasuredLog) else list(x) for x in (logs, test)]
     own = [log.mapping for log in (*several[0], *several[1]) if isinstance(log, MeasuredLog)]
     mapping = mapping or next((path for path in own if path), None)
@@ -323,6 +324,10 @@ def analyse(
         findings = judged(intake).findings
         read = common([quality_table(findings)], findings)
         return MeasuredLog(*read, options.logs[0], options.mapping)
+    if step == "power":
+        from pipeline.api.supply.power import added_up
+
+        return added_up(given, intake, options, progress, common)
     progress.step("simulating the logs' motion")
     where = find_where(given, given.model, intake, parts, fitted)
     findings, joints = where.intake.findings, given.model.joints

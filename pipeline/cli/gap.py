@@ -24,6 +24,7 @@ from pipeline.progress import Progress
 
 if TYPE_CHECKING:
     from pipeline.api.logs import Comparison, Driven, Identified
+    from pipeline.api.supply.power import Powered
     from pipeline.identification.workflow.setup import Setup
     from pipeline.logs.quality.finding import Finding
 
@@ -126,6 +127,7 @@ def run_gap(given: argparse.Namespace) -> int:
     with folder_held(given), Progress("gap") as progress:
         progress.step("loading")
         from pipeline.api.logs import Comparison, Driven, Identified, analyse
+        from pipeline.api.supply.power import Powered
 
         options = options_of(given)
         result = analyse(options, progress)
@@ -139,6 +141,10 @@ def run_gap(given: argparse.Namespace) -> int:
             return int(result.unexplained)
         if isinstance(result, Driven):
             return _say_errors(result)
+        if isinstance(result, Powered):
+            _say_warnings(result.given, result.findings)
+            _say_power(result, options.out)
+            return int(result.account.negative)
         if isinstance(result, Comparison):
             _say_warnings(result.given, result.findings)
             _say_where(result)
@@ -183,6 +189,15 @@ def _say_answer(result: Identified, out: Path) -> None:
     from reports.typeset import plain
 
     for paragraph in (whose_motors(result.story), *answer(result.story, result.bodies)):
+        print(plain(paragraph))
+    print(f"written to {out}")
+
+
+def _say_power(result: Powered, out: Path) -> None:
+    from reports.pages.power_page import power_answer
+    from reports.typeset import plain
+
+    for paragraph in power_answer(result.account):
         print(plain(paragraph))
     print(f"written to {out}")
 

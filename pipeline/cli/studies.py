@@ -27,6 +27,8 @@ def add_verbs(add: AddVerb) -> None:
     twin.add_argument("--machine", help=text)
     text = "effects to hide; drawn by default, none without names"
     twin.add_argument("--hide", nargs="*", metavar="EFFECT", help=text)
+    text = "hide it between the supply and the motors of a walking hexapod, for gap power"
+    twin.add_argument("--supply", action="store_true", help=text)
     twin.add_argument("--out", type=named_path, required=True, help="new folder for the trial")
 
     text = "simulate machines with hidden effects and count how often gap finds them"

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from pipeline.blind.machines.supply import make_supply
 from pipeline.blind.machines.trial import make
 from pipeline.errors import PipelineError
 from reports.folder import PREFIX, output_errors
@@ -42,14 +43,17 @@ def run_twin(options: argparse.Namespace) -> int:
     effects = None if options.hide is None else tuple(options.hide)
     there = out.exists()
     with output_errors(out), _whole(out, there):
-        truth = make(
-            options.source,
-            options.seed,
-            options.number,
-            out,
-            machine=options.machine,
-            effects=effects,
-        )
+        if options.supply:
+            truth = make_supply(options.seed, options.number, out, effects)
+        else:
+            truth = make(
+                options.source,
+                options.seed,
+                options.number,
+                out,
+                machine=options.machine,
+                effects=effects,
+            )
     print(f"the truth is in {out / 'truth.json'}; without looking at it:")
     command = shlex.join(["python", "-m", "pipeline", "gap", *truth["options"]])
     print(f"cd {shlex.quote(str(out / 'given'))} && {command} --out ../answer")

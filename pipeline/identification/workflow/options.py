@@ -14,6 +14,7 @@ STEPS: Final = {
     "name": "which effects the model lacks: candidates.csv, found.csv",
     "add": "the same, and write the effects into model.toml",
     "forward": "drive the model under its servos' law and compare positions: forward.csv",
+    "power": "what the supply gives, against the sum over the drives: power.csv",
     "shrink": "the gap with and without the effects of a model file (--model)",
 }
 DEFAULT_OUT: Final = Path("reports/out/gap")

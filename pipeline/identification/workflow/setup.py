@@ -142,7 +142,8 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         usual = alternative or own.usual or _default(catalog)
         actuators = own.actuators(catalog, usual)
         expected = expected_of_robot(robot, ratio=_ratio(actuators, robot.joints))
-        if not alternative and _channel(options, expected) != AT_JOINT:
+        electrical = options.step == "power" or _channel(options, expected) != AT_JOINT
+        if not alternative and electrical:
             alternative = usual
         bare = machine_of_robot(robot, actuators if alternative else None)
         sources = (*robot.spec.sources, *(() if robot.spec.build else (robot.spec.urdf,)))

@@ -23,6 +23,8 @@ Mask = NDArray[np.bool_]
 EFFORTS: Final[Mapping[str, str]] = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 #: What servos are told.
 GOALS: Final = ("goal_position", "goal_velocity", "goal_torque")
+#: Of the supply: its voltage, and what it gives; seldom as often as the joints.
+SUPPLY: Final = ("supply", "supply_current", "supply_power")
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,9 @@ class Log:
         base_pitch: Shape (N,) [rad].
         valid: False where position or effort is unusable, shape (N, J).
         torque_off: True where the drive was switched off, shape (N, J).
-        supply: Supply voltage, shape (N,) [V].
+        supply: Voltage of the supply of all drives, shape (N,) [V].
+        supply_current: Out of it, shape (N,) [A].
+        supply_power: Out of it, shape (N,) [W].
         gain: Of the controller, duty per position error [1/rad].
         torque_off_bridge: ``"open"`` (no current flows) or ``"shorted"`` where the drive is off.
         locked: Joints that stood still on purpose.
@@ -115,6 +119,8 @@ class Log:
     valid: Mask = field(default_factory=lambda: np.ones((0, 0), dtype=np.bool_))
     torque_off: Mask | None = None
     supply: Array | None = None
+    supply_current: Array | None = None
+    supply_power: Array | None = None
     gain: float | None = None
     torque_off_bridge: str | None = None
     locked: tuple[str, ...] = ()
@@ -138,7 +144,7 @@ class Log:
         if self.valid.size == 0:
             object.__setattr__(self, "valid", np.isfinite(self.position))
         shapes = {"time": (n,), "valid": (n, j), "torque_off": (n, j)}
-        shapes |= dict.fromkeys(("base_roll", "base_pitch", "supply"), (n,))
+        shapes |= dict.fromkeys(("base_roll", "base_pitch", *SUPPLY), (n,))
         shapes |= dict.fromkeys(
             ("velocity", *EFFORTS, *GOALS, "temperature", "motor_position"), (n, j)
         )

@@ -34,6 +34,12 @@ FOOT_COLUMNS: Final = {
     "contact": ("contact", "1"),
 }
 BASE_COLUMNS: Final = {"roll_rad": ("base_roll", "rad"), "pitch_rad": ("base_pitch", "rad")}
+#: What the supply of all drives gives; positive out of it.
+SUPPLY_COLUMNS: Final = {
+    "voltage_V": ("supply", "V"),
+    "current_A": ("supply_current", "A"),
+    "power_W": ("supply_power", "W"),
+}
 #: Letters that may be off in a header for it to be taken for a slip of the pen.
 _SLIPS: Final = 2
 #: Units as they are written at the end of a header, and none at all.
@@ -50,8 +56,8 @@ class Target:
     """Where a column's numbers go.
 
     Attributes:
-        kind: ``"time"``, ``"joint"``, ``"foot"`` or ``"base"``.
-        owner: Joint or leg; empty for time and base.
+        kind: ``"time"``, ``"joint"``, ``"foot"``, ``"base"`` or ``"supply"``.
+        owner: Joint or leg; empty for the others.
         quantity: Attribute of the log, or part of one.
         unit: In which the log keeps it.
     """
@@ -91,15 +97,17 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
         ("joint", expected.joints, JOINT_COLUMNS),
         ("foot", expected.feet, FOOT_COLUMNS),
         ("base", ("base",), BASE_COLUMNS),
+        ("supply", ("supply",), SUPPLY_COLUMNS),
     ):
         if owner not in owners:
             continue
         if quantity in table:
             attribute, unit = table[quantity]
-            return Target(kind, "" if kind == "base" else owner, attribute, unit)
+            return Target(kind, owner if kind in ("joint", "foot") else "", attribute, unit)
         for known, (attribute, _) in table.items():
-            written = quantity.removeprefix(attribute).removeprefix("_")
-            if quantity.startswith(attribute) and written in _UNIT_SUFFIXES:
+            stem = known.partition("_")[0] if kind == "supply" else attribute
+            written = quantity.removeprefix(stem).removeprefix("_")
+            if quantity.startswith(stem) and written in _UNIT_SUFFIXES:
                 raise LogFormatError(_unit_message(column, f"{owner}__{known}", where))
     return None
 
@@ -127,6 +135,7 @@ def misspelt(column: str, expected: Expected) -> str:
         (expected.joints, JOINT_COLUMNS),
         (expected.feet, FOOT_COLUMNS),
         (("base",), BASE_COLUMNS),
+        (("supply",), SUPPLY_COLUMNS),
     ):
         if owner in owners and quantity not in table:
             slips = {known: _slips(quantity.lower(), known.lower()) for known in table}

@@ -81,7 +81,9 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
     columns = _in_si(plan, data, first_row)
     time = columns[_TIME]
     fresh = _check_time(time, where, first_row)
-    base: dict[str, Any] = {t.quantity: x for t, x in columns.items() if t.kind == "base"}
+    base: dict[str, Any] = {
+        t.quantity: x for t, x in columns.items() if t.kind in ("base", "supply")
+    }
     joints = {
         quantity: _side_by_side(columns, quantity, expected.joints, time.size)
         for quantity in {t.quantity for t in columns if t.kind == "joint"}

@@ -1,0 +1,1 @@
+"""What a machine takes from its supply, as one call."""

@@ -1,0 +1,152 @@
+"""Power into every drive along a log: work, friction, copper.
+
+What flows into a motor's terminals is what it turns into motion and what its winding loses,
+
+    u i = k_t i w + R i^2,    k_t i w = tau v + friction
+
+with torque tau and speed v of the joint's bodies and speed w of the motor (Krishnan, Electric Motor
+Drives, 2001, section 2.2). The motor's torque is the log's own, or the model's at a joint whose
+effort the log does not tell; what the motor gives and the bodies do not take is friction: that of
+gears, bearings and seals, what rotors store, and what the bodies' file has wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.identification.compare.observe import observe_all
+from pipeline.logs.errors import ModelError
+from pipeline.logs.prepared.prepare import Prepared
+from pipeline.logs.signals.noise import smoother_noise
+from pipeline.machine.machine import MachineModel
+from pipeline.simulation.predict import Simulator
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Power by drive along one log, positive from supply to motor.
+
+    Attributes:
+        time: Shape (N,) [s].
+        joints: Names of the columns.
+        speed: Of the joints, shape (N, J) [rad/s].
+        work: Torque of the bodies times speed, shape (N, J) [W].
+        friction: Of the motor's mechanical power what is no work, shape (N, J) [W].
+        copper: R i^2, shape (N, J) [W].
+        current: Of the motors, shape (N, J) [A].
+        enabled: Whether the drive is on, shape (N, J).
+        usable: Whether all of it is known, shape (N,).
+        step: Between rows without a gap [s].
+        reach: Time within which the low-pass of the motion blurs [s].
+        by_model: Joints whose torque is the model's.
+    """
+
+    time: Array
+    joints: tuple[str, ...]
+    speed: Array
+    work: Array
+    friction: Array
+    copper: Array
+    current: Array
+    enabled: Mask
+    usable: Mask
+    step: float
+    reach: float
+    by_model: tuple[str, ...]
+
+    @property
+    def electrical(self) -> Array:
+        """Into the motors' terminals, shape (N, J) [W]."""
+        return self.work + self.friction + self.copper
+
+
+def drawn_along(model: MachineModel, one: Prepared) -> Drawn:
+    """Power into every drive along one log.
+
+    Args:
+        model: With a motor in every joint.
+        one: The log.
+
+    Raises:
+        ModelError: A joint has no motor.
+    """
+    for a in model.actuators:
+        if a.motor is None:
+            raise ModelError(
+                f"joint '{a.name}': no motor, so that its copper losses are not known; name the "
+                "actuator with --alternative"
+            )
+    m = observe_all(model, [one])[0]
+    predicted = Simulator(m).predict(model)
+    told = np.asarray(np.isfinite(one.effort).any(axis=0))
+    off = np.zeros(one.v.shape, dtype=np.bool_)
+    if one.torque_off is not None:
+        off = one.torque_off
+
+    def on_grid(x: Array) -> Array:
+        return np.stack([np.interp(one.time, m.time, column) for column in x.T], axis=1)
+
+    work = np.where(off, 0.0, on_grid(predicted.torque) * one.v)
+    terminals = _at_terminals(model, one, on_grid(predicted.motor_torque), told)
+    mechanical, copper, current = (np.where(off, 0.0, x) for x in terminals)
+    known = np.where(told, one.mask | off, one.motion_ok)
+    return Drawn(
+        time=one.time,
+        joints=one.joints,
+        speed=one.v,
+        work=work,
+        friction=mechanical - work,
+        copper=copper,
+        current=current,
+        enabled=~off,
+        usable=np.asarray(known.all(axis=1)),
+        step=one.settings.dt,
+        reach=1.0 / one.cutoff,
+        by_model=tuple(j for j, t in zip(one.joints, told, strict=True) if not t),
+    )
+
+
+def _at_terminals(
+    model: MachineModel, one: Prepared, motor_torque: Array, told: Mask
+) -> tuple[Array, Array, Array]:
+    """Mechanical power of the motors [W], copper losses [W] and currents [A], each (N, J).
+
+    Efforts are not filtered: what a filter takes off a current that jumps is missing in R i^2. What
+    its noise adds there on average is taken off.
+    """
+    raw, good = one.unfiltered_effort(), one.mask
+    noise = smoother_noise(raw, good, one.pieces, one.settings.lowpass, in_band=False)
+    noise = np.where(np.isfinite(noise), noise, 0.0)
+    mechanical, copper, current = (np.empty_like(one.v) for _ in range(3))
+    # Coupled motors first: what they bring to the other joint must be known.
+    order = sorted(range(len(model.actuators)), key=lambda k: not model.actuators[k].coupled_to)
+    own = motor_torque.copy()
+    for k in order:
+        a = model.actuators[k]
+        assert a.motor is not None
+        channel = one.channel if told[k] else ""
+        constant, resistance = (
+            float(np.asarray(x)) for x in (a.motor.torque_constant, a.motor.resistance)
+        )
+        speed = a.ratio * model.drivetrains.turned(k, one.v)
+        seen = (raw[:, k] - a.effort_offset) / a.gains.get(channel, 1.0)
+        per_ampere = {"torque": a.ratio * constant, "current": 1.0, "voltage": resistance}
+        if channel == "torque":
+            own[:, k] = seen - model.drivetrains.carried(k, own)
+        i = own[:, k] / (a.ratio * constant)
+        if channel == "current":
+            i = seen
+        elif channel == "voltage":
+            i = (seen - constant * speed) / resistance
+        blur = noise[k] / per_ampere[channel] if channel in per_ampere else 0.0
+        current[:, k], copper[:, k] = i, resistance * (i * i - blur * blur)
+        mechanical[:, k] = constant * i * speed
+        if channel == "power":
+            mechanical[:, k] = seen - copper[:, k]
+    return mechanical, copper, current

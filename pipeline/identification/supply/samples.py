@@ -1,0 +1,108 @@
+"""What the supply gave, sample by sample, at the pace at which it was logged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.errors import LogContentError
+from pipeline.logs.reading.log import Log
+
+Array = NDArray[np.float64]
+
+#: Samples that are the fewest from which terms can be told apart and proved.
+FEWEST: Final = 24
+#: Intervals are no shorter than this many times the reach of the motion's low-pass.
+SHORTEST: Final = 1.0
+#: Share of equal neighbours from which on a column holds its last value between samples.
+_HELD: Final = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of the supply of one log, each the mean over the time since the one before.
+
+    Attributes:
+        begin: Shape (K,) [s].
+        end: Shape (K,) [s].
+        power: Shape (K,) [W].
+        voltage: Shape (K,) [V]; NaN where it is not known.
+        current: Out of the supply, shape (K,) [A]; NaN where it is not known.
+        measured: Whether the voltage was measured and not stated.
+    """
+
+    begin: Array
+    end: Array
+    power: Array
+    voltage: Array
+    current: Array
+    measured: bool
+
+
+def supply_samples(log: Log, shortest: float) -> Samples:
+    """The supply's samples of one log.
+
+    Args:
+        log: As read; the supply's columns may be empty or hold their value between samples.
+        shortest: Samples closer together than this [s] are averaged.
+
+    Raises:
+        LogContentError: There is no power at the supply, or it cannot be one.
+    """
+    voltage, current, power = (
+        _own(log, getattr(log, name)) for name in ("supply", "supply_current", "supply_power")
+    )
+    if power is None and (voltage is None or current is None):
+        have = "a voltage alone" if voltage else "a current alone" if current else "no column"
+        raise LogContentError(
+            f"{log.name}: {have} of the supply; log supply__power_W, or supply__current_A with "
+            "supply__voltage_V or with voltage under [supply] in a mapping file"
+        )
+    if voltage is not None and (voltage[1] <= 0.0).any():
+        raise LogContentError(
+            f"{log.name}: the supply's voltage falls to {voltage[1].min():.4g} V; expected a "
+            "positive one, leave cells empty where it was not measured"
+        )
+    told = power or current
+    assert told is not None
+    at = told[0]
+    u = np.full(at.size, np.nan) if voltage is None else np.interp(at, *voltage)
+    i = np.full(at.size, np.nan) if current is None else np.interp(at, *current)
+    p = u * i if power is None else power[1]
+    if np.median(p) <= 0.0:
+        raise LogContentError(
+            f"{log.name}: the supply gives {np.median(p):.4g} W at the middle sample; expected "
+            "power out of it to be positive; flip the column in a mapping file"
+        )
+    group = np.concatenate([[0], np.cumsum(_groups(at, shortest))])
+    end = at[np.flatnonzero(np.diff(np.append(group, group[-1] + 1)))]
+    p, u, i = (np.bincount(group, x) / np.bincount(group) for x in (p, u, i))
+    stated = voltage is None or np.ptp(voltage[1]) == 0.0
+    return Samples(end[:-1], end[1:], p[1:], u[1:], i[1:], not stated)
+
+
+def _own(log: Log, values: Array | None) -> tuple[Array, Array] | None:
+    """Instants and values of a column where it has samples of its own; None without any.
+
+    Raises:
+        LogContentError: Fewer than can be told apart.
+    """
+    if values is None or not np.isfinite(values).any():
+        return None
+    time, values = log.time[np.isfinite(values)], values[np.isfinite(values)]
+    changes = np.flatnonzero(np.diff(values)) + 1
+    if 0 < changes.size < (1.0 - _HELD) * values.size and changes.size > 1:
+        # Held between samples, which come every so many rows.
+        every = max(1, int(np.quantile(np.diff(changes), 0.05)))
+        rows = np.arange(changes[0] % every, values.size, every)
+        time, values = time[rows], values[rows]
+    return time, values
+
+
+def _groups(at: Array, shortest: float) -> NDArray[np.bool_]:
+    """Whether a new group begins with a sample, for all but the first, (K - 1,)."""
+    place = np.floor((at - at[0]) / shortest * (1.0 + 1e-9))
+    return np.diff(place) > 0

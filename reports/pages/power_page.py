@@ -1,0 +1,81 @@
+"""The page of `gap power`: what the supply gives, term by term."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipeline.identification.supply.account import BASIS_FOUND, MEASURED, UNEXPLAINED, Account
+from reports.html import write_html
+from reports.markdown import write_markdown
+from reports.page import FigureBlock, Number, Page, Section, Text, table_block
+from reports.table import Table
+from reports.words import Words, number, percent
+
+WORDS = Words("power")
+
+
+def power_answer(told: Account) -> tuple[str, ...]:
+    """The answer in words, a paragraph each."""
+    shares = {s.term: s for s in told.shares}
+    found = [s for s in told.shares if s.basis == BASIS_FOUND]
+    own = [s for s in told.shares if s.basis and s.basis != BASIS_FOUND]
+    measured, left = shares[MEASURED], shares[UNEXPLAINED]
+    paragraphs = (
+        WORDS("wrong_sum", told.wrong_sum),
+        WORDS("sums", measured, own, len(told.drives)),
+        WORDS("found", found, shares.get("drivers")),
+        WORDS("left", left, measured, told.rms),
+        WORDS("sag", told.sag),
+        WORDS("basis", told.by_model, told.reading),
+    )
+    return tuple(filter(None, paragraphs))
+
+
+def write_power_page(
+    told: Account, robot: str, tables: Sequence[Table], warnings: Sequence[str], folder: Path
+) -> None:
+    """Write ``report.md`` and ``index.html``; the figures must be there already."""
+    by_name = {t.name: t for t in tables}
+    shares = {s.term: s for s in told.shares}
+    measured, left = shares[MEASURED], shares[UNEXPLAINED]
+    answer = power_answer(told)
+    own = float(sum(s.watts for s in told.shares if s.basis and s.basis != BASIS_FOUND))
+    page = Page(
+        title=f"What the supply of '{robot}' gives, by log '{', '.join(told.logs)}'",
+        numbers=(
+            Number(f"{number(measured.watts)} W", "at the supply, mean of samples that prove"),
+            Number(f"{number(own)} W", "sum over the drives, by log and model"),
+            Number(
+                f"{number(left.watts)} W",
+                f"unexplained, {percent(abs(left.watts) / abs(measured.watts), 1)} of it",
+                "bad" if told.negative else "good",
+            ),
+        ),
+        picture=FigureBlock(folder / "power_shares_narrow.svg", alt="Shares of the power."),
+        answer=answer[:3],
+        sections=(
+            Section("The answer in full", tuple(map(Text, answer))),
+            Section(
+                "Term by term",
+                (
+                    FigureBlock(
+                        folder / "power_shares.svg", "Each term begins where that above ends."
+                    ),
+                    table_block(by_name["power"], digits=3),
+                    FigureBlock(
+                        folder / "power_in_time.svg",
+                        "Power at the supply; shaded: samples that prove.",
+                    ),
+                ),
+            ),
+            Section("Drive by drive", (table_block(by_name["power_drives"], digits=3),)),
+            Section(
+                "What the data are worth",
+                (*map(Text, warnings), table_block(by_name["quality"], digits=3)),
+            ),
+        ),
+        files={f"{t.name}.csv": t.description for t in tables},
+    )
+    write_markdown(page, folder / "report.md")
+    write_html(page, folder / "index.html")
