@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs.columns.explaining import FLOOR, Bodies
+from pipeline.logs.columns.explaining import Bodies
 from pipeline.logs.columns.findings import column_findings, copies
 from pipeline.logs.columns.hypotheses import Reading, as_named
 from pipeline.logs.columns.search import search
@@ -34,8 +34,6 @@ _SHIFT: Final = 0.3
 #: what an end carries over the mass of all that moves, and how far out over the links' length.
 _CARRIED: Final = 0.2
 _OUT: Final = 0.5
-#: Share of an effort that is left where a rule stands for the forces of the ground.
-_BY_RULE: Final = 0.3
 #: Bodies lighter than this share of what the model says are none.
 _LIGHTEST: Final = 0.1
 
@@ -68,7 +66,7 @@ class AlongLogs:
             model: As its files say.
             measurements: Its logs.
         """
-        self._model, self._logs = model, measurements
+        self._model, self._logs = model, [_surely(model, m) for m in measurements]
         every = sum(len(m) for m in measurements)
         self._rows = {
             rough: [np.arange(0, len(m), max(1, every // most)) for m in measurements]
@@ -117,7 +115,6 @@ class AlongLogs:
         opened = (_Open(self._model.bodies, 1.0, _SCALE, _LIGHTEST - 1.0),) if rough else self._open
         least = np.array([o.least for o in opened])
         carried = [o.spread == _CARRIED and o.least == 0.0 for o in opened]
-        known = all(not self._model.floating or legs_are_separate(self._model, m) for m in ms)
         return Bodies(
             base=np.concatenate(base),
             columns=np.concatenate(columns, axis=1),
@@ -128,8 +125,25 @@ class AlongLogs:
             a=np.concatenate([m.a for m in ms]),
             rest=ms[0].rest_speed[of] * np.abs(factor),
             ends=np.flatnonzero(carried),
-            floor=FLOOR if known else _BY_RULE,
         )
+
+
+def _surely(model: MachineModel, m: Measurement) -> Measurement:
+    """Without rows of joints in which a rule says what the ground asks of them.
+
+    Feet that squeeze the ground, and a touch-down that the motion does not show, leave half of the
+    torque of a leg that stands. Of a leg in the air its bodies say all, and nothing of it hangs on
+    what carries the others: no ground is left.
+    """
+    if not model.floating or model.layout is None or m.standing is None:
+        return m
+    if legs_are_separate(model, m):
+        return m
+    held = np.zeros_like(m.mask)
+    for leg, standing in enumerate(m.standing.T):
+        held[:, model.layout.of(leg)] |= standing[:, None]
+    none = np.zeros_like(m.standing)
+    return replace(m, mask=m.mask & ~held, standing=none, foot_force=np.zeros((*none.shape, 3)))
 
 
 def _later(m: Measurement, late: float) -> Array:

@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from pipeline.identification.supply.account import BASIS_FOUND, MEASURED, UNEXPLAINED, Account
+from pipeline.identification.supply.account import (
+    BASIS_FOUND,
+    MEASURED,
+    RECOGNISED,
+    UNEXPLAINED,
+    Account,
+)
 from reports.html import write_html
 from reports.markdown import write_markdown
 from reports.page import FigureBlock, Number, Page, Section, Text, table_block
@@ -29,7 +35,8 @@ def power_answer(told: Account) -> tuple[str, ...]:
         WORDS("sag", told.sag),
         WORDS("basis", told.by_model, told.reading),
     )
-    return tuple(filter(None, paragraphs))
+    # Of what is no power no term means anything.
+    return tuple(filter(None, paragraphs[:2] if told.wrong_sum == RECOGNISED else paragraphs))
 
 
 def write_power_page(

@@ -32,6 +32,7 @@ Mask = NDArray[np.bool_]
 READINGS = ("mean", "instant")
 BASIS_MODEL, BASIS_FOUND = "model", "found"
 UNEXPLAINED, MEASURED = "unexplained", "measured"
+RECOGNISED = "recognised"
 #: Part of the measured power below which what stays unexplained is no finding.
 SMALL = 0.02
 
@@ -125,7 +126,7 @@ class Account:
         assert measured is not None
         sure = not left.watts_low <= 0.0 <= left.watts_high
         much = abs(left.watts) > SMALL * abs(measured.watts)
-        return self.wrong_sum == "recognised" or (sure and much)
+        return self.wrong_sum == RECOGNISED or (sure and much)
 
 
 def account(
@@ -231,7 +232,7 @@ def _wrong_sum(problem: Problem, chosen: Sequence[str]) -> str:
     own = problem.ahead(chosen)
     sums = [problem.ahead_of_sum(kind) for kind in problem.rows.summed]
     if any(better(other, own) for other in sums):
-        return "recognised"
+        return RECOGNISED
     return "possible" if any(not better(own, other) for other in sums) else ""
 
 

@@ -15,12 +15,14 @@ import pandas as pd
 import pinocchio as pin
 import pytest
 
+from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.locate import find_where
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup, take_in
 from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.quality.finding import Finding
+from pipeline.simulation.along_logs import wrong_columns
 
 RATE = 200.0
 LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="{m}"/>
@@ -28,6 +30,7 @@ LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="
 <joint name="j{k}" type="continuous"><parent link="{parent}"/><child link="l{k}"/>
 <origin xyz="{at} 0 0"/><axis xyz="{axis}"/></joint>"""
 LIMIT = '<limit lower="-9" upper="9" effort="9" velocity="9"/>'
+
 Spoil = Callable[[pd.DataFrame], None]
 
 
@@ -241,3 +244,35 @@ def test_a_robot_that_stands_is_no_fixed_base(tmp_path: Path) -> None:
         log[f"j{k}__torque_Nm"] = total[:, k] + 0.02 * rng.standard_normal(t.size)
     with pytest.raises(LogContentError, match="contact forces are missing"):
         judged(log, urdf, tmp_path)
+
+
+def walked(folder: Path, turned: str = "") -> Path:
+    """The demonstration's walk without its foot forces, a joint's current turned."""
+    log = pd.read_parquet("pipeline/identification/demo/walk.parquet")
+    log = log[[n for n in log.columns if "__force" not in n and "__voltage" not in n]]
+    if turned:
+        log[f"{turned}__current_A"] *= -1.0
+    path = folder / "walk.parquet"
+    log.to_parquet(path)
+    return path
+
+
+def columns_of_walk(path: Path) -> list[Finding]:
+    options = Options((path,), robot=Path("urdf/hexapod.toml"), step="where")
+    given = setup(options)
+    prepared = take_in(given, options)[0].prepared
+    seen = observe_all(given.bare, prepared)
+    return wrong_columns(given.bare, seen, prepared[0].log, given.expected.ratio)
+
+
+def test_a_walk_without_foot_forces_is_judged_by_its_legs_in_the_air(tmp_path: Path) -> None:
+    """What squeezes the ground and a touch-down that no motion shows are no wrong columns."""
+    assert columns_of_walk(walked(tmp_path)) == []
+
+
+@pytest.mark.slow
+def test_a_turned_current_of_a_walk_without_foot_forces_is_found(tmp_path: Path) -> None:
+    (found,) = columns_of_walk(walked(tmp_path, "lr_joint_2"))
+    assert found.verdict == "refused"
+    assert "lr_joint_2" in found.column
+    assert "sign" in found.detail

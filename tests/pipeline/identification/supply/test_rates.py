@@ -1,0 +1,78 @@
+"""How often `gap power` finds what stands between battery and motors of a simulated hexapod."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pipeline.blind.machines.supply import make_supply
+from pipeline.identification.supply.account import BASIS_FOUND, RECOGNISED, Account, account
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup, take_in
+
+SEED, TRIALS = 202, 20
+#: Terms that may stand in the answer beside what is hidden: windings of a leg that rubs carry more.
+BESIDE = {"extra_friction": {"more_copper"}}
+
+
+def score(truth: dict[str, Any], told: Account) -> Counter[str]:
+    """Right, missed and wrong names, intervals that hold the truth, wrong sums and sags."""
+    out: Counter[str] = Counter()
+    hidden = set(truth["hidden"])
+    out["sums hidden" if "wrong_sum" in hidden else "powers"] += 1
+    if told.wrong_sum == RECOGNISED:
+        out["sums recognised" if "wrong_sum" in hidden else "sums wrongly"] += 1
+    if "wrong_sum" in hidden:
+        return out
+    names = {n for n in ("constant", "drivers") if n in hidden}
+    names |= {f"extra_friction {truth['leg']}"} if "extra_friction" in hidden else set()
+    may = names | {"returned"} if "returned" in hidden else names
+    may = may.union(*(BESIDE.get(n, set()) for n in hidden))
+    found = [s for s in told.shares if s.basis == BASIS_FOUND]
+    classes = [{s.term, *s.rivals} for s in found]
+    out["hidden"] += len(names)
+    out["found"] += sum(any(n in one for one in classes) for n in names)
+    out["named"] += len(found)
+    out["wrong"] += sum(not one & may for one in classes)
+    constant = told.share("constant")
+    if constant is not None and "constant" in hidden:
+        out["constants"] += 1
+        out["within 1 W"] += abs(constant.watts - truth["constant"]) < 1.0
+    if told.sag is not None and "sag" in hidden:
+        out["sags"] += 1
+        out["sags within"] += told.sag.low <= truth["resistance"] <= told.sag.high
+    return out
+
+
+def trial(k: int, folder: Path) -> Counter[str]:
+    truth = make_supply(SEED, k, folder)
+    given = folder / "given"
+    stated = given / "mapping.toml" if truth["stated"] else None
+    asked = Options(
+        (given / "log.parquet",),
+        step="power",
+        robot=given / "urdf" / "hexapod.toml",
+        alternative="ideal",
+        mapping=stated,
+    )
+    machine = setup(asked)
+    intake, _, _ = take_in(machine, asked)
+    return score(truth, account(machine, intake.prepared, 0, None))
+
+
+@pytest.mark.slow
+def test_what_is_hidden_is_found_and_nothing_else(tmp_path: Path) -> None:
+    """The rates of the room's README, less what a few trials more or less may change."""
+    total: Counter[str] = Counter()
+    for k in range(TRIALS):
+        total += trial(k, tmp_path / str(k))
+    assert total["found"] >= 0.9 * total["hidden"], total
+    assert total["wrong"] <= 0.1 * total["named"], total
+    assert total["sums recognised"] == total["sums hidden"], total
+    assert total["sums wrongly"] == 0, total
+    assert total["within 1 W"] >= 0.9 * total["constants"], total
+    assert total["sags within"] >= 0.75 * total["sags"], total
+    print(total)
