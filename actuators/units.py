@@ -32,6 +32,8 @@ UNITS: Final[Mapping[str, Mapping[str, float]]] = {
         "mN*m/krpm": 1e-3 / (1e3 * _RPM),
         "mN*m/rpm": 1e-3 / _RPM,
     },
+    "torque per temperature": {"N*m/K": 1.0},
+    "viscous friction per temperature": {"N*m*s/(rad*K)": 1.0},
     "stiffness": {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3},
     "damping": {"N*s/m": 1.0},
     "density": {"kg/m^3": 1.0, "g/cm^3": 1e3},

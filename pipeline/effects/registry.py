@@ -32,6 +32,7 @@ from pipeline.effects.friction.presets import (
     StribeckFriction,
     ViscousFriction,
 )
+from pipeline.effects.friction.warming_friction import WarmingFriction
 from pipeline.effects.sensing.effort_gain import EffortGain
 from pipeline.effects.sensing.effort_offset import EffortOffset
 from pipeline.effects.sensing.position_offset import PositionOffset
@@ -50,6 +51,7 @@ EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
             DirectionDependentFriction(),
             BackdriveLoss(),
             JointFrictionLaw(),
+            WarmingFriction(),
             FrictionCurveEffect(),
             PositionCurveEffect(),
             RotorInertia(),

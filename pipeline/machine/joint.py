@@ -24,6 +24,7 @@ from actuators.elements.element import Element
 from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
 from actuators.elements.motor import DCMotor
 from actuators.elements.position_torque import PositionTorque
+from actuators.elements.warming import Warming
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import ModelError
 
@@ -47,6 +48,7 @@ class JointModel:
         coupled_to: Joint with which this one's motor also turns; empty without.
         coupling: Turns of the motor, at the joint side, per turn of that other joint [1].
         heating: Thermal node of the motor; None for a motor that stays cold.
+        warming: How its friction falls with its temperature; None where it does not.
         encoder_offset: The position sensor reads high by this [rad].
         effort_offset: The effort sensor reads high by this, in the unit of its channel.
         delay: The effort channels lag behind the position by this [s].
@@ -67,6 +69,7 @@ class JointModel:
     coupled_to: str = ""
     coupling: float = 0.0
     heating: Heating | None = None
+    warming: Warming | None = None
     encoder_offset: float = 0.0
     effort_offset: float = 0.0
     delay: float = 0.0

@@ -35,6 +35,7 @@ SENSORS = ("effort_offset", "effort_gain", "position_offset", "time_delay")
 LEFT_OUT = {
     "joint_elasticity": "the motor's own motion differs by the wind-up only",
     "backlash": "the motor's own motion differs by the gap only",
+    "warming_friction": "friction is that of the temperature which its file states",
     "winding_heating": "one cycle is too short to warm a winding; numbers are for cold motors",
 }
 

@@ -177,7 +177,12 @@ class Simulator:
             rate = m.derivative(deflection)
             position, velocity = position + deflection, velocity + rate
             acceleration = acceleration + m.derivative(rate)
-        shaft = a.at_motor(self._side(k, (position, velocity, acceleration), load))
+        side = self._side(k, (position, velocity, acceleration), load)
+        if a.warming is not None:
+            warm = self._temperature(k, "warming_friction takes the gear's")
+            fallen = a.warming.torque(warm, side.direction[:, 0], velocity)
+            side = side.with_torque(side.torque + fallen[:, None])
+        shaft = a.at_motor(side)
         shaft_torque, speed = shaft.torque[:, 0], shaft.velocity[:, 0]
         at_joint = shaft_torque * a.ratio
         brought = at_joint + drives.carried(k, motor)
@@ -229,13 +234,23 @@ class Simulator:
         m = self.measurement
         rise = a.heating.temperature_rise(m.time, a.motor.copper_loss(current))
         if a.heating.sensor_gain:
-            if m.temperature is None:
-                raise ModelError(
-                    f"log '{m.name}' has no temperature of joint '{m.joints[k]}', from which the "
-                    "model's winding_heating takes the winding's"
-                )
-            rise = rise + a.heating.sensed(m.temperature[:, k])
+            warm = self._temperature(k, "winding_heating takes the winding's")
+            rise = rise + a.heating.sensed(warm)
         return a.warm(rise)
+
+    def _temperature(self, k: int, why: str) -> Array:
+        """By one joint's sensor, (N,) [degC].
+
+        Raises:
+            ModelError: The log has none.
+        """
+        m = self.measurement
+        if m.temperature is None:
+            raise ModelError(
+                f"log '{m.name}' has no temperature of joint '{m.joints[k]}', from which the "
+                f"model's {why}"
+            )
+        return m.temperature[:, k]
 
     def _electrical(self, out: Array, a: JointModel, k: int, torque: Array, speed: Array) -> None:
         """Current, voltage, power of one motor; with measured current voltage is k speed alone."""

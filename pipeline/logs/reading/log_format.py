@@ -33,7 +33,11 @@ FOOT_COLUMNS: Final = {
     "force_z_N": ("force_z", "N"),
     "contact": ("contact", "1"),
 }
-BASE_COLUMNS: Final = {"roll_rad": ("base_roll", "rad"), "pitch_rad": ("base_pitch", "rad")}
+BASE_COLUMNS: Final = {
+    "roll_rad": ("base_roll", "rad"),
+    "pitch_rad": ("base_pitch", "rad"),
+    "temperature_degC": ("base_temperature", "degC"),
+}
 #: What the supply of all drives gives; positive out of it.
 SUPPLY_COLUMNS: Final = {
     "voltage_V": ("supply", "V"),

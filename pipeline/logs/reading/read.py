@@ -88,6 +88,8 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
         quantity: _side_by_side(columns, quantity, expected.joints, time.size)
         for quantity in {t.quantity for t in columns if t.kind == "joint"}
     }
+    warm = joints.pop("temperature", None), base.pop("base_temperature", None)
+    temperature = _warm(*warm, time, len(expected.joints))
     own, motor = joints.pop("position", None), joints.pop("motor_position", None)
     sides = sides_of(own, motor, expected, mapping.gear_ratio, where)
     derived = "goal_position" in joints and (
@@ -118,6 +120,7 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
         chosen_effort=mapping.effort,
         sha256=digest,
         source=plan.table.path,
+        temperature=temperature,
         rules={(t.owner, t.quantity): source for t, source in plan.sources.items()},
         **base | joints | feet | {"told": plan.table.remarks} | drive,
     )
@@ -164,6 +167,23 @@ def _side_by_side(
         if target.kind == "joint" and target.quantity == quantity:
             block[:, joints.index(target.owner)] = values
     return block
+
+
+def _warm(own: Array | None, common: Array | None, time: Array, joints: int) -> Array | None:
+    """Temperatures (N, J), the machine's own where a joint has none.
+
+    They are slow: samples that come more seldom than rows are joined by straight lines.
+    """
+    if own is None and common is None:
+        return None
+    out = np.full((time.size, joints), np.nan) if own is None else own.copy()
+    if common is not None:
+        out[:, ~np.isfinite(out).any(axis=0)] = common[:, None]
+    for column in out.T:
+        good = np.isfinite(column)
+        if good.any() and not good.all():
+            column[:] = np.interp(time, time[good], column[good])
+    return out
 
 
 def _stand_still(

@@ -40,6 +40,7 @@ SHAPES: Mapping[type[Effect], Mapping[str, float]] = {
     type(EFFECTS["backlash"]): {"crossing": 0.7},
     type(EFFECTS["torque_ripple"]): {"order": 100.0},
     type(EFFECTS["winding_heating"]): {"time_constant": 4.0},
+    type(EFFECTS["warming_friction"]): {"reference": 300.0},
     SensedHeating: {"time_constant": 10.0},
     BareCoupling: {"ratio": -1.0},
     LinkMass: {"x": 0.1, "y": -0.02, "z": 0.3},

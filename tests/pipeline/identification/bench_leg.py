@@ -65,6 +65,12 @@ def leg_motion(seed: int = 0, duration: float = 16.0) -> Measurement:
     )
 
 
+def warmed(motion: Measurement) -> Measurement:
+    """The same motion while the gears warm from 20 to 50 degrees."""
+    warm = 20.0 + 30.0 * (1.0 - np.exp(-motion.time / 6.0)) / (1.0 - np.exp(-motion.time[-1] / 6.0))
+    return replace(motion, temperature=np.tile(warm[:, None], (1, 3)))
+
+
 def measured(truth: MachineModel, motion: Measurement, seed: int = 1) -> Measurement:
     """The log of a machine on a motion.
 

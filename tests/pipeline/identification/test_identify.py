@@ -38,6 +38,7 @@ HIDDEN = {
         J2,
         {"rise": 40.0, "thermal_resistance": 6.0, "time_constant": 4.0},
     ),
+    "warming_friction": (J2, {"coulomb": 0.02, "viscous": 0.03, "reference": 308.15}),
     "effort_offset": (J2, {"offset": 0.05}),
     "effort_gain": (("rm_joint_2__current_A",), {"gain": 1.3}),
     "position_offset": (J2, {"angle": 0.08}),
@@ -64,6 +65,8 @@ def motion():  # type: ignore[no-untyped-def]
 def test_hidden_effect_is_named_with_its_values(name, motion) -> None:  # type: ignore[no-untyped-def]
     place, values = HIDDEN[name]
     nominal = leg.leg_model()
+    if name == "warming_friction":
+        motion = leg.warmed(motion)
     truth = effect_named(name).apply(nominal, place, values)
     result = identify(nominal, [leg.measured(truth, motion)]).naming
     assert result.found, "nothing was found"
@@ -91,6 +94,23 @@ def test_nothing_is_found_where_nothing_is_missing(seed) -> None:  # type: ignor
     left = leg.left_by(nominal, [log])
     assert not any(r.significant for r in left)
     assert np.allclose([r.error / r.noise_floor for r in left], 1.0, atol=0.1)
+
+
+def test_a_temperature_that_varies_names_nothing_where_friction_stays(motion) -> None:  # type: ignore[no-untyped-def]
+    nominal = leg.leg_model()
+    truth = effect_named("coulomb_friction").apply(nominal, J2, {"torque": 0.5})
+    found = identify(nominal, [leg.measured(truth, leg.warmed(motion))]).naming.found
+    assert [(f.effect, f.place) for f in found] == [("coulomb_friction", J2)]
+
+
+def test_friction_that_falls_is_no_candidate_without_a_temperature_that_varies(motion) -> None:  # type: ignore[no-untyped-def]
+    effect, nominal = effect_named("warming_friction"), leg.leg_model()
+    assert effect.places(nominal, motion) == []
+    still = replace(motion, temperature=np.full((motion.time.size, 3), 30.0))
+    (shape,) = effect.shapes(nominal, still, J2)
+    assert not effect.shown(still, J2, shape)
+    warm = leg.warmed(motion)
+    assert effect.shown(warm, J2, effect.shapes(nominal, warm, J2)[0])
 
 
 def test_two_effects_are_both_named(motion) -> None:  # type: ignore[no-untyped-def]

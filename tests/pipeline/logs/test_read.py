@@ -227,3 +227,33 @@ def test_streamed_time_is_checked_across_pieces(
     columns["time_s"][700:] -= columns["time_s"][700] - columns["time_s"][600]
     pq.write_table(pa.table(columns), path := tmp_path / "log.parquet")
     one_line(lambda: list(stream_log(path, two_joints, rows=700)), ("row 702",))
+
+
+def test_one_temperature_stands_for_joints_without_their_own_and_slow_ones_are_joined(
+    columns: Columns, read: Read
+) -> None:
+    n = columns["time_s"].size
+    slow = np.full(n, np.nan)
+    slow[[0, n - 1]] = 20.0, 40.0
+    own = np.full(n, np.nan)
+    own[[0, n - 1]] = 30.0, 50.0
+    log = read({**columns, "base__temperature_degC": slow, "b__temperature_degC": own})
+    assert log.temperature is not None
+    line = (columns["time_s"] - columns["time_s"][0]) / np.ptp(columns["time_s"])
+    assert log.temperature[:, 0] == pytest.approx(20.0 + 20.0 * line)
+    assert log.temperature[:, 1] == pytest.approx(30.0 + 20.0 * line)
+
+
+def test_the_supplys_columns_are_read_in_their_units(columns: Columns, read: Read) -> None:
+    seldom = np.full(columns["time_s"].size, np.nan)
+    seldom[::100] = 24.5
+    log = read({**columns, "supply__voltage_V": seldom, "supply__current_A": 0.1 * seldom})
+    assert log.supply is not None
+    assert log.supply_current is not None
+    assert np.array_equal(log.supply, seldom, equal_nan=True)
+    assert np.nanmax(log.supply_current) == pytest.approx(2.45)
+    assert log.supply_power is None
+    one_line(
+        lambda: read({**columns, "supply__current_mA": seldom}),
+        ("supply__current_mA", "supply__current_A"),
+    )

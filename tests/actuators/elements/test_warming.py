@@ -1,0 +1,34 @@
+"""Friction that falls with temperature: first order of the exponential law, and energy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from actuators.elements.warming import ZERO_CELSIUS, Warming
+from actuators.errors import UnphysicalElementError
+
+
+def test_it_is_the_first_order_of_an_exponential_law() -> None:
+    """Friction (c s + d v) exp(-b (T - T_ref)) to first order in b (T - T_ref)."""
+    b, c, d, reference = 1e-4, 2.0, 0.5, 300.0
+    kelvin = np.linspace(290.0, 310.0, 21)
+    v = np.linspace(-2.0, 2.0, 21)
+    sense = np.sign(v)
+    friction = c * sense + d * v
+    exact = friction * np.exp(-b * (kelvin - reference)) - friction
+    told = Warming(b * c, b * d, reference).torque(kelvin - ZERO_CELSIUS, sense, v)
+    assert told == pytest.approx(exact, abs=1e-3 * np.abs(exact).max())
+
+
+def test_a_warm_joint_needs_less_and_a_cold_one_more() -> None:
+    warm = Warming(0.02, 0.01, ZERO_CELSIUS + 25.0)
+    v = np.array([1.0, -1.0])
+    hot = warm.torque(np.array([45.0, 45.0]), np.sign(v), v)
+    assert hot == pytest.approx([-0.6, 0.6])
+    assert (warm.torque(np.array([5.0, 5.0]), np.sign(v), v) * v > 0.0).all()
+
+
+def test_friction_that_grows_is_none() -> None:
+    with pytest.raises(UnphysicalElementError):
+        Warming(-0.1)
