@@ -69,7 +69,8 @@ def added_up(
     progress.step("adding up the drives")
     told = account(given, intake.prepared, len(options.holdout), options.prove_last)
     findings = judged(intake).findings
-    return Powered(*common([quality_table(findings), *power_tables(told)], findings), told)
+    own = common([quality_table(findings), *power_tables(told)], findings)
+    return Powered(*own, account=told)
 
 
 def power(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Powered:

@@ -26,6 +26,8 @@ Mask = NDArray[np.bool_]
 LEVEL: Final = 0.05
 #: Share of the root mean square error by which a prediction has to be better.
 LITTLE: Final = 0.05
+#: Share of the mean power that no meter at a supply tells from nothing.
+METER: Final = 1e-3
 #: Blocks a log is cut into, and the fewest samples of one.
 BLOCKS: Final = 24
 SMALLEST: Final = 2
@@ -105,8 +107,8 @@ def choose(problem: Problem) -> tuple[str, ...]:
     """Names of the terms that predict better than without, in the order they were taken in."""
     every = [t.name for t in problem.terms]
     chosen: list[str] = []
-    before = problem.ahead(chosen)
-    while rest := [n for n in every if n not in chosen]:
+    before, least = problem.ahead(chosen), (METER * problem.rows.power.mean()) ** 2
+    while before.mean() > least and (rest := [n for n in every if n not in chosen]):
         tried = {n: problem.ahead([*chosen, n]) for n in rest}
         best = min(tried, key=lambda n: float(tried[n].mean()))
         if not better(tried[best], before, len(rest)):
