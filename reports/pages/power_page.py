@@ -33,7 +33,7 @@ def power_answer(told: Account) -> tuple[str, ...]:
         WORDS("found", found, shares.get("drivers")),
         WORDS("left", left, measured, told.rms),
         WORDS("sag", told.sag),
-        WORDS("basis", told.by_model, told.reading),
+        WORDS("basis", told.by_model, told.reading, len(told.drives)),
     )
     # Of what is no power no term means anything.
     return tuple(filter(None, paragraphs[:2] if told.wrong_sum == RECOGNISED else paragraphs))

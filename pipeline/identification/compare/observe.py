@@ -248,7 +248,7 @@ def _channels(model: MachineModel, one: Prepared) -> tuple[tuple[str, ...], Arra
         noise.append(smoother_noise(filled, good, one.pieces, one.settings.lowpass, in_band=True))
     floor = np.stack(noise, axis=1)
     # A joint without enough good samples has no floor of its own; it is masked anyway.
-    usual = np.nanmedian(floor, axis=0)
+    usual = np.nanmedian(floor, axis=0) if np.isfinite(floor).any() else np.ones(floor.shape[1])
     return tuple(names), np.stack(efforts, axis=2), np.where(np.isfinite(floor), floor, usual)
 
 

@@ -103,6 +103,8 @@ def terms_of(legs: Sequence[str], *, switched: bool) -> tuple[Term, ...]:
         Term("returned", "share of what motors return that is used again", "1", high=1.0),
         Term("copper", "copper losses beyond the data sheet's, relative", "1", low=-1.0),
         Term("friction", "friction beyond the log's or the model's, relative", "1", low=-1.0),
+        Term("extra_friction", "dry friction that no torque shows, each joint", "N*m"),
+        Term("extra_viscous", "viscous friction that no torque shows, each joint", "N*m*s/rad"),
     ]
     out += [
         Term(f"extra_friction {leg}", f"friction of {leg} that no torque shows, each joint", "N*m")
@@ -135,6 +137,8 @@ def rows_of(
         "switching": bus * size.sum(axis=1),
         "returned": np.minimum(drawn.electrical, 0.0).sum(axis=1),
         "idle": drawn.enabled.sum(axis=1).astype(np.float64),
+        "extra_friction": np.abs(drawn.speed).sum(axis=1),
+        "extra_viscous": (drawn.speed**2).sum(axis=1),
         "magnitudes": size.sum(axis=1),
         "signed": drawn.current.sum(axis=1),
     }

@@ -307,6 +307,11 @@ def _adjusted(log: Log, given: Setup, options: Options) -> Log:
         )
     if options.base in ("level", "fixed"):
         log = log.with_changes(base_roll=None, base_pitch=None)
+    if log.supply_alone and options.step != "power":
+        raise LogContentError(
+            f"{log.name}: no effort of any joint, only the supply: that is for `gap power`; log "
+            "torque, current, voltage or power per joint, or give the servos' gains"
+        )
     actuators = given.model.actuators
     if actuators and actuators[0].motor is None and log.effort.channel != "torque":
         raise LogContentError(

@@ -141,7 +141,7 @@ def _silent(log: Log, still: Mask, found: Findings, *, whole: bool) -> tuple[Mas
         found.note(position, "standstill_share", share, "1", "ok", f"{100 * share:.1f} % at rest")
     if all(is_constant(q) for q in log.position.T):
         found.note("", "constant", 1, "1", "refused", "no joint moves; nothing can be compared")
-    elif whole and silent.all() and not empty:
+    elif whole and silent.all() and not empty and not log.supply_alone:
         detail = f"no joint that moves has a live {channel}; nothing can be compared"
         found.note("", "empty", 1, "1", "refused", detail)
     return silent, empty

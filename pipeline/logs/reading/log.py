@@ -25,6 +25,8 @@ EFFORTS: Final[Mapping[str, str]] = {"torque": "N*m", "current": "A", "voltage":
 GOALS: Final = ("goal_position", "goal_velocity", "goal_torque")
 #: Of the supply: its voltage, and what it gives; seldom as often as the joints.
 SUPPLY: Final = ("supply", "supply_current", "supply_power")
+#: Where the torque of a log without any effort, for `gap power`, comes from.
+BY_MODEL: Final = "none logged: the model's stands in"
 
 
 @dataclass(frozen=True)
@@ -163,6 +165,11 @@ class Log:
     def finite(self) -> tuple[Mask, Mask]:
         """Positions and efforts that are numbers, each shape (N, J)."""
         return np.isfinite(self.position), self.valid & np.isfinite(self.effort.values)
+
+    @property
+    def supply_alone(self) -> bool:
+        """Whether no effort of any joint is logged, and the supply's power or current is."""
+        return BY_MODEL in self.derived.values()
 
     @property
     def position_quantity(self) -> str:

@@ -87,6 +87,16 @@ class ReadingPlan:
             and any(t.quantity == "goal_position" for t in self.sources)
         )
 
+    @property
+    def supply_alone(self) -> bool:
+        """Whether the supply's power or current is all that the file tells of effort."""
+        quantities = {t.quantity for t in self.sources}
+        return (
+            bool(quantities & {"supply_power", "supply_current"})
+            and not quantities & {*EFFORTS}
+            and not (self.derives_torque or self.derives_voltage)
+        )
+
     def has(self, owner: str, quantity: str) -> bool:
         """Whether the file has a quantity of a joint."""
         return any(t.owner == owner and t.quantity == quantity for t in self.sources)
@@ -323,6 +333,8 @@ def _check_efforts(plan: ReadingPlan) -> None:
         found = ["voltage"]
     if plan.derives_torque:
         found = ["torque", *found]
+    if plan.supply_alone:
+        return
     if not found:
         columns = ", ".join(column_name(plan.expected.joints[0], c) for c in EFFORTS)
         goals = any(t.quantity == "goal_position" for t in plan.sources)

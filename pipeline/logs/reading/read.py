@@ -14,7 +14,7 @@ from actuators.units import from_si
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.formats.convert import sha256
 from pipeline.logs.reading.expected import Expected
-from pipeline.logs.reading.log import EFFORTS, Log
+from pipeline.logs.reading.log import BY_MODEL, EFFORTS, Log
 from pipeline.logs.reading.log_format import Target, column_name, parse_column
 from pipeline.logs.reading.mapping import ColumnTable, Mapping
 from pipeline.logs.reading.plan import ReadingPlan, plan_reading
@@ -292,6 +292,9 @@ def _drive(
             out["torque"][out["torque_off"]] = 0.0
         out["derived"] = {"torque": gains.formula(joints)}
         out["told"] = (*plan.table.remarks, f"the torque {CANNOT}")
+    if plan.supply_alone:
+        out["torque"], out["derived"] = np.full(position.shape, np.nan), {"torque": BY_MODEL}
+        return out | {"valid": valid}
     channels = joints | out
     effort = mapping.effort or next((c for c in EFFORTS if c in channels), None)
     if effort is not None:

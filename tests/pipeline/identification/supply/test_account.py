@@ -100,6 +100,18 @@ def test_terms_without_regression_sum_to_what_is_measured(tmp_path: Path) -> Non
     assert found.watts == pytest.approx(5.0, abs=0.2)
 
 
+def test_log_without_any_effort_is_answered_by_the_models_torque(tmp_path: Path) -> None:
+    path = walk_log(tmp_path, 5.0)
+    table = parquet.read_table(path)
+    kept = [name for name in table.column_names if "__current" not in name]
+    parquet.write_table(table.select(kept), path)
+    told = answered(path, robot=HEXAPOD, alternative="reversible")
+    assert len(told.by_model) == 18
+    assert told.rows.predicted.mean() == pytest.approx(told.rows.power.mean() - 5.0, rel=0.05)
+    where = exit_code(["gap", "where", str(path), "--out", str(tmp_path / "out")])
+    assert where == 2
+
+
 def drawn(time: Array, work: Array, **parts: Array) -> Drawn:
     zero = np.zeros_like(work)
     one = np.ones(work.shape, dtype=np.bool_)
