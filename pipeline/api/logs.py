@@ -36,7 +36,7 @@ from pipeline.simulation.found_bodies import FoundBodies
 from reports.table import Table
 
 #: What every result of logs begins with: verb, tables, sidecar, inputs, machine, findings.
-_Common = tuple[
+Common = tuple[
     str,
     dict[str, Table],
     Callable[[], dict[str, Any]],
@@ -313,7 +313,7 @@ def analyse(
     refuse_own_urdf(given, options.out)
     step = options.step
 
-    def common(tables: Sequence[Table], findings: Sequence[Finding]) -> _Common:
+    def common(tables: Sequence[Table], findings: Sequence[Finding]) -> Common:
         verb = "gap" if step == "all" else f"gap {step}"
         inputs = tuple(inputs_of(options, given))
         return verb, by_name(tables), lambda: metadata(options, given), inputs, given, findings

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from pipeline.api.gap_tables import quality_table
-from pipeline.api.logs import LogResult, analysed
+from pipeline.api.logs import Common, LogResult, analysed
 from pipeline.api.machine import Machine
 from pipeline.identification.compare.intake import Intake
 from pipeline.identification.supply.account import (
@@ -22,6 +22,7 @@ from pipeline.identification.supply.account import (
 from pipeline.identification.workflow.locate import judged
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
+from pipeline.logs.quality.finding import Finding
 from pipeline.progress import Progress
 from reports.figures.gap.power import (
     PowerBar,
@@ -63,14 +64,14 @@ def added_up(
     intake: Intake,
     options: Options,
     progress: Progress,
-    common: Callable[..., Any],
+    common: Callable[[Sequence[Table], Sequence[Finding]], Common],
 ) -> Powered:
     """The account of all logs' supply; `common` makes what every result begins with."""
     progress.step("adding up the drives")
     told = account(given, intake.prepared, len(options.holdout), options.prove_last)
     findings = judged(intake).findings
     own = common([quality_table(findings), *power_tables(told)], findings)
-    return Powered(*own, account=told)
+    return Powered(*own, told)
 
 
 def power(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Powered:

@@ -124,7 +124,7 @@ def drawn(time: Array, work: Array, **parts: Array) -> Drawn:
 
 def test_power_that_returns_is_no_part_of_what_is_drawn() -> None:
     """A drive that brakes draws nothing; what it gives back is negative and counts by its share."""
-    time = np.arange(201) * 0.01
+    time = np.linspace(0.0, 2.0, 201)
     work = np.stack([np.full(201, 10.0), np.full(201, -6.0)], axis=1)
     copper = np.stack([np.full(201, 1.0), np.full(201, 2.0)], axis=1)
     nan = np.full(2, np.nan)
@@ -137,7 +137,8 @@ def test_power_that_returns_is_no_part_of_what_is_drawn() -> None:
 
 
 def test_sample_over_a_gap_is_left_out_and_others_are_exact_means() -> None:
-    time = 0.01 * np.concatenate([np.arange(0.0, 101.0), np.arange(150.0, 401.0)])
+    known = np.concatenate([np.arange(101), np.arange(150, 401)])
+    time = np.asarray(0.01 * known, dtype=np.float64)
     work = (1.0 + time)[:, None]
     end = np.array([1.0, 2.0, 3.0, 4.0])
     nan = np.full(4, np.nan)
