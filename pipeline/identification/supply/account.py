@@ -33,6 +33,8 @@ READINGS = ("mean", "instant")
 BASIS_MODEL, BASIS_FOUND = "model", "found"
 UNEXPLAINED, MEASURED = "unexplained", "measured"
 RECOGNISED = "recognised"
+#: Share of the power's variance that a sum may leave which the power is said to follow.
+FOLLOWS = 0.5
 #: Part of the measured power below which what stays unexplained is no finding.
 SMALL = 0.02
 
@@ -228,10 +230,12 @@ def _refuse_few(rows: Rows, prepared: Sequence[Prepared]) -> None:
 
 
 def _wrong_sum(problem: Problem, chosen: Sequence[str]) -> str:
-    """Whether the column is motor currents summed, times a voltage."""
-    own = problem.ahead(chosen)
-    sums = [problem.ahead_of_sum(kind) for kind in problem.rows.summed]
-    if any(better(other, own) for other in sums):
+    """Whether the column is motor currents summed, times a voltage: it has to vary as they do."""
+    own, spread = problem.ahead(chosen), float(problem.rows.power.var())
+    tried = (problem.ahead_of_sum(kind) for kind in problem.rows.summed)
+    sums = [error for error in tried if error.mean() < FOLLOWS * spread]
+    # One coefficient that predicts as well as several terms is the simpler truth.
+    if any(other.mean() <= own.mean() for other in sums):
         return RECOGNISED
     return "possible" if any(not better(own, other) for other in sums) else ""
 

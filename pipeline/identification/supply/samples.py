@@ -77,6 +77,11 @@ def supply_samples(log: Log, shortest: float) -> Samples:
             f"{log.name}: the supply gives {np.median(p):.4g} W at the middle sample; expected "
             "power out of it to be positive; flip the column in a mapping file"
         )
+    if np.ptp(p) == 0.0:
+        raise LogContentError(
+            f"{log.name}: the supply gives {p[0]:.4g} W in every sample: a dead sensor, or a "
+            "stated value; log what it measures"
+        )
     group = np.concatenate([[0], np.cumsum(_groups(at, shortest))])
     end = at[np.flatnonzero(np.diff(np.append(group, group[-1] + 1)))]
     p, u, i = (np.bincount(group, x) / np.bincount(group) for x in (p, u, i))

@@ -184,6 +184,7 @@ BAD: dict[str, tuple[dict[str, Array], str]] = {
     "a current alone": ({"supply_current": np.ones(200)}, "supply__voltage_V"),
     "a voltage alone": ({"supply": np.ones(200)}, "supply__current_A"),
     "negative voltage": ({"supply": -np.ones(200), "supply_current": np.ones(200)}, "positive"),
+    "dead meter": ({"supply_power": np.full(200, 48.0)}, "dead sensor"),
     "power the other way": ({"supply_power": -np.ones(200)}, "flip"),
 }
 
@@ -267,3 +268,16 @@ def test_command_writes_tables_and_says_the_answer(
     }
     told = json.loads((tmp_path / "trial" / "truth.json").read_text())
     assert set(told["hidden"]) == set(hidden)
+
+
+def test_motor_currents_times_the_supplys_voltage_are_no_power(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truth = make_supply(6, 0, tmp_path / "trial", ("wrong_sum",))
+    given = tmp_path / "trial" / "given"
+    options = [
+        str(given / x) if x.startswith(("log.", "urdf/", "mapping.")) else x
+        for x in truth["options"]
+    ]
+    assert exit_code(["gap", *options, "--out", str(tmp_path / "answer")]) == 1
+    assert "no power at the supply" in capsys.readouterr().out
