@@ -177,6 +177,10 @@ class ForwardSimulator:
                 raise ModelError(
                     f"joint '{a.name}': a coupled or loose transmission cannot be simulated forward"
                 )
+            if a.warming is not None:
+                raise ModelError(
+                    f"joint '{a.name}': friction that falls as it warms is not simulated forward"
+                )
         self.model, self._actuators = model, model.actuators
         self._rigid = changed_model(model.rigid, model.bodies)
         self._data = self._rigid.createData()

@@ -155,6 +155,8 @@ def _no_number_for(a: JointModel) -> list[str]:
         out.append(f"its motor turns with {a.coupled_to}, too ({a.coupling:.4g} of it)")
     if a.heating is not None:
         out.append("warming of the motor")
+    if a.warming is not None:
+        out.append("friction that falls as it warms")
     if a.motor is not None:
         out.append("the motor's current, voltage and power")
     return out
