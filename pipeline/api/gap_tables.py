@@ -90,8 +90,7 @@ def found_table(found: Sequence[Found], model: MachineModel) -> Table:
                     gap_after=_known(f.gap_after),
                     gap_unit=f.unit,
                     noise_floor=f.noise_floor,
-                    level=SUSPECTED if f.level == SUSPECTED else p.level or one.level,
-                    share=_known(p.share if p.level else one.share),
+                    level=SUSPECTED if f.level == SUSPECTED else one.level,
                     reason=f.reason,
                     written=f.written,
                 )

@@ -16,7 +16,6 @@
     place = ["rm_joint_1"]
     basis = "identified"
     level = "confirmed"
-    share = 1.0                      # of draws of the log's blocks in which it wins
     source = "log.csv, SHA-256 ..."
     [edit.parameters.torque]
     value = 0.108
@@ -32,7 +31,6 @@ Edits are applied in order to what the files say; the files themselves are never
 from __future__ import annotations
 
 import hashlib
-import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -86,7 +84,6 @@ class Edit:
         source: The log and its hash.
         level: ``"confirmed"``, or ``"approximate"``: it closes a large part of the gap, though its
             law is not exactly the machine's or its size scatters.
-        share: Of draws of the log's blocks in which it wins; NaN where it is not known.
     """
 
     effect: str
@@ -95,7 +92,6 @@ class Edit:
     basis: str = "identified"
     source: str = ""
     level: str = "confirmed"
-    share: float = math.nan
 
     @property
     def values(self) -> dict[str, float]:
@@ -179,7 +175,6 @@ class _Edit(Table):
     place: Annotated[Names, Field(min_length=1)]
     basis: Literal["identified", "assumed"] = "identified"
     level: Literal["confirmed", "approximate"] = "confirmed"
-    share: Annotated[Number, Field(ge=0.0, le=1.0)] | None = None
     source: Text
     parameters: dict[str, _Value]
 

@@ -47,8 +47,6 @@ class Estimate:
         low: Of the 95 % interval.
         high: Of the 95 % interval.
         unit: Unit.
-        level: Of a term by itself, where its effect has several; empty for that of the effect.
-        share: Likewise, of draws of the log's blocks in which the term wins.
     """
 
     name: str
@@ -56,8 +54,6 @@ class Estimate:
     low: float
     high: float
     unit: str
-    level: str = ""
-    share: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -68,13 +64,11 @@ class Member:
         place: Where.
         parameters: Estimates.
         level: Of this one.
-        share: Of draws of the log's blocks in which it wins.
     """
 
     place: tuple[str, ...]
     parameters: tuple[Estimate, ...]
     level: str
-    share: float
 
     @property
     def values(self) -> dict[str, float]:
@@ -128,7 +122,6 @@ class Found:
         excitation: The motion that would tell it from its rivals.
         level: `CONFIRMED`, `APPROXIMATE` or `SUSPECTED`.
         reason: Why it is not confirmed, or empty.
-        share: Of draws of the log's blocks in which it wins; NaN where none were drawn.
         law: Which of its laws, where the effect has several.
         members: Where several like findings are told as one, each of them.
         gap_before: Error on *prove* without it, where it shows most; NaN until the written model
@@ -149,7 +142,6 @@ class Found:
     excitation: str
     level: str = CONFIRMED
     reason: str = ""
-    share: float = float("nan")
     law: str = ""
     members: tuple[Member, ...] = ()
     gap_before: float = float("nan")
@@ -164,7 +156,7 @@ class Found:
     @property
     def each(self) -> tuple[Member, ...]:
         """Its members; itself where it has none."""
-        return self.members or (Member(self.place, self.parameters, self.level, self.share),)
+        return self.members or (Member(self.place, self.parameters, self.level),)
 
     @property
     def key(self) -> tuple[str, tuple[str, ...]]:

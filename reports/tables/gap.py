@@ -101,11 +101,6 @@ class FoundRow:
     gap_unit: str = declared("unit of both gaps and the noise floor")
     noise_floor: float = declared("of the joints it acts on", "see gap_unit")
     level: str = declared("confirmed, approximate (both written) or suspected (not written)")
-    share: float | None = declared(
-        "of draws of the log's blocks in which it wins; empty where none were drawn",
-        "1",
-        "share of draws",
-    )
     reason: str = declared("why it is not confirmed; empty where it is")
     written: bool = declared(
         "whether model.toml holds it; one that it leaves out: gap beside the file's"

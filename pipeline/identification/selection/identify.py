@@ -381,8 +381,7 @@ def _rms(errors: Array, joints: Sequence[int]) -> float:
 
 def _members(problem: Problem, level: str) -> tuple[Member, ...]:
     """Refitted bodies, link by link."""
-    nan = float("nan")
-    return tuple(Member((link,), ten, level, nan) for link, ten in bodies_of(problem).items())
+    return tuple(Member((link,), ten, level) for link, ten in bodies_of(problem).items())
 
 
 def _candidates(judged: Judgement, found: Sequence[Found]) -> Iterator[Candidate]:

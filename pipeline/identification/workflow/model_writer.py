@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,7 +27,6 @@ def edits_of(found: Sequence[Found], source: str) -> tuple[Edit, ...]:
             parameters=_in_order(one.effect, member.parameters),
             source=source,
             level=member.level,
-            share=member.share,
         )
         for one in found
         if one.kept
@@ -87,8 +85,6 @@ def _edit(edit: Edit) -> tomlkit.items.Table:
     table["place"] = list(edit.place)
     table["basis"] = edit.basis
     table["level"] = edit.level
-    if not math.isnan(edit.share):
-        table["share"] = float(edit.share)
     table["source"] = edit.source
     parameters = tomlkit.table()
     for p in edit.parameters:

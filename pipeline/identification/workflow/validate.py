@@ -60,7 +60,6 @@ def _found(number: int, group: Sequence[Edit], unit: str) -> Found:
             edit.place,
             tuple(Estimate(p.name, p.value, *p.interval, unit=p.unit) for p in edit.parameters),
             edit.level,
-            edit.share,
         )
         for edit in group
     )
@@ -79,7 +78,6 @@ def _found(number: int, group: Sequence[Edit], unit: str) -> Found:
         noise_floor=float("nan"),
         excitation=effect.excitation,
         level=CONFIRMED if levels == {CONFIRMED} else APPROXIMATE,
-        share=min(edit.share for edit in group),
         law=effect.law(first.values),
         members=members if several else (),
     )

@@ -183,18 +183,17 @@ def test_a_parameter_that_may_be_left_out_may_and_another_may_not(
                 read_model_file(path)
 
 
-def test_level_and_share_of_a_finding_are_written_and_read_back(tmp_path: Path, root: Path) -> None:
+def test_the_level_of_a_finding_is_written_and_read_back(tmp_path: Path, root: Path) -> None:
     file = new_model_file(root / "urdf" / "leg.toml", "rotor")
     friction, path = EFFECTS["coulomb_friction"], tmp_path / "model.toml"
     found = _found(friction, ("rm_joint_2",), {"torque": 0.3}, "current")
-    found = dataclasses.replace(found, level="approximate", share=0.8)
+    found = dataclasses.replace(found, level="approximate")
     path.write_text(
         model_text(file.with_edits(edits_of([found], source="log")), tmp_path), encoding="utf-8"
     )
     (edit,) = read_model_file(path).edits
-    assert (edit.level, edit.share) == ("approximate", 0.8)
-    for old, new in (('"approximate"', '"doubtful"'), ("share = 0.8", "share = 1.2")):
-        path.write_text(path.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
-        with pytest.raises(ModelFileError, match=r"edit 1\.(level|share)"):
-            read_model_file(path)
-        path.write_text(path.read_text(encoding="utf-8").replace(new, old), encoding="utf-8")
+    assert edit.level == "approximate"
+    text = path.read_text(encoding="utf-8").replace('"approximate"', '"doubtful"')
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ModelFileError, match=r"edit 1\.level"):
+        read_model_file(path)
