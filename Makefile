@@ -13,6 +13,8 @@ ARGS   ?=
 quoted = '$(subst ','\'',$(1))'
 # Of the faults that tests reach; all of them take about two hours.
 SHARE  ?= 0.15
+# A run of blind whose tables the page of blind trials takes over.
+BLIND  ?=
 
 .DEFAULT_GOAL := help
 .PHONY: help env reports view choose gap blind calibrate test test-slow lint check bench mutants readme docs urdf lock clean

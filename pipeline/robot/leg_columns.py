@@ -39,6 +39,13 @@ class LegColumns:
         every = np.arange(self.size, dtype=np.intp)
         return bool(self.real.all() and np.array_equal(self.columns.ravel(), every))
 
+    @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Leg of every column and the joint's number in it, shape (J, 2); -1 outside the legs."""
+        out = np.full((self.size, 2), -1, dtype=np.intp)
+        out[self.columns[self.real]] = np.argwhere(self.real)
+        return out
+
     def of(self, leg: int) -> NDArray[np.intp]:
         """The columns of one leg, as many as it has joints."""
         return self.columns[leg, : self.counts[leg]]

@@ -37,7 +37,6 @@ class EffortGain(Effect):
     signature = "load"
     rescales = True
     #: Gains 1, 2, 5, 1/2 and 1/5: what a voltage makes of a wrong current is not linear in it.
-    reaches: ClassVar = (1.0, 1000.0, 4000.0, -500.0, -800.0)
     excitation = "carries clearly different known loads"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:

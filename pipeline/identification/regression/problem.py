@@ -26,8 +26,10 @@ from pipeline.identification.regression.tolerances import (
     UNCERTAINTY,
     Nuisance,
     grouped,
+    leg_place,
     nuisance_columns,
     nuisances,
+    of_own_leg,
 )
 from pipeline.logs.prepared.measurement import CHOOSE, FIT
 from pipeline.machine.machine import MachineModel
@@ -64,12 +66,6 @@ class _Everywhere:
         for other in self._places:
             model = self._effect.edit(model, other, x, shape)
         return model
-
-
-def _joint_of(model: MachineModel, place: str) -> int:
-    """Column of the joint that a link or joint hangs on; -1 for the base."""
-    joint = place if place in model.joints else model.carrier(place)
-    return model.index(joint) if joint in model.joints else -1
 
 
 @dataclass(frozen=True)
@@ -292,16 +288,12 @@ class Problem:
         if effect.name not in _OF_ONE_LEG or not legs_are_separate(self.model, bench.measurement):
             return [(place, effect_columns(bench, base, effect, place, shape, self.sigma))]
         places = effect.places(base.model, bench.measurement)
-        joint = {p: _joint_of(self.model, p[0]) for p in places}
-        at = joint[place] % 3
-        group = [p for p in places if joint[p] >= 0 and joint[p] % 3 == at and joint[place] >= 0]
-        if len(group) < 2:
+        leg, number = leg_place(self.model, place[0])
+        group = [p for p in places if leg_place(self.model, p[0])[1] == number]
+        if leg < 0 or len(group) < 2:
             return [(place, effect_columns(bench, base, effect, place, shape, self.sigma))]
         whole = effect_columns(bench, base, _Everywhere(effect, group), place, shape, self.sigma)
-        return [
-            (p, [{j: c for j, c in column.items() if j // 3 == joint[p] // 3} for column in whole])
-            for p in group
-        ]
+        return [(p, [of_own_leg(self.model, p[0], column) for column in whole]) for p in group]
 
     def tolerance_columns(self, log: int) -> list[dict[int, Array]]:
         """Columns of the tolerances, per standard deviation of each."""

@@ -164,31 +164,33 @@ def nuisance_columns(
         model = nuisance.edit(model, step * nuisance.sigma)
     change = bench.simulator.difference(base, model)
     whole = bench.whitened(change.effort / step, change.joints, sigma)
-    out = []
-    for nuisance in group:
-        leg = leg_of(base.model, nuisance.place)
-        out.append({j: column for j, column in whole.items() if j // 3 == leg})
-    return out
+    return [of_own_leg(base.model, nuisance.place, whole) for nuisance in group]
 
 
-def leg_of(model: MachineModel, place: str) -> int:
-    """Number of the leg that a link or joint belongs to; -1 for the base."""
+def leg_place(model: MachineModel, place: str) -> tuple[int, int]:
+    """Leg that a link or joint belongs to and its number there; -1 and -1 outside the legs."""
     joint = place if place in model.joints else model.carrier(place)
-    return model.index(joint) // 3 if joint in model.joints else -1
+    if model.layout is None or joint not in model.joints:
+        return -1, -1
+    leg, number = model.layout.places[model.index(joint)].tolist()
+    return leg, number
+
+
+def of_own_leg(model: MachineModel, place: str, column: dict[int, Array]) -> dict[int, Array]:
+    """Of a column by joint what stands at joints of the leg of a link or joint."""
+    assert model.layout is not None
+    own = model.layout.of(leg_place(model, place)[0])
+    return {j: c for j, c in column.items() if j in own}
 
 
 def grouped(model: MachineModel, m: Measurement, every: Sequence[Nuisance]) -> list[list[Nuisance]]:
     """Tolerances in groups that one prediction serves."""
     if not legs_are_separate(model, m):
         return [[n] for n in every]
-    groups: dict[tuple[str, int], list[Nuisance]] = {}
+    groups: dict[tuple[str, int | str], list[Nuisance]] = {}
     for n in every:
-        if not n.place:
-            groups[(n.kind, -2)] = [n]
-            continue
-        joint = n.place if n.place in model.joints else model.carrier(n.place)
-        at = model.index(joint) % 3 if joint in model.joints else -1
-        groups.setdefault((n.kind, at), []).append(n)
+        leg, number = leg_place(model, n.place) if n.place else (-1, -1)
+        groups.setdefault((n.kind, n.place if leg < 0 else number), []).append(n)
     return list(groups.values())
 
 

@@ -220,7 +220,7 @@ class Judgement:
             term = search.pool.terms[k]
             if rest.evidence + gains[k] < state.evidence - limits.EXCLUDED - 5.0:
                 break
-            known = own is not None and _related(own, term)
+            known = own is not None and _within(own, term)
             if not known and term.key not in [r.key for r in out]:
                 out.append(self._rival(term.key, search.with_term(rest, int(k))))
         return out
@@ -249,11 +249,12 @@ def owners(term: Term) -> tuple[str, ...]:
     return tuple(p.partition("__")[0] for p in term.place)
 
 
-def _related(a: Term, b: Term) -> bool:
-    """Whether one is a special case of the other at the same place."""
-    names = a.effect.name, b.effect.name
-    related = names[0] in b.effect.contains or names[1] in a.effect.contains
-    return a.key == b.key or (related and a.place == b.place)
+def _within(a: Term, b: Term) -> bool:
+    """Whether a name is another or a special case of it at the same place.
+
+    What has the name in it explains as much; a special case has to be excluded like any other name.
+    """
+    return a.key == b.key or (a.effect.name in b.effect.contains and a.place == b.place)
 
 
 def _found(judged: Judgement, channel: str) -> Iterator[Found]:

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from pipeline.effects.base import REACH, Effect, Place
-from pipeline.effects.bodies.link_mass import AXES, AddedBody, LinkMass, last_links
+from pipeline.effects.bodies.link_mass import AXES, AddedBody, LinkMass, last_links, point_mass
 from pipeline.effects.drive.torque_ripple import TorqueRipple
 from pipeline.effects.friction.presets import FrictionPreset
 from pipeline.effects.registry import catalogue
@@ -30,6 +31,7 @@ _PEAKS = 4
 #: Triples of neighbouring rows without which noise is not told by them.
 _FOLLOWING = 50
 _RIDGE = 1e-9
+_TEN = len(AddedBody.coordinates)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,19 +231,18 @@ def _payloads(
     columns: Sequence[Sequence[Mapping[int, Array]]],
     held: Array,
 ) -> Iterator[tuple[str, dict[str, float]]]:
-    """Where a payload would be on each last link, by a body of any shape beside any friction."""
+    """Where a point mass would be on each last link, beside any friction."""
     beside = list(range(len(problem.tolerances)))
     for term in terms:
         if isinstance(term.effect, FrictionPreset) or term.effect.name == "effort_offset":
             beside += term.columns.tolist()
     full = np.zeros(len(columns[0]))
     full[: held.size] = held
-    model = problem.current()
-    prior = np.zeros(len(beside))
+    model, n = problem.current(), len(beside)
+    prior = np.zeros(n)
     prior[: len(problem.tolerances)] = problem.precision[: len(problem.tolerances)]
     for link in last_links(model):
-        n = len(beside) + len(AddedBody.coordinates)
-        H, h = np.zeros((n, n)), np.zeros(n)
+        H, h = np.zeros((n + _TEN, n + _TEN)), np.zeros(n + _TEN)
         for k, (bench, own) in enumerate(zip(problem.benches, columns, strict=True)):
             added = effect_columns(
                 bench, problem.predictions()[k], AddedBody(), (link,), {}, problem.sigma
@@ -252,12 +253,37 @@ def _payloads(
             for j, r in rest.items():
                 X = np.stack([_row(c, j, bench.rows.size)[head] for c in every])
                 H, h = H + X @ X.T, h + X @ r[head, 0]
-        ridge = np.concatenate(
-            [prior + 1e-6 * np.diag(H)[: len(beside)], 1e-6 * np.diag(H)[len(beside) :]]
-        )
-        mass, *first = solve_spd(H + np.diag(ridge), h)[len(beside) :][:4]
+        mass, *place = _point(H, h, prior)
         if mass > 0.0:
-            yield link, {axis: float(m / mass) for axis, m in zip(AXES, first, strict=True)}
+            yield link, dict(zip(AXES, place, strict=True))
+
+
+def _point(H: Array, h: Array, prior: Array) -> list[float]:
+    """Mass [kg] and place [m] of the point mass by which a log is likeliest, (4,).
+
+    Args:
+        H: X^T X of what stands beside it and of ten inertial parameters.
+        h: X^T r.
+        prior: Precision of what stands beside it.
+    """
+    n = prior.size
+    own = H[:n, :n] + np.diag(prior + 1e-6 * np.diag(H)[:n])
+    taken = solve_spd(own, np.column_stack([H[:n, n:], h[:n]]))
+    rest = np.column_stack([H[n:, n:], h[n:]]) - H[n:, :n] @ taken
+    size, axes = np.linalg.eigh(0.5 * (rest[:, :-1] + rest[:, :-1].T))
+    kept = size > 1e-9 * max(float(size[-1]), 1e-300)
+    A = np.sqrt(size[kept])[:, None] * axes[:, kept].T
+    b = axes[:, kept].T @ rest[:, -1] / np.sqrt(size[kept])
+
+    def left(p: Array) -> Array:
+        return np.asarray(A @ point_mass(p[0], p[1:]) - b)
+
+    ten = np.linalg.lstsq(A, b, rcond=None)[0]
+    mass = max(float(ten[0]), 1e-3)
+    starts = [np.array([mass, *centre]) for centre in (ten[1:4] / mass, np.zeros(3))]
+    found = [least_squares(left, start, x_scale="jac") for start in starts]
+    best = min(found, key=lambda f: float(f.cost))
+    return np.asarray(best.x).tolist()
 
 
 def _channels(

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.linalg
 from numpy.typing import NDArray
 
-from pipeline.effects.base import REACH
+from pipeline.effects.base import REACH, Effect
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.tolerances import STRAINS, UNCERTAINTY
 from pipeline.identification.results import UNCERTAINTIES
@@ -76,8 +76,6 @@ class Search:
         self.bodies = np.array(
             [k for k, n in enumerate(pool.problem.tolerances) if n.kind in STRAINS], dtype=np.intp
         )
-        self._tolerances = pool.problem.precision[: pool.base].copy()
-        self._tolerances[self.bodies] = 1.0
         self._wide = self._widths()
         names = len({t.key for t in pool.terms}) + 1
         # A nonlinear parameter costs what a coordinate that many rows tell does.
@@ -99,7 +97,10 @@ class Search:
         names = list(dict.fromkeys(t.key for t in pool.terms))
         self._keys = np.array([names.index(t.key) for t in pool.terms], dtype=np.intp)
         self._in_bodies = np.array([self._of_bodies(t) for t in pool.terms], dtype=np.bool_)
+        # What a column looks across is a chord: it tells nothing of what is far smaller.
+        self._least = np.array([0.5 * _reached(t) for t in pool.terms])
         counts = np.array([t.columns.size for t in pool.terms], dtype=np.intp)
+        self._spare = np.array([bool(_spare(t.effect)) for t in pool.terms], dtype=np.bool_)
         self._by_count = {int(n): np.flatnonzero(counts == n) for n in np.unique(counts)}
         self._own = {
             n: np.array([pool.terms[t].columns for t in own]) for n, own in self._by_count.items()
@@ -141,7 +142,8 @@ class Search:
 
     def precision(self, columns: Index, uncertainty: float) -> Array:
         """Prior precision of some columns, tolerances among them."""
-        every = np.concatenate([self._tolerances, self._wide[self.pool.base :]])
+        # A tolerance that is a name in small stays open beside it: what it holds needs no name.
+        every = np.concatenate([np.ones(self.pool.base), self._wide[self.pool.base :]])
         every[self.bodies] = (UNCERTAINTY / uncertainty) ** 2
         return np.maximum(every[columns], 1e-12 * np.maximum(np.diag(self.H)[columns], 1e-300))
 
@@ -190,6 +192,8 @@ class Search:
     def _plausible(self, number: int, x: Mapping[int, float]) -> bool:
         term = self.pool.terms[number]
         names = [c.name for c in term.effect.coordinates]
+        if abs(x.get(0, 0.0)) < self._least[number]:
+            return False
         full = {name: x.get(k, 0.0) for k, name in enumerate(names)}
         if any(full[c.name] < 0 and not c.signed for c in term.effect.coordinates):
             return True  # its sign is judged by itself
@@ -236,30 +240,36 @@ class Search:
         x = np.linalg.solve(M, g[:, :, None])[:, :, 0]
         out = 0.5 * np.sum(g * x, axis=1) - 0.5 * np.linalg.slogdet(M)[1]
         out += 0.5 * np.log(prior).sum(axis=1)
-        out[~sound] = -np.inf
-        for k in np.flatnonzero(
-            sound
-            & (
-                (x < 0.0)
-                & ~self._signed[g.shape[1]][np.searchsorted(self._by_count[g.shape[1]], numbers)]
-            ).any(axis=1)
-        ):
+        out[~sound | (abs(x[:, 0]) < self._least[numbers])] = -np.inf
+        own = np.searchsorted(self._by_count[g.shape[1]], numbers)
+        wrong = ((x < 0.0) & ~self._signed[g.shape[1]][own]).any(axis=1)
+        for k in np.flatnonzero(sound & (wrong | self._spare[numbers])):
             out[k] = self._gain(self.pool.terms[numbers[k]], S[k], g[k], prior[k])
         return out
 
     def _gain(self, term: Term, S: Array, g: Array, prior: Array) -> float:
-        """The same of one term, coordinates against their sign left out."""
+        """The same of one term, without coordinates against their sign or not worth it."""
         coordinates = term.effect.coordinates
-        free = list(range(len(coordinates)))
-        while free:
+
+        def rise(free: Sequence[int]) -> tuple[float, Array]:
             M = S[np.ix_(free, free)] + np.diag(prior[free])
             x = np.linalg.solve(M, g[free])
+            size = np.linalg.slogdet(M)[1] - np.log(prior[free]).sum()
+            return float(0.5 * g[free] @ x - 0.5 * size), x
+
+        free = list(range(len(coordinates)))
+        while free:
+            most, x = rise(free)
             wrong = [k for k, v in zip(free, x, strict=True) if v < 0 and not coordinates[k].signed]
-            if not wrong:
-                size = np.linalg.slogdet(M)[1] - np.log(prior[free]).sum()
-                return float(0.5 * g[free] @ x - 0.5 * size)
             if any(coordinates[k].required for k in wrong):
                 return -np.inf
+            if not wrong:
+                spare = [k for k in free if k in _spare(term.effect)] if len(free) > 1 else []
+                less = {k: rise([f for f in free if f != k])[0] for k in spare}
+                worst = max(less, key=less.__getitem__, default=None)
+                if worst is None or less[worst] <= most:
+                    return most
+                wrong = [worst]
             free = [k for k in free if k not in wrong]
         return -np.inf
 
@@ -285,9 +295,23 @@ class Search:
         return out
 
     def with_term(self, state: State, number: int) -> State:
-        """A state with one term more."""
-        every = tuple(range(len(self.pool.terms[number].effect.coordinates)))
-        return self.valid(replace(state, terms=(*state.terms, (number, every))))
+        """A state with one term more, in as few of its components as make the log likeliest."""
+        effect = self.pool.terms[number].effect
+        used = tuple(range(len(effect.coordinates)))
+        state = self.valid(replace(state, terms=(*state.terms, (number, used))))
+        while number in state.numbers:
+            *before, (_, used) = state.terms
+            forms = [
+                (*before, (number, tuple(u for u in used if u != k)))
+                for k in _spare(effect)
+                if k in used and len(used) > 1
+            ]
+            less = (self.valid(replace(state, terms=form)) for form in forms)
+            better = max(less, key=lambda s: s.evidence, default=state)
+            if better.evidence <= state.evidence:
+                break
+            state = better
+        return state
 
     def without(self, state: State, number: int) -> State:
         """A state with one term less."""
@@ -398,6 +422,18 @@ class Search:
                 if other.evidence > state.evidence + 1e-6:
                     return self._swapped(other)
         return state
+
+
+def _reached(term: Term) -> float:
+    """What the column of a term's first coordinate reaches across, beyond a small step."""
+    return abs(term.shape.get(REACH, 0.0)) * term.effect.coordinates[0].step
+
+
+def _spare(effect: Effect) -> list[int]:
+    """Coordinates that a law may do without: components that may have either sign."""
+    if not effect.has_law:
+        return []
+    return [k for k, c in enumerate(effect.coordinates) if c.signed and not c.required]
 
 
 def _none() -> Index:

@@ -23,7 +23,7 @@ HIDDEN = {
     "backdrive_loss": (J2, {"driving": 0.25, "driven": 0.05}),
     "rotor_inertia": (("rm_joint_1",), {"added": 5e-6}),
     "link_mass": (("rm_tibia_link",), {"mass": 0.4}),
-    "center_of_mass_offset": (("rm_tibia_link",), {"x": 0.05, "y": 0.0, "z": 0.0}),
+    "center_of_mass_offset": (("rm_tibia_link",), {"x": 0.0, "y": 0.03, "z": 0.0}),
     "base_tilt": (("ground",), {"roll": 0.03, "pitch": -0.06}),
     "joint_elasticity": (("rm_joint_3",), {"stiffness": 2000.0}),
     "backlash": (("rm_joint_3",), {"width": 0.01, "stiffness": 1e5, "crossing": 0.1}),
@@ -210,7 +210,8 @@ def test_what_only_proves_has_no_say(motion) -> None:  # type: ignore[no-untyped
     assert list(first.tolerances) == list(second.tolerances)
 
     def judged(naming):  # type: ignore[no-untyped-def]
-        return [(c.effect, c.place, c.verdict) for c in naming.candidates]
+        every = (c for c in naming.candidates if c.effect != "winding_heating")
+        return [(c.effect, c.place, c.verdict) for c in every]
 
     assert judged(first) == judged(second)
     alone = identify(nominal, [replace(log, effort=garbage)]).naming
