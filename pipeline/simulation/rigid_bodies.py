@@ -127,6 +127,7 @@ class RigidBodies:
     def __init__(self, measurement: Measurement) -> None:
         self.measurement = measurement
         self._base: tuple[Array, Array] | None = None
+        self._turned: Rotation | None = None
         self._measured: tuple[float, Array] | None = None
 
     def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
@@ -154,10 +155,10 @@ class RigidBodies:
         from scipy.spatial.transform import Rotation
 
         m = self.measurement
-        if m.base_roll is None and m.base_pitch is None:
-            return None
-        angles = [np.zeros(n) if x is None else x for x in (m.base_pitch, m.base_roll)]
-        return Rotation.from_euler("YX", np.stack(angles, axis=1))
+        if self._turned is None and not m.base_roll is m.base_pitch is None:
+            angles = [np.zeros(n) if x is None else x for x in (m.base_pitch, m.base_roll)]
+            self._turned = Rotation.from_euler("YX", np.stack(angles, axis=1))
+        return self._turned
 
     def _base_motion(self, machine: MachineModel) -> tuple[Array, Array]:
         """Velocity (N, 3) and acceleration (N, 6) of the base in its own frame.

@@ -25,7 +25,7 @@ from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.refit import refit, tolerances_of
 from pipeline.identification.results import UNCERTAINTIES, Candidate, Found, Member, Naming
 from pipeline.identification.selection.pool import Key, Term
-from pipeline.identification.selection.search import BODIES, Search, State
+from pipeline.identification.selection.search import BODIES, CLOSE, Search, State
 from pipeline.identification.selection.settle import Settled, settle, settle_without
 from pipeline.logs.prepared.measurement import CHOOSE, FIT, Measurement
 from pipeline.machine.machine import MachineModel
@@ -213,12 +213,12 @@ class Judgement:
             for u in UNCERTAINTIES:
                 if u > state.uncertainty:
                     other = search.at(rest, u)
-                    if state.evidence - other.evidence < limits.EXCLUDED + 5.0:
+                    if state.evidence - other.evidence < CLOSE:
                         out.append(self._rival(BODIES, other))
         gains = search.gains(rest)
         for k in np.argsort(-gains)[: limits.RIVALS]:
             term = search.pool.terms[k]
-            if rest.evidence + gains[k] < state.evidence - limits.EXCLUDED - 5.0:
+            if rest.evidence + gains[k] < state.evidence - CLOSE:
                 break
             known = own is not None and _within(own, term)
             if not known and term.key not in [r.key for r in out]:

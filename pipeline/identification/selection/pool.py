@@ -250,9 +250,11 @@ def _payloads(
             every = [*(own[i] for i in beside), *added]
             rest = _absolute(problem, k, own, full)
             head = problem.head(k)
-            for j, r in rest.items():
-                X = np.stack([_row(c, j, bench.rows.size)[head] for c in every])
-                H, h = H + X @ X.T, h + X @ r[head, 0]
+            for j in {j for column in added for j in column}:
+                ids = [i for i, column in enumerate(every) if j in column]
+                X = np.stack([every[i][j][head, 0] for i in ids])
+                H[np.ix_(ids, ids)] += X @ X.T
+                h[ids] += X @ rest[j][head, 0]
         mass, *place = _point(H, h, prior)
         if mass > 0.0:
             yield link, dict(zip(AXES, place, strict=True))

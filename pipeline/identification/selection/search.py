@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from pipeline.effects.base import REACH, Effect
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.tolerances import STRAINS, UNCERTAINTY
-from pipeline.identification.results import UNCERTAINTIES
+from pipeline.identification.results import EXCLUDED, UNCERTAINTIES
 from pipeline.identification.selection.pool import Key, Pool, Term, saturated
 
 Array = NDArray[np.float64]
@@ -41,6 +41,8 @@ COARSE: Final = 0.1
 #: Parts of a log's blocks, each judged by estimates from the others.
 FOLDS: Final = 8
 _RIDGE: Final = 1e-10
+#: Evidence that a rival may lack and still be looked at.
+CLOSE: Final = EXCLUDED + 5.0
 
 
 @dataclass(frozen=True)
@@ -243,7 +245,10 @@ class Search:
         out[~sound | (abs(x[:, 0]) < self._least[numbers])] = -np.inf
         own = np.searchsorted(self._by_count[g.shape[1]], numbers)
         wrong = ((x < 0.0) & ~self._signed[g.shape[1]][own]).any(axis=1)
-        for k in np.flatnonzero(sound & (wrong | self._spare[numbers])):
+        # A coordinate left out saves its ln(S / prior) / 2 at most.
+        saved = 0.5 * np.log(np.maximum(np.einsum("tii->ti", M) / prior, 1.0)).sum(axis=1)
+        close = out + self._prior[numbers] + saved > -CLOSE
+        for k in np.flatnonzero(sound & close & (wrong | self._spare[numbers])):
             out[k] = self._gain(self.pool.terms[numbers[k]], S[k], g[k], prior[k])
         return out
 
