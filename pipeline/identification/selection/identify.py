@@ -108,27 +108,34 @@ def identify(
 
 
 def _best_judged(settled: Settled, channel: str) -> tuple[Judgement, tuple[Found, ...]]:
-    """The names with how sure each is, of the answer whose sure names predict best.
+    """The names with how sure each is.
 
-    Names that are suspected are closed and the others compete anew; what that leads to is taken
-    only where it predicts blocks it has not seen better, by the names that would be written.
+    Names that are suspected are closed and the others compete anew. What that leads to is the
+    answer unless by the names that would be written it predicts blocks it has not seen worse.
     """
     weights, idle = settled.search.weights, frozenset[Key]()
-    best: tuple[float, Judgement, tuple[Found, ...]] | None = None
+    best: tuple[Array, Judgement, tuple[Found, ...]] | None = None
     for left in reversed(range(_RENEWED + 1)):
         judged = Judgement(settled)
         found = tuple(_found(judged, channel))
         more = frozenset(_key(f) for f in found if f.level == limits.SUSPECTED)
         search = Search(settled.pool, weights, more)
-        loss = float(search.block_losses(search.left(settled.state)).sum())
-        if best is None or loss < best[0]:
-            best = loss, judged, found
+        losses = search.block_losses(search.left(settled.state))
+        if best is None or _worse(losses, best[0]) < limits.SURE:
+            best = losses, judged, found
         if not more or not left:
             break
         idle |= more
         settled = settle_without(settled, idle)
     assert best is not None
     return best[1], best[2]
+
+
+def _worse(losses: Array, others: Array) -> float:
+    """By how many standard errors over blocks losses (B,) are larger than others."""
+    d = losses - others
+    error = float(np.sqrt(d.size) * d.std(ddof=1)) if d.size > 1 else np.inf
+    return float(d.sum()) / max(error, 1e-12)
 
 
 def _key(f: Found) -> Key:
@@ -212,7 +219,7 @@ class Judgement:
         if number is not None:
             for u in UNCERTAINTIES:
                 if u > state.uncertainty:
-                    other = search.at(rest, u)
+                    other = search.pruned(search.at(rest, u))
                     if state.evidence - other.evidence < CLOSE:
                         out.append(self._rival(BODIES, other))
         gains = search.gains(rest)
@@ -227,9 +234,7 @@ class Judgement:
 
     def _rival(self, key: Key | None, other: State) -> Rival:
         """How a set does against the one found."""
-        d = self.search.block_losses(other) - self.losses
-        error = float(np.sqrt(d.size) * d.std(ddof=1)) if d.size > 1 else np.inf
-        sure = float(d.sum()) / max(error, 1e-12)
+        sure = _worse(self.search.block_losses(other), self.losses)
         richer = sum(len(u) for _, u in other.terms) > sum(len(u) for _, u in self.state.terms)
         return Rival(key, self.state.evidence - other.evidence, sure, richer)
 

@@ -365,7 +365,7 @@ class Search:
     def _climbed(self, state: State, uncertainties: Sequence[float]) -> State:
         state = self.valid(state)
         while True:
-            better = self._pruned(self._freed(self._grown(state), uncertainties))
+            better = self.pruned(self._freed(self._grown(state), uncertainties))
             better = self._swapped(better)
             better = self._freed(better, uncertainties)
             if better.evidence <= state.evidence + 1e-6:
@@ -378,14 +378,15 @@ class Search:
             for number in np.argsort(-gains)[:3]:
                 if gains[number] <= 0.0:
                     return state
-                more = self._pruned(self.with_term(state, int(number)))
+                more = self.pruned(self.with_term(state, int(number)))
                 if more.evidence > state.evidence + 1e-6:
                     state = more
                     break
             else:
                 return state
 
-    def _pruned(self, state: State) -> State:
+    def pruned(self, state: State) -> State:
+        """A state without the terms that make it less likely."""
         while state.terms:
             changes = self.removals(state)
             best = int(np.argmax(changes))
@@ -423,7 +424,7 @@ class Search:
             gains = self.gains(rest)
             best = int(np.argmax(gains))
             if best != t and rest.evidence + gains[best] > state.evidence + 1e-6:
-                other = self._pruned(self.with_term(rest, best))
+                other = self.pruned(self.with_term(rest, best))
                 if other.evidence > state.evidence + 1e-6:
                     return self._swapped(other)
         return state
