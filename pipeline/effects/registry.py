@@ -29,6 +29,7 @@ from pipeline.effects.friction.presets import (
     CoulombFriction,
     DirectionDependentFriction,
     LoadDependentFriction,
+    QuadraticDrag,
     StribeckFriction,
     ViscousFriction,
 )
@@ -46,6 +47,7 @@ EFFECTS: Final[Mapping[str, Effect]] = MappingProxyType(
         for effect in (
             CoulombFriction(),
             ViscousFriction(),
+            QuadraticDrag(),
             StribeckFriction(),
             LoadDependentFriction(),
             DirectionDependentFriction(),

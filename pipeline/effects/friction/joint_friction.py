@@ -14,7 +14,7 @@ _TERMS: Final = (
     (("coulomb",), "Coulomb", "coulomb_friction"),
     (("viscous",), "viscous", "viscous_friction"),
     (("excess",), "Stribeck", "stribeck_friction"),
-    (("quadratic",), "quadratic", ""),
+    (("quadratic",), "quadratic", "quadratic_drag"),
     (("saturating",), "saturating", ""),
     (("load",), "load-dependent", "load_dependent_friction"),
     (("driving", "driven"), "load-dependent by quadrant", "backdrive_loss"),

@@ -59,6 +59,17 @@ class ViscousFriction(FrictionPreset):
     excitation = "moves at clearly different speeds, the fastest near the limit"
 
 
+class QuadraticDrag(FrictionPreset):
+    """Friction that grows with the square of the speed: churned oil, air."""
+
+    name = "quadratic_drag"
+    additive = True
+    parameters: ClassVar = (Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3),)
+    coordinates: ClassVar = (Coordinate("quadratic", 1e-2),)
+    terms: ClassVar = {"quadratic": "quadratic"}
+    excitation = "moves at clearly different speeds, the fastest near the limit"
+
+
 class StribeckFriction(FrictionPreset):
     """Dry friction that falls from break-away to Coulomb level with speed."""
 

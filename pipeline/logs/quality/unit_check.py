@@ -40,6 +40,8 @@ OF_LIMITS: Final = ("share_outside_limits", "speed")
 _COMPARED_ROWS: Final = 50_000
 #: Rows to either side over which a position's rate is taken.
 _REACH: Final = 3
+#: Factor between a velocity and the position's rate that no filter or rounding makes.
+_CONTRADICTS: Final = 3.0
 #: Share of the weight that feet may carry more or less on average: sensors err by some per cent.
 _WEIGHT: Final = 0.1
 #: Correlation from which the shift between two channels means something.
@@ -132,8 +134,14 @@ def _factor(factor: float) -> tuple[str, str]:
             "refused",
             "runs against the rate of the position: flip one of them in a mapping file",
         )
-    verdict = "warning" if abs(factor - 1) > 0.1 else "ok"
-    return verdict, f"{factor:.4g} times the rate of the position"
+    detail = f"{factor:.4g} times the rate of the position"
+    if max(size, 1.0 / size) > _CONTRADICTS:
+        return (
+            "refused",
+            f"is {detail}: one of them is not what it is called, or the gear's ratio "
+            "is applied where it is not to be; give a scale or [gear_ratio] in a mapping file",
+        )
+    return "warning" if abs(factor - 1) > 0.1 else "ok", detail
 
 
 def _note_lag(found: Findings, column: str, check: str, seen: Skew, dt: float, of: str) -> None:

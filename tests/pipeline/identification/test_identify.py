@@ -17,6 +17,7 @@ J2 = ("rm_joint_2",)
 HIDDEN = {
     "coulomb_friction": (J2, {"torque": 0.4}),
     "viscous_friction": (J2, {"coefficient": 0.8}),
+    "quadratic_drag": (J2, {"quadratic": 0.5}),
     "stribeck_friction": (J2, {"coulomb": 0.3, "excess": 0.6, "velocity": 0.06}),
     "load_dependent_friction": (J2, {"share": 0.12}),
     "direction_dependent_friction": (J2, {"positive": 0.9, "negative": 0.2}),
