@@ -30,6 +30,7 @@ SURE: Final = 2.0
 #: Rivals of a name that are looked at.
 RIVALS: Final = 6
 SHAPELESS: Final = "it is a curve, drawn where no law of the catalogue fits"
+BESIDE: Final = "beside it a curve is drawn over the same variable, whose law is not known"
 #: What a model leaves over the noise floor, in any channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
 MORE_LEFT: Final = "more is left there than it explains; what causes that may stand behind it"

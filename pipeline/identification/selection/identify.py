@@ -238,6 +238,16 @@ class Judgement:
         richer = sum(len(u) for _, u in other.terms) > sum(len(u) for _, u in self.state.terms)
         return Rival(key, self.state.evidence - other.evidence, sure, richer)
 
+    def beside_curve(self, number: int) -> bool:
+        """Whether a curve without a law stands at a name's joint over the same variable."""
+        own = self.settled.pool.terms[number]
+        return any(
+            not t.effect.has_law
+            and t.effect.signature == own.effect.signature
+            and set(owners(t)) & set(owners(own))
+            for t in (self.settled.pool.terms[k] for k in self.state.numbers)
+        )
+
     def notes(self) -> Iterator[str]:
         """What has no name, in words."""
         terms = [self.settled.pool.terms[t] for t in self.state.numbers]
@@ -333,6 +343,8 @@ def _level(
         return limits.APPROXIMATE, "parts of the log disagree whether it is there"
     if number is not None and not judged.settled.pool.terms[number].effect.has_law:
         return limits.APPROXIMATE, limits.SHAPELESS
+    if number is not None and judged.beside_curve(number):
+        return limits.APPROXIMATE, limits.BESIDE
     noise = float(np.sqrt(np.mean(judged.noise[joints] ** 2)))
     if left**2 - noise**2 > before**2 - left**2:
         return limits.APPROXIMATE, limits.MORE_LEFT
