@@ -111,18 +111,18 @@ def _best_judged(settled: Settled, channel: str) -> tuple[Judgement, tuple[Found
     """The names with how sure each is.
 
     Names that are suspected are closed and the others compete anew. What that leads to is the
-    answer unless by the names that would be written it predicts blocks it has not seen worse.
+    answer unless the log is less likely with the names that would then be written.
     """
     weights, idle = settled.search.weights, frozenset[Key]()
-    best: tuple[Array, Judgement, tuple[Found, ...]] | None = None
+    best: tuple[float, Judgement, tuple[Found, ...]] | None = None
     for left in reversed(range(_RENEWED + 1)):
         judged = Judgement(settled)
         found = tuple(_found(judged, channel))
         more = frozenset(_key(f) for f in found if f.level == limits.SUSPECTED)
         search = Search(settled.pool, weights, more)
-        losses = search.block_losses(search.left(settled.state))
-        if best is None or _worse(losses, best[0]) < limits.SURE:
-            best = losses, judged, found
+        evidence = search.left(settled.state).evidence
+        if best is None or evidence > best[0] - limits.EXCLUDED:
+            best = evidence, judged, found
         if not more or not left:
             break
         idle |= more

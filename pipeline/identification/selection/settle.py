@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 _ROUNDS: Final = 2
 #: Evidence below which two points are the same.
 _SAME: Final = 1e-3
-#: Shares of linear estimates that a nonlinear fit may start from.
-_SHARES: Final = (1.0, 0.3, 0.1)
+#: Shares of the way to linear estimates that a nonlinear fit may start from.
+_SHARES: Final = (1.0, 0.3, 0.1, 0.0)
 #: Answers of the first search that are estimated in full.
 _STARTS: Final = 2
 
@@ -127,12 +127,18 @@ def names_of(search: Search, state: State) -> tuple[frozenset[Key], float]:
 
 
 def _started(problem: Problem, search: Search, state: State) -> Problem:
-    """The problem at linear estimates, or a share of them where all of them lead astray."""
+    """The problem at linear estimates, or a share of the way to them where all leads astray."""
     held, accepted = estimated(search, state)
+    present = {(a.effect.name, a.place): a.x for a in problem.accepted}
     tried = []
     for share in _SHARES:
-        shortened = [replace(a, x={k: share * v for k, v in a.x.items()}) for a in accepted]
-        tried.append(problem.with_accepted(shortened, problem.inside(share * held)))
+        on_the_way = []
+        for a in accepted:
+            now = present.get((a.effect.name, a.place), {})
+            x = {k: now.get(k, 0.0) + share * (v - now.get(k, 0.0)) for k, v in a.x.items()}
+            on_the_way.append(replace(a, x=x))
+        between = problem.held + share * (held - problem.held)
+        tried.append(problem.with_accepted(on_the_way, problem.inside(between)))
     return min(tried, key=Problem.cost)
 
 
