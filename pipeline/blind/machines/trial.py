@@ -31,7 +31,7 @@ from pipeline.blind.machines.plant import Plant, rigid_plant
 from pipeline.blind.machines.sensors import draw_sensors, measure
 from pipeline.blind.machines.visible import THRESHOLD, judge
 from pipeline.blind.machines.walk import draw_walker, gait_course
-from pipeline.errors import PipelineError
+from pipeline.errors import PipelineError, TippingError
 from reports.atomic import write_text
 
 #: Kinds of ten trials in a row: 4 single, 2 several, 2 outside the catalogue, 2 empty.
@@ -102,7 +102,7 @@ def make(
         try:
             truth = _run(source, name, hidden, partial(stream, source, seed, k, again), folder)
             break
-        except forward.RanAwayError:
+        except (forward.RanAwayError, TippingError):  # bodies far off may tip a walking robot
             if again == _AGAIN - 1:
                 raise
     truth = {"source": source, "seed": seed, "trial": k, "kind": kind} | truth
