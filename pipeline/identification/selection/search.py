@@ -260,7 +260,7 @@ class Search:
             M = S[np.ix_(free, free)] + np.diag(prior[free])
             x = np.linalg.solve(M, g[free])
             size = np.linalg.slogdet(M)[1] - np.log(prior[free]).sum()
-            return float(0.5 * g[free] @ x - 0.5 * size), x
+            return float(0.5 * g[free] @ x - 0.5 * size), np.asarray(x)
 
         free = list(range(len(coordinates)))
         while free:
