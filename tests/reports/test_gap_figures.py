@@ -128,7 +128,7 @@ def test_words_of_the_gap_in_time_lie_on_nothing(joints: int) -> None:
 
 def test_tables_have_the_promised_columns() -> None:
     what = "order effect law amounts_to joint place parameter value ci_low ci_high unit"
-    how = "gap_before gap_after gap_unit noise_floor level share reason written"
+    how = "gap_before gap_after gap_unit noise_floor level reason written"
     assert list(table_of(FoundRow, []).columns) == [*what.split(), *how.split()]
     table = deciding_motion(np.arange(3.0), ["a", "b"], np.zeros((3, 2)))
     assert list(table.columns) == ["time_s", "a__position_rad", "b__position_rad"]

@@ -138,7 +138,7 @@ def test_what_is_found_is_in_the_model_and_read_back(
     plain = lw.walk(machine, "rotor", samples=101).energy.frame()
     assert energies[0]["electrical_J"].max() > plain["electrical_J"].max()
     again = lw.validate("pipeline/identification/demo/walk_slow.parquet", read)
-    assert again.gap[1] < 0.1 * again.gap[0]
+    assert again.gap[1] < 0.2 * again.gap[0]
 
 
 def test_errors_are_one_line(machine: lw.Machine, tmp_path: Path) -> None:
