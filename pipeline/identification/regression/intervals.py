@@ -73,7 +73,11 @@ def estimates(problem: Problem, channel: str) -> list[Sized]:
         best = a.effect.physical(a.x, a.shape)
         parameters = tuple(_estimate(a, n, best, samples, channel) for n in best)
         size = np.array([a.x[n] for n in names])
-        out.append(Sized(parameters, _certain(size, draws[:, coordinates])))
+        own = draws[:, coordinates]
+        # An effect is this effect only while what it requires is something, each by itself.
+        needed = [k for k, c in enumerate(a.effect.coordinates) if c.required]
+        certain = all(_certain(size[[k]], own[:, [k]]) for k in needed)
+        out.append(Sized(parameters, certain and _certain(size, own)))
     return out
 
 

@@ -32,6 +32,8 @@ _PEAKS = 4
 _FOLLOWING = 50
 _RIDGE = 1e-9
 _TEN = len(AddedBody.coordinates)
+#: Places about a link's joint from which that of a payload is looked for [m].
+_AROUND = np.vstack([np.zeros(3), *(0.2 * np.eye(3)), *(-0.2 * np.eye(3))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +233,7 @@ def _payloads(
     columns: Sequence[Sequence[Mapping[int, Array]]],
     held: Array,
 ) -> Iterator[tuple[str, dict[str, float]]]:
-    """Where a point mass would be on each last link, beside any friction."""
+    """Where a point mass would be on each last link, beside any friction and beside none."""
     beside = list(range(len(problem.tolerances)))
     for term in terms:
         if isinstance(term.effect, FrictionPreset) or term.effect.name == "effort_offset":
@@ -255,9 +257,11 @@ def _payloads(
                 X = np.stack([every[i][j][head, 0] for i in ids])
                 H[np.ix_(ids, ids)] += X @ X.T
                 h[ids] += X @ rest[j][head, 0]
-        mass, *place = _point(H, h, prior)
-        if mass > 0.0:
-            yield link, dict(zip(AXES, place, strict=True))
+        for known in (n, len(problem.tolerances)):
+            kept = np.concatenate([np.arange(known), np.arange(n, n + _TEN)])
+            mass, *place = _point(H[np.ix_(kept, kept)], h[kept], prior[:known])
+            if mass > 0.0:
+                yield link, dict(zip(AXES, place, strict=True))
 
 
 def _point(H: Array, h: Array, prior: Array) -> list[float]:
@@ -280,10 +284,13 @@ def _point(H: Array, h: Array, prior: Array) -> list[float]:
     def left(p: Array) -> Array:
         return np.asarray(A @ point_mass(p[0], p[1:]) - b)
 
-    ten = np.linalg.lstsq(A, b, rcond=None)[0]
-    mass = max(float(ten[0]), 1e-3)
-    starts = [np.array([mass, *centre]) for centre in (ten[1:4] / mass, np.zeros(3))]
-    found = [least_squares(left, start, x_scale="jac") for start in starts]
+    starts = []
+    for centre in _AROUND:
+        unit = A @ point_mass(1.0, centre)
+        starts.append([float(unit @ b) / max(float(unit @ unit), 1e-300), *centre])
+    found = [least_squares(left, start, x_scale="jac") for start in starts if start[0] > 0.0]
+    if not found:
+        return [0.0] * 4
     best = min(found, key=lambda f: float(f.cost))
     return np.asarray(best.x).tolist()
 
