@@ -37,8 +37,8 @@ class BodyChange:
         inertia_scale: Further factor on the rotational inertia about the centre of mass [1].
         carried: Ten inertial parameters of what is carried besides, in Pinocchio's order, about the
             frame of the body's joint.
-        strain: Symmetric S (4, 4) by `STRAINS`, with which the pseudo-inertia P = L L^T becomes
-            L exp(S) L^T: whatever S is, some body has it.
+        strain: By how much it was stretched, moved and made heavier, ten entries in the order of
+            `STRAINS`: whatever they are, some body has them (`rigid_bodies.strained`).
     """
 
     payload: float = 0.0

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _BLOCK = 2048
-#: Entries of a strain, in this order.
-_ROWS, _COLUMNS = (0, 1, 2, 3, 0, 0, 1, 0, 1, 2), (0, 1, 2, 3, 1, 2, 2, 3, 3, 3)
 #: Least share of a direction in a body's scaled pseudo-inertia.
 _LEAST = 1e-6
 _MANY = 8192  # rows from which a second thread pays
@@ -65,14 +63,19 @@ def changed_model(rigid: pin.Model, bodies: Bodies) -> pin.Model:
 
 
 def strained(body: pin.Inertia, strain: Sequence[float]) -> pin.Inertia:
-    """A body whose pseudo-inertia P = L L^T has become L exp(S) L^T.
+    """A body that was stretched, moved and made heavier, so that it stays one that can be.
 
-    P = [[tr(I) / 2 - I, m c], [(m c)^T, m]] about the joint's frame (Wensing, Kim and Slotine,
-    RA-L 2018); S is symmetric, so that the mass stays positive and the inertia possible.
+    With the second moments M = tr(I) / 2 - I about the centre of mass c and the longest radius of
+    gyration k, k^2 m the largest eigenvalue of M, its mass, centre and second moments become
+
+        m exp(a),    c + k d,    exp(a) exp(E) M exp(E).
+
+    A rotation of the axes in which it is measured turns E and d and nothing else. The centre of a
+    slender link may lie off its axis as far as along it: motors and wires sit beside it.
 
     Args:
         body: Before.
-        strain: Of S the entries xx, yy, zz, mm, xy, xz, yz, xm, ym, zm.
+        strain: Of the symmetric E the entries xx, yy, zz, then a, then of E xy, xz, yz, and d.
     """
     ten = tuple(np.asarray(body.toDynamicParameters()).tolist())
     return pin.Inertia.FromDynamicParameters(np.array(_strained(ten, tuple(strain))))
@@ -80,14 +83,21 @@ def strained(body: pin.Inertia, strain: Sequence[float]) -> pin.Inertia:
 
 @lru_cache(maxsize=4096)
 def _strained(ten: tuple[float, ...], strain: tuple[float, ...]) -> tuple[float, ...]:
-    S = np.zeros((4, 4))
-    S[_ROWS, _COLUMNS] = strain
-    S[_COLUMNS, _ROWS] = strain
     P = pseudo_inertia(np.array(ten))
-    size, axes = np.linalg.eigh(P)
-    L = axes * np.sqrt(np.maximum(size, 0.0))
-    # A planar or point-like body has no extent that could change.
-    return tuple(_ten(P + L @ (scipy.linalg.expm(S) - np.eye(4)) @ L.T).tolist())
+    if P[3, 3] <= 0.0:
+        return ten
+    c = P[:3, 3] / P[3, 3]
+    M = P[:3, :3] - P[3, 3] * np.outer(c, c)
+    xx, yy, zz, a, xy, xz, yz, *d = strain
+    stretch = scipy.linalg.expm(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+    m = np.exp(a) * P[3, 3]
+    radius = np.sqrt(max(float(np.linalg.eigvalsh(M)[-1]), 0.0) / P[3, 3])
+    c = c + radius * np.array(d)
+    P = np.empty((4, 4))
+    P[:3, :3] = np.exp(a) * stretch @ M @ stretch + m * np.outer(c, c)
+    P[:3, 3] = P[3, :3] = m * c
+    P[3, 3] = m
+    return tuple(_ten(P).tolist())
 
 
 def possible(ten: Array) -> Array:

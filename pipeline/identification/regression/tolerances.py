@@ -27,11 +27,14 @@ from pipeline.simulation.rigid_bodies import legs_are_separate
 
 Array = NDArray[np.float64]
 
-#: Entries of a body's strain (`BodyChange.strain`) and their standard deviation at an uncertainty
-#: of 1 of the URDF: a rotation of the axes in which a body is measured leaves this as it is.
+#: Entries of a body's strain (`rigid_bodies.strained`) and their standard deviation at an
+#: uncertainty of 1 of the URDF: a rotation of the axes in which a body is measured leaves this as
+#: it is. A radius of gyration has half the uncertainty of the moment of inertia.
 STRAINS: Final = {
-    **dict.fromkeys(("xx", "yy", "zz", "mm"), 1.0),
-    **dict.fromkeys(("xy", "xz", "yz", "xm", "ym", "zm"), 0.5**0.5),
+    **dict.fromkeys(("xx", "yy", "zz"), 0.5),
+    "mass": 1.0,
+    **dict.fromkeys(("xy", "xz", "yz"), 0.5 * 0.5**0.5),
+    **dict.fromkeys(("x", "y", "z"), 1.0),
 }
 #: Uncertainty of the URDF in which strains are counted [1].
 UNCERTAINTY: Final = 0.01

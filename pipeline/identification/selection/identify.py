@@ -345,8 +345,7 @@ def _level(
         return limits.APPROXIMATE, limits.SHAPELESS
     if number is not None and judged.beside_curve(number):
         return limits.APPROXIMATE, limits.BESIDE
-    noise = float(np.sqrt(np.mean(judged.noise[joints] ** 2)))
-    if left**2 - noise**2 > before**2 - left**2:
+    if left > limits.UNEXPLAINED * float(np.sqrt(np.mean(judged.noise[joints] ** 2))):
         return limits.APPROXIMATE, limits.MORE_LEFT
     return limits.CONFIRMED, ""
 

@@ -34,6 +34,7 @@ class Made:
     fixed: tuple[str, ...] = ()
     lowest: float = -np.inf
     has_law: bool = True
+    contains: tuple[str, ...] = ()
 
     def plausible(self, model: Any, place: Any, x: dict[str, float], shape: Any) -> bool:
         """Whether no coordinate lies below what can be."""
