@@ -1,4 +1,4 @@
-"""Bodies that were stretched, moved and made heavier stay bodies, whatever axes they are told in."""
+"""Bodies that were stretched, moved and made heavier stay bodies, in whatever axes."""
 
 from __future__ import annotations
 
