@@ -284,7 +284,9 @@ def _point(H: Array, h: Array, prior: Array) -> list[float]:
     def left(p: Array) -> Array:
         return np.asarray(A @ point_mass(p[0], p[1:]) - b)
 
-    starts = []
+    # Free of each other the ten parameters tell mass and first moment, where the log shows both.
+    ten = axes[:, kept] @ (b / np.sqrt(size[kept]))
+    starts = [[float(ten[0]), *(ten[1:4] / ten[0])]] if ten[0] > 0.0 else []
     for centre in _AROUND:
         unit = A @ point_mass(1.0, centre)
         starts.append([float(unit @ b) / max(float(unit @ unit), 1e-300), *centre])
