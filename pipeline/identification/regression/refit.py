@@ -42,7 +42,7 @@ def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
     damping = 0.0
     for _ in range(_STEPS):
         D = np.diag(damping * np.diag(A))
-        after = _stepped(problem, _bounded(A + D, problem.gradient(stacks), _lowest(problem)))
+        after = _stepped(problem, _bounded(A + D, problem.gradient(stacks), *_bounds(problem)))
         reached = after.cost()
         if reached >= cost:
             damping = max(_DAMPED, 10.0 * damping)
@@ -57,29 +57,34 @@ def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
     return problem, cost
 
 
-def _lowest(problem: Problem) -> Array:
-    """Least step of every unknown, (n,): what has one sign stops at nothing."""
-    out = np.full(problem.names, -np.inf)
+def _bounds(problem: Problem) -> tuple[Array, Array]:
+    """Least and largest step of every unknown, (n,) each.
+
+    What has one sign stops at nothing, a tolerance where it would stand in for something else.
+    """
+    low, high = np.full(problem.names, -np.inf), np.full(problem.names, np.inf)
+    count = problem.held.size
+    for bound, far in ((low, -np.inf), (high, np.inf)):
+        bound[:count] = problem.inside(np.full(count, far)) - problem.held
     for a, (coordinates, _) in zip(problem.accepted, problem.spans(), strict=True):
         every = a.effect.coordinates
-        out[coordinates] = [-np.inf if c.signed else -a.x[c.name] for c in every]
-    return out
+        low[coordinates] = [-np.inf if c.signed else -a.x[c.name] for c in every]
+    return low, high
 
 
-def _bounded(A: Array, h: Array, lowest: Array) -> Array:
-    """Least squares step; unknowns that would pass their bound stay there and the rest follows."""
-    held = np.zeros(h.size, dtype=np.bool_)
+def _bounded(A: Array, h: Array, low: Array, high: Array) -> Array:
+    """Least squares step; unknowns that would pass a bound stay there and the rest follows."""
     theta = np.zeros_like(h)
+    free = np.ones(h.size, dtype=np.bool_)
     while True:
-        free = ~held
-        theta[held] = lowest[held]
         theta[free] = solve_spd(
-            A[np.ix_(free, free)], h[free] - A[np.ix_(free, held)] @ theta[held]
+            A[np.ix_(free, free)], h[free] - A[np.ix_(free, ~free)] @ theta[~free]
         )
-        below = free & (theta < lowest)
-        if not below.any():
+        beyond = free & ((theta < low) | (theta > high))
+        if not beyond.any():
             return theta
-        held |= below
+        theta[beyond] = np.clip(theta[beyond], low[beyond], high[beyond])
+        free &= ~beyond
 
 
 def _stepped(problem: Problem, theta: Array) -> Problem:

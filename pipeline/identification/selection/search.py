@@ -94,7 +94,8 @@ class Search:
         self._open = np.ones(len(pool.terms), dtype=np.bool_)
         self._shut = np.array([t.key in closed for t in pool.terms], dtype=np.bool_)
         self._index(pool)
-        self._none = 0.5 * float(np.sum(counts) - np.sum(sums))
+        self._misfit = float(np.sum(sums))
+        self._none = 0.5 * (float(np.sum(counts)) - self._misfit)
 
     def _index(self, pool: Pool) -> None:
         """Terms by their number of coordinates."""
@@ -166,6 +167,17 @@ class Search:
         if state.uncertainty > UNCERTAINTIES[0]:
             evidence += self._name
         return columns, L, x, float(evidence)
+
+    def reached(self, state: State, cost: float) -> float:
+        """A state's evidence where another cost than that of these columns is reached.
+
+        Args:
+            state: With its evidence.
+            cost: Twice the negative logarithm of likelihood and prior, of `Problem.cost`.
+        """
+        columns, L, _, evidence = self.solve(state)
+        y = scipy.linalg.solve_triangular(L, self.h[columns], lower=True)
+        return evidence - 0.5 * float(y @ y) + 0.5 * self._misfit - 0.5 * cost
 
     def valid(self, state: State) -> State:
         """A state with its evidence, coordinates against their sign left out."""

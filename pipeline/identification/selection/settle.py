@@ -25,7 +25,7 @@ from pipeline.progress import Progress
 
 Array = NDArray[np.float64]
 #: Times an answer is looked at again about its own estimates, at most.
-_ROUNDS: Final = 2
+_ROUNDS: Final = 3
 #: Evidence below which two points are the same.
 _SAME: Final = 1e-3
 #: Shares of the way to linear estimates that a nonlinear fit may start from.
@@ -66,14 +66,15 @@ def settle(problem: Problem, progress: Progress | None = None) -> Settled:
     if progress:
         progress.step("letting all names compete")
     first = Search(make_pool(problem))
-    starts = sorted(dict.fromkeys(_starts(first)), key=lambda s: -first.valid(s).evidence)
+    starts = [_estimated(problem, first, s) for s in dict.fromkeys(_starts(first))]
+    starts.sort(key=lambda start: -start[0])
     points: list[Settled] = []
-    for state in starts[:_STARTS]:
+    for _, state, near in starts[:_STARTS]:
         if any(names_of(first, state) == names_of(p.search, p.state) for p in points):
             continue
         if progress:
             progress.step(f"estimating {len(state.terms)} effects together")
-        points.append(_best_near(problem, first, state))
+        points.append(_best_near(near, first))
     weights = np.max([p.search.weights for p in points], axis=0)
     judged = [(Search(p.pool, weights), p) for p in points]
     evidence = [search.valid(p.state).evidence for search, p in judged]
@@ -95,21 +96,29 @@ def _starts(search: Search) -> Iterator[State]:
                 yield State(tuple(sorted(held.terms)), held.uncertainty)
 
 
-def _best_near(problem: Problem, search: Search, state: State) -> Settled:
-    """The best point that an answer leads to."""
+def _estimated(problem: Problem, search: Search, state: State) -> tuple[float, State, Problem]:
+    """A state's evidence by its likelihood at estimates of its own, the state, and the estimates.
+
+    About a model that is far off, columns promise what no estimate reaches.
+    """
+    problem = problem.judged(state.uncertainty, search.noise)
+    problem = refit(_started(problem, search, state))
+    return search.reached(state, problem.cost()), state, problem
+
+
+def _best_near(problem: Problem, first: Search) -> Settled:
+    """The best point that estimates of an answer lead to."""
     best: Settled | None = None
-    first, closed = search, search.closed
-    for _ in range(_ROUNDS):
-        problem = problem.judged(state.uncertainty, search.noise)
-        problem = refit(_started(problem, search, state))
-        search = Search(make_pool(problem), closed=closed)
+    for left in reversed(range(_ROUNDS)):
+        search = Search(make_pool(problem), closed=first.closed)
         here = search.valid(as_accepted(search))
         if best is not None and here.evidence < best.state.evidence - _SAME:
             break
         best = Settled(problem, search, here, first)
-        state = search.climbed(here, search.uncertainties)
+        state = search.climbed(here, search.uncertainties) if left else here
         if names_of(search, state) == names_of(search, here):
             break
+        _, _, problem = _estimated(problem, search, state)
     assert best is not None
     return best
 
@@ -118,7 +127,8 @@ def settle_without(settled: Settled, closed: frozenset[Key]) -> Settled:
     """The best set that the other names lead to where some are closed."""
     search = Search(settled.pool, settled.search.weights, closed)
     state = search.climbed(search.left(settled.state), search.uncertainties)
-    return replace(_best_near(settled.problem, search, state), first=settled.first)
+    _, _, near = _estimated(settled.problem, search, state)
+    return replace(_best_near(near, search), first=settled.first)
 
 
 def names_of(search: Search, state: State) -> tuple[frozenset[Key], float]:
