@@ -466,11 +466,17 @@ def _excludes(a: Term, b: Term) -> bool:
     return a.key == b.key or (both and bool(set(a.place) & set(b.place)))
 
 
-def noise_weights(pool: Pool) -> Array:
+def noise_weights(pool: Pool, estimated: bool = False) -> Array:
     """Weight of every channel: noise is what everything together leaves, with its memory.
 
     The residual of all columns over the samples it has left, at least the sensor's noise; where
     its gradient scatters more over blocks than independent samples would, samples count for less.
+
+    Args:
+        pool: The columns.
+        estimated: Whether the present model holds estimates: what it leaves is then taken for
+            noise where that is more, so that no name is had for next to nothing in a log that
+            nothing explains to its noise.
     """
     out = np.empty(len(pool.channels))
     for k, channel in enumerate(pool.channels):
@@ -479,9 +485,14 @@ def noise_weights(pool: Pool) -> Array:
         n = channel.count.sum()
         left = channel.s.sum() - x @ h
         variance = max(left / max(n - rank, 0.1 * n), 1.0)
+        spread = variance
+        if estimated:
+            now = pool.held[channel.ids]
+            left = channel.s.sum() + now @ (channel.H.sum(axis=0) @ now - 2.0 * h)
+            spread = max(variance, float(left) / n)
         g = channel.h - channel.H @ x
         own = np.einsum("bii->bi", channel.H)
         live = own.sum(axis=0) > 0
         scatter = (g[:, live] ** 2).sum(axis=0) / (variance * own[:, live].sum(axis=0))
-        out[k] = 1.0 / (variance * max(1.0, float(np.median(scatter)) if live.any() else 1.0))
+        out[k] = 1.0 / (spread * max(1.0, float(np.median(scatter)) if live.any() else 1.0))
     return out

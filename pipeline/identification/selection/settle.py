@@ -8,7 +8,7 @@ judged with columns of its own, is the answer.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -20,14 +20,12 @@ from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.refit import refit
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.pool import Key, Pool, make_pool
-from pipeline.identification.selection.search import Search, State
+from pipeline.identification.selection.search import Search, State, noise_weights
 from pipeline.progress import Progress
 
 Array = NDArray[np.float64]
 #: Times an answer is looked at again about its own estimates, at most.
 _ROUNDS: Final = 3
-#: Evidence below which two points are the same.
-_SAME: Final = 1e-3
 #: Shares of the way to linear estimates that a nonlinear fit may start from.
 _SHARES: Final = (1.0, 0.3, 0.1, 0.0)
 #: Answers of the first search that are estimated in full.
@@ -75,9 +73,13 @@ def settle(problem: Problem, progress: Progress | None = None) -> Settled:
         if progress:
             progress.step(f"estimating {len(state.terms)} effects together")
         points.append(_best_near(near, first))
+    return _likeliest(points)
+
+
+def _likeliest(points: Sequence[Settled]) -> Settled:
+    """The point with the most evidence, all judged by the least noise of any."""
     weights = np.max([p.search.weights for p in points], axis=0)
-    judged = [(Search(p.pool, weights), p) for p in points]
-    evidence = [search.valid(p.state).evidence for search, p in judged]
+    evidence = [Search(p.pool, weights).valid(p.state).evidence for p in points]
     return points[int(np.argmax(evidence))]
 
 
@@ -108,19 +110,20 @@ def _estimated(problem: Problem, search: Search, state: State) -> tuple[float, S
 
 def _best_near(problem: Problem, first: Search) -> Settled:
     """The best point that estimates of an answer lead to."""
-    best: Settled | None = None
+    points: list[Settled] = []
     for left in reversed(range(_ROUNDS)):
-        search = Search(make_pool(problem), closed=first.closed)
+        pool = make_pool(problem)
+        search = Search(pool, noise_weights(pool, estimated=True), first.closed)
         here = search.valid(as_accepted(search))
-        if best is not None and here.evidence < best.state.evidence - _SAME:
-            break
-        best = Settled(problem, search, here, first)
+        points.append(Settled(problem, search, here, first))
         state = search.climbed(here, search.uncertainties) if left else here
-        if names_of(search, state) == names_of(search, here):
+        if (
+            names_of(search, state) == names_of(search, here)
+            or _likeliest(points) is not points[-1]
+        ):
             break
         _, _, problem = _estimated(problem, search, state)
-    assert best is not None
-    return best
+    return _likeliest(points)
 
 
 def settle_without(settled: Settled, closed: frozenset[Key]) -> Settled:
