@@ -8,8 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pipeline.effects.bodies.link_mass import point_mass
 from pipeline.effects.registry import effect_named
 from pipeline.identification.selection.identify import identify
+from pipeline.identification.selection.pool import _point
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.pipeline.identification import bench_leg as leg
 
@@ -48,3 +50,17 @@ def test_against_a_machine_whose_bodies_are_known_mass_and_place_are_found() -> 
     for p in first.parameters:
         assert p.low <= FAR[p.name] <= p.high, p
         assert p.value == pytest.approx(FAR[p.name], rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_its_place_is_found_beside_ten_free_parameters(seed: int) -> None:
+    """Where gravity tells the first moment and little else tells the rest."""
+    rng = np.random.default_rng(seed)
+    scale = np.array([1e-3, 9.81, 9.81, 9.81, *[0.3] * 6, 1.0])
+    X = rng.standard_normal((400, 11)) * scale
+    place = rng.uniform(-0.6, 0.6, 3)
+    y = X[:, :10] @ point_mass(0.8, place) + 1.5 * X[:, 10] + 1e-3 * rng.standard_normal(400)
+    X = X[:, [10, *range(10)]]
+    mass, *found = _point(X.T @ X, X.T @ y, np.zeros(1))
+    assert mass == pytest.approx(0.8, rel=0.05)
+    np.testing.assert_allclose(found, place, atol=0.03)

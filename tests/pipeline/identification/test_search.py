@@ -299,6 +299,30 @@ def test_weights_are_one_over_what_all_columns_leave_never_less_than_the_sensors
     assert quiet <= 1.0
 
 
+def test_what_estimates_leave_is_noise_where_it_is_more() -> None:
+    log = log_of(FOUR, {2: 0.8})
+    held = np.zeros(log.pool.size)
+    everything = noise_weights(replace(log.pool, held=held), estimated=True)
+    assert everything == pytest.approx([1.0 / np.mean(r**2) for r in log.r])
+    held[2] = 0.8
+    of_the_truth = noise_weights(replace(log.pool, held=held), estimated=True)
+    left = [np.mean((r - 0.8 * x[2]) ** 2) for x, r in zip(log.X, log.r, strict=True)]
+    assert of_the_truth == pytest.approx(np.minimum(1.0 / np.array(left), noise_weights(log.pool)))
+
+
+def test_another_cost_than_that_of_the_columns_moves_the_evidence_by_half_of_it() -> None:
+    log = log_of(FOUR, {2: 0.8})
+    search = Search(log.pool, WEIGHTS)
+    state = search.valid(State(((0, (0,)), (1, (0, 1))), UNCERTAINTIES[0]))
+    columns, _, x, _ = search.solve(state)
+    prior = search.precision(columns, state.uncertainty)
+    cost = float(prior @ x**2) + sum(
+        w * np.sum((r - x @ X[columns]) ** 2) for X, r, w in zip(log.X, log.r, WEIGHTS, strict=True)
+    )
+    assert search.reached(state, cost) == pytest.approx(state.evidence)
+    assert search.reached(state, cost + 6.0) == pytest.approx(state.evidence - 3.0)
+
+
 def test_samples_with_memory_count_for_less() -> None:
     """Noise and columns that stay the same over a block: as many samples as there are blocks."""
     rng = np.random.default_rng(0)
