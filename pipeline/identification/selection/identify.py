@@ -345,7 +345,7 @@ def _level(
         return limits.APPROXIMATE, limits.SHAPELESS
     if number is not None and judged.beside_curve(number):
         return limits.APPROXIMATE, limits.BESIDE
-    if left > limits.UNEXPLAINED * float(np.sqrt(np.mean(judged.noise[joints] ** 2))):
+    if (_errors(search, state) > limits.UNEXPLAINED * judged.noise)[joints].any():
         return limits.APPROXIMATE, limits.MORE_LEFT
     return limits.CONFIRMED, ""
 

@@ -474,25 +474,24 @@ def noise_weights(pool: Pool, estimated: bool = False) -> Array:
 
     Args:
         pool: The columns.
-        estimated: Whether the present model holds estimates: what it leaves is then taken for
-            noise where that is more, so that no name is had for next to nothing in a log that
-            nothing explains to its noise.
+        estimated: Whether the present model holds estimates. What it leaves, over this noise and in
+            the mean of all samples, is then the dispersion by which all of them count for less
+            (McCullagh and Nelder, Generalized Linear Models, 1989, section 4.5), so that in a log
+            that nothing explains to its noise no name is had for next to nothing.
     """
     out = np.empty(len(pool.channels))
+    left, count = 0.0, 0.0
     for k, channel in enumerate(pool.channels):
-        h = channel.h.sum(axis=0)
-        x, rank = saturated(channel.H.sum(axis=0), h)
+        H, h, s = channel.H.sum(axis=0), channel.h.sum(axis=0), channel.s.sum()
+        x, rank = saturated(H, h)
         n = channel.count.sum()
-        left = channel.s.sum() - x @ h
-        variance = max(left / max(n - rank, 0.1 * n), 1.0)
-        spread = variance
-        if estimated:
-            now = pool.held[channel.ids]
-            left = channel.s.sum() + now @ (channel.H.sum(axis=0) @ now - 2.0 * h)
-            spread = max(variance, float(left) / n)
+        variance = max((s - x @ h) / max(n - rank, 0.1 * n), 1.0)
         g = channel.h - channel.H @ x
         own = np.einsum("bii->bi", channel.H)
         live = own.sum(axis=0) > 0
         scatter = (g[:, live] ** 2).sum(axis=0) / (variance * own[:, live].sum(axis=0))
-        out[k] = 1.0 / (spread * max(1.0, float(np.median(scatter)) if live.any() else 1.0))
-    return out
+        out[k] = 1.0 / (variance * max(1.0, float(np.median(scatter)) if live.any() else 1.0))
+        now = pool.held[channel.ids]
+        left += float(s + now @ (H @ now - 2.0 * h)) / variance
+        count += float(n)
+    return out / max(1.0, left / count) if estimated else out

@@ -127,6 +127,6 @@ def test_a_step_stops_at_bounds_and_the_rest_follows(seed: int) -> None:
     step = _bounded(X.T @ X, X.T @ y, low, high)
     assert ((step >= low) & (step <= high)).all()
     free = (step > low) & (step < high)
-    np.testing.assert_allclose((X.T @ (y - X @ step))[free], 0.0, atol=1e-9)
+    np.testing.assert_allclose((X.T @ (y - X @ step))[free], 0.0, atol=1e-6)
     best = lsq_linear(X, y, (low, high))
     assert np.sum((X @ step - y) ** 2) <= 2.0 * best.cost * 1.02
