@@ -309,7 +309,7 @@ def test_what_estimates_leave_is_the_dispersion_of_all_samples() -> None:
     )
     held[2] = 0.8
     of_the_truth = noise_weights(replace(log.pool, held=held), estimated=True)
-    assert of_the_truth == pytest.approx(quiet, rel=0.03)
+    assert of_the_truth == pytest.approx(quiet, rel=0.1)
 
 
 def test_another_cost_than_that_of_the_columns_moves_the_evidence_by_half_of_it() -> None:
