@@ -34,7 +34,7 @@ STRAINS: Final = {
     **dict.fromkeys(("xx", "yy", "zz"), 0.5),
     "mass": 1.0,
     **dict.fromkeys(("xy", "xz", "yz"), 0.5 * 0.5**0.5),
-    **dict.fromkeys(("x", "y", "z"), 1.0),
+    **dict.fromkeys(("x", "y", "z"), 0.5**0.5),
 }
 #: Uncertainty of the URDF in which strains are counted [1].
 UNCERTAINTY: Final = 0.01
