@@ -120,7 +120,7 @@ def _best_judged(settled: Settled, channel: str) -> tuple[Judgement, tuple[Found
         found = tuple(_found(judged, channel))
         more = frozenset(_key(f) for f in found if f.level == limits.SUSPECTED)
         search = Search(settled.pool, weights, more)
-        evidence = search.left(settled.state).evidence
+        evidence = search.left(settled.state).evidence - search.promised(settled.state)
         if best is None or evidence > best[0] - limits.EXCLUDED:
             best = evidence, judged, found
         if not more or not left:

@@ -179,6 +179,18 @@ class Search:
         y = scipy.linalg.solve_triangular(L, self.h[columns], lower=True)
         return evidence - 0.5 * float(y @ y) + 0.5 * self._misfit - 0.5 * cost
 
+    def promised(self, state: State) -> float:
+        """How much more evidence the columns promise than the present model's estimates have.
+
+        Args:
+            state: The set of the present model.
+        """
+        columns = self.columns(state)
+        held = self.pool.held
+        prior = self.precision(columns, state.uncertainty) @ held[columns] ** 2
+        cost = self._misfit + held @ (self.H @ held - 2.0 * self.h) + prior
+        return self.solve(state)[3] - self.reached(state, float(cost))
+
     def valid(self, state: State) -> State:
         """A state with its evidence, coordinates against their sign left out."""
         while True:

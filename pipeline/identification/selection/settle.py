@@ -77,9 +77,13 @@ def settle(problem: Problem, progress: Progress | None = None) -> Settled:
 
 
 def _likeliest(points: Sequence[Settled]) -> Settled:
-    """The point with the most evidence, all judged by the least noise of any."""
+    """The point with the most evidence at its estimates, all judged by the least noise of any."""
     weights = np.max([p.search.weights for p in points], axis=0)
-    evidence = [Search(p.pool, weights).valid(p.state).evidence for p in points]
+    searches = [Search(p.pool, weights) for p in points]
+    evidence = [
+        s.valid(p.state).evidence - s.promised(p.state)
+        for s, p in zip(searches, points, strict=True)
+    ]
     return points[int(np.argmax(evidence))]
 
 
