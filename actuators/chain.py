@@ -152,7 +152,7 @@ class Chain:
         at = self._index(element.name)
         return replace(self, elements=(*self.elements[:at], element, *self.elements[at + 1 :]))
 
-    def moving(self, joint: ShaftSeries) -> ChainResult:
+    def inverse(self, joint: ShaftSeries) -> ChainResult:
         """Return everything the chain needs for a motion of its joints.
 
         Samples of a joint at rest (`direction` zero) get the holding torque of least magnitude
@@ -176,7 +176,7 @@ class Chain:
             if (rate := element.stored(shown)) is not None:
                 stored[element.name] = rate
             drawn += element.drawn(shown.torque, shown.velocity, shown.direction)
-            shown = motor_side = element.moving(side)
+            shown = motor_side = element.inverse(side)
             if standing:
                 low, high = element.holding(low, high, side.position)
                 held = np.where(at_rest, least_magnitude(low, high), motor_side.torque)
@@ -222,7 +222,7 @@ class Chain:
         voltage = self.motor.voltage(current, still)
         return HoldingResult(low, high, motor_torque, current, voltage, voltage * current + drawn)
 
-    def driving(self, motor: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor: ShaftSeries) -> ShaftSeries:
         """Return what reaches the joints from the motor's torque, all motion being known.
 
         Args:
@@ -233,7 +233,7 @@ class Chain:
         """
         side = motor
         for element in reversed(self.elements):
-            side = element.driving(side)
+            side = element.forward(side)
         return side
 
     def _index(self, name: str) -> int:
@@ -248,7 +248,7 @@ def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
     """Return what a row of elements, from the joint to the motor, needs at its motor side."""
     side = joint
     for element in elements:
-        side = element.moving(side)
+        side = element.inverse(side)
     return side
 
 

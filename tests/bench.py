@@ -54,7 +54,7 @@ def chain_ratios(robot: Robot, motion: Motion) -> None:
         "split": lambda: joint_series(motion_demand(robot, motion)),
     }
     for name, chain in chains.items():
-        calls[name] = lambda chain=chain: chain.moving(series)  # type: ignore[misc]
+        calls[name] = lambda chain=chain: chain.inverse(series)  # type: ignore[misc]
     seconds = timed(calls)
     joints = len(robot.joints)
     print(f"chains, {joints} joints, {series.time.size} rows after splitting at velocity zeros")
@@ -90,7 +90,7 @@ def energy_of_a_search() -> None:
         "one, a number changed": lambda: lw.energy(
             machine.with_values({"harmonic_drive.viscous": 1.0}), demand, "reversible"
         ),
-        "the bare chain": lambda: machine.ready.chain("reversible").moving(demand.series),
+        "the bare chain": lambda: machine.ready.chain("reversible").inverse(demand.series),
     }
     print("energy of 51 samples of 18 joints, no file read")
     for name, seconds in timed(calls, turns=200).items():

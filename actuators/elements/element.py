@@ -14,7 +14,7 @@ class Element:
 
     Elements are listed from the joint to the supply. Each has a joint side and a motor side; this
     one passes everything on, and a law overrides what it does otherwise: `added` where it takes or
-    gives torque, `moving` and `driving` where it changes the motion or asks for the load.
+    gives torque, `inverse` and `forward` where it changes the motion or asks for the load.
     Subclasses are frozen dataclasses; a parameter is one number for all joints or one per joint
     (J,). A law that an alternative does not have is simply not in its list.
 
@@ -36,14 +36,14 @@ class Element:
         """
         return np.zeros_like(side.torque)
 
-    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
+    def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return what the motor side needs (inverse)."""
         return joint_side.with_torque(joint_side.torque + self.added(joint_side))
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Return what reaches the joint side (forward), all motion being known.
 
-        It inverts `moving`. As it stands it does where `added` depends on the motion alone.
+        It undoes `inverse`. As it stands it does where `added` depends on the motion alone.
         """
         return motor_side.with_torque(motor_side.torque - self.added(motor_side))
 

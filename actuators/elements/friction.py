@@ -82,7 +82,7 @@ class FrictionLaw(Element):
         share = self.share(side.velocity, side.torque * sense > 0.0)
         return self.free(side, sense) + share * np.abs(side.torque) * sense
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Subtract the friction torque; as shares are below 1, the load has the sign of the rest.
 
         With x = torque on the motor side less the free part, x = torque + share s |torque|.

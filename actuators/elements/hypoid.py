@@ -108,14 +108,14 @@ class Hypoid(Element):
         force: FloatArray = joint_side.torque / (self.wheel_radius * across)
         return force
 
-    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
+    def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return the pinion's torque and motion (Eq. 13)."""
         force = self.normal_force(joint_side)
         rubbing = self.friction * np.sin(self.pinion_angle) * joint_side.direction * np.abs(force)
         torque = (force * np.cos(self.pinion_angle) + rubbing) * self.pinion_radius
         return joint_side.geared(self.ratio, torque)
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Return the wheel's torque and motion.
 
         Raises:

@@ -40,7 +40,7 @@ class SecondMotor(Element):
         """Return what the chain's own motor need not supply, negative for a load that resists."""
         return -self.share * side.torque
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Return both motors' torque."""
         return motor_side.with_torque(motor_side.torque / (1.0 - self.share))
 

@@ -145,7 +145,7 @@ def _surge(
     period: float,
     neutral: Array,
 ) -> float:
-    """Half the body's way ahead and back [m]; see `pipeline.motion.base_motion.Surge`."""
+    """Half the body's way ahead and back [m]; see `pipeline.motion.base_motion.surge`."""
     if not table.surge:
         return 0.0
     duty = float(np.mean(list(footfall.duty.values())))

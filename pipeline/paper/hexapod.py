@@ -259,14 +259,14 @@ def chain_at(
 
 def drawn(demand: Demand, chain: Chain) -> Array:
     """E_el(+) per cycle of the printed leg alone, (W,) [J]; both made for one leg."""
-    power = chain.moving(demand.series).electrical_power
+    power = chain.inverse(demand.series).electrical_power
     forward, _ = split_integral(demand.series.time, power)
     return by_leg(forward, len(demand.legs)).sum(axis=(1, 2))
 
 
 def outcome(demand: Demand, chain: Chain) -> Outcome:
     """Take a demand through an alternative made for it."""
-    walking = chain.moving(demand.series)
+    walking = chain.inverse(demand.series)
     energy, motor = stage_energy(walking, "el"), chain.motor
     peaks = {
         "speed": np.abs(walking.motor.velocity).max(axis=0) / motor.max_speed,

@@ -2,9 +2,9 @@
 
 The measured motion gives nothing but the first instant. With inertia M(q) and bias h(q, v) of the
 rigid bodies, the motors' torques found from the servo's law, and every chain asked for what it
-needs at its motor (`Element.moving`), the accelerations solve, joint by joint,
+needs at its motor (`Element.inverse`), the accelerations solve, joint by joint,
 
-    moving(M a + h, v, a) = motor torque
+    inverse(M a + h, v, a) = motor torque
 
 A joint at rest stays there while its motor's torque lies in the interval that holds it
 (`Element.holding`); friction is neither regularised nor chattering. Servo: a bridge that applies

@@ -201,7 +201,7 @@ def walk(
     motion = motion or walking_motion(robot, samples=samples)
     demand = demand_along(robot, motion, quasi_static=quasi_static, adjust=adjust, forces=forces)
     series = joint_series(demand)
-    results = {name: chain.moving(series) for name, chain in chains.items()}
+    results = {name: chain.inverse(series) for name, chain in chains.items()}
     steady = motion.segments if robot.floating else ()
     return Walking(
         motion,
@@ -250,7 +250,7 @@ def compare_rules(
                     forces=choice.ground(chains, regeneration.recovered, adjust),
                 )
                 series = joint_series(demand)
-            result = chain.moving(series)
+            result = chain.inverse(series)
             drawn = supply(result, regeneration.policy, regeneration.fraction).supplied_energy
             torque = np.concatenate([part.torque for part in demand.segments])
             yield RuleCost(

@@ -162,7 +162,7 @@ def cost(
         return Cost(float(bare[counted].sum()), float(full.on[counted].sum()))
     known_candidate(machine, name)
     chain = machine.ready.chain(name)
-    result = chain.moving(load.series)
+    result = chain.inverse(load.series)
     power = supply(result).supplied_energy / load.duration
     idle = load.mode.stands & _locks(chain, load) & (result.current == 0.0).all(axis=0)
     return Cost(float(power[counted].sum()), float((~idle)[counted].sum()))

@@ -148,7 +148,7 @@ class PowerOfJoints:
             torque,
             s.direction[rows],
         )
-        result = self._rule.chain.moving(side)
+        result = self._rule.chain.inverse(side)
         return (
             result.motor.torque[:, self._loaded],
             result.electrical_power[:, self._loaded],
