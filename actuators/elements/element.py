@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars
+from actuators.arrays import Array, Scalars
 from actuators.shaft import ShaftSeries
 
 
@@ -28,7 +28,7 @@ class Element:
 
     name: str
 
-    def added(self, side: ShaftSeries) -> FloatArray:
+    def added(self, side: ShaftSeries) -> Array:
         """Return the torque that the motor side supplies on top of the joint side's, (N, J) [N*m].
 
         Where `direction` is zero, dry friction is zero here; the chain replaces such samples by
@@ -48,8 +48,8 @@ class Element:
         return motor_side.with_torque(motor_side.torque - self.added(motor_side))
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return the motor-side torques that hold some joint-side torque at standstill.
 
         Args:
@@ -63,7 +63,7 @@ class Element:
         """
         return low, high
 
-    def loss(self, joint_side: ShaftSeries) -> FloatArray | None:
+    def loss(self, joint_side: ShaftSeries) -> Array | None:
         """Return the dissipated power (N, J) [W] from the element's own law, or None.
 
         Args:
@@ -71,11 +71,11 @@ class Element:
         """
         return None
 
-    def stored(self, joint_side: ShaftSeries) -> FloatArray | None:
+    def stored(self, joint_side: ShaftSeries) -> Array | None:
         """Return the rate of energy stored in the element (N, J) [W], or None; as for `loss`."""
         return None
 
-    def drawn(self, torque: FloatArray, velocity: FloatArray, direction: FloatArray) -> Scalars:
+    def drawn(self, torque: Array, velocity: Array, direction: Array) -> Scalars:
         """Return the power that the element itself draws from the supply [W]; none as a rule.
 
         Args:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, require
+from actuators.arrays import Array, Scalars, require
 from actuators.elements.element import Element
 from actuators.shaft import ShaftSeries
 
@@ -35,8 +35,8 @@ class Ratio(Element):
         return motor_side.geared(1.0 / np.asarray(self.ratio), motor_side.torque * self.ratio)
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Scale the interval."""
         return low / self.ratio, high / self.ratio
 

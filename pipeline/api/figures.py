@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.scene import Scene, mass_centre
 from pipeline.api.pictures.walk import steps_of, stretches, thinned
@@ -43,7 +43,6 @@ from reports.pages.names import leg_words, short_titles, shown_leg
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 #: File name without ending to what makes the figure; nothing is drawn before it is called.
 Drawings = dict[str, Callable[[], "Figure"]]
 #: File name of each subject's Fig. 21.

@@ -7,8 +7,8 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
@@ -27,7 +27,6 @@ from reports.pages.gap_report import write_report
 from reports.table import Table
 from reports.typeset import unit_text
 
-Array = NDArray[np.float64]
 #: A stretch of time that a picture can show [s].
 _LONGEST = 8.0
 #: Steps that the narrow picture shows one by one.

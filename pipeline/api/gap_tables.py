@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import Where
 from pipeline.identification.results import (
@@ -26,7 +26,6 @@ from reports.tables import forward as forward_tables
 from reports.tables import gap as tables
 
 JOINED = "+"
-Array = NDArray[np.float64]
 
 
 def quality_table(findings: Sequence[Finding]) -> Table:

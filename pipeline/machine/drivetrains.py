@@ -14,14 +14,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from actuators.arrays import least_magnitude
+from actuators.arrays import Array, least_magnitude
 from actuators.chain import Chain, ChainResult, HoldingResult, held
 from actuators.shaft import ShaftSeries
 from pipeline.machine.joint import JointModel, joints_of
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

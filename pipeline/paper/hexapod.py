@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import Chain, ChainResult, HoldingResult
 from actuators.energy.energy import split_integral, stage_energy
 from actuators.energy.limits import rms_over_time
@@ -27,7 +28,6 @@ from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.walk_stand import joint_series, stand, walk
 
-Array = NDArray[np.float64]
 Number = TypeVar("Number", float, Array)
 MIDDLE_LEGS = ("lm", "rm")
 PUBLISHED_LEG = "rm"

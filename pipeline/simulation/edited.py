@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.dynamics.demand import JointDemand
 from pipeline.machine.drivetrains import Actuators, Drivetrains
@@ -26,7 +25,6 @@ from pipeline.robot.kinematics import foot_force_torques
 from pipeline.robot.robot import Robot
 from pipeline.simulation.rigid_bodies import changed_model, outward
 
-Array = NDArray[np.float64]
 #: The alternative that stays without losses.
 IDEAL = "ideal"
 #: What acts on sensors alone.

@@ -21,16 +21,14 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 #: Longest step [s]; a servo's joint takes some ten times as long to answer.
 LONGEST_STEP: Final = 1e-3
 #: Rows whose slope is the first velocity.

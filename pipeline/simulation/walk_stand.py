@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import ChainResult, HoldingResult
 from actuators.energy.regeneration import BUS, Supply, supply
 from actuators.reversals import split_at_reversals
@@ -24,8 +24,6 @@ from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
 from pipeline.robot.robot import Robot
 from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES, ForceChoice
 from pipeline.simulation.ground_forces.least_power import Adjust
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.simulation.found_bodies import FoundBody
 from reports.column import column as declared
 from reports.table import Meaning, Table
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.first_mapping.names import Named, assign
 from pipeline.logs.first_mapping.numbers import (
     ANGLES,
@@ -22,7 +22,6 @@ from pipeline.logs.first_mapping.numbers import (
 )
 from pipeline.logs.reading.expected import Expected
 
-Array = NDArray[np.float64]
 POSITIONS: Final = ("position", "motor_position")
 #: Factor between a position and its velocity beyond which the position is a motor's.
 _GEARED: Final = 1.5

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.errors import GapError, LogFormatError
 from pipeline.logs.first_mapping.guess import Guess, guesses
@@ -35,7 +35,6 @@ from pipeline.logs.reading.table_file import (
     stream_columns,
 )
 
-Array = NDArray[np.float64]
 _DIALECTS: Final = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _ROWS: Final = 100_000  # that are looked at

@@ -14,10 +14,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.reading.log_format import JOINT_COLUMNS, TIME
 
-Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 _ROWS: Final = 50_000  # of the table that are put together at once
 #: Times the usual step beyond which nothing is drawn between two messages.

@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.prepared.prepare import Prepared
-
-Array = NDArray[np.float64]
 
 #: Correlation from which a motion counts as repeated.
 REPEATED: Final = 0.98

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from actuators.arrays import Array, Mask
+
 _SHORT = 300  # samples of a kernel up to which summing is quicker than transforming
 _PER_ROW: Final = (
     *("time", "q", "v", "a", "effort", "mask", "part", "block", "base_roll", "base_pitch"),

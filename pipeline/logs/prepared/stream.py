@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.formats.convert import sha256
 from pipeline.logs.prepared.contact import Contact
@@ -24,7 +24,6 @@ from pipeline.logs.reading.mapping import Mapping as MappingFile
 from pipeline.logs.reading.read import read_log, stream_log
 from pipeline.logs.reading.table_file import TableFile, open_table, row_count
 
-Array = NDArray[np.float64]
 #: Refusals that concern a log as a whole and not a chunk of it.
 FINE_IN_A_CHUNK: Final = ("rows", "constant", "empty")
 #: Rows that are surveyed, and that naming works on, per log.

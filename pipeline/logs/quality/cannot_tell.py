@@ -8,10 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.reading.log import Log
-
-Array = NDArray[np.float64]
 
 #: Fast over slow speeds below which laws of speed look alike.
 _SPEEDS: Final = 4.0

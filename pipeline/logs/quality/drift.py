@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
 
 #: Blocks per log.
 _BLOCKS: Final = 8

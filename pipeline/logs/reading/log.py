@@ -10,14 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from actuators.errors import closest
 from pipeline.logs.errors import LogContentError
 
 if TYPE_CHECKING:
     from pipeline.logs.reading.mapping import ColumnTable
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Channels in which measurement and simulation are compared, the most direct first, with unit.
 EFFORTS: Final[Mapping[str, str]] = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}

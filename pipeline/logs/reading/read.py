@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from actuators.units import from_si
 from pipeline.logs.errors import LogContentError
@@ -22,7 +23,6 @@ from pipeline.logs.reading.servo_law import CANNOT
 from pipeline.logs.reading.sides import sides_of
 from pipeline.logs.reading.table_file import read_columns, stream_columns
 
-Array = NDArray[np.float64]
 _LARGEST: Final = 1e9  # nothing a robot measures is larger in the log's units
 _TIME: Final = Target("time", "", "time", "s")
 

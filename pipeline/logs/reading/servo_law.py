@@ -13,13 +13,12 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from actuators.arrays import Array
 from actuators.checked import Number, Table
 from actuators.errors import closest, one_line
 
-Array = NDArray[np.float64]
 Positive = Annotated[Number, Field(ge=0.0, le=1e6)]
 #: One number for all joints, or one for each by the robot's name of it.
 Gains = Positive | dict[str, Positive]

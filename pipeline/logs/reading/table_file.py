@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.formats.convert import plain
 from pipeline.logs.reading.csv_head import CsvHead, read_head
 from pipeline.logs.reading.mapping import CsvTable
 
-Array = NDArray[np.float64]
 _HEADER_BYTES: Final = 1 << 20
 _DECIMAL_COMMA: Final = re.compile(r"^\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*$")
 

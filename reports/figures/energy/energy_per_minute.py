@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.style import (
     CYCLE,
     INK,
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 #: The prior's bands are wide and overlap, so they are fainter than those of figures left out.
 PRIOR_ALPHA, LEFT_OUT_ALPHA = 0.10, 0.28
 _REACH = 4.0  # to either side of the crossing [%]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.style import (
     BLUE,
     ORANGE,
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 _PALE = "#b4bac1"
 #: More points than a picture can show.
 _MOST_POINTS = 2500

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.style import (
     BLUE,
     GREEN,
@@ -27,7 +28,6 @@ from reports.figures.style import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 _PALE = "#b4bac1"
 
 
