@@ -34,6 +34,7 @@ from pipeline.simulation.walk_stand import joint_series
 from reports.tables.walking import walking_joint_demand
 from reports.writer import csv_bytes
 from tests.bench_bags import bag_costs
+from tests.bench_choice import choice_ratios
 from tests.bench_demand import demand_ratios, support
 from tests.bench_gap import gap_costs
 from tests.bench_kinematics import inverse_kinematics
@@ -174,6 +175,7 @@ def main() -> None:
     energy_of_a_search()
     sweep_ratio()
     supply_ratios()
+    choice_ratios()
     cold_run()
     gap_costs()
     bag_costs()
