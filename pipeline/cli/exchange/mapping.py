@@ -53,14 +53,17 @@ def run_mapping(given: argparse.Namespace) -> int:
     if made.open:
         print(f"look at: {one_line(', '.join(made.open))}")
     robot = f" --robot {shlex.quote(str(given.robot))}" if given.robot else ""
+    steps = [""]
     if expected is not None:
         try:
-            plan_reading(given.log, expected, load_mapping(given.out))
+            plan = plan_reading(given.log, expected, load_mapping(given.out))
         except GapError as error:
             print(f"still missing: {error}")
             return 1
+        steps = ["power "] if plan.supply_alone else ["", "power "] if plan.of_supply else [""]
     log, mapping = shlex.quote(str(given.log)), shlex.quote(str(given.out))
-    print(f"next: python -m pipeline gap {log} --mapping {mapping}{robot}")
+    for step in steps:
+        print(f"next: python -m pipeline gap {step}{log} --mapping {mapping}{robot}")
     return 0
 
 

@@ -21,6 +21,7 @@ from pipeline.logs.first_mapping.numbers import (
     rate_of,
 )
 from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import SUPPLY
 
 POSITIONS: Final = ("position", "motor_position")
 #: Factor between a position and its velocity beyond which the position is a motor's.
@@ -111,7 +112,7 @@ def guesses(
         units[seen.named[column].joint] = guess.unit
         out.append(guess)
     for column, named in seen.named.items():
-        if named.quantity not in ("", "supply", *POSITIONS):
+        if named.quantity not in ("", *SUPPLY, *POSITIONS):
             out.append(_other(seen, column, told, expected, units, moved.get(column), ratios))
     return out, ratios, by
 
@@ -158,7 +159,7 @@ def _positions_of_velocities(seen: _Seen) -> None:
 
 def _called_otherwise(seen: _Seen, owners: Sequence[str]) -> None:
     """Joints that other quantities call by other names than positions do: `enc 1`, `motor 1 A`."""
-    for quantity in {n.quantity for n in seen.named.values()} - {"", "supply", *POSITIONS}:
+    for quantity in {n.quantity for n in seen.named.values()} - {"", *SUPPLY, *POSITIONS}:
         columns = seen.of(quantity)
         own = list(dict.fromkeys(seen.named[c].joint for c in columns))
         if owners and not {*own} <= {*owners}:
@@ -246,7 +247,7 @@ def _other(
         )
     if quantity == "velocity" and velocity:
         return _velocity(column, joint, units.get(named.joint, ""), velocity, why, ratios)
-    if quantity == "current" and most > _AMPERES:
+    if quantity == "current" and current_unit(x):
         others = (("current", "A", "in amperes"),)
         return Guess(column, quantity, joint, "mA", f"{why}; up to {most:.4g}", others=others)
     if quantity == "torque":
@@ -257,6 +258,11 @@ def _other(
         unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
         return Guess(column, quantity, joint, unit, f"{why}; up to {most:.4g}", others=others)
     return Guess(column, quantity, joint, "", why)
+
+
+def current_unit(x: Array) -> str:
+    """Unit of a current that nothing states: milliamperes where amperes would be too many."""
+    return "mA" if float(np.nanmax(np.abs(x))) > _AMPERES else ""
 
 
 def _velocity(

@@ -14,8 +14,8 @@ import numpy as np
 from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.errors import GapError, LogFormatError
-from pipeline.logs.first_mapping.guess import Guess, guesses
-from pipeline.logs.first_mapping.names import read_name, words_of
+from pipeline.logs.first_mapping.guess import Guess, current_unit, guesses
+from pipeline.logs.first_mapping.names import Named, read_name, words_of
 from pipeline.logs.first_mapping.numbers import clock_units
 from pipeline.logs.formats.arrays import TIMES
 from pipeline.logs.reading.csv_head import unit_spelt
@@ -74,6 +74,7 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
     foreign = [c for c in table.header if c in data and c not in own | {clock} and "*" not in c]
     named = [read_name(c, units.get(c, "")) for c in foreign]
     found, ratios, by = guesses(named, data, time, expected)
+    found += _of_supply(named, data)
     lines, mapped, open_ = _lines(found, own)
     supply = next((n for n in named if n.quantity == "supply"), None)
     said = {g.column for g in found} | own | {clock} | ({supply.column} if supply else set())
@@ -100,6 +101,22 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
     if unused:
         text += ["", "# Not used: " + json.dumps(list(unused), ensure_ascii=False)[1:-1]]
     return FirstMapping("\n".join(text) + "\n", mapped, open_, unused)
+
+
+def _of_supply(named: Sequence[Named], data: Mapping[str, Array]) -> list[Guess]:
+    """What the supply of all drives gives; of several columns of a kind none is it for sure."""
+    out = []
+    for quantity in ("supply_current", "supply_power"):
+        columns = [n for n in named if n.quantity == quantity]
+        why = "named of a supply; positive out of it: else add flip = true"
+        if len(columns) > 1:
+            why = "one of several named of a supply: put the one of all drives, or add them up"
+        for n in columns:
+            unit = n.unit
+            if not unit and quantity == "supply_current":
+                unit = current_unit(data[n.column])
+            out.append(Guess(n.column, quantity, "supply", unit, why, sure=len(columns) == 1))
+    return out
 
 
 def _known(column: str, expected: Expected | None, where: str) -> bool:
@@ -222,7 +239,7 @@ def _line(guess: Guess, quantity: str, unit: str) -> str:
 def _gains(found: Sequence[Guess], own: set[str]) -> list[str]:
     """What a log without any effort needs: the servos' law."""
     efforts = {"torque", "current", "voltage", "power"}
-    suffixes = {plotted(c).rpartition("__")[2] for c in own}
+    suffixes = {plotted(c).rpartition("__")[2] for c in own if not c.startswith("supply__")}
     have = {g.quantity for g in found if g.sure} | {
         JOINT_COLUMNS[s][0] for s in suffixes if s in JOINT_COLUMNS
     }
