@@ -14,7 +14,7 @@ from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
 from pipeline.identification.compare.stages import Stage, overall
 from pipeline.identification.workflow.story import Told, signature_name
-from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.predict import Prediction
 from reports.figures.gap.in_time import GapTrace, gap_time_figure
@@ -103,7 +103,7 @@ def write_in_time(
     joints: Sequence[int],
     out: Path,
 ) -> None:
-    """Draw `in_time`: the joints around the longest stretch that proves.
+    """Draw `in_time`: the joints around the longest stretch of test rows.
 
     Args:
         measurements: One per log.
@@ -127,7 +127,7 @@ def write_in_time(
                 after=series[1][rows, j],
                 noise_floor=float(m.noise[j, 0]),
                 unit=CHANNEL_UNITS[m.channels[0]],
-                proves=m.part[rows] == PROVE,
+                held_out=m.part[rows] == TEST,
             )
         )
     figure = gap_time_figure(
@@ -141,11 +141,11 @@ def write_in_time(
 
 
 def _stretch(measurements: Sequence[Measurement]) -> tuple[int, slice]:
-    """Log and rows around the block of *prove* in which most rows of most joints count."""
+    """Log and rows around the test block in which most rows of most joints count."""
     best, found = -1.0, (0, slice(0, len(measurements[0])))
     for k, m in enumerate(measurements):
-        proving = m.part == PROVE
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], proving.astype(np.int8), [0]])))
+        tested = m.part == TEST
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], tested.astype(np.int8), [0]])))
         for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             count = float(m.mask[start:stop].sum())
             if count > best:

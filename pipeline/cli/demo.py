@@ -9,7 +9,7 @@ from typing import Final
 _FOLDER: Final = Path(__file__).parents[1] / "identification" / "demo"
 #: The log; its robot is `urdf/hexapod.toml`, its actuator the catalogue's alternative "rotor".
 DEMO: Final = _FOLDER / "walk.parquet"
-#: The same machine at another speed, held out to prove.
+#: The same machine at another speed, held out for the test.
 SLOW: Final = _FOLDER / "walk_slow.parquet"
 
 

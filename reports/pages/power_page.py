@@ -51,7 +51,7 @@ def write_power_page(
     page = Page(
         title=f"What the supply of '{robot}' gives, by log '{', '.join(told.logs)}'",
         numbers=(
-            Number(f"{number(measured.watts)} W", "at the supply, mean of samples that prove"),
+            Number(f"{number(measured.watts)} W", "at the supply, mean of the held-out samples"),
             Number(f"{number(own)} W", "sum over the drives, by log and model"),
             Number(
                 f"{number(left.watts)} W",
@@ -72,7 +72,7 @@ def write_power_page(
                     table_block(by_name["power"], digits=3),
                     FigureBlock(
                         folder / "power_in_time.svg",
-                        "Power at the supply; shaded: samples that prove.",
+                        "Power at the supply; shaded: held-out samples.",
                     ),
                 ),
             ),

@@ -17,7 +17,7 @@ class PowerRow:
 
     table: ClassVar = "power"
     about: ClassVar = (
-        "Mean power at the supply on samples that prove, term by term; the terms, measured and "
+        "Mean power at the supply on held-out samples, term by term; the terms, measured and "
         "unexplained: the last is the one before less all above."
     )
     term: str = declared("name of the term")

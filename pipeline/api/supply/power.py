@@ -101,7 +101,7 @@ def write_power_figures(told: Account, robot: str, out: Path) -> None:
         told.explained[own],
         told.proves[own],
     )
-    subtitle = f"log '{told.logs[0]}', {np.count_nonzero(own)} samples; shaded: samples that prove"
+    subtitle = f"log '{told.logs[0]}', {np.count_nonzero(own)} samples; shaded: held-out samples"
     title = f"{robot}: power at the supply"
     save_figure(power_time_figure(trace, title=title, subtitle=subtitle), out, "power_in_time")
     kinds = {BASIS_FOUND: "found", "": "left"}

@@ -93,7 +93,7 @@ class Survey:
     Attributes:
         log: The stretches that tell most; what lies between them is a gap.
         found: All stretches.
-        proves_from: Time from which the log only proves [s]; infinite where nothing was said.
+        proves_from: Time from which rows are for the test only [s]; infinite where none are.
     """
 
     log: Log
@@ -106,7 +106,7 @@ def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:
 
     Args:
         stream: The log.
-        prove_last: Share at its end that only proves: a quarter of the stretches come from there.
+        prove_last: Share at its end for the test only: a quarter of the stretches come from there.
 
     Raises:
         GapError: As for `read_log`.

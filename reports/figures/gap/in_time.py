@@ -45,7 +45,7 @@ class GapTrace:
         after: Predicted with everything found, shape (N,).
         noise_floor: Standard deviation of the noise.
         unit: Of the channel.
-        proves: Held-out rows, shape (N,), shaded; None for all of them.
+        held_out: Held-out rows, shape (N,), shaded; None for all of them.
     """
 
     joint: str
@@ -56,7 +56,7 @@ class GapTrace:
     after: Array
     noise_floor: float
     unit: str
-    proves: NDArray[np.bool_] | None = None
+    held_out: NDArray[np.bool_] | None = None
 
 
 @house_style()
@@ -103,8 +103,8 @@ def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: boo
     bottom.plot(t, left_before, color=ORANGE, linewidth=1.0)
     bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
     kept, where = np.ones(t.size, dtype=np.bool_), ""
-    if trace.proves is not None and np.isfinite(left_after[trace.proves]).any():
-        kept, where = trace.proves, "held out: "
+    if trace.held_out is not None and np.isfinite(left_after[trace.held_out]).any():
+        kept, where = trace.held_out, "held out: "
         edges = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(np.int8), [0]])))
         for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
             for ax in (top, bottom):

@@ -40,14 +40,14 @@ class PowerTrace:
         measured: [W].
         model: Sum over the drives [W].
         explained: The same with all terms [W].
-        proves: Held-out samples, shaded.
+        held_out: Held-out samples, shaded.
     """
 
     time: Array
     measured: Array
     model: Array
     explained: Array
-    proves: NDArray[np.bool_]
+    held_out: NDArray[np.bool_]
 
 
 @house_style()
@@ -65,7 +65,7 @@ def power_time_figure(trace: PowerTrace, *, title: str, subtitle: str = "") -> F
     bottom.plot(t, trace.measured - trace.explained, color=BLUE, linewidth=1.0)
     bottom.set_ylabel("unexplained [W]")
     bottom.set_xlabel("time [s]")
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], trace.proves.astype(np.int8), [0]])))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], trace.held_out.astype(np.int8), [0]])))
     for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         for axes in (top, bottom):
             axes.axvspan(
@@ -135,5 +135,5 @@ def power_shares_figure(
     name_rows(axes, [bar.name for bar in bars], thick, above=narrow)
     axes.set_xlim(min(0.0, at), 1.16 * max(measured, at))
     axes.set_ylim(len(bars) - 0.45, -1.05)
-    axes.set_xlabel("mean power on samples that prove [W]")
+    axes.set_xlabel("mean power on held-out samples [W]")
     return figure

@@ -25,7 +25,7 @@ from pipeline.identification.workflow.setup import Setup, setup, take_in
 from pipeline.identification.workflow.story import tell
 from pipeline.identification.workflow.validate import check
 from pipeline.identification.workflow.written import Weighed
-from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.progress import Progress
 from pipeline.simulation.predict import Simulator
 
@@ -239,7 +239,7 @@ def test_xl330_lacks_load_dependent_friction(friction: bool, xl330: Run, shared_
 
 @pytest.mark.slow
 def test_xl330_voltage_of_a_gain_that_had_no_say(xl330: Run) -> None:
-    proved = {m.name.split("_")[1] for m in xl330.where.measurements if (m.part == PROVE).any()}
+    proved = {m.name.split("_")[1] for m in xl330.where.measurements if (m.part == TEST).any()}
     assert proved == {"kp200"}
     before = xl330.weighed.found[0].gap_before
     assert before > 0.4
