@@ -62,7 +62,7 @@ class CandidateRow:
     joint: str = declared("joint it acts at; empty where it acts on all")
     place: str = declared("joints, link or ground it acts on")
     validation_before: float | None = declared(
-        "gap without it on rows that choose, by the others", "see unit"
+        "gap without it on validation rows, by the others", "see unit"
     )
     validation_after: float | None = declared(
         "the same with it; empty where it was not tried in earnest", "see unit"
