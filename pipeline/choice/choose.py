@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.elements.position_torque import ParallelSpring
 from actuators.loading.parts import Part, load_parts
 from actuators.supply.battery import Battery
 from actuators.supply.from_parts import battery_of
@@ -24,7 +25,7 @@ from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.settle import NUDGE, Robots
 from pipeline.choice.shelf import Shelf, combinations, named
 from pipeline.choice.track import Account
-from pipeline.choice.wanted import Wanted, filtered
+from pipeline.choice.wanted import Wanted, filtered, springs_of
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ class Chosen:
             Each with its own demand.
         first: What the first search, before mass was fed back, took the answer's power for [W].
         present: Mass of an actuator that the bodies hold already [kg].
+        spring: Beside the actuators of all joints; None without any.
         shelf: The parts.
         battery: Of the answer, at the highest voltage of its groups.
     """
@@ -70,6 +72,7 @@ class Chosen:
     sides: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
     first: Mapping[str, float]
     present: float
+    spring: ParallelSpring | None
     shelf: Shelf
     battery: Battery
 
@@ -164,8 +167,8 @@ def choose(
     doubts = asked.doubts(found, candidates, price, wanted.draws)
     return Chosen(
         *(machine, wanted, robots.loads, found, candidates, doubts, answer),
-        *(asked.sides(answer, found, price, robots), first, asked.present, asked.shelf),
-        asked.battery(answer),
+        *(asked.sides(answer, found, price, robots), first),
+        *(asked.present, asked.spring, asked.shelf, asked.battery(answer)),
     )
 
 
@@ -181,7 +184,13 @@ def _asked(machine: Machine, modes: Sequence[Mode], wanted: Wanted) -> _Asked:
     shelf = Shelf.of(left, driver, idle=wanted.idle, voltage=wanted.voltage)
     held = machine.ready.motors.mass[0]
     present = held if wanted.present is None else wanted.present
-    return _Asked(machine, modes, groups, shelf, wanted.account, present, pack, wanted.battery)
+    asked = _Asked(
+        *(machine, modes, groups, shelf, wanted.account, present, pack, wanted.battery),
+        spring=springs_of(robot.joints, wanted.springs),
+    )
+    if wanted.present_battery is None or not robot.floating:
+        return asked
+    return replace(asked, on_base=asked.pack_mass - wanted.present_battery)
 
 
 def _candidates(answer: Design, found: Found, pool: Iterable[Design]) -> list[Design]:
@@ -204,6 +213,8 @@ class _Asked:
     present: float
     pack: Part
     energy: float | None = None
+    on_base: float = 0.0
+    spring: ParallelSpring | None = None
 
     def searched(
         self, designs: Designs, loads: Sequence[Load], price: Mapping[str, Feedback]
@@ -213,6 +224,19 @@ class _Asked:
             g: search(Demanded.of(g, joints, loads), designs, self.account, price[g])
             for g, joints in self.groups.items()
         }
+
+    @property
+    def pack_mass(self) -> float:
+        """Of the battery [kg].
+
+        Raises:
+            ChoiceError: Its file states neither mass nor specific energy.
+        """
+        sheet = {entry: number.value for entry, number in self.pack.printed.items()}
+        if not {"mass", "specific_energy"} & sheet.keys():
+            raise ChoiceError(f"--present-battery: part '{self.pack.name}' states no mass")
+        any_voltage = {"voltage": 1.0} | sheet
+        return battery_of(self.pack.name, any_voltage, energy=self.energy).mass
 
     def battery(self, answer: Mapping[str, Design]) -> Battery:
         """At the highest voltage of an answer's groups."""
@@ -264,13 +288,15 @@ class _Asked:
     def robots(self, mass: Mapping[str, float]) -> Robots:
         """All robots about masses of one actuator of each group [kg]."""
         added = {j: mass[g] - self.present for g, joints in self.groups.items() for j in joints}
-        loads = loads_of(self.machine, self.modes, added)
+        added |= {self.machine.ready.robot.model.names[1]: self.on_base} if self.on_base else {}
+        loads = loads_of(self.machine, self.modes, added, spring=self.spring)
         nudged = {
             g: loads_of(
                 self.machine,
                 self.modes,
                 {j: m + NUDGE * (j in joints) for j, m in added.items()},
                 along=loads,
+                spring=self.spring,
             )
             for g, joints in self.groups.items()
         }

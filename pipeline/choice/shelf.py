@@ -96,7 +96,14 @@ class Shelf:
         driver = driver or _shipped()[DRIVER]
         known = {**_shipped(), **parts}
         numbers = {name: _filled(part, known) for name, part in parts.items()}
-        numbers[driver.name] = {**driver.printed, **({"idle_power": idle} if idle else {})}
+        own = {**driver.printed, **({"idle_power": idle} if idle else {})}
+        others = [
+            p.printed["mass"].value
+            for p in known.values()
+            if p.kind == "driver" and "mass" in p.printed
+        ]
+        own.setdefault("mass", _range(min(others), max(others), 1.0, "kg"))
+        numbers[driver.name] = own
         return cls({**parts, driver.name: driver}, numbers, driver.name, voltage)
 
     def unknown(self, design: Sequence[str]) -> Iterator[tuple[str, str, Number]]:
@@ -179,9 +186,9 @@ class Shelf:
             out[key] = found[f"motor.{key}"]
         out |= {entry: x[entry] for entry in _OF_MOTORS}
         out["peak_current"] = max(found["motor.peak_current"], out["continuous_current"])
-        driver = driver_of(
-            self.driver, self._values(self.driver, drawn), current_of=x["current_of"]
-        )
+        sheet = self._values(self.driver, drawn)
+        driver = driver_of(self.driver, sheet, current_of=x["current_of"])
+        out["mass"] += sheet["mass"]
         bus = self.voltage or min(x["supply_voltage"], float(driver.most_voltage))
         for limit in ("continuous_current", "peak_current"):
             out[limit] = min(out[limit], float(getattr(driver, limit)))

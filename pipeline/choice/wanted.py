@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Final
 
-from actuators.errors import CatalogError, closest
+import numpy as np
+
+from actuators.elements.position_torque import ParallelSpring
+from actuators.errors import CatalogError, UnitError, closest, one_line
 from actuators.loading.data_sheet import Number
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part
+from actuators.units import quantity
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.shelf import GEARS
 from pipeline.choice.track import Account
+
+#: Dimensions of a spring's stiffness and angle without torque.
+_SPRING: Final = ("rotational stiffness", "angle")
 
 
 @dataclass(frozen=True)
@@ -31,8 +40,10 @@ class Wanted:
         account: Hotel load, returned energy.
         pack: Part that is the battery.
         battery: Energy of it when full, in place of its part's [J].
-        present: Mass of an actuator that the robot's bodies hold already, each joint's [kg]; by
-            default that of the motors of its actuator files.
+        present: Mass of an actuator, with its driver, that the robot's bodies hold already, each
+            joint's [kg]; by default that of the motors of its actuator files.
+        present_battery: Mass of a battery that they hold already [kg]; by default the pack's own.
+        springs: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints.
         draws: Over what is not printed.
     """
 
@@ -49,7 +60,42 @@ class Wanted:
     pack: str = PACK
     battery: float | None = None
     present: float | None = None
+    present_battery: float | None = None
+    springs: tuple[str, ...] = ()
     draws: int = 256
+
+
+def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | None:
+    """The springs beside the actuators of all joints; None without any.
+
+    Args:
+        joints: Of the robot, in order.
+        given: ``PATTERN=STIFFNESS@ANGLE`` each, with units.
+
+    Raises:
+        ChoiceError: It is written otherwise, a number or unit is wrong, or its pattern fits no
+            joint, or one that has a spring.
+    """
+    stiffness, rest = np.zeros(len(joints)), np.zeros(len(joints))
+    for text in given:
+        pattern, _, numbers = text.partition("=")
+        if numbers.count("@") != 1:
+            form = "'PATTERN=STIFFNESS@ANGLE', such as '*_knee=3 N*m/rad@40 deg'"
+            raise ChoiceError(f"--spring {one_line(text)}: expected {form}")
+        which = np.array([fnmatchcase(joint, pattern) for joint in joints])
+        if not which.any():
+            hint = closest(pattern, joints)
+            raise ChoiceError(f"--spring {one_line(text)}: no joint '{pattern}': {hint}")
+        if (stiffness[which] != 0.0).any():
+            raise ChoiceError(f"--spring {one_line(text)}: a joint of it has a spring already")
+        try:
+            k, q = (quantity(x, kind) for x, kind in zip(numbers.split("@"), _SPRING, strict=True))
+        except UnitError as error:
+            raise ChoiceError(f"--spring {one_line(text)}: {error}") from None
+        if k <= 0.0:
+            raise ChoiceError(f"--spring {one_line(text)}: the stiffness has to be above 0")
+        stiffness[which], rest[which] = k, q
+    return ParallelSpring("spring", stiffness, rest) if given else None
 
 
 def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:

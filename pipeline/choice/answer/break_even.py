@@ -101,7 +101,8 @@ def rows(
     one, two = names
     stand = Mode("stand", 1.0, True, None, {}, "motor", False, "standing")
     walk = Mode("walk", 1.0, False, None, {}, "motor", True, "walking")
-    (still, own) = loads_of(machine, [stand, walk], samples=samples)
+    spring = chosen.spring if chosen else None
+    (still, own) = loads_of(machine, [stand, walk], samples=samples, spring=spring)
     counted = [k for k, j in enumerate(own.series.joints) if fnmatchcase(j, joints)]
     if not counted:
         hint = closest(joints, own.series.joints)
@@ -109,7 +110,7 @@ def rows(
     for share in SPEEDS:
         speed = share * own.speed
         mode = replace(walk, changes={"gait.speed": f"{speed!r} m/s"} if share != 1.0 else {})
-        (moved,) = loads_of(machine, [mode], samples=samples)
+        (moved,) = loads_of(machine, [mode], samples=samples, spring=spring)
         costs = {
             name: tuple(cost(machine, name, load, counted, chosen) for load in (moved, still))
             for name in (one, two)

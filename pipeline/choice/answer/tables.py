@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,7 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
                 gear=gear,
                 ratio=float(design.ratio[0]),
                 brake=brake,
+                spring=_springs(chosen, found.demanded.joints),
                 driver=chosen.shelf.driver,
                 battery="",
                 power_W=power,
@@ -102,6 +104,7 @@ def _robot_row(chosen: Chosen, rows: Sequence[AnswerRow], day: Sequence[DayRow])
         gear="",
         ratio=None,
         brake="",
+        spring="",
         driver="",
         battery=chosen.battery.name,
         energy_Wh_per_day=energy,
@@ -112,6 +115,12 @@ def _robot_row(chosen: Chosen, rows: Sequence[AnswerRow], day: Sequence[DayRow])
         **totals,
         **powers,
     )
+
+
+def _springs(chosen: Chosen, joints: Sequence[str]) -> str:
+    """Those of the options that stand beside actuators of some joints."""
+    each = {text: text.partition("=")[0] for text in chosen.wanted.springs}
+    return ", ".join(t for t, p in each.items() if any(fnmatchcase(j, p) for j in joints))
 
 
 def words(design: tuple[str, str, str]) -> str:
