@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 import pipeline as lw
 from actuators.loading.parts import load_parts
-from pipeline.choice.designs import Designs
 from pipeline.choice.group import front, merged
 from pipeline.choice.loads import loads_of
 from pipeline.choice.mission import Mode
+from pipeline.choice.parts.designs import Designs
+from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded, torque_rms
-from pipeline.choice.shelf import Shelf, combinations
 from pipeline.choice.track import Account
 from tests.bench_timing import Call, ratio, spread, timed
 

@@ -15,17 +15,18 @@ from actuators.loading.parts import Part, load_parts
 from actuators.supply.battery import Battery
 from actuators.supply.from_parts import battery_of
 from pipeline.choice.answer.full import Full, through
-from pipeline.choice.designs import Designs
 from pipeline.choice.doubt import Design, Doubt, doubt, drawn
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.group import Found, groups_of, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import Mode
+from pipeline.choice.parts.designs import Designs
+from pipeline.choice.parts.shelf import Shelf, combinations, named
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.settle import NUDGE, Robots
-from pipeline.choice.shelf import Shelf, combinations, named
+from pipeline.choice.springs import found_springs, springs_of
 from pipeline.choice.track import Account
-from pipeline.choice.wanted import Wanted, filtered, springs_of
+from pipeline.choice.wanted import Wanted, filtered
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
@@ -138,6 +139,10 @@ def choose(
     asked = _asked(machine, modes, wanted)
     every = combinations(asked.shelf, brakes=wanted.brakes)
     designs = asked.shelf.designs(every)
+    if any("=" not in text for text in wanted.springs):
+        told("springs")
+        wanted = replace(wanted, springs=asked.springs(designs, wanted.springs))
+        asked = _asked(machine, modes, wanted)
     told("the mission's demand")
     robots = asked.robots(dict.fromkeys(asked.groups, asked.present))
     price = dict.fromkeys(asked.groups, Feedback())
@@ -224,6 +229,11 @@ class _Asked:
             g: search(Demanded.of(g, joints, loads), designs, self.account, price[g])
             for g, joints in self.groups.items()
         }
+
+    def springs(self, designs: Designs, given: Sequence[str]) -> tuple[str, ...]:
+        """Those that are stated, and those of least power; see `found_springs`."""
+        robots = self.robots(dict.fromkeys(self.groups, self.present))
+        return found_springs(given, self.groups, robots.loads, designs, self.account)
 
     @property
     def pack_mass(self) -> float:

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from scipy.stats.qmc import LatinHypercube
 
 from actuators.loading.data_sheet import Number
-from pipeline.choice.designs import Designs
+from pipeline.choice.parts.designs import Designs
+from pipeline.choice.parts.shelf import Drawn, Shelf
 from pipeline.choice.search import Demanded, Feedback
-from pipeline.choice.shelf import Drawn, Shelf
 from pipeline.choice.track import Account
 
 Array = NDArray[np.float64]

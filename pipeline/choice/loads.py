@@ -86,10 +86,15 @@ def loads_of(
             raise type(error)(f"{mode.where}: {error}") from None
         except PipelineError as error:
             raise MissionError(f"{mode.where}: {error}") from None
-        if spring is not None and mode.hold != "none":
-            load = replace(load, series=spring.inverse(load.series))
-        out.append(load)
+        out.append(with_spring(load, spring))
     return tuple(out)
+
+
+def with_spring(load: Load, spring: ParallelSpring | None) -> Load:
+    """The mode with springs beside the actuators; with hold none they are not held, either."""
+    if spring is None or load.mode.hold == "none":
+        return load
+    return replace(load, series=spring.inverse(load.series))
 
 
 def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:

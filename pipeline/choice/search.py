@@ -32,8 +32,8 @@ from scipy.spatial import ConvexHull, QhullError
 from actuators.energy.regeneration import BUS
 from actuators.shaft import ShaftSeries
 from pipeline.choice import heat
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.track import SPEED, Account, Track
 
 Array = NDArray[np.float64]

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from actuators.energy.regeneration import BUS
 from actuators.shaft import ShaftSeries
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 
 Array = NDArray[np.float64]
 Which = NDArray[np.bool_]

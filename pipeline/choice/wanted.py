@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Final
 
-import numpy as np
-
-from actuators.elements.position_torque import ParallelSpring
-from actuators.errors import CatalogError, UnitError, closest, one_line
+from actuators.errors import CatalogError, closest
 from actuators.loading.data_sheet import Number
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part
-from actuators.units import quantity
 from pipeline.choice.errors import ChoiceError
-from pipeline.choice.shelf import GEARS
+from pipeline.choice.parts.shelf import GEARS
 from pipeline.choice.track import Account
-
-#: Dimensions of a spring's stiffness and angle without torque.
-_SPRING: Final = ("rotational stiffness", "angle")
 
 
 @dataclass(frozen=True)
@@ -43,7 +34,8 @@ class Wanted:
         present: Mass of an actuator, with its driver, that the robot's bodies hold already, each
             joint's [kg]; by default that of the motors of its actuator files.
         present_battery: Mass of a battery that they hold already [kg]; by default the pack's own.
-        springs: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints.
+        springs: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints; a
+            PATTERN alone is for one that is to be found.
         draws: Over what is not printed.
     """
 
@@ -63,39 +55,6 @@ class Wanted:
     present_battery: float | None = None
     springs: tuple[str, ...] = ()
     draws: int = 256
-
-
-def springs_of(joints: Sequence[str], given: Sequence[str]) -> ParallelSpring | None:
-    """The springs beside the actuators of all joints; None without any.
-
-    Args:
-        joints: Of the robot, in order.
-        given: ``PATTERN=STIFFNESS@ANGLE`` each, with units.
-
-    Raises:
-        ChoiceError: It is written otherwise, a number or unit is wrong, or its pattern fits no
-            joint, or one that has a spring.
-    """
-    stiffness, rest = np.zeros(len(joints)), np.zeros(len(joints))
-    for text in given:
-        pattern, _, numbers = text.partition("=")
-        if numbers.count("@") != 1:
-            form = "'PATTERN=STIFFNESS@ANGLE', such as '*_knee=3 N*m/rad@40 deg'"
-            raise ChoiceError(f"--spring {one_line(text)}: expected {form}")
-        which = np.array([fnmatchcase(joint, pattern) for joint in joints])
-        if not which.any():
-            hint = closest(pattern, joints)
-            raise ChoiceError(f"--spring {one_line(text)}: no joint '{pattern}': {hint}")
-        if (stiffness[which] != 0.0).any():
-            raise ChoiceError(f"--spring {one_line(text)}: a joint of it has a spring already")
-        try:
-            k, q = (quantity(x, kind) for x, kind in zip(numbers.split("@"), _SPRING, strict=True))
-        except UnitError as error:
-            raise ChoiceError(f"--spring {one_line(text)}: {error}") from None
-        if k <= 0.0:
-            raise ChoiceError(f"--spring {one_line(text)}: the stiffness has to be above 0")
-        stiffness[which], rest[which] = k, q
-    return ParallelSpring("spring", stiffness, rest) if given else None
 
 
 def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:

@@ -16,8 +16,8 @@ from actuators.chain import ChainResult
 from actuators.energy.energy import integral
 from actuators.energy.regeneration import BUS, supply_of
 from actuators.supply.battery import Battery
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.track import Account
 from pipeline.machine.drivetrains import Drivetrains
 from pipeline.machine.joint import JointModel, joints_of

@@ -15,8 +15,8 @@ from actuators.units import from_si
 from pipeline.choice import heat
 from pipeline.choice.answer.full import Full, lasting
 from pipeline.choice.choose import Chosen
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded
 from reports.table import Table, table_of
 from reports.tables.choice import (

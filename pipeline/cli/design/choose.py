@@ -64,9 +64,9 @@ def add_verb(add: AddVerb) -> None:
             metavar="NUMBER",
             help=f"{entry.kind} {entry.words}, such as '{entry.example}'",
         )
-    text = "spring beside some joints' actuators, such as '*_knee=3 N*m/rad@40 deg'"
+    text = "spring beside actuators, such as '*_knee=3 N*m/rad@40 deg'; PATTERN alone: found"
     sub.add_argument(
-        "--spring", action="append", default=[], metavar="PATTERN=STIFFNESS@ANGLE", help=text
+        "--spring", action="append", default=[], metavar="PATTERN[=STIFFNESS@ANGLE]", help=text
     )
     for word, usual in (("driver", DRIVER), ("pack", PACK)):
         text = f"part that is the {'battery' if word == 'pack' else word}; {usual}"

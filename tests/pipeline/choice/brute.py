@@ -6,7 +6,7 @@ import numpy as np
 
 from actuators.energy.limits import limit_rows
 from actuators.energy.regeneration import supply_of
-from pipeline.choice.designs import Designs
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded
 
 

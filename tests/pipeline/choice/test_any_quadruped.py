@@ -18,8 +18,8 @@ from pipeline.choice.choose import _Asked
 from pipeline.choice.group import groups_of
 from pipeline.choice.loads import loads_of
 from pipeline.choice.mission import read_mission
+from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded, Feedback, shared
-from pipeline.choice.shelf import Shelf, combinations
 from pipeline.choice.track import Account
 from tests.pipeline.choice.brute import in_full
 from tests.pipeline.robot.walkers import robot_text, urdf_text

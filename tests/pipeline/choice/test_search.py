@@ -14,8 +14,8 @@ from actuators.loading.parts import KINDS, load_parts
 from pipeline.choice.group import front, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.mission import read_mission
+from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded
-from pipeline.choice.shelf import Shelf, combinations
 from pipeline.choice.track import Account
 from tests.pipeline.choice.brute import in_full
 

@@ -14,9 +14,9 @@ from pipeline.choice.errors import ChoiceError
 from pipeline.choice.group import groups_of
 from pipeline.choice.loads import loads_of
 from pipeline.choice.mission import read_mission
+from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded
 from pipeline.choice.settle import Robots
-from pipeline.choice.shelf import Shelf, combinations
 from pipeline.choice.track import Account
 
 PARTS = (

@@ -21,8 +21,8 @@ from actuators.loading.converted import converted
 from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
 from actuators.loading.parts import DRIVER, Part, load_parts
 from actuators.supply.from_parts import driver_of
-from pipeline.choice.designs import Designs
 from pipeline.choice.errors import ChoiceError
+from pipeline.choice.parts.designs import Designs
 
 GEARS: Final = ("strain_wave", "planetary", "self_locking")
 #: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
