@@ -29,7 +29,7 @@ def power_answer(told: Account) -> tuple[str, ...]:
     measured, left = shares[MEASURED], shares[UNEXPLAINED]
     paragraphs = (
         WORDS("wrong_sum", told.wrong_sum),
-        WORDS("sums", measured, own, len(told.drives)),
+        WORDS("sums", measured, own, len(told.drives), told.wrong_sum),
         WORDS("found", found, shares.get("drivers")),
         WORDS("left", left, measured, told.rms),
         WORDS("sag", told.sag),

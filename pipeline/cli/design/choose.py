@@ -22,6 +22,8 @@ from pipeline.progress import Progress
 
 #: The day that comes with the project, of any walking robot.
 DAY = Path(__file__).parents[2] / "choice" / "missions" / "day.csv"
+#: Draws beyond which an answer changes no more, and memory ends.
+MOST_DRAWS = 100_000
 _NUMBERS = {
     "idle": Entry("power", "of a driver that is on", "0.672 W"),
     "hotel": Entry("power", "of the electronics", "10 W"),
@@ -99,8 +101,8 @@ def run_choose(options: argparse.Namespace) -> int:
         from pipeline.simulation.settings import regeneration_of
 
         policy = regeneration_of(options.regeneration)
-        if options.draws < 8:
-            raise ChoiceError(f"--draws {options.draws}: at least 8")
+        if not 8 <= options.draws <= MOST_DRAWS:
+            raise ChoiceError(f"--draws {options.draws}: expected 8 to {MOST_DRAWS}")
         given = vars(options)
         numbers = {name: _number(name, given[name.replace("-", "_")]) for name in _NUMBERS}
         value = {name: None if x is None else x.value for name, x in numbers.items()}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.identification.supply.drawn import Drawn, drawn_along
 from pipeline.identification.supply.regression import (
+    DRAWS,
     SEED,
     Problem,
     better,
@@ -98,7 +99,7 @@ class Account:
             terms [W].
         reading: How samples were read: ``"mean"`` or ``"instant"``.
         wrong_sum: ``"recognised"``, ``"possible"`` or empty: whether motor currents times the
-            supply's voltage were taken for its power.
+            supply's voltage were taken for its power; where that is recognised nothing is found.
         sag: Where voltage and current of the supply were both measured, else None.
         by_model: Joints whose torque no log tells.
         logs: Names.
@@ -158,6 +159,9 @@ def account(
         _refuse_few(rows, prepared)
         tried.append(_chosen(rows, terms, reading, holdout, prove_last))
     best = min(tried, key=lambda one: one.error)
+    wrong_sum = _wrong_sum(best.problem, best.names)
+    if wrong_sum == RECOGNISED:  # no term means anything in what is no power
+        best = replace(best, names=(), coefficients=np.zeros(0), draws=np.zeros((DRAWS, 0)))
     misses = [
         float(np.sqrt(np.mean((best.rows.power - x)[best.proves] ** 2)))
         for x in (best.rows.predicted, best.explained)
@@ -170,7 +174,7 @@ def account(
         explained=best.explained,
         rms=(misses[0], misses[1]),
         reading=best.reading,
-        wrong_sum=_wrong_sum(best.problem, best.names),
+        wrong_sum=wrong_sum,
         sag=sag_of(samples),
         by_model=tuple(dict.fromkeys(j for d in drawn for j in d.by_model)),
         logs=tuple(one.log.name for one in prepared),

@@ -152,12 +152,16 @@ def _numbers(path: Path) -> tuple[TableFile, dict[str, Array]]:
 
 
 def _columns(table: TableFile) -> dict[str, Array]:
+    """Columns with finite numbers; others are NaN there."""
     if table.parquet:
-        return _each(table)
-    try:
-        return read_columns(table, table.header)
-    except GapError:
-        return _each(table)
+        data = _each(table)
+    else:
+        try:
+            data = read_columns(table, table.header)
+        except GapError:
+            data = _each(table)
+    finite = {name: np.where(np.isfinite(x), x, np.nan) for name, x in data.items()}
+    return {name: x for name, x in finite.items() if np.isfinite(x).any()}
 
 
 def _each(table: TableFile) -> dict[str, Array]:
@@ -171,7 +175,7 @@ def _each(table: TableFile) -> dict[str, Array]:
                 data[name] = read_columns(table, [name])[name]
         except (GapError, KeyError):
             continue
-    return {name: x for name, x in data.items() if np.isfinite(x).any()}
+    return data
 
 
 def _clock(

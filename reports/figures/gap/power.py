@@ -122,9 +122,12 @@ def power_shares_figure(
         if bar.high > bar.low:
             axes.plot([at + bar.low, at + bar.high], [row, row], color=INK, linewidth=1.2)
         text = f" {number(bar.mean)} W"
-        axes.text(max(at, at + bar.mean, at + bar.high), row, text, va="center", fontsize=8.5)
+        end = max(at, at + bar.mean, at + bar.high)
+        # On white, so that the line of what was measured does not run through the number.
+        paper = {"facecolor": "white", "edgecolor": "none", "pad": 0}
+        axes.text(end, row, text, va="center", fontsize=8.5, bbox=paper, zorder=4)
         at += bar.mean
-    axes.axvline(measured, color=QUIET, linewidth=1.0, linestyle=(0, (4, 2)))
+    axes.axvline(measured, color=QUIET, linewidth=1.0, linestyle=(0, (4, 2)), zorder=1)
     axes.text(
         *(measured, -0.62, f"measured {number(measured)} W "),
         ha="right",

@@ -252,6 +252,23 @@ def test_a_twin_asks_for_an_empty_folder(
 
 
 @pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--seed", "-1"], "--seed and --number start at 0"),
+        (["--number", "-1"], "--seed and --number start at 0"),
+        (["--supply", "--machine", "leg"], "no --machine, --source"),
+        (["--supply", "--source", "mujoco"], "no --machine, --source"),
+    ],
+)
+def test_a_twin_refuses_what_it_would_pass_over(
+    options: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["twin", *options, "--out", str(tmp_path / "trial")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "trial" / "given").exists()
+
+
+@pytest.mark.parametrize(
     ("target", "given", "words"),
     [
         ("reports", {"OUT": "it's a dir"}, ["--out", "it's a dir"]),

@@ -143,6 +143,15 @@ def test_a_meter_of_the_supply_counts_unless_there_are_several(
     assert made.open == ("bus_current_0", "bus_current_1")
 
 
+def test_columns_without_a_finite_number_are_none(
+    columns: Columns, write: Callable[..., Path]
+) -> None:
+    nothing = {"q_7": np.full(2000, np.nan), "tau_7": np.full(2000, np.inf)}
+    foreign = at_the_motor(columns)
+    made = first_mapping(write(foreign | nothing, "foreign.csv"))
+    assert {*made.mapped} == {*foreign} - {"time"}
+
+
 def test_a_log_in_the_format_needs_nothing(
     columns: Columns, write: Callable[..., Path], two_joints: Expected
 ) -> None:

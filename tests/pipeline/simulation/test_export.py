@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from ruamel.yaml import YAML
 
 from actuators.shaft import ShaftSeries
 from pipeline.cli.main import main
-from pipeline.effects.model_file import file_sha256, load_model
+from pipeline.effects.model_file import CATALOG, file_sha256, load_model
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export.joints import bodies_of
 
@@ -198,3 +199,31 @@ def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
     mapping.write_text("[pd_gains]\nkp = {knee = 80.0}\n")
     assert main([*export, "--to", "mjcf", "--out", str(tmp_path / "none.xml")]) == 2
     assert not (tmp_path / "none.xml").exists()
+
+
+def test_files_that_moved_and_actuators_of_ones_own(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The URDF may be named anew, a changed one is told, other actuators have a folder."""
+    model = write(PLAIN)
+    moved = tmp_path / "moved.urdf"
+    (tmp_path / "arm.urdf").rename(moved)
+    export = ["gap", "export", str(model), "--to", "mjcf", "--out", str(tmp_path / "arm.xml")]
+    assert main(export) == 2
+    assert "arm.urdf" in capsys.readouterr().err
+    assert main([*export, "--robot", str(moved)]) == 0
+    assert "note" not in capsys.readouterr().out
+    moved.write_text(URDF.replace('mass value="2.0"', 'mass value="2.1"'), encoding="utf-8")
+    assert main([*export, "--robot", str(moved)]) == 0
+    assert "note: model.toml: moved.urdf is not the one" in capsys.readouterr().out
+    own = tmp_path / "actuators"
+    shutil.copytree(CATALOG, own)
+    names = own / "alternatives.toml"
+    names.write_text(
+        names.read_text("utf-8").replace("[[rotor", "[[of_mine").replace("[rotor", "[of_mine"),
+        encoding="utf-8",
+    )
+    text = model.read_text(encoding="utf-8")
+    model.write_text(text + '\n[actuators]\nalternative = "of_mine"\n', encoding="utf-8")
+    assert main([*export, "--robot", str(moved)]) == 2
+    assert main([*export, "--robot", str(moved), "--actuators", str(own)]) == 0

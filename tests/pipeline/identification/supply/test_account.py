@@ -25,6 +25,7 @@ from pipeline.identification.workflow.setup import setup, take_in
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.log import Log
 from tests.command_line import exit_code
+from tests.command_line import rows_of as table_rows
 
 Array = NDArray[np.float64]
 HEXAPOD = Path("urdf/hexapod.toml")
@@ -281,3 +282,6 @@ def test_motor_currents_times_the_supplys_voltage_are_no_power(
     ]
     assert exit_code(["gap", *options, "--out", str(tmp_path / "answer")]) == 1
     assert "no power at the supply" in capsys.readouterr().out
+    # No term means anything in what is no power: none is listed.
+    terms = [row["term"] for row in table_rows(tmp_path / "answer" / "power.csv")]
+    assert terms == [*OWN, MEASURED, UNEXPLAINED]
