@@ -64,7 +64,7 @@ class Driver:
     def loss(self, current: Array, bus: Scalars) -> Array:
         """Return the power that the enabled driver turns into heat, (...) [W], not negative.
 
-        The bus supplies it beside the motor's electrical power, whichever way that flows.
+        The bus supplies it in addition to the motor's electrical power, whichever way that flows.
 
         Args:
             current: Of the motor, (...) [A].

@@ -15,10 +15,11 @@ from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
 from pipeline.identification.compare.stages import Stage, overall
 from pipeline.identification.workflow.story import Told, signature_name
 from pipeline.logs.prepared.measurement import TEST, Measurement
+from pipeline.logs.signals.grid import runs_of
 from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.predict import Prediction
 from reports.figures.gap.in_time import GapTrace, gap_time_figure
-from reports.figures.gap.signature import Signature, gap_signature_figure
+from reports.figures.gap.signature import gap_signature_figure
 from reports.figures.gap.waterfall import gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
@@ -144,9 +145,7 @@ def _stretch(measurements: Sequence[Measurement]) -> tuple[int, slice]:
     """Log and rows around the test block in which most rows of most joints count."""
     best, found = -1.0, (0, slice(0, len(measurements[0])))
     for k, m in enumerate(measurements):
-        tested = m.part == TEST
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], tested.astype(np.int8), [0]])))
-        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        for start, stop in np.column_stack(runs_of(m.part == TEST)).tolist():
             count = float(m.mask[start:stop].sum())
             if count > best:
                 size = max(2, int(_LONGEST * m.rate))
@@ -187,14 +186,11 @@ def write_signature(
             part.append(gap_of(m, stage.predictions[k])[:, joint])
     first = measurements[0]
     figure = gap_signature_figure(
-        Signature(
-            label,
-            np.concatenate(x),
-            np.concatenate(rest[0]),
-            np.concatenate(rest[1]),
-            float(first.noise[joint, 0]),
-            CHANNEL_UNITS[first.channels[0]],
-        ),
+        label,
+        np.concatenate(x),
+        (np.concatenate(rest[0]), np.concatenate(rest[1])),
+        float(first.noise[joint, 0]),
+        CHANNEL_UNITS[first.channels[0]],
         title=_words(f"{effect[:1].upper()}{effect[1:]} at {first.joints[joint]}"),
         subtitle="all compared rows; line: running mean, band: noise, 2 sigma",
     )

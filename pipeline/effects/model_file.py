@@ -288,19 +288,6 @@ def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
     return model
 
 
-def load_model(path: Path) -> MachineModel:
-    """The machine of a model file, edits included.
-
-    Raises:
-        ModelFileError: The file is malformed; one line.
-        GapError: An edit does not fit the machine.
-        pipeline.errors.PipelineError: The robot file cannot be used.
-        actuators.errors.ActuatorError: The actuator cannot be used.
-    """
-    file = read_model_file(path)
-    return apply_edits(base_model(file), file.edits)
-
-
 def read_model_file(
     path: Path, catalog: Path | None = None, robot: Path | None = None
 ) -> ModelFile:

@@ -3,7 +3,7 @@
 Bodies and ground change what is demanded of the joints; so do springs and ripples, which act beside
 the actuators. They count in every alternative, and so does what is found of the motor, which all of
 them share. Friction, inertia and coupling of a drivetrain belong to the alternative they were found
-against: what was found beside a motor's data sheet alone is all that the machine's gears lose.
+against: what was found against a motor's data sheet alone is all that the machine's gears lose.
 Another alternative has gears, and losses of their own in the catalogue; to add one to the other
 would count gears twice, and to put one in place of the other would make a self-locking gear lock no
 more. So there they do not count, and it is said.

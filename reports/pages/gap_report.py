@@ -304,7 +304,7 @@ def _energy(story: Story) -> tuple[Section, ...]:
         rows,
         "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
         "energy lost, and power to stand as the robot file says, without and with what the model "
-        "file holds; a dash: it cannot be told.",
+        "file holds; a dash: it is not known.",
     )
     catalog = story.given.catalog
     titles = [

@@ -126,23 +126,23 @@ def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str]
         joints: Of the robot, in its order.
 
     Returns:
-        Name to joint, for those that can be told, and why; a guess by order is said to be one.
+        Name to joint, for those that are recognised, and why; a guess by order is said to be one.
     """
     plain = _plain(joints)
-    told = {
+    assigned = {
         owner: joints[plain.index(key)]
         for owner, key in zip(owners, _plain(owners), strict=True)
         if plain.count(key) == 1
     }
-    if len(told) == len(owners) and len({*told.values()}) == len(told):
-        return told, "by name"
+    if len(assigned) == len(owners) and len({*assigned.values()}) == len(assigned):
+        return assigned, "by name"
     if len(owners) == len(joints):
         ordered = sorted(owners, key=lambda o: [(w.isdigit(), w.zfill(8)) for w in words_of(o)])
         in_order = ordered if all(w.isdigit() for o in owners for w in words_of(o)) else owners
         return dict(zip(in_order, joints, strict=True)), "by order, a guess"
-    known = [owner for owner in told if [*told.values()].count(told[owner]) == 1]
+    known = [owner for owner in assigned if [*assigned.values()].count(assigned[owner]) == 1]
     numbered = [*owners] != known and all(owner.isdigit() for owner in owners)
-    return ({} if numbered else {owner: told[owner] for owner in known}), "by name"
+    return ({} if numbered else {owner: assigned[owner] for owner in known}), "by name"
 
 
 def _plain(names: Sequence[str]) -> list[str]:

@@ -84,12 +84,12 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
         "# Remarks in front of a column are other readings of it; put the right one in its place.",
         "# Signs and zeros are the joint's in the file as here; `gap` itself names those that are",
         "# not, with the line that mends them (flip = true, zero = ...).",
-        f"# Joints are told {by}." if lines else "# Its columns are those of the log format.",
+        f"# Joints are recognised {by}." if lines else "# Its columns are those of the log format.",
     ]
     if table.dialect != CsvTable():
-        told = table.dialect
-        text += ["", "[csv]", f"delimiter = {json.dumps(told.delimiter)}"]
-        text += [f"decimal = {json.dumps(told.decimal)}"]
+        dialect = table.dialect
+        text += ["", "[csv]", f"delimiter = {json.dumps(dialect.delimiter)}"]
+        text += [f"decimal = {json.dumps(dialect.decimal)}"]
     text += [*head, *(["", "[columns]", *lines] if lines else [])]
     if ratios:
         text += ["", "[gear_ratio]  # motor turns per joint turn, by the motion"]
@@ -251,7 +251,7 @@ def _gains(found: Sequence[Guess], own: set[str]) -> list[str]:
         return []
     return [
         "",
-        "# Targets and no effort: with the gains of the servos their law tells the torque.",
+        "# Targets and no effort: with the gains of the servos their law gives the torque.",
         "# [pd_gains]",
         "# kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}",
         "# kd = 1.0  # [N*m*s/rad]",

@@ -45,7 +45,7 @@ class Contact:
 
 
 def log_contact(log: Log) -> Contact | None:
-    """Contact as the log itself tells it: from forces, else from contact columns, else None."""
+    """Contact as the log itself states it: from forces, else from contact columns, else None."""
     if log.foot_force is not None:
         return Contact(log.feet, _standing_by_force(log.foot_force[..., 2]), "forces")
     if log.contact is not None:

@@ -68,7 +68,7 @@ def cycle_noise(prepared: Prepared, cycle: float) -> Array | None:
         cycle: Period [s].
 
     Returns:
-        Standard deviation, shape (J,), NaN where it cannot be told; None where nothing repeats.
+        Standard deviation, shape (J,), NaN where it is not known; None where nothing repeats.
     """
     pairs = []
     for piece in prepared.pieces:

@@ -41,8 +41,7 @@ def cannot_tell(log: Log, velocity: Array, effort: Array, ok: NDArray[np.bool_])
         )
     if log.torque is None or log.current is None:
         out.append(
-            "a torque constant but by gravity: log a torque beside the current, or hold known "
-            "weights"
+            "a torque constant but by gravity: log both torque and current, or hold known weights"
         )
     duration = float(log.time[-1] - log.time[0])
     if log.temperature is None and duration < _WARMING:

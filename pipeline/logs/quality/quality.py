@@ -61,7 +61,7 @@ def judge(
             from end to end.
     """
     found = Findings(log.name)
-    for remark in log.told:  # what holds for all of it comes first
+    for remark in log.notes:  # what holds for all of it comes first
         found.note("", "file", 1, "1", "warning", remark)
     verdict = "refused" if len(log) < FEWEST_ROWS else "ok"
     detail = f"{len(log)} rows; at least {FEWEST_ROWS} are needed"

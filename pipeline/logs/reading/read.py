@@ -122,7 +122,7 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
         source=plan.table.path,
         temperature=temperature,
         rules={(t.owner, t.quantity): source for t, source in plan.sources.items()},
-        **base | joints | feet | {"told": plan.table.remarks} | drive,
+        **base | joints | feet | {"notes": plan.table.remarks} | drive,
     )
     return log if fresh.all() else log.rows(fresh)
 
@@ -291,7 +291,7 @@ def _drive(
         if "torque_off" in out:
             out["torque"][out["torque_off"]] = 0.0
         out["derived"] = {"torque": gains.formula(joints)}
-        out["told"] = (*plan.table.remarks, f"the torque {CANNOT}")
+        out["notes"] = (*plan.table.remarks, f"the torque {CANNOT}")
     if plan.supply_alone:
         out["torque"], out["derived"] = np.full(position.shape, np.nan), {"torque": BY_MODEL}
         return out | {"valid": valid}

@@ -54,7 +54,7 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
     """Open a file of columns and read its header.
 
     Args:
-        path: CSV, Parquet, or what becomes such a table; kinds are told by their first bytes.
+        path: CSV, Parquet, or what becomes such a table; kinds are recognised by their first bytes.
         dialect: Of a CSV file; the log format's own by default.
 
     Raises:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Mask
+from pipeline.logs.signals.grid import runs_of
 from reports.figures.style import (
     BLUE,
     ORANGE,
@@ -51,12 +51,12 @@ class GapTrace:
     joint: str
     time: Array
     measured: Array
-    compared: NDArray[np.bool_]
+    compared: Mask
     before: Array
     after: Array
     noise_floor: float
     unit: str
-    held_out: NDArray[np.bool_] | None = None
+    held_out: Mask | None = None
 
 
 @house_style()
@@ -105,8 +105,7 @@ def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: boo
     kept, where = np.ones(t.size, dtype=np.bool_), ""
     if trace.held_out is not None and np.isfinite(left_after[trace.held_out]).any():
         kept, where = trace.held_out, "held out: "
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(np.int8), [0]])))
-        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        for start, stop in np.column_stack(runs_of(kept)).tolist():
             for ax in (top, bottom):
                 ax.axvspan(t[start], t[stop - 1], color=YELLOW, alpha=0.18, linewidth=0, zorder=0)
     rms = [float(np.sqrt(np.nanmean(x[kept] ** 2))) for x in (left_before, left_after)]

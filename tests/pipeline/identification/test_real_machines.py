@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.cli.gap import options_of
 from pipeline.cli.main import main, parser
-from pipeline.effects.model_file import load_model
+from pipeline.effects.model_file import apply_edits, base_model, read_model_file
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.results import CONFIRMED, Found
 from pipeline.identification.workflow.locate import Whereabouts, find_where
@@ -74,7 +74,8 @@ def score(model: Path, log: Path, cutoff: float, rate: float, *, last: float = 1
     One Butterworth of order 4 forward and backward on everything, the velocity column where there
     is one, every row of the last share, no tolerance.
     """
-    machine, table = load_model(model), pd.read_csv(log)
+    file, table = read_model_file(model), pd.read_csv(log)
+    machine = apply_edits(base_model(file), file.edits)
     time = table["time_s"].to_numpy()
     dt = float(np.median(np.diff(time)))
     grid = np.arange(time[0], time[-1], dt)

@@ -15,7 +15,13 @@ from ruamel.yaml import YAML
 
 from actuators.shaft import ShaftSeries
 from pipeline.cli.main import main
-from pipeline.effects.model_file import CATALOG, file_sha256, load_model
+from pipeline.effects.model_file import (
+    CATALOG,
+    apply_edits,
+    base_model,
+    file_sha256,
+    read_model_file,
+)
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export.joints import bodies_of
 
@@ -97,6 +103,11 @@ def motion(n: int = 200) -> tuple[Array, Array, Array]:
     return q[moves], v[moves], (-(w**2) * q)[moves]
 
 
+def machine_of(path: Path) -> MachineModel:
+    file = read_model_file(path)
+    return apply_edits(base_model(file), file.edits)
+
+
 def our_torque(machine: MachineModel, q: Array, v: Array, a: Array) -> Array:
     """What the motors give at the joints, by rigid bodies and the drivetrains' own laws."""
     model = bodies_of(machine)
@@ -140,7 +151,7 @@ def test_mujoco_computes_the_torques_that_we_do(
         "not carried over: meshes, collisions and contacts: bodies and joints alone are written"
     ]
     q, v, a = motion()
-    ours = our_torque(load_model(model), q, v, a)
+    ours = our_torque(machine_of(model), q, v, a)
     assert np.abs(mujoco_torque(out, q, v, a) - ours).max() < 1e-3 * np.abs(ours).max()
     # Without what was found they are far apart: the comparison can fail.
     bare = write(())
@@ -165,7 +176,7 @@ def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Pat
     model = write(PLAIN)
     out = tmp_path / "found.urdf"
     assert main(["gap", "export", str(model), "--to", "urdf", "--out", str(out)]) == 0
-    again, machine = pin.buildModelFromUrdf(str(out)), load_model(model)
+    again, machine = pin.buildModelFromUrdf(str(out)), machine_of(model)
     # Pinocchio reads `dynamics`: friction as dry friction, damping as viscous.
     assert np.allclose(again.upperDryFrictionLimit, [1.3, 0.0], atol=1e-7)
     assert np.allclose(again.damping, [0.7, 0.2], atol=1e-7)
