@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from pipeline.identification.supply.regression import (
     blocks_of,
     choose,
     drawn_coefficients,
+    intervals,
     rivals_of,
 )
 from pipeline.identification.supply.sag import Sag, sag_of
@@ -36,6 +38,8 @@ UNEXPLAINED, MEASURED = "unexplained", "measured"
 RECOGNISED = "recognised"
 #: Share of the power's variance that a sum may leave which the power is said to follow.
 FOLLOWS = 0.5
+#: Part of the measured power that is rounding.
+_ROUNDING: Final = 1e-9
 #: Part of the measured power below which what stays unexplained is no finding.
 SMALL = 0.02
 
@@ -249,10 +253,15 @@ def _shares(best: _Chosen) -> tuple[Share, ...]:
     proof, block = best.rows.only(best.proves), best.block[best.proves]
     terms = {t.name: t for t in best.problem.terms}
     rivals = rivals_of(best.problem, best.names)
-    out = [_own(name, float(proof.own[name].mean())) for name in OWN]
+    ends = intervals(best.problem, best.names, best.draws, rivals)
+    total = float(proof.power.mean())
+    out = []
+    for name in OWN:
+        mean = float(proof.own[name].mean())
+        out.append(_own(name, mean if abs(mean) > _ROUNDING * total else 0.0))
     for k, name in enumerate(best.names):
         mean = float(proof.columns[name].mean())
-        own = float(best.coefficients[k]), best.draws[:, k]
+        own = float(best.coefficients[k]), *ends[name]
         out.append(_found(terms[name], *own, mean, rivals[name]))
     left = proof.power - proof.predicted
     columns = [proof.columns[n] for n in best.names]
@@ -265,7 +274,6 @@ def _shares(best: _Chosen) -> tuple[Share, ...]:
         parts = zip(coefficients, columns, strict=True)
         spread.append(float(np.mean(left[kept])) - sum(c * np.mean(x[kept]) for c, x in parts))
     low, high = (float(x) for x in np.quantile(spread, [0.025, 0.975]))
-    total = float(proof.power.mean())
     watts = float((best.rows.power - best.explained)[best.proves].mean())
     return (
         *out,
@@ -290,9 +298,8 @@ def _own(name: str, watts: float) -> Share:
 
 
 def _found(
-    term: Term, coefficient: float, draws: Array, mean: float, rivals: tuple[str, ...]
+    term: Term, coefficient: float, low: float, high: float, mean: float, rivals: tuple[str, ...]
 ) -> Share:
-    low, high = (float(x) for x in np.quantile(draws, [0.025, 0.975]))
     ends = sorted((low * mean, high * mean))
     name = {"copper": "more_copper", "friction": "more_friction"}.get(term.name, term.name)
     watts = coefficient * mean, ends[0], ends[1]

@@ -49,12 +49,14 @@ class FirstMapping:
         mapped: Columns that count.
         open: Columns that are remarks until somebody decides.
         unused: Columns that say nothing.
+        asks_gains: Whether there are targets and no effort: the servos' gains are to be put in.
     """
 
     text: str
     mapped: tuple[str, ...]
     open: tuple[str, ...]
     unused: tuple[str, ...]
+    asks_gains: bool
 
 
 def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
@@ -97,10 +99,11 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
     if supply:
         unit = supply.unit or "V"
         text += ["", "[supply]", f"column = {json.dumps(supply.column)}", f'unit = "{unit}"']
-    text += _gains(found, own)
+    gains = _gains(found, own)
+    text += gains
     if unused:
         text += ["", "# Not used: " + json.dumps(list(unused), ensure_ascii=False)[1:-1]]
-    return FirstMapping("\n".join(text) + "\n", mapped, open_, unused)
+    return FirstMapping("\n".join(text) + "\n", mapped, open_, unused, bool(gains))
 
 
 def _of_supply(named: Sequence[Named], data: Mapping[str, Array]) -> list[Guess]:

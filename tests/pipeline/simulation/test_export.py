@@ -195,6 +195,8 @@ def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
     out = tmp_path / "control.yaml"
     assert main([*export, "--to", "ros2_control", "--out", str(out)]) == 0
     gains = YAML(typ="safe").load(out)["joint_trajectory_controller"]["ros__parameters"]["gains"]
+    # A parameter of ROS 2 that is a double refuses a whole number.
+    assert {type(x) for own in gains.values() for x in own.values()} == {float}
     assert gains["shoulder"] == {
         "p": 80.0,
         "i": 0.0,
