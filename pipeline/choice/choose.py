@@ -140,7 +140,6 @@ def choose(
     every = combinations(asked.shelf, brakes=wanted.brakes)
     designs = asked.shelf.designs(every)
     if any("=" not in text for text in wanted.springs):
-        told("springs")
         wanted = replace(wanted, springs=asked.springs(designs, wanted.springs))
         asked = _asked(machine, modes, wanted)
     told("the mission's demand")
@@ -172,8 +171,10 @@ def choose(
     doubts = asked.doubts(found, candidates, price, wanted.draws)
     return Chosen(
         *(machine, wanted, robots.loads, found, candidates, doubts, answer),
-        *(asked.sides(answer, found, price, robots), first),
-        *(asked.present, asked.spring, asked.shelf, asked.battery(answer)),
+        *(asked.sides(answer, found, price, robots), first, asked.present),
+        spring=asked.spring,
+        shelf=asked.shelf,
+        battery=asked.battery(answer),
     )
 
 

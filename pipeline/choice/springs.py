@@ -125,14 +125,20 @@ def _found(
     for _ in range(_TURNS if starts else 0):
         pool = [f.designs.taken(f.looked[f.finalists]) for f in found]
 
-        def power(x: Array, pool: Sequence[Designs] = pool) -> float:
+        def power(x: Array, pool: Sequence[Designs]) -> float:
             each = zip(beside(*x), pool, strict=True)
             return sum(float(one.power(some, account).min()) for one, some in each)
 
-        first = best or min(starts, key=lambda x: power(np.array(x)))
+        first = np.array(best or min(starts, key=lambda x: power(np.array(x), pool)))
         bounds = [(1e-3 * first[0], 1e3 * first[0]), (starts[0][1], starts[-1][1])]
-        tolerances = {"xatol": 1e-3, "fatol": 0.1 * _BETTER * least, "maxiter": 100}
-        result = minimize(power, first, method="Nelder-Mead", bounds=bounds, options=tolerances)
+        result = minimize(
+            power,
+            first,
+            (pool,),
+            method="Nelder-Mead",
+            bounds=bounds,
+            options={"xatol": 1e-3, "fatol": 0.1 * _BETTER * least, "maxiter": 100},
+        )
         k, rest = (float(x) for x in result.x)
         found = [search(demanded, designs, account) for demanded in beside(k, rest)]
         now = sum(float(f.score.min()) for f in found)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from actuators.errors import CatalogError, closest
+from actuators.errors import CatalogError, closest, one_line
 from actuators.loading.data_sheet import Number
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part
 from pipeline.choice.errors import ChoiceError
@@ -66,7 +66,9 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
     """
     for name in (*wanted.only, *wanted.without):
         if not any(part.startswith(name) for part in parts):
-            raise CatalogError(f"no part '{name}': {closest(name, [*parts])}")
+            near = closest(name, [*parts])  # not 195 names
+            near = "`pipeline components` lists them" if near.startswith("known") else near
+            raise CatalogError(f"no part '{one_line(name)}', nor one that begins so: {near}")
     for kind in wanted.kinds:
         if kind not in GEARS:
             raise ChoiceError(f"--kind {kind}: {closest(kind, GEARS)}")

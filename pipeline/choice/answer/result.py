@@ -68,11 +68,12 @@ class Choice(Result):
         ]
         unknown = self.table("unknowns").frame()
         last = "nothing unprinted would change the choice"
-        if len(unknown) and unknown["worth_W"][0] > 0.0:
+        if len(unknown) and unknown["worth_W"][0] > 1e-6:
             top = unknown.iloc[0]
+            unit = "" if top["unit"] == "1" else f" {top['unit']}"
             last = (
                 f"measure next {top['part']}.{top['entry']} ({top['low']:.3g} to "
-                f"{top['high']:.3g} {top['unit']}): worth {top['worth_W']:.2g} W of the expected "
+                f"{top['high']:.3g}{unit}): worth {top['worth_W']:.2g} W of the expected "
                 f"regret of {robot['regret_W']:.2g} W"
             )
         return [first, "; ".join(each), last + self._even]

@@ -150,6 +150,7 @@ def _number(name: str, words: str | None) -> Number | None:
     """An option with its unit, SI."""
     if words is None:
         return None
-    if words == "0" or (words[:1] == "0" and not quantity(words, _NUMBERS[name].kind)):
+    nothing = words == "0" or (words[:1] == "0" and not quantity(words, _NUMBERS[name].kind))
+    if nothing and name not in ("voltage", "battery"):
         return Number(0.0, 0.0, 0.0, "1", "0")
     return read_entry(name, words, _NUMBERS)
