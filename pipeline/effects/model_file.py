@@ -272,8 +272,8 @@ def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
     catalog = load_catalog(actuators or actuator_folder(spec) or CATALOG)
     own = own_actuators(spec, catalog)
     name = file.alternative
-    actuators = own.actuators(own.catalog(catalog), name) if name else None
-    return machine_of_robot(load_robot(spec), actuators)
+    drives = own.actuators(own.catalog(catalog), name) if name else None
+    return machine_of_robot(load_robot(spec), drives)
 
 
 def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
