@@ -171,7 +171,7 @@ def intervals(
         draws: Their coefficients, shape (DRAWS, T).
         rivals: Of each of them: with one in its place the others have other coefficients.
     """
-    sets = [(None, draws)]
+    sets: list[tuple[int | None, Array]] = [(None, draws)]
     for k, name in enumerate(chosen):
         for other in rivals[name]:
             exchanged = [*chosen[:k], other, *chosen[k + 1 :]]
