@@ -12,7 +12,7 @@ import pipeline as lw
 from actuators.loading.parts import load_parts
 from pipeline.choice.group import front, merged
 from pipeline.choice.loads import loads_of
-from pipeline.choice.mission import Mode
+from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded, torque_rms

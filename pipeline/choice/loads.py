@@ -15,7 +15,7 @@ from actuators.energy.energy import duration
 from actuators.shaft import ShaftSeries
 from pipeline.api.demand import demand
 from pipeline.choice.errors import MissionError
-from pipeline.choice.mission import Mode
+from pipeline.choice.missions.mission import Mode
 from pipeline.errors import PipelineError, StanceError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion

@@ -23,7 +23,7 @@ from actuators.errors import CatalogError, closest
 from pipeline.choice.answer.full import through
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.loads import Load, loads_of
-from pipeline.choice.mission import Mode
+from pipeline.choice.missions.mission import Mode
 from pipeline.choice.track import Account
 from pipeline.machine.drivetrains import Actuators
 from reports.tables.choice import BreakEvenRow

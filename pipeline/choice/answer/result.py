@@ -17,7 +17,7 @@ from pipeline.choice.answer.break_even import known_candidate, rows
 from pipeline.choice.answer.sides import side_rows
 from pipeline.choice.answer.tables import ROBOT, tables_of, words
 from pipeline.choice.choose import Chosen, choose
-from pipeline.choice.mission import read_mission
+from pipeline.choice.missions.mission import read_mission
 from pipeline.choice.wanted import Wanted
 from pipeline.progress import Progress
 from reports.pages.choice_page import PartSource, write_choice_page
@@ -104,7 +104,7 @@ def choice(
 
     Args:
         machine: From `load`.
-        mission: CSV; see `pipeline.choice.mission`.
+        mission: CSV; see `pipeline.choice.missions.mission`.
         wanted: What is searched and counted.
         compare: Two candidates for the table ``break_even``: alternatives of the machine's actuator
             files, or ``answer``.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from actuators.energy.energy import integral
 from actuators.loading.build import WINDING
-from actuators.units import from_si
+from actuators.units import from_si, known_units
 from pipeline.choice import heat
 from pipeline.choice.answer.full import Full, lasting
 from pipeline.choice.choose import Chosen
@@ -139,9 +139,8 @@ def front_rows(chosen: Chosen) -> list[FrontRow]:
             f"{group}: {words(found.designs.parts[found.looked[found.front[i]]])}"
             for (group, found), i in zip(groups, which, strict=True)
         ]
-        own = float(p)
-        energy, hours = own * chosen.hours, float(lasts[k - 1])
-        rows.append(FrontRow(k, own, energy, hours, float(m), "; ".join(names)))
+        energy, hours = float(p) * chosen.hours, float(lasts[k - 1])
+        rows.append(FrontRow(k, float(p), energy, hours, float(m), "; ".join(names)))
     return rows
 
 
@@ -344,8 +343,8 @@ def unknown_rows(chosen: Chosen) -> list[UnknownRow]:
     for group, doubt in chosen.doubts.items():
         known = zip(doubt.unknowns, doubt.worth(), doubt.moves(), strict=True)
         for (part, entry, number), worth, moves in known:
-            low, high = (from_si(x, number.unit) for x in (number.low, number.high))
-            rows.append(
-                UnknownRow(group, part, entry, low, high, number.unit, float(worth), float(moves))
-            )
+            unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
+            ends = [from_si(x, unit) for x in (number.low, number.high)]
+            own = (group, part, entry, *ends, number.unit, float(worth), float(moves))
+            rows.append(UnknownRow(*own))
     return sorted(rows, key=lambda row: (-row.worth_W, -abs(row.moves_W)))

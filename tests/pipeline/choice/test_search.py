@@ -13,7 +13,7 @@ from actuators.loading.data_sheet import read_entry
 from actuators.loading.parts import KINDS, load_parts
 from pipeline.choice.group import front, merged, search
 from pipeline.choice.loads import Load, loads_of
-from pipeline.choice.mission import read_mission
+from pipeline.choice.missions.mission import read_mission
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded
 from pipeline.choice.track import Account
@@ -124,9 +124,9 @@ def test_fronts_add() -> None:
 
 
 def test_mission_that_ships_is_read() -> None:
-    import pipeline.choice.mission as module
+    import pipeline.choice.missions.mission as module
 
-    modes = read_mission(Path(module.__file__).parent / "missions" / "day.csv")
+    modes = read_mission(Path(module.__file__).parent / "day.csv")
     assert sum(mode.hours for mode in modes) == pytest.approx(24.0)
 
 

@@ -12,7 +12,7 @@ from actuators.elements.position_torque import ParallelSpring
 from actuators.loading.parts import load_parts
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.loads import Load, loads_of, with_spring
-from pipeline.choice.mission import Mode
+from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf
 from pipeline.choice.search import Demanded
 from pipeline.choice.springs import found_springs, springs_of
