@@ -6,7 +6,7 @@ STAMP  := $(VENV)/.installed
 OUT    ?= reports/out
 ROBOT  ?= urdf/hexapod.toml
 LOG    ?= pipeline/identification/demo/walk.parquet
-# The demonstration is proved on the same machine at another speed.
+# The demonstration is tested on the same machine at another speed.
 HOLDOUT := $(if $(filter file,$(origin LOG)),--holdout pipeline/identification/demo/walk_slow.parquet)
 ARGS   ?=
 # A name as one word of the shell, whatever is in it.

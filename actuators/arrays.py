@@ -1,4 +1,4 @@
-"""Array types of the actuator room and the checks that every law shares."""
+"""Types of arrays for all rooms, and the checks that every law of an actuator shares."""
 
 from typing import TypeAlias
 
@@ -7,8 +7,10 @@ from numpy.typing import NDArray
 
 from actuators.errors import UnphysicalElementError
 
-FloatArray: TypeAlias = NDArray[np.float64]
-Scalars: TypeAlias = float | FloatArray  # one number for all joints, or one per joint (J,)
+Array: TypeAlias = NDArray[np.float64]
+Mask: TypeAlias = NDArray[np.bool_]
+Index: TypeAlias = NDArray[np.intp]
+Scalars: TypeAlias = float | Array  # one number for all joints, or one per joint (J,)
 
 
 def require(condition: object, where: str, remedy: str) -> None:
@@ -39,7 +41,7 @@ def require_non_negative(where: str, **values: Scalars) -> None:
         )
 
 
-def least_magnitude(low: FloatArray, high: FloatArray) -> FloatArray:
+def least_magnitude(low: Array, high: Array) -> Array:
     """Return the value of least magnitude in each interval [low, high]."""
-    value: FloatArray = np.clip(0.0, low, high)
+    value: Array = np.clip(0.0, low, high)
     return value

@@ -6,7 +6,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, least_magnitude
+from actuators.arrays import Array, Scalars, least_magnitude
 from actuators.elements.element import Element
 from actuators.elements.motor import DCMotor
 from actuators.errors import ChainError, closest
@@ -29,12 +29,12 @@ class HoldingResult:
         power: Electrical power, of the motor and of what elements draw themselves [W].
     """
 
-    low: FloatArray
-    high: FloatArray
-    motor_torque: FloatArray
-    current: FloatArray
-    voltage: FloatArray
-    power: FloatArray
+    low: Array
+    high: Array
+    motor_torque: Array
+    current: Array
+    voltage: Array
+    power: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +54,11 @@ class ChainResult:
 
     chain: str
     shafts: Mapping[str, ShaftSeries]
-    losses: Mapping[str, FloatArray]
-    stored: Mapping[str, FloatArray]
-    current: FloatArray
-    voltage: FloatArray
-    electrical_power: FloatArray
+    losses: Mapping[str, Array]
+    stored: Mapping[str, Array]
+    current: Array
+    voltage: Array
+    electrical_power: Array
     motors: tuple[DCMotor, ...]
 
     @property
@@ -76,7 +76,7 @@ class ChainResult:
         """Names of the stages from `out` to `el`."""
         return (*self.shafts, SUPPLY_STAGE)
 
-    def stage_power(self, stage: str) -> FloatArray:
+    def stage_power(self, stage: str) -> Array:
         """Return the power towards the joint at a stage, (N, J) [W].
 
         Raises:
@@ -152,7 +152,7 @@ class Chain:
         at = self._index(element.name)
         return replace(self, elements=(*self.elements[:at], element, *self.elements[at + 1 :]))
 
-    def moving(self, joint: ShaftSeries) -> ChainResult:
+    def inverse(self, joint: ShaftSeries) -> ChainResult:
         """Return everything the chain needs for a motion of its joints.
 
         Samples of a joint at rest (`direction` zero) get the holding torque of least magnitude
@@ -166,8 +166,8 @@ class Chain:
         low = high = joint.torque
         stage_after = {element: stage for stage, element in self.stages.items()}
         shafts = {JOINT_STAGE: joint}
-        losses: dict[str, FloatArray] = {}
-        stored: dict[str, FloatArray] = {}
+        losses: dict[str, Array] = {}
+        stored: dict[str, Array] = {}
         drawn = np.zeros_like(joint.torque)
         side = shown = joint
         for element in self.elements:
@@ -176,7 +176,7 @@ class Chain:
             if (rate := element.stored(shown)) is not None:
                 stored[element.name] = rate
             drawn += element.drawn(shown.torque, shown.velocity, shown.direction)
-            shown = motor_side = element.moving(side)
+            shown = motor_side = element.inverse(side)
             if standing:
                 low, high = element.holding(low, high, side.position)
                 held = np.where(at_rest, least_magnitude(low, high), motor_side.torque)
@@ -199,7 +199,7 @@ class Chain:
             motors=(self.motor,) * len(joint.joints),
         )
 
-    def holding(self, torque: FloatArray, position: FloatArray | None = None) -> HoldingResult:
+    def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
         """Return what holds joint torques at standstill.
 
         Each element maps the interval of torques that hold; the motor supplies the one of least
@@ -222,7 +222,7 @@ class Chain:
         voltage = self.motor.voltage(current, still)
         return HoldingResult(low, high, motor_torque, current, voltage, voltage * current + drawn)
 
-    def driving(self, motor: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor: ShaftSeries) -> ShaftSeries:
         """Return what reaches the joints from the motor's torque, all motion being known.
 
         Args:
@@ -233,7 +233,7 @@ class Chain:
         """
         side = motor
         for element in reversed(self.elements):
-            side = element.driving(side)
+            side = element.forward(side)
         return side
 
     def _index(self, name: str) -> int:
@@ -248,16 +248,16 @@ def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
     """Return what a row of elements, from the joint to the motor, needs at its motor side."""
     side = joint
     for element in elements:
-        side = element.moving(side)
+        side = element.inverse(side)
     return side
 
 
 def held(
     elements: Iterable[Element],
-    low: FloatArray,
-    high: FloatArray,
-    position: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray]:
+    low: Array,
+    high: Array,
+    position: Array | None = None,
+) -> tuple[Array, Array]:
     """Return which torques at the motor side of a row of elements hold at standstill.
 
     Args:
@@ -272,8 +272,8 @@ def held(
 
 
 def _placed(
-    elements: Iterable[Element], position: FloatArray | None
-) -> Iterator[tuple[Element, FloatArray | None]]:
+    elements: Iterable[Element], position: Array | None
+) -> Iterator[tuple[Element, Array | None]]:
     """Every element of a row with the position of its joint side."""
     for element in elements:
         yield element, position

@@ -2,6 +2,7 @@
 
 import difflib
 from collections.abc import Sequence
+from typing import Final
 
 
 class ActuatorError(Exception):
@@ -44,6 +45,10 @@ class EnergyError(ActuatorError):
     """An energy account that cannot be drawn up, such as one over no time at all."""
 
 
+#: Names that one reads in a line.
+_NAMES: Final = 40
+
+
 def one_line(text: object) -> str:
     """Return the text on a single line of at most 200 characters."""
     line = " ".join(str(text).split())
@@ -51,7 +56,9 @@ def one_line(text: object) -> str:
 
 
 def closest(name: str, known: Sequence[str]) -> str:
-    """Return a hint naming the closest known name, or all known names where none is close.
+    """Return a hint naming the closest known name, or the known names where none is close.
+
+    A catalogue's names are many: of more than one reads, the first.
 
     Args:
         name: What was written.
@@ -60,4 +67,6 @@ def closest(name: str, known: Sequence[str]) -> str:
     match = difflib.get_close_matches(one_line(name), known, n=1)
     if match:
         return f"did you mean '{match[0]}'?"
-    return "known: " + (", ".join(sorted(known)) or "none")
+    names = sorted(known)
+    more = f" and {len(names) - _NAMES} more" if len(names) > _NAMES else ""
+    return "known: " + (", ".join(names[:_NAMES]) or "none") + more

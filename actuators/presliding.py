@@ -12,15 +12,13 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import FloatArray
+from actuators.arrays import Array
 
 #: A step in time this many times the usual one is a gap, after which nothing is remembered.
 GAP: Final = 5.0
 
 
-def presliding(
-    time: FloatArray, position: FloatArray, direction: FloatArray, travel: float
-) -> FloatArray:
+def presliding(time: Array, position: Array, direction: Array, travel: float) -> Array:
     """Return the sense of dry friction, -1 to 1, (N,).
 
     Args:

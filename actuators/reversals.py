@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.arrays import FloatArray
+from actuators.arrays import Array
 from actuators.shaft import REST_SPEED, ShaftSeries
 
 _SNAP: Final = 1e-9  # a zero nearer to a sample than this share of the interval is on the sample
@@ -62,7 +62,7 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
     within = np.concatenate((np.zeros(series.time.size + doubled.size), np.repeat(u, 2)))
     source = np.lexsort((within, row))  # stable
 
-    def merged(samples: FloatArray, between: FloatArray) -> FloatArray:
+    def merged(samples: Array, between: Array) -> Array:
         everything = np.concatenate((samples, samples[doubled], np.repeat(between, 2, axis=0)))
         return everything[source]
 
@@ -77,7 +77,7 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
 
 
 def _instants(
-    interval: NDArray[np.intp], fraction: FloatArray
+    interval: NDArray[np.intp], fraction: Array
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
     """Zeros of several joints at one instant become one break.
 
@@ -94,8 +94,8 @@ def _instants(
 
 
 def _crossings(
-    series: ShaftSeries, signs: FloatArray
-) -> tuple[NDArray[np.intp], FloatArray, NDArray[np.intp]]:
+    series: ShaftSeries, signs: Array
+) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
     """Return interval, fraction of it and joint of each sign change between two samples."""
     step = np.diff(series.time)
     interval, joint = np.nonzero((signs[:-1] * signs[1:] < 0.0) & (step > 0.0)[:, None])
@@ -117,9 +117,7 @@ def _crossings(
     return interval, 0.5 * (low + high), joint
 
 
-def _zeros_on_samples(
-    time: FloatArray, signs: FloatArray
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _zeros_on_samples(time: Array, signs: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return row and joint of zeros on samples where a sign changes or a stay at rest ends."""
     rows: list[int] = []
     columns: list[int] = []
@@ -143,16 +141,14 @@ def _zeros_on_samples(
     return np.array(rows, dtype=np.intp), np.array(columns, dtype=np.intp)
 
 
-def _inside_block(time: FloatArray, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _inside_block(time: Array, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
     """Return which samples have a neighbour of their own block on both sides."""
     joined = np.concatenate(([False], np.diff(time) > 0.0, [False]))
     inside: NDArray[np.bool_] = joined[rows] & joined[rows + 1]
     return inside
 
 
-def _interpolated(
-    series: ShaftSeries, at: NDArray[np.intp], u: FloatArray
-) -> dict[str, FloatArray]:
+def _interpolated(series: ShaftSeries, at: NDArray[np.intp], u: Array) -> dict[str, Array]:
     """Return time (K,) and the series' quantities (K, J) at fractions `u` of intervals `at`."""
     step = np.diff(series.time)[at]
     s, h = u[:, None], step[:, None]
@@ -167,12 +163,12 @@ def _interpolated(
 
 
 def _keep_signs(
-    velocity: FloatArray,
+    velocity: Array,
     series: ShaftSeries,
-    signs: FloatArray,
-    zeros: tuple[NDArray[np.intp], FloatArray, NDArray[np.intp]],
+    signs: Array,
+    zeros: tuple[NDArray[np.intp], Array, NDArray[np.intp]],
     at: NDArray[np.intp],
-    u: FloatArray,
+    u: Array,
 ) -> None:
     """Set to zero, in place, velocities whose Hermite overshoots to the wrong side of zero.
 
@@ -190,12 +186,10 @@ def _keep_signs(
     velocity[np.broadcast_to(expected == 0.0, velocity.shape)] = 0.0
 
 
-def _hermite(
-    f0: FloatArray, f1: FloatArray, d0: FloatArray, d1: FloatArray, h: FloatArray, u: FloatArray
-) -> FloatArray:
+def _hermite(f0: Array, f1: Array, d0: Array, d1: Array, h: Array, u: Array) -> Array:
     """Return the cubic with values f0, f1 and slopes d0, d1 over a step h at fraction u."""
     w = 1.0 - u
-    value: FloatArray = (
+    value: Array = (
         w * w * (1.0 + 2.0 * u) * f0 + u * u * (3.0 - 2.0 * u) * f1 + u * w * h * (w * d0 - u * d1)
     )
     return value

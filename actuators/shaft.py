@@ -22,7 +22,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from actuators.arrays import FloatArray, Scalars
+from actuators.arrays import Array, Scalars
 from actuators.errors import ShaftError
 
 REST_SPEED: Final = 1e-9  # [rad/s]
@@ -43,12 +43,12 @@ class ShaftSeries:
     """
 
     joints: tuple[str, ...]
-    time: FloatArray
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
-    torque: FloatArray
-    direction: FloatArray
+    time: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    torque: Array
+    direction: Array
 
     @classmethod
     def at_joint(
@@ -81,7 +81,7 @@ class ShaftSeries:
         if t.ndim != 1 or t.size == 0:
             raise ShaftError(f"time has shape {t.shape}: expected (N,) with N >= 1")
         shape = (t.size, len(names))
-        arrays: dict[str, FloatArray] = {}
+        arrays: dict[str, Array] = {}
         for name, values in (
             ("position", position),
             ("velocity", velocity),
@@ -103,7 +103,7 @@ class ShaftSeries:
         return cls(joints=names, time=t, direction=direction, **arrays)
 
     @property
-    def power(self) -> FloatArray:
+    def power(self) -> Array:
         """Power through the shaft towards the joint, (N, J) [W]."""
         return self.torque * self.velocity
 
@@ -120,11 +120,11 @@ class ShaftSeries:
             direction=self.direction[:, k],
         )
 
-    def with_torque(self, torque: FloatArray) -> "ShaftSeries":
+    def with_torque(self, torque: Array) -> "ShaftSeries":
         """Return the same motion with another torque, (N, J) [N*m]; arrays are shared."""
         return replace(self, torque=torque)
 
-    def geared(self, ratio: Scalars, torque: FloatArray) -> "ShaftSeries":
+    def geared(self, ratio: Scalars, torque: Array) -> "ShaftSeries":
         """Return the motion of a shaft that turns `ratio` times as fast, with its torque.
 
         Args:
@@ -142,12 +142,12 @@ class ShaftSeries:
         )
 
 
-def block_starts(time: FloatArray) -> NDArray[np.intp]:
+def block_starts(time: Array) -> NDArray[np.intp]:
     """Return the index of each block's first sample: 0 and every second of a repeated stamp."""
     return np.concatenate(([0], np.flatnonzero(np.diff(time) == 0.0) + 1))
 
 
-def directions(time: FloatArray, velocity: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+def directions(time: Array, velocity: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Decide sgn(velocity) for every sample by the rules of this module.
 
     Args:
@@ -170,9 +170,9 @@ def directions(time: FloatArray, velocity: FloatArray) -> tuple[FloatArray, NDAr
     return direction, rest
 
 
-def _signs_filled(velocity: FloatArray) -> FloatArray:
+def _signs_filled(velocity: Array) -> Array:
     """Return signs (n,) in which samples at rest copy the moving sample before, or the first."""
     moving = np.flatnonzero(np.abs(velocity) >= REST_SPEED)
     source = np.searchsorted(moving, np.arange(velocity.size), side="right") - 1
-    signs: FloatArray = np.sign(velocity[moving[np.maximum(source, 0)]])
+    signs: Array = np.sign(velocity[moving[np.maximum(source, 0)]])
     return signs

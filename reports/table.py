@@ -8,16 +8,15 @@ from dataclasses import dataclass, field, fields
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.errors import TableError
 from reports.typeset import unit_suffix, unit_text
 
 if TYPE_CHECKING:
     import pandas
 
-Array = NDArray[np.float64]
 #: What a column may hold: a NumPy vector, or a sequence in which None stands for "no value".
 Column = Sequence[Any] | NDArray[Any]
 #: Of a column: (meaning, unit), and where the header's own words would not do, its title.

@@ -34,6 +34,7 @@ from pipeline.simulation.walk_stand import joint_series
 from reports.tables.walking import walking_joint_demand
 from reports.writer import csv_bytes
 from tests.bench_bags import bag_costs
+from tests.bench_choice import choice_ratios
 from tests.bench_demand import demand_ratios, support
 from tests.bench_gap import gap_costs
 from tests.bench_kinematics import inverse_kinematics
@@ -54,7 +55,7 @@ def chain_ratios(robot: Robot, motion: Motion) -> None:
         "split": lambda: joint_series(motion_demand(robot, motion)),
     }
     for name, chain in chains.items():
-        calls[name] = lambda chain=chain: chain.moving(series)  # type: ignore[misc]
+        calls[name] = lambda chain=chain: chain.inverse(series)  # type: ignore[misc]
     seconds = timed(calls)
     joints = len(robot.joints)
     print(f"chains, {joints} joints, {series.time.size} rows after splitting at velocity zeros")
@@ -90,7 +91,7 @@ def energy_of_a_search() -> None:
         "one, a number changed": lambda: lw.energy(
             machine.with_values({"harmonic_drive.viscous": 1.0}), demand, "reversible"
         ),
-        "the bare chain": lambda: machine.ready.chain("reversible").moving(demand.series),
+        "the bare chain": lambda: machine.ready.chain("reversible").inverse(demand.series),
     }
     print("energy of 51 samples of 18 joints, no file read")
     for name, seconds in timed(calls, turns=200).items():
@@ -174,6 +175,7 @@ def main() -> None:
     energy_of_a_search()
     sweep_ratio()
     supply_ratios()
+    choice_ratios()
     cold_run()
     gap_costs()
     bag_costs()

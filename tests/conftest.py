@@ -9,7 +9,6 @@ import pytest
 from hypothesis import settings
 from matplotlib.figure import Figure
 
-from pipeline.cli.demo import DEMO
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
@@ -17,6 +16,7 @@ from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures import save as saving
 from tests.command_line import Command, exit_code, stand_and_walk
+from tests.demo import DEMO
 
 # No clock in a test: a loaded machine is no failure.
 settings.register_profile("legwatt", deadline=None)

@@ -29,8 +29,9 @@ ORDER = (
     ),
     *("logs", "dynamics", "motion", "robot", "actuators"),
 )
-#: Seen by everybody: errors, units, how files are read.
+#: Seen by everybody: types of arrays, errors, units, how files are read.
 LEAVES = {
+    "actuators.arrays",
     *("actuators.units", "actuators.parameters", "actuators.errors", "actuators.text_file"),
     "actuators.checked",
     *(
@@ -117,8 +118,10 @@ def test_the_rule_can_fail() -> None:
     assert allowed("reports.page", "pipeline.simulation.predict")
 
 
-def test_leaves_use_the_standard_library_what_reads_files_the_bar_and_workers_only() -> None:
-    allowed_there = sys.stdlib_module_names | {"pydantic", "pydantic_core", "tqdm", "distributed"}
+def test_leaves_use_the_standard_library_numpy_what_reads_files_the_bar_and_workers_only() -> None:
+    allowed_there = sys.stdlib_module_names | {
+        *("numpy", "pydantic", "pydantic_core", "tqdm", "distributed")
+    }
     for leaf in LEAVES:
         path = ROOT / Path(*leaf.split(".")).with_suffix(".py")
         modules = {m for m in imports(path) if m.split(".")[0] not in allowed_there}

@@ -38,6 +38,8 @@ MAKEFILE = (ROOT / "Makefile").read_text(encoding="utf-8")
 #: Blocks by section.
 SECTIONS = [list(own) for _, own in groupby(BLOCKS, lambda b: (b.page, b.heading))]
 HOW_TOS = [own for own in SECTIONS if own[0].heading.startswith(HOW_TO)]
+#: The same for logs, in which a command may answer no.
+FROM_FILE_TO_ANSWER = [s for s in SECTIONS if s[0].heading.startswith("From file to answer")]
 RUNNING = [
     own
     for own in SECTIONS
@@ -196,6 +198,33 @@ def test_options_and_targets_in_the_text_exist(page: Path) -> None:
         assert option in helped or option == "--help", option
     for target in set(re.findall(r"`make ([a-z-]+)", text)):
         assert re.search(rf"^{target}:.*##", MAKEFILE, re.M), target
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("section", FROM_FILE_TO_ANSWER, ids=name_of)
+def test_logs_go_from_file_to_answer_to_the_letter(section: list[Block], tmp_path: Path) -> None:
+    """Commands in order, each with an answer (exit code 0, or 1 for no), which the page quotes."""
+    said = ""
+    tree = copy_of_tree(tmp_path / "tree")
+    environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
+    for block in section:
+        if block.file:
+            change(tree, block)
+        elif block.language in SHELL:
+            for words in Shell().commands(block.text):
+                run = subprocess.run(
+                    [sys.executable, *words[1:]],
+                    cwd=tree,
+                    env=environment,
+                    capture_output=True,
+                    text=True,
+                    check=False,
+                )
+                assert run.returncode in (0, 1), f"{block}: {shlex.join(words)}\n{run.stderr}"
+                assert run.stderr == "", f"{block}: {shlex.join(words)}"
+                said += run.stdout
+        elif block.language == "text":
+            assert [line for line in block.text.splitlines() if line not in said] == [], said
 
 
 # --- how-tos --------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars
+from actuators.arrays import Array, Scalars
 from actuators.shaft import ShaftSeries
 
 
@@ -14,7 +14,7 @@ class Element:
 
     Elements are listed from the joint to the supply. Each has a joint side and a motor side; this
     one passes everything on, and a law overrides what it does otherwise: `added` where it takes or
-    gives torque, `moving` and `driving` where it changes the motion or asks for the load.
+    gives torque, `inverse` and `forward` where it changes the motion or asks for the load.
     Subclasses are frozen dataclasses; a parameter is one number for all joints or one per joint
     (J,). A law that an alternative does not have is simply not in its list.
 
@@ -28,7 +28,7 @@ class Element:
 
     name: str
 
-    def added(self, side: ShaftSeries) -> FloatArray:
+    def added(self, side: ShaftSeries) -> Array:
         """Return the torque that the motor side supplies on top of the joint side's, (N, J) [N*m].
 
         Where `direction` is zero, dry friction is zero here; the chain replaces such samples by
@@ -36,20 +36,20 @@ class Element:
         """
         return np.zeros_like(side.torque)
 
-    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
+    def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return what the motor side needs (inverse)."""
         return joint_side.with_torque(joint_side.torque + self.added(joint_side))
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Return what reaches the joint side (forward), all motion being known.
 
-        It inverts `moving`. As it stands it does where `added` depends on the motion alone.
+        It undoes `inverse`. As it stands it does where `added` depends on the motion alone.
         """
         return motor_side.with_torque(motor_side.torque - self.added(motor_side))
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return the motor-side torques that hold some joint-side torque at standstill.
 
         Args:
@@ -63,7 +63,7 @@ class Element:
         """
         return low, high
 
-    def loss(self, joint_side: ShaftSeries) -> FloatArray | None:
+    def loss(self, joint_side: ShaftSeries) -> Array | None:
         """Return the dissipated power (N, J) [W] from the element's own law, or None.
 
         Args:
@@ -71,11 +71,11 @@ class Element:
         """
         return None
 
-    def stored(self, joint_side: ShaftSeries) -> FloatArray | None:
+    def stored(self, joint_side: ShaftSeries) -> Array | None:
         """Return the rate of energy stored in the element (N, J) [W], or None; as for `loss`."""
         return None
 
-    def drawn(self, torque: FloatArray, velocity: FloatArray, direction: FloatArray) -> Scalars:
+    def drawn(self, torque: Array, velocity: Array, direction: Array) -> Scalars:
         """Return the power that the element itself draws from the supply [W]; none as a rule.
 
         Args:

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erf
 
-from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+from actuators.arrays import Array, Scalars, require, require_non_negative
 from actuators.elements.element import Element
 from actuators.presliding import presliding
 from actuators.shaft import ShaftSeries
@@ -55,18 +55,18 @@ class FrictionLaw(Element):
         require_non_negative(self.name, rise=self.rise, travel=self.travel)
 
     @abstractmethod
-    def free(self, side: ShaftSeries, sense: FloatArray) -> FloatArray:
+    def free(self, side: ShaftSeries, sense: Array) -> Array:
         """Return the friction torque that no load changes, (N, J) [N*m]."""
 
     @abstractmethod
-    def share(self, velocity: FloatArray, drives: NDArray[np.bool_]) -> Scalars:
+    def share(self, velocity: Array, drives: NDArray[np.bool_]) -> Scalars:
         """Return friction per transmitted torque, by who drives, (N, J)."""
 
     @abstractmethod
     def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
         """Return levels [N*m] against negative and positive motion, and shares driving, driven."""
 
-    def sense(self, side: ShaftSeries) -> FloatArray:
+    def sense(self, side: ShaftSeries) -> Array:
         """Return the sense of motion, -1 to 1, (N, J)."""
         if self.travel > 0.0:
             columns = zip(side.position.T, side.direction.T, strict=True)
@@ -76,13 +76,13 @@ class FrictionLaw(Element):
         width = np.maximum(np.sqrt(2.0) * np.asarray(self.rise), 1e-300)
         return np.where(np.asarray(self.rise) > 0.0, erf(side.velocity / width), side.direction)
 
-    def added(self, side: ShaftSeries) -> FloatArray:
+    def added(self, side: ShaftSeries) -> Array:
         """Return the friction torque, (N, J) [N*m]."""
         sense = self.sense(side)
         share = self.share(side.velocity, side.torque * sense > 0.0)
         return self.free(side, sense) + share * np.abs(side.torque) * sense
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Subtract the friction torque; as shares are below 1, the load has the sign of the rest.
 
         With x = torque on the motor side less the free part, x = torque + share s |torque|.
@@ -94,8 +94,8 @@ class FrictionLaw(Element):
         return motor_side.with_torque(x / (1.0 + share * along))
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Widen the interval by the whole dry friction at each end; monotone as shares are < 1."""
         against, along, driving, driven = self.static()
         return (
@@ -103,7 +103,7 @@ class FrictionLaw(Element):
             high + along + np.where(high > 0.0, driving, driven) * np.abs(high),
         )
 
-    def loss(self, joint_side: ShaftSeries) -> FloatArray:
+    def loss(self, joint_side: ShaftSeries) -> Array:
         """Return friction torque times speed, (N, J) [W]."""
         return self.added(joint_side) * joint_side.velocity
 
@@ -168,7 +168,7 @@ class Friction(FrictionLaw):
         rare = ("skew", "excess", "asymmetry", "quadratic", "saturating")
         return frozenset(name for name in rare if np.any(getattr(self, name)))
 
-    def free(self, side: ShaftSeries, sense: FloatArray) -> FloatArray:
+    def free(self, side: ShaftSeries, sense: Array) -> Array:
         """Return all terms but those of the load, (N, J) [N*m]."""
         velocity = side.velocity
         v, terms = velocity, self._terms
@@ -183,7 +183,7 @@ class Friction(FrictionLaw):
             torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
         return torque
 
-    def share(self, velocity: FloatArray, drives: NDArray[np.bool_]) -> Scalars:
+    def share(self, velocity: Array, drives: NDArray[np.bool_]) -> Scalars:
         """Return the coefficient of the quadrant of power, (N, J)."""
         return self.load + np.where(drives, self.when_driving, self.when_driven)
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+from actuators.arrays import Array, Scalars, require, require_non_negative
 from actuators.elements.friction import FrictionLaw
 from actuators.shaft import ShaftSeries
 
@@ -58,13 +58,13 @@ class FrictionCurve(FrictionLaw):
         shares = np.array(self.shares)
         require((shares >= 0.0) & (shares <= _MOST_SHARE), self.name, "shares must be 0 to 0.99")
 
-    def at(self, values: tuple[float, ...], speed: FloatArray) -> FloatArray:
+    def at(self, values: tuple[float, ...], speed: Array) -> Array:
         """Return a curve at speeds (...) [rad/s]; the last line goes on beyond the last knot."""
         x, y = np.array(self.speeds), np.array(values)
         beyond = np.maximum(speed - x[-1], 0.0) * (y[-1] - y[-2]) / (x[-1] - x[-2])
         return np.asarray(np.interp(speed, x, y) + beyond)
 
-    def free(self, side: ShaftSeries, sense: FloatArray) -> FloatArray:
+    def free(self, side: ShaftSeries, sense: Array) -> Array:
         """Return levels and asymmetry, (N, J) [N*m]; they take energy out at every speed."""
         velocity, speed = side.velocity, np.abs(side.velocity)
         level = np.maximum(self.at(self.levels, speed), -self.viscous * speed)
@@ -75,7 +75,7 @@ class FrictionCurve(FrictionLaw):
             level = level + np.interp(side.position, self.places, self.spots)
         return np.asarray(level * sense + skew * np.abs(sense) + self.viscous * velocity)
 
-    def share(self, velocity: FloatArray, drives: NDArray[np.bool_]) -> FloatArray:
+    def share(self, velocity: Array, drives: NDArray[np.bool_]) -> Array:
         """Return friction per transmitted torque, (N, J)."""
         return np.clip(self.at(self.shares, np.abs(velocity)), 0.0, _MOST_SHARE)
 

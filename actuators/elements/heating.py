@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import FloatArray, require, require_non_negative
+from actuators.arrays import Array, require, require_non_negative
 
 COPPER: Final = 0.00393  # [1/K]
 MAGNET: Final = -0.0011  # [1/K]
@@ -46,7 +46,7 @@ class Heating:
         require_non_negative("heating", thermal_resistance=self.thermal_resistance)
         require(self.time_constant > 0.0, "heating", "time_constant must be > 0")
 
-    def temperature_rise(self, time: FloatArray, cold_loss: FloatArray) -> FloatArray:
+    def temperature_rise(self, time: Array, cold_loss: Array) -> Array:
         """Return dT (N,) [K] over time (N,) [s], strictly increasing.
 
         With R = R0 (1 + COPPER dT) the node's equation stays linear in dT; it is stepped exactly
@@ -71,16 +71,16 @@ class Heating:
             result.append(level)
         return np.clip(result, -EXTREME, EXTREME)
 
-    def sensed(self, temperature: FloatArray) -> FloatArray:
+    def sensed(self, temperature: Array) -> Array:
         """Return the part of dT (...) [K] that a sensor's temperature (...) [degC] implies."""
         return self.sensor_gain * (temperature - REFERENCE)
 
 
-def warm_resistance(resistance: float, rise: FloatArray) -> FloatArray:
+def warm_resistance(resistance: float, rise: Array) -> Array:
     """Return the winding's resistance (N,) [ohm] warmed by `rise` (N,) [K]."""
     return resistance * (1.0 + COPPER * rise)
 
 
-def warm_torque_constant(torque_constant: float, rise: FloatArray) -> FloatArray:
+def warm_torque_constant(torque_constant: float, rise: Array) -> Array:
     """Return the torque constant (N,) [N*m/A] with magnets warmed by `rise` (N,) [K]."""
     return torque_constant * (1.0 + MAGNET * rise)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, require_non_negative
+from actuators.arrays import Array, Scalars, require_non_negative
 from actuators.elements.element import Element
 from actuators.shaft import ShaftSeries
 
@@ -44,15 +44,15 @@ class HoldingBrake(Element):
         )
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Widen the interval by the static torque."""
         return low - self.static_torque, high + self.static_torque
 
-    def drawn(self, torque: FloatArray, velocity: FloatArray, direction: FloatArray) -> FloatArray:
+    def drawn(self, torque: Array, velocity: Array, direction: Array) -> Array:
         """Return the coil's power [W]."""
         return np.where(direction == 0.0, self.engaged_power, self.released_power)
 
-    def loss(self, joint_side: ShaftSeries) -> FloatArray:
+    def loss(self, joint_side: ShaftSeries) -> Array:
         """Return the coil's power, all of it heat, (N, J) [W]."""
         return self.drawn(joint_side.torque, joint_side.velocity, joint_side.direction)

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+from actuators.arrays import Array, Scalars, require, require_non_negative
 from actuators.elements.element import Element
 from actuators.errors import SelfLockingError
 from actuators.shaft import ShaftSeries
@@ -101,21 +101,21 @@ class Hypoid(Element):
         """The ratio."""
         return self.ratio
 
-    def normal_force(self, joint_side: ShaftSeries) -> FloatArray:
+    def normal_force(self, joint_side: ShaftSeries) -> Array:
         """Return the signed normal force at the teeth, (N, J) [N] (Eq. 12)."""
         along = np.sign(joint_side.torque) * joint_side.direction
         across = np.cos(self.wheel_angle) + self.friction * np.sin(self.wheel_angle) * along
-        force: FloatArray = joint_side.torque / (self.wheel_radius * across)
+        force: Array = joint_side.torque / (self.wheel_radius * across)
         return force
 
-    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
+    def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return the pinion's torque and motion (Eq. 13)."""
         force = self.normal_force(joint_side)
         rubbing = self.friction * np.sin(self.pinion_angle) * joint_side.direction * np.abs(force)
         torque = (force * np.cos(self.pinion_angle) + rubbing) * self.pinion_radius
         return joint_side.geared(self.ratio, torque)
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Return the wheel's torque and motion.
 
         Raises:
@@ -141,8 +141,8 @@ class Hypoid(Element):
         return motor_side.geared(1.0 / np.asarray(self.ratio), torque)
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Return the span of Eq. 13 over both senses of an impending motion.
 
         Each end of the motor-side interval is a concave (lower) or convex (upper) function of the
@@ -153,7 +153,7 @@ class Hypoid(Element):
         ends = [low * a, low * b, high * a, high * b]
         return np.minimum.reduce(ends), np.maximum.reduce(ends)
 
-    def loss(self, joint_side: ShaftSeries) -> FloatArray:
+    def loss(self, joint_side: ShaftSeries) -> Array:
         """Return mu |F| |v|, (N, J) [W], with the sliding speed v along the teeth.
 
         v = r2 w2 cos b2 (tan b1 - tan b2): both gears share the speed normal to the teeth and

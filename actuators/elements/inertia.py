@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from actuators.arrays import FloatArray, Scalars, require_non_negative
+from actuators.arrays import Array, Scalars, require_non_negative
 from actuators.elements.element import Element
 from actuators.shaft import ShaftSeries
 
@@ -26,10 +26,10 @@ class Inertia(Element):
     def __post_init__(self) -> None:
         require_non_negative(self.name, inertia=self.inertia)
 
-    def added(self, side: ShaftSeries) -> FloatArray:
+    def added(self, side: ShaftSeries) -> Array:
         """Return inertia times acceleration; nothing at standstill."""
         return self.inertia * side.acceleration
 
-    def stored(self, joint_side: ShaftSeries) -> FloatArray:
+    def stored(self, joint_side: ShaftSeries) -> Array:
         """Return the rate of kinetic energy, (N, J) [W]."""
         return self.added(joint_side) * joint_side.velocity

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+from actuators.arrays import Array, Scalars, require, require_non_negative
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,19 +64,19 @@ class DCMotor:
             "peak_current must not be below continuous_current",
         )
 
-    def current(self, torque: FloatArray) -> FloatArray:
+    def current(self, torque: Array) -> Array:
         """Return the current (...) [A] for an air-gap torque [N*m]."""
         return torque / self.torque_constant
 
-    def voltage(self, current: FloatArray, velocity: FloatArray) -> FloatArray:
+    def voltage(self, current: Array, velocity: Array) -> Array:
         """Return the voltage at the terminals (...) [V]."""
         return self.resistance * current + self.torque_constant * velocity
 
-    def copper_loss(self, current: FloatArray) -> FloatArray:
+    def copper_loss(self, current: Array) -> Array:
         """Return R I^2, (...) [W]."""
         return self.resistance * current * current
 
-    def torque(self, voltage: FloatArray, velocity: FloatArray) -> FloatArray:
+    def torque(self, voltage: Array, velocity: Array) -> Array:
         """Return the air-gap torque (...) [N*m] that a voltage gives at a speed (forward)."""
         current = (voltage - self.torque_constant * velocity) / self.resistance  # [A]
         return self.torque_constant * current

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, require
+from actuators.arrays import Array, Scalars, require
 from actuators.elements.element import Element
 from actuators.errors import ChainError
 from actuators.shaft import ShaftSeries
@@ -19,16 +19,16 @@ class PositionTorque(Element):
     """What the motor side has to supply in addition because of where the shaft stands."""
 
     @abstractmethod
-    def torque(self, position: FloatArray) -> FloatArray:
+    def torque(self, position: Array) -> Array:
         """Return the additional demand (...) [N*m] at positions (...) [rad]."""
 
-    def added(self, side: ShaftSeries) -> FloatArray:
+    def added(self, side: ShaftSeries) -> Array:
         """Return the torque at the series' positions, (N, J) [N*m]."""
         return self.torque(side.position)
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Shift the interval.
 
         Raises:
@@ -39,7 +39,7 @@ class PositionTorque(Element):
         torque = self.torque(position)
         return low + torque, high + torque
 
-    def stored(self, joint_side: ShaftSeries) -> FloatArray:
+    def stored(self, joint_side: ShaftSeries) -> Array:
         """Return the rate of potential energy, (N, J) [W]."""
         return self.torque(joint_side.position) * joint_side.velocity
 
@@ -62,7 +62,7 @@ class ParallelSpring(PositionTorque):
         for values in (self.stiffness, self.rest):
             require(np.isfinite(values), self.name, "values must be finite")
 
-    def torque(self, position: FloatArray) -> FloatArray:
+    def torque(self, position: Array) -> Array:
         """Return stiffness (position - rest) [N*m]."""
         return self.stiffness * (position - self.rest)
 
@@ -88,9 +88,9 @@ class Ripple(PositionTorque):
         values = [self.amplitude, self.order, self.phase]
         require(np.isfinite(values), self.name, "values must be finite")
 
-    def torque(self, position: FloatArray) -> FloatArray:
+    def torque(self, position: Array) -> Array:
         """Return the ripple torque [N*m]."""
-        result: FloatArray = self.amplitude * np.sin(self.order * position + self.phase)
+        result: Array = self.amplitude * np.sin(self.order * position + self.phase)
         return result
 
 
@@ -111,6 +111,6 @@ class PositionCurve(PositionTorque):
         require(ascending, self.name, "places must ascend, with a level at each")
         require(np.isfinite(self.levels), self.name, "values must be finite")
 
-    def torque(self, position: FloatArray) -> FloatArray:
+    def torque(self, position: Array) -> Array:
         """Return the curve's torque [N*m]."""
         return np.interp(position, self.places, self.levels)

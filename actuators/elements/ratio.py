@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, require
+from actuators.arrays import Array, Scalars, require
 from actuators.elements.element import Element
 from actuators.shaft import ShaftSeries
 
@@ -26,17 +26,17 @@ class Ratio(Element):
         ratio = np.asarray(self.ratio, dtype=float)
         require(np.isfinite(ratio) & (ratio > 0.0), self.name, "ratio must be positive and finite")
 
-    def moving(self, joint_side: ShaftSeries) -> ShaftSeries:
+    def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return the faster shaft with the smaller torque."""
         return joint_side.geared(self.ratio, joint_side.torque / self.ratio)
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Return the slower shaft with the larger torque."""
         return motor_side.geared(1.0 / np.asarray(self.ratio), motor_side.torque * self.ratio)
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Scale the interval."""
         return low / self.ratio, high / self.ratio
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from actuators.arrays import FloatArray, Scalars, least_magnitude, require, require_non_negative
+from actuators.arrays import Array, Scalars, least_magnitude, require, require_non_negative
 from actuators.elements.element import Element
 from actuators.shaft import ShaftSeries
 
@@ -36,26 +36,26 @@ class SecondMotor(Element):
         require(self.torque_constant > 0.0, self.name, "torque_constant must be > 0")
         require(self.share < 1.0, self.name, "share must be below 1")
 
-    def added(self, side: ShaftSeries) -> FloatArray:
+    def added(self, side: ShaftSeries) -> Array:
         """Return what the chain's own motor need not supply, negative for a load that resists."""
         return -self.share * side.torque
 
-    def driving(self, motor_side: ShaftSeries) -> ShaftSeries:
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
         """Return both motors' torque."""
         return motor_side.with_torque(motor_side.torque / (1.0 - self.share))
 
     def holding(
-        self, low: FloatArray, high: FloatArray, position: FloatArray | None = None
-    ) -> tuple[FloatArray, FloatArray]:
+        self, low: Array, high: Array, position: Array | None = None
+    ) -> tuple[Array, Array]:
         """Shift the interval by the share of the least torque that holds."""
         own = self.share * least_magnitude(low, high)
         return low - own, high - own
 
-    def drawn(self, torque: FloatArray, velocity: FloatArray, direction: FloatArray) -> FloatArray:
+    def drawn(self, torque: Array, velocity: Array, direction: Array) -> Array:
         """Return its electrical power [W]."""
         own = self.share * torque
         return own * velocity + self.resistance * (own / self.torque_constant) ** 2
 
-    def loss(self, joint_side: ShaftSeries) -> FloatArray:
+    def loss(self, joint_side: ShaftSeries) -> Array:
         """Return R I^2, (N, J) [W]."""
         return self.resistance * (self.share * joint_side.torque / self.torque_constant) ** 2

@@ -21,7 +21,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+from actuators.arrays import Array, Scalars, require, require_non_negative
 from actuators.elements.heating import COPPER, REFERENCE
 
 #: Temperature for which data sheets hold [K].
@@ -42,17 +42,17 @@ class Temperatures:
             copper's energy in a mode is P times the mode's time.
     """
 
-    peak: FloatArray
-    winding: FloatArray
-    housing: FloatArray
+    peak: Array
+    winding: Array
+    housing: Array
 
     @property
-    def resistance(self) -> FloatArray:
+    def resistance(self) -> Array:
         """See above."""
         return 1.0 + COPPER * (self.winding - REFERENCE_K)
 
     @property
-    def runs_away(self) -> FloatArray:
+    def runs_away(self) -> Array:
         """Whether there is no such round, (...) boolean."""
         return ~np.isfinite(self.peak)
 
@@ -82,8 +82,8 @@ class TwoBody:
             require(np.greater(value, 0.0), "thermal model", f"{name} must be > 0")
 
     def balance(
-        self, copper: FloatArray, other: Scalars = 0.0, *, ambient: float = REFERENCE_K
-    ) -> tuple[FloatArray, FloatArray]:
+        self, copper: Array, other: Scalars = 0.0, *, ambient: float = REFERENCE_K
+    ) -> tuple[Array, Array]:
         """Return the temperatures of winding and housing in the end, (...) [K].
 
         Args:
@@ -104,8 +104,8 @@ class TwoBody:
 
     def day(
         self,
-        seconds: FloatArray,
-        copper: FloatArray,
+        seconds: Array,
+        copper: Array,
         other: Scalars = 0.0,
         *,
         ambient: float = REFERENCE_K,
@@ -129,7 +129,7 @@ class TwoBody:
             map_, gained = mode.map @ map_, _times(mode.map, gained) + mode.gained
         stable = _largest_eigenvalue(map_) < 1.0
         safe = np.where(stable[..., None, None], map_, 0.0)
-        state: FloatArray = np.asarray(
+        state: Array = np.asarray(
             np.linalg.solve(np.eye(2) - safe, gained[..., None])[..., 0], dtype=np.float64
         )
         peaks, means = [state[..., 0]], []
@@ -147,7 +147,7 @@ class _Mode:
     """Constant losses for some time: x' = A x + u, x = warmer than the surroundings, (..., 2)."""
 
     def __init__(
-        self, body: TwoBody, copper: FloatArray, other: FloatArray, seconds: float, ambient: float
+        self, body: TwoBody, copper: Array, other: Array, seconds: float, ambient: float
     ) -> None:
         own = copper * body.winding_to_housing  # [K]
         back = body.housing_to_ambient / body.winding_to_housing / body.housing_time  # [1/s]
@@ -177,17 +177,17 @@ class _Mode:
         self.map = self._of(np.exp, seconds)
         self.gained = seconds * _times(self._of(_phi, seconds), self.source)
 
-    def _of(self, function: Callable[[FloatArray], FloatArray], seconds: Scalars) -> FloatArray:
+    def _of(self, function: Callable[[Array], Array], seconds: Scalars) -> Array:
         """A function of A t, (..., 2, 2)."""
         values = function(np.minimum(self.eigenvalues * seconds, _LARGE))
         return np.asarray((values[..., None, None] * self.parts).sum(axis=0))
 
-    def mean(self, state: FloatArray) -> FloatArray:
+    def mean(self, state: Array) -> Array:
         """Mean over the mode, (..., 2) [K]."""
         twice = _times(self._of(_phi2, self.seconds), self.source)
         return _times(self._of(_phi, self.seconds), state) + self.seconds * twice
 
-    def turning(self, state: FloatArray) -> FloatArray:
+    def turning(self, state: Array) -> Array:
         """The winding where it turns from warming to cooling, else at the begin, (...) [K]."""
         slope = _times(self.rate, state) + self.source
         one, two = (_times(part, slope)[..., 0] for part in self.parts)
@@ -200,24 +200,24 @@ class _Mode:
         return np.asarray((there + gained)[..., 0])
 
 
-def _times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+def _times(matrix: Array, vector: Array) -> Array:
     return np.asarray((matrix @ vector[..., None])[..., 0])
 
 
-def _largest_eigenvalue(m: FloatArray) -> FloatArray:
+def _largest_eigenvalue(m: Array) -> Array:
     """Of matrices (..., 2, 2) whose off-diagonal is not negative, so that it is real."""
     apart = m[..., 0, 0] - m[..., 1, 1]
     root = np.sqrt(apart * apart + 4.0 * m[..., 0, 1] * m[..., 1, 0])
     return np.asarray(0.5 * (m[..., 0, 0] + m[..., 1, 1] + root))
 
 
-def _phi(z: FloatArray) -> FloatArray:
+def _phi(z: Array) -> Array:
     """(exp(z) - 1) / z."""
     small = np.abs(z) < 1e-9
     return np.where(small, 1.0 + 0.5 * z, np.expm1(z) / np.where(small, 1.0, z))
 
 
-def _phi2(z: FloatArray) -> FloatArray:
+def _phi2(z: Array) -> Array:
     """(exp(z) - 1 - z) / z^2."""
     small = np.abs(z) < 1e-5
     safe = np.where(small, 1.0, z)

@@ -13,7 +13,7 @@ which is added to the friction that the joint has at the reference.
 from dataclasses import dataclass
 from typing import Final
 
-from actuators.arrays import FloatArray, require, require_non_negative
+from actuators.arrays import Array, require, require_non_negative
 
 ZERO_CELSIUS: Final = 273.15  # [K]
 
@@ -39,9 +39,7 @@ class Warming:
         require_non_negative("warming", coulomb=self.coulomb, viscous=self.viscous)
         require(self.reference > 0.0, "warming", "reference must be > 0 K")
 
-    def torque(
-        self, temperature: FloatArray, direction: FloatArray, velocity: FloatArray
-    ) -> FloatArray:
+    def torque(self, temperature: Array, direction: Array, velocity: Array) -> Array:
         """Return what comes on top of the friction at the reference, (N,) [N*m].
 
         Args:

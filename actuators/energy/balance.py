@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from actuators.arrays import FloatArray
+from actuators.arrays import Array
 from actuators.chain import ChainResult
 from actuators.energy.regeneration import Supply
 
 
-def balance_residual(result: ChainResult, supply: Supply | None = None) -> FloatArray:
+def balance_residual(result: ChainResult, supply: Supply | None = None) -> Array:
     """Return the relative error of the power balance, (N, J), or (N, 1) for a shared bus.
 
         supplied - dumped - joint - sum of losses - sum of stored = 0

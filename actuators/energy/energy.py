@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray
+from actuators.arrays import Array
 from actuators.chain import ChainResult
 from actuators.errors import EnergyError
 
@@ -26,16 +26,16 @@ class StageEnergy:
 
     stage: str
     joints: tuple[str, ...]
-    forward: FloatArray
-    reverse: FloatArray
+    forward: Array
+    reverse: Array
 
     @property
-    def net(self) -> FloatArray:
+    def net(self) -> Array:
         """E(+) - E(-), (J,) [J]."""
         return self.forward - self.reverse
 
 
-def duration(time: FloatArray) -> float:
+def duration(time: Array) -> float:
     """Return the time a series spans, the shortest of its columns [s].
 
     Args:
@@ -52,7 +52,7 @@ def duration(time: FloatArray) -> float:
     return span
 
 
-def integral(time: FloatArray, power: FloatArray) -> FloatArray:
+def integral(time: Array, power: Array) -> Array:
     """Return the integral of a piecewise linear quantity over time, (J,).
 
     Args:
@@ -66,20 +66,18 @@ def integral(time: FloatArray, power: FloatArray) -> FloatArray:
     return weighted(weights, power)
 
 
-def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
+def weighted(weights: Array, values: Array) -> Array:
     """Return the weighted sum over the samples, (J,).
 
     Args:
         weights: (N,) or (N, J).
         values: (N, J), or (N,).
     """
-    total: FloatArray = (
-        weights @ values if weights.ndim == 1 else np.einsum("nj,nj->j", weights, values)
-    )
+    total: Array = weights @ values if weights.ndim == 1 else np.einsum("nj,nj->j", weights, values)
     return total
 
 
-def split_integral(time: FloatArray, power: FloatArray) -> tuple[FloatArray, FloatArray]:
+def split_integral(time: Array, power: Array) -> tuple[Array, Array]:
     """Return the integrals of the positive and of the negative part, both not negative, (J,).
 
     Args:
@@ -114,6 +112,6 @@ def stage_energies(result: ChainResult) -> tuple[StageEnergy, ...]:
     return tuple(stage_energy(result, stage) for stage in result.stages)
 
 
-def loss_energies(result: ChainResult) -> dict[str, FloatArray]:
+def loss_energies(result: ChainResult) -> dict[str, Array]:
     """Return the energy each element dissipates, by name, (J,) [J]."""
     return {name: integral(result.joint.time, power) for name, power in result.losses.items()}

@@ -7,11 +7,11 @@ continuous current bounds a root mean square and no instant; it is no edge of th
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars
+from actuators.arrays import Array, Scalars
 from actuators.elements.motor import DCMotor
 
 
-def operating_region(motor: DCMotor, *, joint: int = 0, reach: tuple[float, float]) -> FloatArray:
+def operating_region(motor: DCMotor, *, joint: int = 0, reach: tuple[float, float]) -> Array:
     """Return the corners of the region, counterclockwise, (M, 2): speed [rad/s], torque [N*m].
 
     Args:
@@ -45,7 +45,7 @@ def _of(values: Scalars, joint: int) -> float:
     return float(column[joint if column.size > 1 else 0])
 
 
-def _clipped(corners: FloatArray, normal: FloatArray, bound: float) -> FloatArray:
+def _clipped(corners: Array, normal: Array, bound: float) -> Array:
     """The part of a convex polygon where normal . corner <= bound."""
     above = corners @ normal - bound
     kept = []

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray
+from actuators.arrays import Array
 from actuators.chain import ChainResult, HoldingResult
 from actuators.elements.motor import DCMotor
 from actuators.energy.energy import duration, weighted
@@ -92,7 +92,7 @@ def standing_rows(
     return tuple(rows)
 
 
-def rms_over_time(time: FloatArray, values: FloatArray) -> FloatArray:
+def rms_over_time(time: Array, values: Array) -> Array:
     """Return the root mean square of a piecewise linear quantity, (J,).
 
     Args:
@@ -105,11 +105,11 @@ def rms_over_time(time: FloatArray, values: FloatArray) -> FloatArray:
     a, b = values[:-1], values[1:]
     square = weighted(np.diff(time, axis=0), a * a + a * b + b * b) / 3.0  # exact if linear
     duration(time)
-    mean_square: FloatArray = square / (time[-1] - time[0])
+    mean_square: Array = square / (time[-1] - time[0])
     return np.sqrt(mean_square)
 
 
-def time_over(time: FloatArray, magnitude: FloatArray, limit: float) -> float:
+def time_over(time: Array, magnitude: Array, limit: float) -> float:
     """Return for how long a piecewise linear quantity exceeds a limit [s].
 
     Args:

@@ -5,7 +5,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import FloatArray
+from actuators.arrays import Array
 from actuators.chain import ChainResult
 from actuators.energy.energy import split_integral
 from actuators.errors import EnergyError, closest
@@ -28,28 +28,28 @@ class Supply:
 
     policy: str
     accounts: tuple[str, ...]
-    time: FloatArray
-    electrical: FloatArray
+    time: Array
+    electrical: Array
     recovered: float
 
     @property
-    def supplied(self) -> FloatArray:
+    def supplied(self) -> Array:
         """Power out of the supply, negative where it takes power back, (N, K) [W]."""
         return np.maximum(self.electrical, 0.0) + self.recovered * np.minimum(self.electrical, 0.0)
 
     @property
-    def dumped(self) -> FloatArray:
+    def dumped(self) -> Array:
         """Power turned into heat in the braking resistor, (N, K) [W], not negative."""
         return -(1.0 - self.recovered) * np.minimum(self.electrical, 0.0)
 
     @property
-    def supplied_energy(self) -> FloatArray:
+    def supplied_energy(self) -> Array:
         """Energy out of the supply, (K,) [J]."""
         forward, reverse = split_integral(self.time, self.electrical)
         return forward - self.recovered * reverse
 
     @property
-    def dumped_energy(self) -> FloatArray:
+    def dumped_energy(self) -> Array:
         """Energy dumped, (K,) [J]."""
         _, reverse = split_integral(self.time, self.electrical)
         return (1.0 - self.recovered) * reverse
@@ -62,8 +62,8 @@ def supply(result: ChainResult, policy: str = "none", fraction: float = 0.0) -> 
 
 
 def supply_of(
-    power: FloatArray,
-    time: FloatArray,
+    power: Array,
+    time: Array,
     joints: tuple[str, ...],
     policy: str = "none",
     fraction: float = 0.0,

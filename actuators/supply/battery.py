@@ -18,7 +18,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.arrays import FloatArray, require, require_non_negative
+from actuators.arrays import Array, require, require_non_negative
 
 #: Nodes of Gauss and Legendre over the charge; the integrand is smooth above the greatest power.
 _NODES, _WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(24))
@@ -63,7 +63,7 @@ class Battery:
         """From full to empty [A*s]."""
         return self.energy / (0.5 * (self.full + self.empty))
 
-    def open_voltage(self, charged: FloatArray) -> FloatArray:
+    def open_voltage(self, charged: Array) -> Array:
         """Return the voltage without current, (...) [V].
 
         Args:
@@ -71,7 +71,7 @@ class Battery:
         """
         return self.empty + (self.full - self.empty) * np.asarray(charged)
 
-    def current(self, power: FloatArray, charged: FloatArray) -> FloatArray:
+    def current(self, power: Array, charged: Array) -> Array:
         """Return the current out of the battery, (...) [A]; NaN where it cannot give the power.
 
         Args:
@@ -83,7 +83,7 @@ class Battery:
         root = np.sqrt(np.where(left >= 0.0, left, np.nan))
         return np.asarray(2.0 * power / (voltage + root))
 
-    def voltage(self, power: FloatArray, charged: FloatArray) -> FloatArray:
+    def voltage(self, power: Array, charged: Array) -> Array:
         """Return the voltage at the terminals, (...) [V]; NaN where it cannot give the power.
 
         Arguments as for `current`.
@@ -91,7 +91,7 @@ class Battery:
         drop = self.resistance * self.current(power, charged)
         return np.asarray(self.open_voltage(charged) - drop)
 
-    def charge_at_end(self, power: FloatArray, cut_off: float = 0.0) -> FloatArray:
+    def charge_at_end(self, power: Array, cut_off: float = 0.0) -> Array:
         """Return the share of charge that stays, (...) in [0, 1]; 1 where it cannot even begin.
 
         Args:
@@ -109,12 +109,12 @@ class Battery:
 
     def hours(
         self,
-        power: FloatArray,
-        shares: FloatArray,
+        power: Array,
+        shares: Array,
         *,
-        peak: FloatArray | None = None,
+        peak: Array | None = None,
         cut_off: float = 0.0,
-    ) -> FloatArray:
+    ) -> Array:
         """Return how long a full battery lasts, (...) [h]; infinite where nothing is drawn.
 
         The modes alternate so quickly that the charge hardly changes in one round of them.

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import FloatArray, Scalars, require, require_non_negative
+from actuators.arrays import Array, Scalars, require, require_non_negative
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +61,10 @@ class Driver:
         for limit in ("voltage_share", "continuous_current", "peak_current", "most_voltage"):
             require(np.greater(getattr(self, limit), 0.0), self.name, f"{limit} must be > 0")
 
-    def loss(self, current: FloatArray, bus: Scalars) -> FloatArray:
+    def loss(self, current: Array, bus: Scalars) -> Array:
         """Return the power that the enabled driver turns into heat, (...) [W], not negative.
 
-        The bus supplies it beside the motor's electrical power, whichever way that flows.
+        The bus supplies it in addition to the motor's electrical power, whichever way that flows.
 
         Args:
             current: Of the motor, (...) [A].

@@ -17,7 +17,7 @@ def driver_of(name: str, x: Values, *, current_of: float = 1.0) -> Driver:
     """Return a driver in the ampere of a motor.
 
     What is missing at full voltage and continuous current to the loss that its efficiency states,
-    beside idle power and conduction, is switching, which nothing else on a sheet tells.
+    in addition to idle power and conduction, is switching, which nothing else on a sheet tells.
 
     Args:
         name: Of the part.

@@ -120,7 +120,7 @@ def energy(
     names = [actuator] if actuator else list(given.catalog.alternatives)
     return {
         name: supply(
-            given.chain(name).moving(demand.series), policy.policy, policy.fraction
+            given.chain(name).inverse(demand.series), policy.policy, policy.fraction
         ).supplied_energy
         for name in names
     }

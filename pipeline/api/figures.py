@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.scene import Scene, mass_centre
 from pipeline.api.pictures.walk import steps_of, stretches, thinned
@@ -26,7 +26,7 @@ from reports.atomic import write_text
 from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
 from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
 from reports.figures.energy.electrical_energy import electrical_energy_figure
-from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
+from reports.figures.energy.energy_per_minute import BreakEven, energy_per_minute_figure
 from reports.figures.energy.joint_demand import joint_demand_figure
 from reports.figures.energy.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
@@ -43,7 +43,6 @@ from reports.pages.names import leg_words, short_titles, shown_leg
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 #: File name without ending to what makes the figure; nothing is drawn before it is called.
 Drawings = dict[str, Callable[[], "Figure"]]
 #: File name of each subject's Fig. 21.
@@ -314,8 +313,8 @@ def write_fig_21(judgement: Judgement, titles: dict[str, str], out: Path) -> int
             mark = BreakEven(row.computed, energy, known)
         every[f"energy_per_minute_{subject}"] = partial(
             energy_per_minute_figure,
-            share,
-            [EnergyLine(titles[c.alternative], c.energy, c.prior, c.left_out) for c in curves],
+            curves,
+            titles,
             title=f"Energy in one minute: {words}",
             subtitle=note or _bands(curves),
             break_even=mark,

@@ -15,8 +15,6 @@ from pipeline.simulation.found_bodies import (
     not_in_urdf,
 )
 from reports.pages.gap_words import URDF_FILE
-from reports.table import Table
-from reports.tables.gap import bodies
 from reports.writer import write_text
 
 
@@ -34,11 +32,6 @@ def bodies_of(given: Setup, text: str) -> FoundBodies:
         source = given.robot.urdf if given.robot else read_urdf(given.path)
         urdf = corrected_urdf(source, str(given.path), given.bare, edits)
     return FoundBodies(bodies, not_in_urdf(edits), urdf)
-
-
-def bodies_tables(found: FoundBodies) -> list[Table]:
-    """`bodies.csv`, where there are any."""
-    return [bodies(found.bodies)] if found.bodies else []
 
 
 def write_model(folder: Path, text: str, found: FoundBodies) -> None:

@@ -7,18 +7,19 @@ from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
 from pipeline.identification.compare.stages import Stage, overall
 from pipeline.identification.workflow.story import Told, signature_name
-from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, Measurement
+from pipeline.logs.signals.grid import runs_of
 from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.predict import Prediction
 from reports.figures.gap.in_time import GapTrace, gap_time_figure
-from reports.figures.gap.signature import Signature, gap_signature_figure
+from reports.figures.gap.signature import gap_signature_figure
 from reports.figures.gap.waterfall import gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.save import save_figure
@@ -27,7 +28,6 @@ from reports.pages.gap_report import write_report
 from reports.table import Table
 from reports.typeset import unit_text
 
-Array = NDArray[np.float64]
 #: A stretch of time that a picture can show [s].
 _LONGEST = 8.0
 #: Steps that the narrow picture shows one by one.
@@ -104,7 +104,7 @@ def write_in_time(
     joints: Sequence[int],
     out: Path,
 ) -> None:
-    """Draw `in_time`: the joints around the longest stretch that proves.
+    """Draw `in_time`: the joints around the longest stretch of test rows.
 
     Args:
         measurements: One per log.
@@ -128,7 +128,7 @@ def write_in_time(
                 after=series[1][rows, j],
                 noise_floor=float(m.noise[j, 0]),
                 unit=CHANNEL_UNITS[m.channels[0]],
-                proves=m.part[rows] == PROVE,
+                held_out=m.part[rows] == TEST,
             )
         )
     figure = gap_time_figure(
@@ -142,12 +142,10 @@ def write_in_time(
 
 
 def _stretch(measurements: Sequence[Measurement]) -> tuple[int, slice]:
-    """Log and rows around the block of *prove* in which most rows of most joints count."""
+    """Log and rows around the test block in which most rows of most joints count."""
     best, found = -1.0, (0, slice(0, len(measurements[0])))
     for k, m in enumerate(measurements):
-        proving = m.part == PROVE
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], proving.astype(np.int8), [0]])))
-        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        for start, stop in np.column_stack(runs_of(m.part == TEST)).tolist():
             count = float(m.mask[start:stop].sum())
             if count > best:
                 size = max(2, int(_LONGEST * m.rate))
@@ -188,14 +186,11 @@ def write_signature(
             part.append(gap_of(m, stage.predictions[k])[:, joint])
     first = measurements[0]
     figure = gap_signature_figure(
-        Signature(
-            label,
-            np.concatenate(x),
-            np.concatenate(rest[0]),
-            np.concatenate(rest[1]),
-            float(first.noise[joint, 0]),
-            CHANNEL_UNITS[first.channels[0]],
-        ),
+        label,
+        np.concatenate(x),
+        (np.concatenate(rest[0]), np.concatenate(rest[1])),
+        float(first.noise[joint, 0]),
+        CHANNEL_UNITS[first.channels[0]],
         title=_words(f"{effect[:1].upper()}{effect[1:]} at {first.joints[joint]}"),
         subtitle="all compared rows; line: running mean, band: noise, 2 sigma",
     )

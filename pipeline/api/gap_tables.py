@@ -6,37 +6,23 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.registry import effect_named
-from pipeline.identification.compare.circumstances import Where
 from pipeline.identification.results import (
     INDISTINGUISHABLE,
     SUSPECTED,
     Candidate,
     Found,
 )
-from pipeline.identification.selection.deciding_motion import Deciding
 from pipeline.identification.workflow.forward import Drive, by_model
 from pipeline.logs.errors import EffectError
-from pipeline.logs.quality.finding import Finding
 from pipeline.machine.machine import MachineModel
 from reports.table import Table, table_of
 from reports.tables import forward as forward_tables
 from reports.tables import gap as tables
 
 JOINED = "+"
-Array = NDArray[np.float64]
-
-
-def quality_table(findings: Sequence[Finding]) -> Table:
-    """Rows of `quality.csv`."""
-    return table_of(tables.QualityRow, findings)
-
-
-def where_table(rows: Sequence[Where]) -> Table:
-    """Rows of `where.csv`."""
-    return table_of(tables.WhereRow, rows)
 
 
 def candidates_table(
@@ -118,11 +104,6 @@ def joint_of(model: MachineModel, effect: str, place: Sequence[str]) -> str:
         owner = place[0].partition("__")[0]
         return owner if owner in model.joints else ""
     return JOINED.join(name for name in place if name in model.joints)
-
-
-def motion_table(motion: Deciding, joints: Sequence[str]) -> Table:
-    """`deciding_motion.csv`."""
-    return tables.deciding_motion(motion.time, joints, motion.position)
 
 
 def forward_table(drives: Sequence[Drive], joints: Sequence[str]) -> Table:

@@ -7,16 +7,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pipeline.api.gap_bodies import bodies_of, bodies_tables, refuse_own_urdf, write_model
+from pipeline.api.gap_bodies import bodies_of, refuse_own_urdf, write_model
 from pipeline.api.gap_meta import inputs_of, metadata
 from pipeline.api.gap_tables import (
     candidates_table,
     forward_table,
     found_table,
-    motion_table,
-    quality_table,
     rollout_tables,
-    where_table,
 )
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result, by_name
@@ -33,7 +30,8 @@ from pipeline.logs.formats.convert import plain
 from pipeline.logs.quality.finding import Finding
 from pipeline.progress import Progress
 from pipeline.simulation.found_bodies import FoundBodies
-from reports.table import Table
+from reports.table import Table, table_of
+from reports.tables.gap import QualityRow, WhereRow, bodies, deciding_motion
 
 #: What every result of logs begins with: verb, tables, sidecar, inputs, machine, findings.
 Common = tuple[
@@ -322,7 +320,7 @@ def analyse(
     intake, parts, fitted = take_in(given, options)
     if step == "read":
         findings = judged(intake).findings
-        read = common([quality_table(findings)], findings)
+        read = common([table_of(QualityRow, findings)], findings)
         return MeasuredLog(*read, options.logs[0], options.mapping)
     if step == "power":
         from pipeline.api.supply.power import added_up
@@ -331,7 +329,7 @@ def analyse(
     progress.step("simulating the logs' motion")
     where = find_where(given, given.model, intake, parts, fitted)
     findings, joints = where.intake.findings, given.model.joints
-    tables = [quality_table(findings), where_table(where.rows)]
+    tables = [table_of(QualityRow, findings), table_of(WhereRow, where.rows)]
     if step == "where":
         return Comparison(*common(tables, findings), where)
     if step == "forward":
@@ -345,15 +343,16 @@ def analyse(
     else:
         progress.step("letting effects compete")
         told = tell(given, where, options, progress)
-    bodies = bodies_of(given, told.model_file)
-    tables += [*_answer_tables(told, given), *bodies_tables(bodies)]
-    return Identified(*common(tables, findings), told, bodies, step)
+    found = bodies_of(given, told.model_file)
+    tables += _answer_tables(told, given, found)
+    return Identified(*common(tables, findings), told, found, step)
 
 
-def _answer_tables(told: Told, given: Setup) -> list[Table]:
-    naming = told.story.naming
+def _answer_tables(told: Told, given: Setup, found: FoundBodies) -> list[Table]:
+    naming, motion = told.story.naming, told.deciding
     return [
         candidates_table(naming.candidates, naming.found, given.model),
         found_table(naming.found, given.model),
-        *([motion_table(told.deciding, given.model.joints)] if told.deciding else []),
+        *([deciding_motion(motion.time, given.model.joints, motion.position)] if motion else []),
+        *([bodies(found.bodies)] if found.bodies else []),
     ]

@@ -9,29 +9,39 @@ the answer,
 
 the expected value of partial perfect information (Raiffa and Schlaifer, 1961), the inner mean over
 quantile bins of u. A design that exceeds a limit in a draw cannot be the best of it.
+
+What a model file says of bodies and ground is drawn from its intervals, too; what it says of drives
+goes with the actuators that are replaced.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats.qmc import LatinHypercube
 
 from actuators.loading.data_sheet import Number
-from pipeline.choice.designs import Designs
+from pipeline.choice.parts.designs import Designs
+from pipeline.choice.parts.shelf import Drawn, Shelf
 from pipeline.choice.search import Demanded, Feedback
-from pipeline.choice.shelf import Drawn, Shelf
 from pipeline.choice.track import Account
+from pipeline.effects.base import place_text
+from pipeline.effects.registry import effect_named
+
+if TYPE_CHECKING:
+    from pipeline.api.machine import Machine
 
 Array = NDArray[np.float64]
 Design = tuple[str, str, str]
 Unknown = tuple[str, str, Number]
 DRAWS: Final = 256
 _BINS: Final = 8
+_EFFECTS: Final = 16  # draws of what a model file says
+_BODIES: Final = ("link", "ground")  # places of effects that change what is asked of the joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +120,8 @@ def doubt(
     *,
     draws: int = DRAWS,
     seed: int = 0,
+    effects: Sequence[Unknown] = (),
+    found: Sequence[tuple[Array, Demanded]] = (),
 ) -> Doubt:
     """Draw what is not printed of some designs, and evaluate them in every draw.
 
@@ -121,17 +133,75 @@ def doubt(
         feedback: What the mass of the actuators costs the robot.
         draws: How many.
         seed: Of the draws.
+        effects: What is drawn of a model file, E of them.
+        found: Values of these (E,) and the day's demand with them, in turn for one draw after the
+            other; `demanded` for all if empty.
     """
     count = len(combinations)
     unknowns, values, sheets = drawn(shelf, combinations, draws, seed)
+    turn = np.arange(draws) % max(len(found), 1)
+    if found:
+        unknowns += tuple(effects)
+        values = np.column_stack([values, np.stack([own for own, _ in found])[turn]])
     designs = Designs.together([shelf.designs(combinations, sheet) for sheet in sheets])
-    power = demanded.power(designs, account)
-    within = np.all([share <= 1.0 for share in demanded.limits(designs).values()], axis=0)
+    power, within = np.zeros(len(designs)), np.zeros(len(designs), dtype=np.bool_)
+    for k, one in enumerate([asked for _, asked in found] or [demanded]):
+        at = np.flatnonzero(np.repeat(turn == k, count))
+        own = designs.taken(at)
+        power[at] = one.power(own, account)
+        within[at] = np.all([share <= 1.0 for share in one.limits(own).values()], axis=0)
     score = power + feedback.cost(demanded, designs)
     shape = (draws, count)
     return Doubt(
         power.reshape(shape), score.reshape(shape), within.reshape(shape), unknowns, values
     )
+
+
+def effects_of(machine: Machine) -> tuple[Unknown, ...]:
+    """What a machine's model file says of bodies and ground, with an interval."""
+    return tuple(
+        (
+            f"{edit.effect} of {place_text(edit.place)}",
+            p.name,
+            Number(p.value, *p.interval, p.unit, ""),
+        )
+        for edit in (machine.model.edits if machine.model else ())
+        if effect_named(edit.effect).place_kind in _BODIES
+        for p in edit.parameters
+        if p.interval[0] < p.interval[1]
+    )
+
+
+def drawn_machines(machine: Machine) -> Iterator[tuple[Array, Machine]]:
+    """Values of `effects_of` (E,), and the machine with them, draw by draw; none without any."""
+    if effects := effects_of(machine):
+        low, high = np.array([(number.low, number.high) for _, _, number in effects]).T
+        for shares in LatinHypercube(len(effects), rng=2).random(_EFFECTS):
+            yield low + shares * (high - low), with_effects(machine, shares.tolist())
+
+
+def with_effects(machine: Machine, shares: Sequence[float]) -> Machine:
+    """The machine with each of `effects_of` at a share of its interval.
+
+    Args:
+        machine: With a model file.
+        shares: 0 for the lower end to 1 for the upper one.
+    """
+    if (file := machine.model) is None:
+        return machine
+    left, edits = iter(shares), []
+    for edit in file.edits:
+        effect, own = effect_named(edit.effect), []
+        bounds = {p.name: (p.low, p.high) for p in effect.parameters}
+        for p in edit.parameters:
+            low, high = p.interval
+            if effect.place_kind in _BODIES and low < high:
+                value = float(np.clip(low + next(left) * (high - low), *bounds[p.name]))
+                own.append(replace(p, value=value, interval=(value, value)))
+            else:
+                own.append(p)
+        edits.append(replace(edit, parameters=tuple(own)))
+    return machine.with_model(replace(file, edits=tuple(edits)))
 
 
 def drawn(

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.errors import closest
-from pipeline.choice.designs import Designs
 from pipeline.choice.errors import ChoiceError
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.track import Account
 from pipeline.robot.robot_file import RobotSpec

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from actuators.elements.two_body import REFERENCE_K, Temperatures, TwoBody
 from actuators.supply.battery import HOUR
-from pipeline.choice.designs import Designs
+from pipeline.choice.parts.designs import Designs
 
 Array = NDArray[np.float64]
 

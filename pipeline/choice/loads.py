@@ -10,11 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.elements.position_torque import ParallelSpring
 from actuators.energy.energy import duration
 from actuators.shaft import ShaftSeries
 from pipeline.api.demand import demand
 from pipeline.choice.errors import MissionError
-from pipeline.choice.mission import Mode
+from pipeline.choice.missions.mission import Mode
 from pipeline.errors import PipelineError, StanceError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
@@ -57,6 +58,7 @@ def loads_of(
     added: Mapping[str, float] | None = None,
     samples: int = LEAST_SAMPLES,
     along: Sequence[Load] = (),
+    spring: ParallelSpring | None = None,
 ) -> tuple[Load, ...]:
     """Every mode's demand.
 
@@ -67,6 +69,8 @@ def loads_of(
         samples: Per half period of a gait.
         along: The same modes with other masses, whose motions are kept; by default motions are
             planned for the masses there are.
+        spring: Beside the actuators of all joints, with a stiffness and rest angle for each: the
+            torques are those that actuators have to give, the spring's included.
 
     Raises:
         MissionError: A mode cannot be done; its row is named.
@@ -77,12 +81,20 @@ def loads_of(
     for mode, motion in zip(modes, motions, strict=True):
         try:
             own = with_masses(machine.with_values(mode.changes), added)
-            out.append(_load(own, mode, samples, motion))
+            load = _load(own, mode, samples, motion)
         except StanceError as error:
             raise type(error)(f"{mode.where}: {error}") from None
         except PipelineError as error:
             raise MissionError(f"{mode.where}: {error}") from None
+        out.append(with_spring(load, spring))
     return tuple(out)
+
+
+def with_spring(load: Load, spring: ParallelSpring | None) -> Load:
+    """The mode with springs beside the actuators; with hold none they are not held, either."""
+    if spring is None or load.mode.hold == "none":
+        return load
+    return replace(load, series=spring.inverse(load.series))
 
 
 def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
@@ -92,7 +104,8 @@ def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
 
     Args:
         machine: From `load`.
-        added: By joint [kg]; less than none takes mass away.
+        added: By joint [kg]; less than none takes mass away. By the free joint of a floating base:
+            at the origin of the base.
     """
     if not added or not any(added.values()):
         return machine
@@ -103,6 +116,8 @@ def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
         for joint, mass in added.items():
             at = out.getJointId(joint)
             before, place = out.parents[at], out.jointPlacements[at].translation
+            if not before and given.robot.floating:
+                before = at
             point = np.concatenate([[mass], mass * place, _second_moments(mass, place)])
             dynamic = out.inertias[before].toDynamicParameters() + point
             out.inertias[before] = pin.Inertia.FromDynamicParameters(dynamic)

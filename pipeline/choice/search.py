@@ -32,13 +32,13 @@ from scipy.spatial import ConvexHull, QhullError
 from actuators.energy.regeneration import BUS
 from actuators.shaft import ShaftSeries
 from pipeline.choice import heat
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.track import SPEED, Account, Track
 
 Array = NDArray[np.float64]
-#: Numbers of a block of designs times samples: 16 MB.
-BLOCK = 2_000_000
+#: Numbers of a block of designs times samples: 0.8 MB, which stay in the cache.
+BLOCK = 100_000
 _MANY = 50  # samples, or designs, from which on a hull is worth finding
 
 
@@ -100,7 +100,7 @@ class Demanded:
             volts[rows] = (np.abs(current) + dropped).max(axis=1, initial=0.0)
         rms, means = np.zeros(len(designs)), []
         for track in self.tracks:
-            mean = _rms(track, designs)
+            mean = torque_rms(track, designs)
             means.append(mean)
             rms = np.maximum(rms, mean)
             if track.rest.any():
@@ -223,15 +223,15 @@ def extreme(points: Array) -> Array:
         return points
 
 
-def _rms(track: Track, designs: Designs) -> Array:
+def torque_rms(track: Track, designs: Designs) -> Array:
     """Of the motor's torque at the joint where it is greatest, (D,) [N*m]."""
-    theta = designs.theta
+    theta, out = designs.theta, np.zeros(len(designs))
     if not track.rest.any():
         i, k = np.triu_indices(5)
-        pairs = theta[:, i] * theta[:, k] * np.where(i == k, 1.0, 2.0)
-        square = (pairs @ track.squares[:, i, k].T).max(axis=1)
-        return np.asarray(np.sqrt(np.maximum(square, 0.0)))
-    out = np.zeros(len(designs))
+        squares = track.squares[:, i, k].T * np.where(i == k, 1.0, 2.0)[:, None]
+        for rows in _blocks(len(designs), len(i)):
+            out[rows] = (theta[rows][:, i] * theta[rows][:, k] @ squares).max(axis=1)
+        return np.asarray(np.sqrt(np.maximum(out, 0.0)))
     for rows in _blocks(len(designs), track.series.torque.size):
         torque = track.torque(designs.taken(np.arange(len(designs))[rows]))
         a, b = torque[:, :-1], torque[:, 1:]

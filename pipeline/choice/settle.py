@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.energy.regeneration import BUS
-from pipeline.choice.designs import Designs
 from pipeline.choice.doubt import Design
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded, Feedback, shared
 from pipeline.choice.track import Account
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from actuators.energy.regeneration import BUS
 from actuators.shaft import ShaftSeries
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 
 Array = NDArray[np.float64]
 Which = NDArray[np.bool_]
@@ -121,12 +121,12 @@ class Track:
     def power(self, designs: Designs, torque: Array) -> Array:
         """Electrical into drivers and the brakes' coils, without idle power, (D, N, J) [W]."""
         out = torque * designs.ohmic[:, None, None]
-        out += designs.ratio[:, None, None] * self.series.velocity * ~self.rest
-        if designs.switching.any():
-            out += np.copysign(designs.switched[:, None, None], torque)
+        out += designs.ratio[:, None, None] * self.x[SPEED]
         out *= torque
+        if designs.switching.any():
+            out += designs.switched[:, None, None] * np.abs(torque)
         if designs.brake_power.any():
-            drawn = ~self.rest | (not self.engaged)
+            drawn = 1.0 * (~self.rest | (not self.engaged))
             out += designs.brake_power[:, None, None] * drawn
         return out
 
@@ -147,8 +147,9 @@ class Track:
         if recovered == 1.0:
             return np.asarray(np.einsum("dnj,n->d", power, self.weight))
         out = np.einsum("dnj,n->d", np.maximum(power, 0.0), self.weight)
-        sign = np.signbit(power)
-        d, n, j = np.nonzero(sign[:, :-1] != sign[:, 1:])
+        sign = power < 0.0
+        changes = sign[:, :-1] != sign[:, 1:]
+        d, n, j = np.unravel_index(np.flatnonzero(changes), changes.shape)
         a, b = np.abs(power[d, n, j]), np.abs(power[d, n + 1, j])
         both = np.maximum(a + b, 1e-300)
         tip = 0.5 * self.step[n] * (a * (b / both)) / self.load.duration

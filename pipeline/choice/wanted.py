@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from actuators.errors import CatalogError, closest
+from actuators.errors import CatalogError, closest, one_line
 from actuators.loading.data_sheet import Number
 from actuators.loading.parts import DRIVER, PACK, PARTS, Part
 from pipeline.choice.errors import ChoiceError
-from pipeline.choice.shelf import GEARS
+from pipeline.choice.parts.shelf import GEARS
 from pipeline.choice.track import Account
 
 
@@ -31,8 +31,11 @@ class Wanted:
         account: Hotel load, returned energy.
         pack: Part that is the battery.
         battery: Energy of it when full, in place of its part's [J].
-        present: Mass of an actuator that the robot's bodies hold already, each joint's [kg]; by
-            default that of the motors of its actuator files.
+        present: Mass of an actuator, with its driver, that the robot's bodies hold already, each
+            joint's [kg]; by default that of the motors of its actuator files.
+        present_battery: Mass of a battery that they hold already [kg]; by default the pack's own.
+        springs: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints; a
+            PATTERN alone is for one that is to be found.
         draws: Over what is not printed.
     """
 
@@ -49,6 +52,8 @@ class Wanted:
     pack: str = PACK
     battery: float | None = None
     present: float | None = None
+    present_battery: float | None = None
+    springs: tuple[str, ...] = ()
     draws: int = 256
 
 
@@ -61,7 +66,9 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
     """
     for name in (*wanted.only, *wanted.without):
         if not any(part.startswith(name) for part in parts):
-            raise CatalogError(f"no part '{name}': {closest(name, [*parts])}")
+            near = closest(name, [*parts])  # not 195 names
+            near = "`pipeline components` lists them" if near.startswith("known") else near
+            raise CatalogError(f"no part '{one_line(name)}', nor one that begins so: {near}")
     for kind in wanted.kinds:
         if kind not in GEARS:
             raise ChoiceError(f"--kind {kind}: {closest(kind, GEARS)}")

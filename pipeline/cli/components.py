@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from actuators.errors import CatalogError, DataSheetError, closest
-from actuators.loading.data_sheet import read_entry
+from actuators.errors import CatalogError, DataSheetError, closest, one_line
+from actuators.loading.data_sheet import option, read_entry
 from actuators.loading.parts import KINDS, PARTS, Part, load_parts, odd
 from pipeline.cli.options import AddVerb, named_path
 
@@ -58,11 +58,8 @@ def run_components(options: argparse.Namespace) -> int:
     for name in options.names:
         if name not in parts:
             raise CatalogError(f"no part '{name}': {closest(name, [*parts])}")
-    bounds = [
-        (name, number, sign)
-        for texts, sign in ((options.least, 1.0), (options.most, -1.0))
-        for name, number in map(_bound, texts)
-    ]
+    bounds = [(*_bound("--least", text), 1.0) for text in options.least]
+    bounds += [(*_bound("--most", text), -1.0) for text in options.most]
     chosen = [parts[name] for name in options.names] or [
         p for p in parts.values() if options.kind in (None, p.kind) and _within(p, bounds)
     ]
@@ -79,14 +76,17 @@ def run_components(options: argparse.Namespace) -> int:
     return int(bool(wrong))
 
 
-def _bound(text: str) -> tuple[str, float]:
-    """An entry and its bound, SI."""
+def _bound(of: str, text: str) -> tuple[str, float]:
+    """An entry and its bound, SI; `of` is the option that gives it."""
     name, _, written = text.partition("=")
     entries = {n: entry for kind in KINDS.values() for n, entry in kind.items()}
     if name not in entries or not written:
         hint = closest(name, sorted(entries)) if written else "expected ENTRY=NUMBER UNIT"
-        raise DataSheetError(f"'{text}': {hint}")
-    return name, read_entry(name, written, entries).value
+        raise DataSheetError(f"{of} '{one_line(text)}': {hint}")
+    try:
+        return name, read_entry(name, written, entries).value
+    except DataSheetError as error:
+        raise DataSheetError(str(error).replace(option(name), f"{of} {name}", 1)) from None
 
 
 def _within(part: Part, bounds: Sequence[tuple[str, float, float]]) -> bool:

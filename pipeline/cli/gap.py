@@ -155,10 +155,10 @@ def run_gap(given: argparse.Namespace) -> int:
 
 def _say_findings(findings: Sequence[Finding]) -> None:
     odd = [finding for finding in findings if finding.verdict != "ok"]
-    told = [f for f in findings if f.check in READ_OFF]
-    for finding in (*odd, *told):
+    known = [f for f in findings if f.check in READ_OFF]
+    for finding in (*odd, *known):
         place = f" {finding.column}" if finding.column else ""
-        word = finding.check if finding in told else finding.verdict
+        word = finding.check if finding in known else finding.verdict
         print(f"{finding.log}{place}: {word.replace('_', ' ')}: {finding.detail}")
     print(f"{len(findings) - len(odd)} of {len(findings)} checks passed without a remark")
 

@@ -34,9 +34,14 @@ def run_twin(options: argparse.Namespace) -> int:
     """Make it; print the command that answers it.
 
     Raises:
-        PipelineError: An unknown source, machine or effect, or a folder that is not empty.
+        PipelineError: An unknown source, machine or effect, a negative seed or number, options that
+            `--supply` has no use for, or a folder that is not empty.
         ReportError: The folder cannot be written.
     """
+    if min(options.seed, options.number) < 0:
+        raise PipelineError("--seed and --number start at 0")
+    if options.supply and (options.machine or options.source != "own"):
+        raise PipelineError("--supply is the hexapod's on its own source: no --machine, --source")
     out: Path = options.out
     if [path for path in out.glob("*") if not path.name.startswith(PREFIX)]:
         raise PipelineError(f"{out}: not empty; give a new folder for the trial")

@@ -18,8 +18,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.dynamics.internal_forces import (
     Bounds,
     held_by_friction,
@@ -28,7 +28,6 @@ from pipeline.dynamics.internal_forces import (
 )
 from pipeline.motion.motion import level_ground
 
-Array = NDArray[np.float64]
 _UNLOADED = 1e-9  # share of the largest load below which a foot bears none
 
 

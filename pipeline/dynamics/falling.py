@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.dynamics.internal_forces import held_by_friction, internal_basis, least_friction
 from pipeline.dynamics.stability import stability_margins
 from pipeline.dynamics.tipping import margin_and_remedy
@@ -12,7 +13,6 @@ from pipeline.errors import SlidingError, TippingError
 from pipeline.motion.motion import Segment
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 #: Share of the largest force: a foot that is exactly unloaded (a tripod at the edge of its
 #: stability) still stands, and one on its cone's surface still holds.
 _ROUNDING = 1e-9

@@ -10,11 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.dynamics.contact_forces import least_tangential_forces
 from pipeline.robot.kinematics import leg_posture
 from pipeline.robot.leg_chains import LegChains
-
-Array = NDArray[np.float64]
 
 
 def inverse_dynamics(

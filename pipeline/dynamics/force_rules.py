@@ -14,12 +14,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.internal_forces import Bounds, internal_basis, out_of_bounds
 from pipeline.errors import GaitError
 from pipeline.motion.motion import Segment
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp] | slice
 ALL = slice(None)
 LEAST_TANGENTIAL = "least_tangential"

@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
+
 #: Weight of normal beside tangential forces: what the least tangential forces leave open.
 NORMAL_WEIGHT = 1e-8
 #: Share of the largest force below which a violated bound is rounding.

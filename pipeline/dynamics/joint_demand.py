@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.dynamics.contact_forces import ContactForces, ground_frame
 from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.falling import refuse_falling
@@ -15,8 +15,6 @@ from pipeline.dynamics.force_rules import PAPER, GroundForces, Stance
 from pipeline.errors import GaitError
 from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def segment_demand(

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
+from actuators.arrays import Array
 from pipeline.motion.motion import Segment
 from pipeline.motion.support import stance_and_centre, support_margin
 from pipeline.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def stability_margins(robot: Robot, segment: Segment) -> Array:

@@ -7,14 +7,12 @@ the edge, in millimetres, is a matter of geometry: with and without each of them
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.motion.gait import body_rotation, gait_of, gait_table
 from pipeline.motion.motion import Segment
 from pipeline.motion.support import stance_and_centre, support_edges
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 #: Less than that towards the edge is no cause [m].
 _NOTABLE = 1e-3
 

@@ -83,7 +83,7 @@ class Effect(ABC):
     """A kind of thing that a model may lack.
 
     An effect is fitted in `coordinates`, in which the prediction is linear or nearly so, at given
-    `shapes` (Stribeck speed, order of a ripple), and told in `parameters`.
+    `shapes` (Stribeck speed, order of a ripple), and reported in `parameters`.
 
     Attributes:
         name: In the field's terms; key of the registry.

@@ -252,23 +252,28 @@ def new_model_file(robot: Path, alternative: str = "", catalog: Path = CATALOG) 
     return ModelFile(robot, file_sha256(robot), alternative, hashes)
 
 
-def base_model(file: ModelFile) -> MachineModel:
+def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
     """The machine of a model file before its edits.
+
+    Args:
+        file: The model file.
+        actuators: Folder of the actuator files; the robot file's or the project's by default.
 
     Raises:
         pipeline.errors.PipelineError: The robot file or URDF cannot be used.
         actuators.errors.ActuatorError: The catalogue has no such alternative.
         ModelFileError: A bare URDF that is not there.
     """
-    if file.robot.suffix == ".urdf":
-        chain = load_catalog().chain(file.alternative) if file.alternative else None
+    if file.robot.suffix.lower() == ".urdf":
+        parts = load_catalog(actuators or CATALOG)
+        chain = parts.chain(file.alternative) if file.alternative else None
         return machine_of_urdf(file.robot, actuators=chain)
     spec = load_robot_file(file.robot)
-    catalog = load_catalog(actuator_folder(spec) or CATALOG)
+    catalog = load_catalog(actuators or actuator_folder(spec) or CATALOG)
     own = own_actuators(spec, catalog)
     name = file.alternative
-    actuators = own.actuators(own.catalog(catalog), name) if name else None
-    return machine_of_robot(load_robot(spec), actuators)
+    drives = own.actuators(own.catalog(catalog), name) if name else None
+    return machine_of_robot(load_robot(spec), drives)
 
 
 def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
@@ -283,26 +288,16 @@ def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:
     return model
 
 
-def load_model(path: Path) -> MachineModel:
-    """The machine of a model file, edits included.
-
-    Raises:
-        ModelFileError: The file is malformed; one line.
-        GapError: An edit does not fit the machine.
-        pipeline.errors.PipelineError: The robot file cannot be used.
-        actuators.errors.ActuatorError: The actuator cannot be used.
-    """
-    file = read_model_file(path)
-    return apply_edits(base_model(file), file.edits)
-
-
-def read_model_file(path: Path, catalog: Path | None = None) -> ModelFile:
+def read_model_file(
+    path: Path, catalog: Path | None = None, robot: Path | None = None
+) -> ModelFile:
     """Read and check a model file.
 
     Args:
         path: The file.
         catalog: Folder of the actuator files, to compare their hashes; the robot file's or the
             project's by default.
+        robot: Robot file or URDF in place of the one that the file names.
 
     Raises:
         ModelFileError: It cannot be read, is no TOML, or a key or value is wrong; the message names
@@ -314,7 +309,7 @@ def read_model_file(path: Path, catalog: Path | None = None) -> ModelFile:
     except UnreadableTextError as error:
         raise ModelFileError(f"{one_line(path)}: {error}") from None
     model = checked(_Model, table, where, ModelFileError)
-    robot, hashes = path.parent / model.robot.file, model.actuators.sha256
+    robot, hashes = robot or path.parent / model.robot.file, model.actuators.sha256
     edits, alternative = tuple(map(_as_edit, model.edit)), model.actuators.alternative
     noise: dict[str, Mapping[str, float]] = {str(c): own for c, own in model.noise.items()}
     file = ModelFile(robot, model.robot.sha256, alternative, hashes, edits, noise)

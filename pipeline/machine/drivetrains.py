@@ -14,19 +14,16 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from actuators.arrays import least_magnitude
+from actuators.arrays import Array, least_magnitude
 from actuators.chain import Chain, ChainResult, HoldingResult, held
 from actuators.shaft import ShaftSeries
 from pipeline.machine.joint import JointModel, joints_of
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Drivetrains:
-    """One drivetrain per joint; it answers `moving` and `holding` as a chain for all joints does.
+    """One drivetrain per joint; it answers `inverse` and `holding` as a chain for all joints does.
 
     Attributes:
         name: Of the alternative.
@@ -96,17 +93,17 @@ class Drivetrains:
             groups[key][1].append(k)
         return list(groups.values())
 
-    def moving(self, joint: ShaftSeries) -> ChainResult:
+    def inverse(self, joint: ShaftSeries) -> ChainResult:
         """Return everything the drivetrains need; a loss that a joint does not have is zero there.
 
         Args:
-            joint: Series at all joints, in their order; see `Chain.moving`.
+            joint: Series at all joints, in their order; see `Chain.inverse`.
         """
         if len(self._groups) == 1 and not self.coupled:
-            return replace(self._groups[0][0].moving(joint), chain=self.name)
+            return replace(self._groups[0][0].inverse(joint), chain=self.name)
         joint, lost = self._behind(joint)
         parts = [
-            (columns, chain.moving(self._side(joint, columns))) for chain, columns in self._groups
+            (columns, chain.inverse(self._side(joint, columns))) for chain, columns in self._groups
         ]
         merged = _merged(self.name, joint, parts)
         return replace(merged, losses={**lost, **merged.losses}) if lost else merged
@@ -118,7 +115,7 @@ class Drivetrains:
         for k, own in enumerate(self.joints):
             side = joint.at(k)
             for element in own.apart:
-                behind = element.moving(side)
+                behind = element.inverse(side)
                 loss = element.loss(side)
                 if loss is not None:
                     total = lost.setdefault(element.name, np.zeros_like(torque))

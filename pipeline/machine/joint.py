@@ -17,8 +17,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import Chain, held, moved
 from actuators.elements.element import Element
 from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
@@ -28,7 +28,6 @@ from actuators.elements.warming import Warming
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import ModelError
 
-Array = NDArray[np.float64]
 _LEAST_CROSSING = 1e-9  # [N*m]
 _MOTOR_STAGE = "m"
 

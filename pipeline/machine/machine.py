@@ -51,7 +51,7 @@ class BodyChange:
 
 @dataclass(frozen=True)
 class Bodies:
-    """What the rigid-body torque depends on beside the motion.
+    """What the rigid-body torque depends on in addition to the motion.
 
     Attributes:
         changes: Joint that carries the body to its change.

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from actuators.arrays import Array
 from pipeline.motion.feet import Course, along_ground, displaced
 from pipeline.motion.gait import Gait
 from pipeline.motion.ground import Ground
 from pipeline.motion.motion import Segment
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.motion.gait import Gait
 from pipeline.motion.transfer_path import transfer_path
 
-Array = NDArray[np.float64]
 Plane = NDArray[np.complex128]
 
 

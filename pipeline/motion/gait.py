@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.errors import GaitError
 from pipeline.motion.footfall import Footfall, in_turn, named, own
@@ -19,7 +19,6 @@ from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
 from pipeline.motion.ground import Ground
 from pipeline.robot.robot_file import RobotSpec
 
-Array = NDArray[np.float64]
 #: Speed, period and stroke agree within this share.
 _AGREE = 1e-6
 #: Margin of the least sway where none is stated [m], or half of what there is to have.
@@ -145,7 +144,7 @@ def _surge(
     period: float,
     neutral: Array,
 ) -> float:
-    """Half the body's way ahead and back [m]; see `pipeline.motion.base_motion.Surge`."""
+    """Half the body's way ahead and back [m]; see `pipeline.motion.base_motion.surge`."""
     if not table.surge:
         return 0.0
     duty = float(np.mean(list(footfall.duty.values())))

@@ -127,7 +127,8 @@ Tilt = Annotated[
     float, BeforeValidator(_size("angle", -_STEEPEST, _STEEPEST, "must lie within 89 deg"))
 ]
 Mass = Annotated[
-    float, BeforeValidator(_size("mass", 0, 1e5, "must not be negative", low_too=True))
+    float,
+    BeforeValidator(_size("mass", 0, 1e5, "must not be negative, and below 1e5 kg", low_too=True)),
 ]
 Lengths = Annotated[float | dict[str, float], BeforeValidator(_each(_LENGTH))]
 Heights = Annotated[float | dict[str, float], BeforeValidator(_each(_HEIGHT))]

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import InvalidMotionError
-
-Array = NDArray[np.float64]
 
 
 def level_ground() -> Array:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import GaitError
 from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.inverse_kinematics import solve_positions
 from pipeline.robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def start_postures(robot: Robot, target: Array) -> Array:

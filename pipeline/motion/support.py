@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.motion.motion import Segment
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 _ON_EDGE = 1e-12  # [m]
 
 

@@ -17,8 +17,8 @@ from functools import cache
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import GaitError
 from pipeline.motion.feet import Course
 from pipeline.motion.gait import Gait, gait_table
@@ -27,7 +27,6 @@ from pipeline.motion.support import stance_and_centre, support_edges
 from pipeline.robot.kinematics import foot_jacobians
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 _DEGREE = 5  # of the spline: its acceleration is smooth, its jerk steady
 _KNOTS_PER_STANCE = 4
 _FEWEST_KNOTS, _MOST_KNOTS = 16, 48

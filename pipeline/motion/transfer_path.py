@@ -10,12 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import closest
 from pipeline.errors import GaitError
 
-Array = NDArray[np.float64]
 #: value, first and second derivative with respect to the phase, each (N,)
 Profile = tuple[Array, Array, Array]
 

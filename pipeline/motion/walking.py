@@ -6,8 +6,8 @@ A segment ends at every lift-off and touch-down of any leg, so that the same fee
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import GaitError, OutOfReachError
 from pipeline.motion.base_motion import base_motion, surge
 from pipeline.motion.feet import Course, support_course, transfer_course
@@ -19,7 +19,6 @@ from pipeline.motion.sway import Sway, burdens, least_sway
 from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 DEFAULT_SAMPLES = 751  # per half period: one every 2 ms at the paper's period
 #: However short a segment is, its energy needs that many.
 FEWEST_SAMPLES = 25

@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import Chain, ChainResult, HoldingResult
 from actuators.energy.energy import split_integral, stage_energy
 from actuators.energy.limits import rms_over_time
@@ -27,7 +28,6 @@ from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.walk_stand import joint_series, stand, walk
 
-Array = NDArray[np.float64]
 Number = TypeVar("Number", float, Array)
 MIDDLE_LEGS = ("lm", "rm")
 PUBLISHED_LEG = "rm"
@@ -259,14 +259,14 @@ def chain_at(
 
 def drawn(demand: Demand, chain: Chain) -> Array:
     """E_el(+) per cycle of the printed leg alone, (W,) [J]; both made for one leg."""
-    power = chain.moving(demand.series).electrical_power
+    power = chain.inverse(demand.series).electrical_power
     forward, _ = split_integral(demand.series.time, power)
     return by_leg(forward, len(demand.legs)).sum(axis=(1, 2))
 
 
 def outcome(demand: Demand, chain: Chain) -> Outcome:
     """Take a demand through an alternative made for it."""
-    walking = chain.moving(demand.series)
+    walking = chain.inverse(demand.series)
     energy, motor = stage_energy(walking, "el"), chain.motor
     peaks = {
         "speed": np.abs(walking.motor.velocity).max(axis=0) / motor.max_speed,

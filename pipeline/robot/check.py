@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import UnphysicalModelError
 from pipeline.robot.published import named_robot
 from pipeline.robot.robot import Robot, load_robot
@@ -18,7 +18,6 @@ from pipeline.robot.urdf_source import read_urdf
 
 __all__ = ["Finding", "check_file", "check_robot", "check_urdf", "refuse_impossible", "refuse_urdf"]
 
-Array = NDArray[np.float64]
 #: Relative, lengths to the leg's: left and right of CAD exports differ.
 SYMMETRY_TOLERANCE = 0.01
 #: Up to here a difference is one of parts and noted, beyond it is a mistake: a wrong sign makes 2.

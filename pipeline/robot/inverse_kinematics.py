@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import OutOfReachError
 from pipeline.robot.inverse.closed_form import closed_form, closed_form_legs
 from pipeline.robot.inverse.damped import approach, square_solve
@@ -26,7 +26,6 @@ from pipeline.robot.kinematics import (
 )
 from pipeline.robot.leg_chains import LegChains
 
-Array = NDArray[np.float64]
 ACCEPTED = 1e-9  # [m]
 _SINGULAR = 1e8  # condition number of a leg's Jacobian that is none any more
 _JUMP = 0.2  # [rad] between two samples that no velocity explains

@@ -12,11 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.leg_chains import LegChains
-
-Array = NDArray[np.float64]
 
 
 def _turn(chains: LegChains, j: int, v: Array, cos: Array, sin: Array) -> Array:

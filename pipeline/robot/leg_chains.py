@@ -15,10 +15,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import closest
 from pipeline.errors import UrdfError
 
-Array = NDArray[np.float64]
 #: Of a leg; fewer follow no path, more are no leg.
 FEWEST_JOINTS, MOST_JOINTS = 1, 7
 

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import closest, one_line
 from pipeline.errors import UrdfError
 from pipeline.robot.leg_chains import LegChains, leg_chains
@@ -22,8 +23,6 @@ from pipeline.robot.leg_columns import LegColumns, leg_columns
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.urdf_builder import build_urdf
 from pipeline.robot.urdf_source import read_elements, read_urdf
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

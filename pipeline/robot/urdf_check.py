@@ -18,8 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.robot import parse_urdf
 from pipeline.robot.urdf_source import (
     INERTIA_KEYS,
@@ -30,8 +30,6 @@ from pipeline.robot.urdf_source import (
     place,
     read_elements,
 )
-
-Array = NDArray[np.float64]
 
 TRIANGLE_TOLERANCE = 1e-6  # relative to the largest principal moment
 #: What moments written with two digits, or a density that CAD guessed, take a body beyond what is

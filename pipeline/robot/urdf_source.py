@@ -13,8 +13,8 @@ from pathlib import Path
 from xml.parsers import expat
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import closest, one_line
 from actuators.text_file import UnreadableTextError, read_file, utf8
 from pipeline.errors import UrdfError
@@ -36,8 +36,6 @@ _SHAPES: Mapping[str, Mapping[str, int]] = {
 }
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _NO_XML = ("solid ", "ply\n", "ply\r\n", "{")  # meshes and JSON, given by mistake
-
-Array = NDArray[np.float64]
 
 
 class Placed(ET.Element):

@@ -9,6 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.columns.explaining import Bodies
 from pipeline.logs.columns.findings import column_findings, copies
 from pipeline.logs.columns.hypotheses import Reading, as_named
@@ -20,9 +21,6 @@ from pipeline.machine.machine import Bodies as Edited
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 from pipeline.simulation.rigid_bodies import legs_are_separate
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Rows that are compared, of all logs together, and of them those of a rough comparison.
 _ROWS: Final = 1200

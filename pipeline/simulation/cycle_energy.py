@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import HoldingResult
 from actuators.energy.energy import split_integral
 from actuators.energy.regeneration import BUS, Supply
@@ -17,7 +17,6 @@ from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.robot.robot_file import RobotSpec
 from reports.column import column
 
-Array = NDArray[np.float64]
 Legs = Mapping[str, Sequence[str]]
 #: Account of the joints outside the legs, which are held.
 HELD = "held joints"

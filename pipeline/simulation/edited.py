@@ -3,7 +3,7 @@
 Bodies and ground change what is demanded of the joints; so do springs and ripples, which act beside
 the actuators. They count in every alternative, and so does what is found of the motor, which all of
 them share. Friction, inertia and coupling of a drivetrain belong to the alternative they were found
-against: what was found beside a motor's data sheet alone is all that the machine's gears lose.
+against: what was found against a motor's data sheet alone is all that the machine's gears lose.
 Another alternative has gears, and losses of their own in the catalogue; to add one to the other
 would count gears twice, and to put one in place of the other would make a self-locking gear lock no
 more. So there they do not count, and it is said.
@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.dynamics.demand import JointDemand
 from pipeline.machine.drivetrains import Actuators, Drivetrains
@@ -26,7 +25,6 @@ from pipeline.robot.kinematics import foot_force_torques
 from pipeline.robot.robot import Robot
 from pipeline.simulation.rigid_bodies import changed_model, outward
 
-Array = NDArray[np.float64]
 #: The alternative that stays without losses.
 IDEAL = "ideal"
 #: What acts on sensors alone.

@@ -2,9 +2,9 @@
 
 The measured motion gives nothing but the first instant. With inertia M(q) and bias h(q, v) of the
 rigid bodies, the motors' torques found from the servo's law, and every chain asked for what it
-needs at its motor (`Element.moving`), the accelerations solve, joint by joint,
+needs at its motor (`Element.inverse`), the accelerations solve, joint by joint,
 
-    moving(M a + h, v, a) = motor torque
+    inverse(M a + h, v, a) = motor torque
 
 A joint at rest stays there while its motor's torque lies in the interval that holds it
 (`Element.holding`); friction is neither regularised nor chattering. Servo: a bridge that applies
@@ -21,16 +21,14 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 #: Longest step [s]; a servo's joint takes some ten times as long to answer.
 LONGEST_STEP: Final = 1e-3
 #: Rows whose slope is the first velocity.

@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import Values, place_text
 from pipeline.effects.bodies.rigid_body_parameters import physical
 from pipeline.effects.model_file import Edit, apply_edits
@@ -24,7 +25,6 @@ from pipeline.robot.robot import parse_urdf
 from pipeline.robot.urdf_inertials import with_inertials
 from pipeline.simulation.rigid_bodies import changed_model
 
-Array = NDArray[np.float64]
 #: Relative difference that comes of turning and adding alone.
 ROUNDING: Final = 1e-9
 #: Parameters of edits on which mass and centre of mass depend.

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from actuators.arrays import Array
 from actuators.errors import closest, one_line
 from pipeline.errors import GaitError, InvalidMotionError
 from pipeline.motion.base_motion import base_quaternions, one_sign
@@ -36,7 +37,6 @@ from pipeline.motion.postures import refuse_beyond_limits
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 PLACE: Final = ("base__x_m", "base__y_m", "base__z_m")
 ATTITUDE: Final = ("base__roll_rad", "base__pitch_rad", "base__yaw_rad")
 #: Quantities of joints and feet that a log has, too, and a motion does not need.

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import moved
 from actuators.elements.motor import DCMotor
 from actuators.shaft import ShaftSeries
@@ -19,8 +19,6 @@ from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import RigidBodies
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

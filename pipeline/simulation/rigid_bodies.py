@@ -18,6 +18,7 @@ import pinocchio as pin
 import scipy.linalg
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.dynamics.feet_on_ground import FeetOnGround, inverse_dynamics
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import Bodies, MachineModel
@@ -26,7 +27,6 @@ from pipeline.robot.kinematics import foot_jacobian_rates, foot_jacobians
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
 _BLOCK = 2048
 #: Least share of a direction in a body's scaled pseudo-inertia.
 _LEAST = 1e-6

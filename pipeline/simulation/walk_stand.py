@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import ChainResult, HoldingResult
 from actuators.energy.regeneration import BUS, Supply, supply
 from actuators.reversals import split_at_reversals
@@ -24,8 +24,6 @@ from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
 from pipeline.robot.robot import Robot
 from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES, ForceChoice
 from pipeline.simulation.ground_forces.least_power import Adjust
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -201,7 +199,7 @@ def walk(
     motion = motion or walking_motion(robot, samples=samples)
     demand = demand_along(robot, motion, quasi_static=quasi_static, adjust=adjust, forces=forces)
     series = joint_series(demand)
-    results = {name: chain.moving(series) for name, chain in chains.items()}
+    results = {name: chain.inverse(series) for name, chain in chains.items()}
     steady = motion.segments if robot.floating else ()
     return Walking(
         motion,
@@ -250,7 +248,7 @@ def compare_rules(
                     forces=choice.ground(chains, regeneration.recovered, adjust),
                 )
                 series = joint_series(demand)
-            result = chain.moving(series)
+            result = chain.inverse(series)
             drawn = supply(result, regeneration.policy, regeneration.fraction).supplied_energy
             torque = np.concatenate([part.torque for part in demand.segments])
             yield RuleCost(

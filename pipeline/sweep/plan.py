@@ -39,7 +39,7 @@ WORDS: Final = {
 METHODS: Final = ("sobol", "lhs")
 MOST_CASES: Final = 10_000_000
 #: Numbers, and the unit behind them.
-_NUMBERS: Final = re.compile(r"([-+0-9.,:eE ]*[0-9.])\s*([A-Za-z%].*)")
+_NUMBERS: Final = re.compile(r"((?:[-+0-9.,:eE ]|nan|inf)*(?:[0-9.]|nan|inf))\s*([A-Za-z%].*)")
 
 Value = float | str
 
@@ -151,12 +151,17 @@ def _values(body: str, place: str) -> tuple[tuple[Value, ...], bool]:
         values = tuple(_value(part.strip()) for part in body.split(","))
         if "" in values or len(set(values)) < len(values):
             raise SweepError(f"{place}: a value is empty or stands twice")
+        for value in values:
+            if isinstance(value, float) and not math.isfinite(value):
+                raise SweepError(f"{place}: {value:g} is no finite number")
         return values, False
     try:
         low, high = float(parts[0]), float(parts[1])
         count = int(parts[2]) if len(parts) == 3 else 2
         if len(parts) > 3 or count < 2 or not (math.isfinite(low) and math.isfinite(high)):
             raise ValueError
+        if count > MOST_CASES:
+            raise SweepError(f"{place}: {count} values: expected at most {MOST_CASES}")
     except ValueError:
         raise SweepError(
             f"{place}: expected FIRST:LAST:COUNT, finite numbers and a count from 2, such as "
@@ -234,8 +239,10 @@ def cases_of(
         seed: Of the draw.
 
     Raises:
-        SweepError: A range without a sample, an unknown method, or too many cases.
+        SweepError: A range without a sample, an unknown method or seed, or too many cases.
     """
+    if seed < 0:
+        raise SweepError(f"--seed {seed}: starts at 0")
     if method not in METHODS:
         raise SweepError(f"--method {one_line(method)}: {closest(method, METHODS)}")
     total = math.prod(len(axis.values) for axis in axes) if sample is None else sample

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.style import (
     BLUE,
     CYCLE,
@@ -24,8 +24,6 @@ from reports.figures.style import (
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @house_style()

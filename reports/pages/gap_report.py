@@ -244,7 +244,7 @@ def _candidates(story: Story) -> TableBlock:
         ("effect", "place", "validation without", "with", "unit", "verdict", "why"),
         rows,
         f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried. "
-        "Without and with: gap on rows that choose, by estimates from others "
+        "Without and with: gap on validation rows, by estimates from others "
         "for either; a dash: it is not in the set of names that explains the log best.",
         "candidates.csv",
         TONES,
@@ -304,7 +304,7 @@ def _energy(story: Story) -> tuple[Section, ...]:
         rows,
         "Electrical energy of one gait cycle of the robot file's own gait, whole robot, returned "
         "energy lost, and power to stand as the robot file says, without and with what the model "
-        "file holds; a dash: it cannot be told.",
+        "file holds; a dash: it is not known.",
     )
     catalog = story.given.catalog
     titles = [
@@ -373,7 +373,8 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
         f"{percent(float(np.mean(shares)))} of the rows count, by joint: not those whose "
         "filter sees the joint stop or turn back, where friction takes any value, nor the ends of "
         "the log.",
-        f"Blocks of the log fit, choose between candidates or are held out to prove: {parts.rule}, "
+        "Blocks of the log are for training, for validation between candidates or held out for the "
+        f"test: {parts.rule}, "
         f"{parts.guard:.2g} s apart, so that none holds a trace of another. "
         + held_out_words(story.where.measurements),
     ]

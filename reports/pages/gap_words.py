@@ -24,7 +24,8 @@ from pipeline.identification.results import (
 )
 from pipeline.identification.workflow.story import Story
 from pipeline.logs.errors import EffectError
-from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, Measurement
+from pipeline.logs.signals.grid import runs_of
 from pipeline.simulation.energy_change import PAIR, EnergyChange
 from pipeline.simulation.found_bodies import FoundBodies, FoundBody
 from reports.page import Block, Points, TableBlock, Text
@@ -180,9 +181,8 @@ def held_out_words(measurements: Sequence[Measurement]) -> str:
     """Which stretches are held out."""
     spans, seconds = [], 0.0
     for m in measurements:
-        inside = np.concatenate([[0], (m.part == PROVE).astype(np.int8), [0]])
-        edges = np.flatnonzero(np.diff(inside))
-        for start, stop in zip(m.time[edges[::2]], m.time[edges[1::2] - 1], strict=True):
+        first, after = runs_of(m.part == TEST)
+        for start, stop in zip(m.time[first], m.time[after - 1], strict=True):
             spans.append(f"{start:.2f} to {stop:.2f} s of log '{m.name}'")
             seconds += stop - start
     return WORDS("held_out", spans, seconds)
@@ -192,7 +192,7 @@ def one_way_words(measurements: Sequence[Measurement], joints: Sequence[int]) ->
     """Joints with an effect whose held-out rows all turn one way, a remark each."""
     out = []
     for j in dict.fromkeys(joints):
-        speeds = np.concatenate([m.v[(m.part == PROVE) & m.mask[:, j], j] for m in measurements])
+        speeds = np.concatenate([m.v[(m.part == TEST) & m.mask[:, j], j] for m in measurements])
         ahead = float((speeds > 0).mean()) if speeds.size else 0.5
         if min(ahead, 1.0 - ahead) < ONE_WAY:
             way = "positive" if ahead > 0.5 else "negative"

@@ -21,42 +21,42 @@ from reports.words import Words, number, percent
 WORDS = Words("power")
 
 
-def power_answer(told: Account) -> tuple[str, ...]:
+def power_answer(balance: Account) -> tuple[str, ...]:
     """The answer in words, a paragraph each."""
-    shares = {s.term: s for s in told.shares}
-    found = [s for s in told.shares if s.basis == BASIS_FOUND]
-    own = [s for s in told.shares if s.basis and s.basis != BASIS_FOUND]
+    shares = {s.term: s for s in balance.shares}
+    found = [s for s in balance.shares if s.basis == BASIS_FOUND]
+    own = [s for s in balance.shares if s.basis and s.basis != BASIS_FOUND]
     measured, left = shares[MEASURED], shares[UNEXPLAINED]
     paragraphs = (
-        WORDS("wrong_sum", told.wrong_sum),
-        WORDS("sums", measured, own, len(told.drives)),
+        WORDS("wrong_sum", balance.wrong_sum),
+        WORDS("sums", measured, own, len(balance.drives), balance.wrong_sum),
         WORDS("found", found, shares.get("drivers")),
-        WORDS("left", left, measured, told.rms),
-        WORDS("sag", told.sag),
-        WORDS("basis", told.by_model, told.reading, len(told.drives)),
+        WORDS("left", left, measured, balance.rms),
+        WORDS("sag", balance.sag),
+        WORDS("basis", balance.by_model, balance.reading, len(balance.drives)),
     )
     # Of what is no power no term means anything.
-    return tuple(filter(None, paragraphs[:2] if told.wrong_sum == RECOGNISED else paragraphs))
+    return tuple(filter(None, paragraphs[:2] if balance.wrong_sum == RECOGNISED else paragraphs))
 
 
 def write_power_page(
-    told: Account, robot: str, tables: Sequence[Table], warnings: Sequence[str], folder: Path
+    balance: Account, robot: str, tables: Sequence[Table], warnings: Sequence[str], folder: Path
 ) -> None:
     """Write ``report.md`` and ``index.html``; the figures must be there already."""
     by_name = {t.name: t for t in tables}
-    shares = {s.term: s for s in told.shares}
+    shares = {s.term: s for s in balance.shares}
     measured, left = shares[MEASURED], shares[UNEXPLAINED]
-    answer = power_answer(told)
-    own = float(sum(s.watts for s in told.shares if s.basis and s.basis != BASIS_FOUND))
+    answer = power_answer(balance)
+    own = float(sum(s.watts for s in balance.shares if s.basis and s.basis != BASIS_FOUND))
     page = Page(
-        title=f"What the supply of '{robot}' gives, by log '{', '.join(told.logs)}'",
+        title=f"What the supply of '{robot}' gives, by log '{', '.join(balance.logs)}'",
         numbers=(
-            Number(f"{number(measured.watts)} W", "at the supply, mean of samples that prove"),
+            Number(f"{number(measured.watts)} W", "at the supply, mean of the held-out samples"),
             Number(f"{number(own)} W", "sum over the drives, by log and model"),
             Number(
                 f"{number(left.watts)} W",
                 f"unexplained, {percent(abs(left.watts) / abs(measured.watts), 1)} of it",
-                "bad" if told.negative else "good",
+                "bad" if balance.negative else "good",
             ),
         ),
         picture=FigureBlock(folder / "power_shares_narrow.svg", alt="Shares of the power."),
@@ -72,7 +72,7 @@ def write_power_page(
                     table_block(by_name["power"], digits=3),
                     FigureBlock(
                         folder / "power_in_time.svg",
-                        "Power at the supply; shaded: samples that prove.",
+                        "Power at the supply; shaded: held-out samples.",
                     ),
                 ),
             ),

@@ -23,7 +23,9 @@ class TrialRow:
     machine: str = column("pendulum, leg, arm or walk")
     joints: float = column("of the machine", "1")
     bodies_off: float = column("largest error of the URDF's bodies", "1")
-    background_friction: str = column("whether all joints have friction beside what is hidden")
+    background_friction: str = column(
+        "whether all joints have friction in addition to what is hidden"
+    )
     motions: str = column("of the training log and of the test log")
     rate_Hz: float = column("of the logs", "Hz")
     encoder_bits: float = column("of the joints' encoders", "1")

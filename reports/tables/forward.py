@@ -6,13 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
+from actuators.arrays import Array
 from reports.column import column
 from reports.table import Quantity, Table, wide_series
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.simulation.found_bodies import FoundBody
 from reports.column import column as declared
 from reports.table import Meaning, Table
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ class CandidateRow:
     joint: str = declared("joint it acts at; empty where it acts on all")
     place: str = declared("joints, link or ground it acts on")
     validation_before: float | None = declared(
-        "gap without it on rows that choose, by the others", "see unit"
+        "gap without it on validation rows, by the others", "see unit"
     )
     validation_after: float | None = declared(
         "the same with it; empty where it was not tried in earnest", "see unit"

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.units import from_si
 from pipeline.paper.calibration.store import VERDICTS
@@ -20,7 +19,6 @@ from pipeline.paper.published import ROLES
 from reports.column import column
 from reports.table import Table, table_of
 
-Array = NDArray[np.float64]
 #: What the columns of intervals mean; empty where the run's numbers are not the calibration's.
 PRIOR_LOW = "2.5 % quantile of what data sheets and literature say, before anything is fitted"
 PRIOR_HIGH = "97.5 % quantile of the same"

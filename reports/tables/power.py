@@ -17,7 +17,7 @@ class PowerRow:
 
     table: ClassVar = "power"
     about: ClassVar = (
-        "Mean power at the supply on samples that prove, term by term; the terms, measured and "
+        "Mean power at the supply on held-out samples, term by term; the terms, measured and "
         "unexplained: the last is the one before less all above."
     )
     term: str = declared("name of the term")
@@ -79,23 +79,23 @@ class SampleRow:
     proves: bool = declared("held out: nothing is estimated or chosen by it")
 
 
-def power_tables(told: Account) -> list[Table]:
+def power_tables(balance: Account) -> list[Table]:
     """Tables of an answer."""
-    rows = told.rows
+    rows = balance.rows
     samples = [
         SampleRow(
-            log=told.logs[rows.log[k]],
+            log=balance.logs[rows.log[k]],
             begin_s=float(rows.begin[k]),
             end_s=float(rows.end[k]),
             measured_W=float(rows.power[k]),
             model_W=float(rows.predicted[k]),
-            explained_W=float(told.explained[k]),
-            proves=bool(told.proves[k]),
+            explained_W=float(balance.explained[k]),
+            proves=bool(balance.proves[k]),
         )
         for k in range(len(rows))
     ]
     return [
-        table_of(PowerRow, told.shares),
-        table_of(DriveRow, told.drives),
+        table_of(PowerRow, balance.shares),
+        table_of(DriveRow, balance.drives),
         table_of(SampleRow, samples),
     ]

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import ChainResult
 from actuators.energy.energy import loss_energies, stage_energies
 from actuators.energy.limits import LimitRow
@@ -22,7 +22,6 @@ from pipeline.simulation.walk_stand import RuleCost
 from reports.column import column
 from reports.table import Quantity, Table, table_of, wide_series
 
-Array = NDArray[np.float64]
 #: Rules of the ground's forces in words.
 _FORCES = {
     "least_tangential": "Least tangential",

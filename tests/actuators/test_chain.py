@@ -21,7 +21,7 @@ REVERSIBLE = ("ideal", "rotor", "reversible")
 # Torques so small that their products are subnormal have fewer digits than the balance asks for.
 @given(seeds, st.just(0.0) | st.floats(1e-9, 200.0))
 def test_energy_balance_at_every_sample(alternative, seed, torque):
-    result = CHAINS[alternative].moving(split(harmonic(300, seed=seed, torque=torque)))
+    result = CHAINS[alternative].inverse(split(harmonic(300, seed=seed, torque=torque)))
     assert np.abs(balance_residual(result)).max() < 1e-9
     for policy, fraction in (("none", 0.0), ("fraction", 0.6), ("bus", 0.0)):
         account = supply(result, policy, fraction)
@@ -29,7 +29,7 @@ def test_energy_balance_at_every_sample(alternative, seed, torque):
 
 
 def test_balance_fails_when_a_loss_law_is_wrong():
-    result = CHAINS["irreversible"].moving(split(harmonic(300)))
+    result = CHAINS["irreversible"].inverse(split(harmonic(300)))
     result.losses["hypoid"][...] *= 1.001
     assert np.abs(balance_residual(result)).max() > 1e-6
 
@@ -38,7 +38,7 @@ def test_balance_fails_when_a_loss_law_is_wrong():
 @settings(max_examples=10)
 @given(seeds)
 def test_losses_are_never_negative(alternative, seed):
-    result = CHAINS[alternative].moving(split(harmonic(200, seed=seed)))
+    result = CHAINS[alternative].inverse(split(harmonic(200, seed=seed)))
     for power in result.losses.values():
         assert (power >= 0.0).all()
 
@@ -49,14 +49,14 @@ def test_losses_are_never_negative(alternative, seed):
 def test_driving_the_whole_chain_inverts_moving(alternative, seed):
     chain = CHAINS[alternative]
     s = split(harmonic(200, seed=seed))
-    back = chain.driving(chain.moving(s).motor)
+    back = chain.forward(chain.inverse(s).motor)
     np.testing.assert_allclose(back.torque, s.torque, atol=1e-9)
     np.testing.assert_allclose(back.velocity, s.velocity, atol=1e-12)
 
 
 def test_stages_are_those_of_the_figures():
     s = constant(1.0, 10.0)
-    stages = {name: chain.moving(s).stages for name, chain in CHAINS.items()}
+    stages = {name: chain.inverse(s).stages for name, chain in CHAINS.items()}
     assert stages == {
         "ideal": ("out", "m", "el"),
         "rotor": ("out", "mt", "m", "el"),
@@ -69,7 +69,7 @@ def test_stages_are_those_of_the_figures():
 def test_standing_series_equals_holding(alternative):
     torques = np.array([0.0, -30.71, 1.46])
     zero = np.zeros((2, 3))
-    result = CHAINS[alternative].moving(series([0.0, 3.0], zero, zero, zero, zero + torques))
+    result = CHAINS[alternative].inverse(series([0.0, 3.0], zero, zero, zero, zero + torques))
     held = CHAINS[alternative].holding(torques)
     for values, expected in (
         (result.motor.torque, held.motor_torque),
@@ -84,9 +84,9 @@ def test_standing_series_equals_holding(alternative):
 def test_one_joint_rests_while_another_moves():
     two = np.ones((2, 1))
     s = series([0, 1], two * [0, 0], two * [0.0, 1.0], two * [0, 0], two * [-30.71, 10.0])
-    result = CHAINS["reversible"].moving(s)
+    result = CHAINS["reversible"].inverse(s)
     held = CHAINS["reversible"].holding(np.array([-30.71])).motor_torque[0]
-    moving = CHAINS["reversible"].moving(constant(1.0, 10.0)).motor.torque[0, 0]
+    moving = CHAINS["reversible"].inverse(constant(1.0, 10.0)).motor.torque[0, 0]
     np.testing.assert_allclose(result.motor.torque[0], [held, moving], rtol=1e-14)
 
 
@@ -96,7 +96,7 @@ def test_holding_contains_the_limits_of_moving(alternative, torque):
     chain = CHAINS[alternative]
     held = chain.holding(np.array([torque]))
     for sign in (1.0, -1.0):
-        limit = chain.moving(constant(sign * 2e-9, torque)).motor.torque[0, 0]
+        limit = chain.inverse(constant(sign * 2e-9, torque)).motor.torque[0, 0]
         assert held.low[0] - 1e-9 <= limit <= held.high[0] + 1e-9
     assert abs(held.motor_torque[0]) <= abs(torque) / 400.0 + 1e-15
 
@@ -104,7 +104,7 @@ def test_holding_contains_the_limits_of_moving(alternative, torque):
 def test_edits_return_new_chains():
     chain, s = CHAINS["rotor"], constant(1.0, 0.0)
     rubbing = chain.replaced(Friction("rotor_friction", coulomb=1.0))
-    np.testing.assert_allclose(rubbing.moving(s).motor.torque[0], 1.0, rtol=1e-3)
+    np.testing.assert_allclose(rubbing.inverse(s).motor.torque[0], 1.0, rtol=1e-3)
     assert chain.element("rotor_friction").coulomb < 0.1
     assert chain.element("transmission").gearing == 400.0
 
@@ -134,12 +134,12 @@ def test_unknown_names_offer_the_closest():
     with pytest.raises(ChainError, match="did you mean 'rotor_friction'"):
         chain.element("rotor_fricton")
     with pytest.raises(ChainError, match="no stage 'mx'"):
-        chain.moving(constant(1.0, 1.0)).stage_power("mx")
+        chain.inverse(constant(1.0, 1.0)).stage_power("mx")
 
 
 def test_alternative_2_costs_more_than_1_in_motion_and_less_at_rest():
     s = split(harmonic(500))
-    power = {name: supply(chain.moving(s)).supplied_energy.sum() for name, chain in CHAINS.items()}
+    power = {name: supply(chain.inverse(s)).supplied_energy.sum() for name, chain in CHAINS.items()}
     assert power["ideal"] < power["rotor"] < power["reversible"]
     assert power["rotor"] < power["irreversible"]
 

@@ -37,7 +37,7 @@ def test_stage_energy_of_an_ideal_joint_in_closed_form():
     # q = -cos t, torque constant: power T sin t, E(+) = E(-) = 2 T
     t = np.linspace(0.0, 2.0 * np.pi, 4001)
     s = split(series(t, -np.cos(t), np.sin(t), np.cos(t), np.full_like(t, 5.0)))
-    result = CHAINS["ideal"].moving(s)
+    result = CHAINS["ideal"].inverse(s)
     for stage in ("out", "m"):
         energy = stage_energy(result, stage)
         assert energy.forward[0] == pytest.approx(10.0, rel=1e-6)
@@ -87,7 +87,7 @@ def test_a_break_has_no_width():
 def test_within_a_thousandth_of_twenty_times_finer_sampling(alternative, seed):
     chain = CHAINS[alternative]
     coarse, fine = (
-        stage_energies(chain.moving(split(harmonic(n, seed=seed)))) for n in (1501, 30001)
+        stage_energies(chain.inverse(split(harmonic(n, seed=seed)))) for n in (1501, 30001)
     )
     for a, b in zip(coarse, fine, strict=True):
         scale = b.forward + b.reverse
@@ -108,9 +108,9 @@ def test_a_reversal_inside_an_interval_has_to_be_split():
     for name, value in (("coulomb", 0.026), ("load", 0.03), ("viscous", 1e-5)):
         catalog = catalog.replaced(f"timing_belt.{name}", value)
     chain = catalog.chain("reversible")
-    fine = stage_energy(chain.moving(split(line(30002))), "el").forward
-    raw = stage_energy(chain.moving(line(12)), "el").forward
-    cut = stage_energy(chain.moving(split(line(12))), "el").forward
+    fine = stage_energy(chain.inverse(split(line(30002))), "el").forward
+    raw = stage_energy(chain.inverse(line(12)), "el").forward
+    cut = stage_energy(chain.inverse(split(line(12))), "el").forward
     assert np.abs(cut / fine - 1.0) < 5e-3
     assert np.abs(raw / fine - 1.0) > 5 * np.abs(cut / fine - 1.0)
 
@@ -118,7 +118,7 @@ def test_a_reversal_inside_an_interval_has_to_be_split():
 @pytest.mark.parametrize("alternative", ALTERNATIVES)
 def test_losses_account_for_the_electrical_energy_of_a_cycle(alternative):
     s = split(harmonic(3001, seed=5))
-    result = CHAINS[alternative].moving(s)
+    result = CHAINS[alternative].inverse(s)
     lost = sum(loss_energies(result).values())
     joint = stage_energy(result, "out").net
     np.testing.assert_allclose(stage_energy(result, "el").net, joint + lost, rtol=1e-4, atol=1e-5)
@@ -135,7 +135,7 @@ def opposed():
     t = np.linspace(0.0, 2.0 * np.pi, 2001)
     v = np.column_stack((np.sin(t), -np.sin(t)))
     s = split(series(t, v, v, v, np.full_like(v, 20.0)))
-    return CHAINS["ideal"].moving(s)
+    return CHAINS["ideal"].inverse(s)
 
 
 def test_policies_share_one_electrical_energy():
@@ -177,7 +177,7 @@ def test_limits_of_a_fast_and_a_slow_joint():
     zero = np.zeros_like(ramp)
     s = split(series(t, zero, ramp, zero, zero, joints=("fast", "slow")))
     chain = CHAINS["ideal"]
-    rows = {(r.joint, r.quantity): r for r in limit_rows(chain.moving(s))}
+    rows = {(r.joint, r.quantity): r for r in limit_rows(chain.inverse(s))}
     assert len(rows) == 8
     speed = rows["fast", "speed"]
     assert speed.breach
@@ -211,7 +211,7 @@ def test_a_peak_at_its_limit_is_no_breach():
     )
     two = np.ones((2, 1))
     s = series([0.0, 4.0], 0 * two, 2.0 * two, 0 * two, 1000.0 * two)  # 800 rad/s, 2.5 N*m
-    result = replace(chain, motor=motor).moving(s)
+    result = replace(chain, motor=motor).inverse(s)
     rows = {r.quantity: r for r in limit_rows(result)}
     assert rows["speed"].peak == rows["speed"].limit == 800.0
     assert rows["current"].peak == rows["current"].limit

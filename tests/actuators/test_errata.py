@@ -12,7 +12,7 @@ from tests.actuators.motions import CHAINS, constant, harmonic, split
 def test_eq_3_lacks_the_dot_on_the_second_omega():
     steady = constant(5.0, 1.0)
     inertia = Inertia("rotor", 2.0)
-    assert (inertia.moving(steady).torque == steady.torque).all()  # J w w would load it
+    assert (inertia.inverse(steady).torque == steady.torque).all()  # J w w would load it
     speeding = constant(5.0, 1.0, acceleration=3.0)
     assert (inertia.stored(speeding) == 2.0 * 5.0 * 3.0).all()
 
@@ -31,11 +31,11 @@ def test_eq_11_is_the_frictionless_limit():
     s = constant([1.0, -1.0], 30.0)
     for mu, equal in ((0.0, True), (0.1, False)):
         gear = Hypoid("h", 30.0, np.radians(80.0), np.radians(25.0), 0.03, mu)
-        assert np.allclose(gear.moving(s).power, s.power, rtol=1e-12) is equal
+        assert np.allclose(gear.inverse(s).power, s.power, rtol=1e-12) is equal
 
 
 def test_section_iv_a_4_describes_the_irreversible_actuator():
-    result = CHAINS["irreversible"].moving(constant(1.0, 10.0))
+    result = CHAINS["irreversible"].inverse(constant(1.0, 10.0))
     assert result.stages == ("out", "2", "ph", "mp", "m", "el")
 
 
@@ -48,6 +48,6 @@ def test_alternative_3_counts_the_rotor_friction_once():
 
 
 def test_rotor_friction_stands_apart_from_the_planetary_gear():
-    result = CHAINS["irreversible"].moving(split(harmonic(100)))
+    result = CHAINS["irreversible"].inverse(split(harmonic(100)))
     assert {"planetary_friction", "rotor_friction"} <= set(result.losses)
     assert np.abs(balance_residual(result)).max() < 1e-9

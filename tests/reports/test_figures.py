@@ -20,10 +20,11 @@ from actuators.elements.motor import DCMotor
 from actuators.energy.energy import StageEnergy
 from actuators.loading.build import load_catalog
 from actuators.shaft import ShaftSeries
+from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from reports.errors import FigureError
 from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
 from reports.figures.energy.electrical_energy import electrical_energy_figure
-from reports.figures.energy.energy_per_minute import BreakEven, EnergyLine, energy_per_minute_figure
+from reports.figures.energy.energy_per_minute import BreakEven, energy_per_minute_figure
 from reports.figures.energy.joint_demand import joint_demand_figure
 from reports.figures.energy.motor_limits import common_scale, motor_limits_figure
 from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
@@ -286,15 +287,17 @@ def test_strong_motors_are_drawn_in_newton_metres() -> None:
 
 def test_energy_per_minute_with_and_without_break_even() -> None:
     share = np.linspace(0, 1, 11)
+    names = {"reversible": "can be driven back", "irreversible": "locks"}
+    band = np.array([95 - 90 * share, 105 - 90 * share])
     lines = [
-        EnergyLine("reversible", 100 - 90 * share, np.array([95 - 90 * share, 105 - 90 * share])),
-        EnergyLine("irreversible", 150 - 150 * share),
+        EnergyPerMinute("robot", "reversible", share, 100 - 90 * share, band, None),
+        EnergyPerMinute("robot", "irreversible", share, 150 - 150 * share, None, None),
     ]
     mark = BreakEven(5 / 6, 25.0, (0.8, 0.86))
-    figure = energy_per_minute_figure(share, lines, title="t", break_even=mark)
+    figure = energy_per_minute_figure(lines, names, title="t", break_even=mark)
     assert len(figure.axes) == 2
     assert any("break-even 83.3 %" in word for word in texts(figure))
-    assert len(energy_per_minute_figure(share, lines, title="t").axes) == 1
+    assert len(energy_per_minute_figure(lines, names, title="t").axes) == 1
 
 
 def test_same_figure_same_bytes_and_no_trace_of_the_machine(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from reports.errors import FigureError
 from reports.figures.gap.in_time import GapTrace, gap_time_figure
-from reports.figures.gap.signature import Signature, binned, gap_signature_figure
+from reports.figures.gap.signature import binned, gap_signature_figure
 from reports.figures.gap.waterfall import gap_waterfall_figure
 from reports.figures.gap.where import WhereGroup, where_map_figure
 from reports.figures.style import NARROW
@@ -56,12 +56,12 @@ def test_signature_means_are_those_of_the_bins() -> None:
     centre, mean = binned(x, np.sign(x))
     assert np.all(mean[centre < -0.1] == -1)
     assert np.all(mean[centre > 0.1] == 1)
-    signature = Signature("velocity [rad/s]", x, np.sign(x), 0 * x, 0.1, "A")
-    figure = gap_signature_figure(signature, title="t")
+    signature = "velocity [rad/s]", x, (np.sign(x), 0 * x), 0.1, "A"
+    figure = gap_signature_figure(*signature, title="t")
     assert figure.axes[0].get_ylim() == figure.axes[1].get_ylim()
-    empty = Signature("velocity [rad/s]", x, np.full_like(x, np.nan), 0 * x, 0.1, "A")
+    empty = "velocity [rad/s]", x, (np.full_like(x, np.nan), 0 * x), 0.1, "A"
     with pytest.raises(FigureError, match="no rows"):
-        gap_signature_figure(empty, title="t")
+        gap_signature_figure(*empty, title="t")
 
 
 def test_waterfall_bars_join_up() -> None:

@@ -17,6 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from actuators.arrays import Array
 from pipeline.api.pictures.scene import Scene
 from pipeline.api.pictures.walk import steps_of
 from pipeline.simulation.settings import Settings
@@ -26,7 +27,6 @@ from reports.figures.robot.solids import Solid, reach
 from reports.figures.robot.steps import Steps
 from reports.pages.gait_words import gait_and_conditions
 
-Array = NDArray[np.float64]
 #: Steps of a cycle.
 STEPS = 120
 _GREEN, _PLUS, _MINUS = (0, 158, 115), (0, 114, 178), (230, 159, 0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.api.pictures.scene import Scene, mass_centre
 from pipeline.robot.robot import Robot
@@ -11,7 +10,6 @@ from pipeline.simulation.walk_stand import Walking
 from reports.figures.robot.steps import Steps
 from reports.figures.stretch import Stretch
 
-Array = NDArray[np.float64]
 #: Steps of a cycle that the moving picture shows.
 STEPS = 24
 #: Samples of a cycle that a picture can show, and the least of one segment.

@@ -23,7 +23,7 @@ from actuators.errors import CatalogError, closest
 from pipeline.choice.answer.full import through
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.loads import Load, loads_of
-from pipeline.choice.mission import Mode
+from pipeline.choice.missions.mission import Mode
 from pipeline.choice.track import Account
 from pipeline.machine.drivetrains import Actuators
 from reports.tables.choice import BreakEvenRow
@@ -101,7 +101,8 @@ def rows(
     one, two = names
     stand = Mode("stand", 1.0, True, None, {}, "motor", False, "standing")
     walk = Mode("walk", 1.0, False, None, {}, "motor", True, "walking")
-    (still, own) = loads_of(machine, [stand, walk], samples=samples)
+    spring = chosen.spring if chosen else None
+    (still, own) = loads_of(machine, [stand, walk], samples=samples, spring=spring)
     counted = [k for k, j in enumerate(own.series.joints) if fnmatchcase(j, joints)]
     if not counted:
         hint = closest(joints, own.series.joints)
@@ -109,7 +110,7 @@ def rows(
     for share in SPEEDS:
         speed = share * own.speed
         mode = replace(walk, changes={"gait.speed": f"{speed!r} m/s"} if share != 1.0 else {})
-        (moved,) = loads_of(machine, [mode], samples=samples)
+        (moved,) = loads_of(machine, [mode], samples=samples, spring=spring)
         costs = {
             name: tuple(cost(machine, name, load, counted, chosen) for load in (moved, still))
             for name in (one, two)
@@ -162,7 +163,7 @@ def cost(
         return Cost(float(bare[counted].sum()), float(full.on[counted].sum()))
     known_candidate(machine, name)
     chain = machine.ready.chain(name)
-    result = chain.moving(load.series)
+    result = chain.inverse(load.series)
     power = supply(result).supplied_energy / load.duration
     idle = load.mode.stands & _locks(chain, load) & (result.current == 0.0).all(axis=0)
     return Cost(float(power[counted].sum()), float((~idle)[counted].sum()))

@@ -16,8 +16,8 @@ from actuators.chain import ChainResult
 from actuators.energy.energy import integral
 from actuators.energy.regeneration import BUS, supply_of
 from actuators.supply.battery import Battery
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.track import Account
 from pipeline.machine.drivetrains import Drivetrains
 from pipeline.machine.joint import JointModel, joints_of
@@ -69,7 +69,7 @@ def through(load: Load, built: Built, account: Account) -> Full:
     for joints, design in built.values():
         chain = design.chain(0, engaged=not mode.stands or mode.hold == "brake")
         models |= {model.name: model for model in joints_of(chain, joints)}
-    result = Drivetrains("answer", tuple(models[j] for j in names)).moving(load.series)
+    result = Drivetrains("answer", tuple(models[j] for j in names)).inverse(load.series)
     driver, idle, on = np.zeros(result.current.shape), np.zeros(len(names)), np.ones(len(names))
     for joints, design in built.values():
         at = [names.index(joint) for joint in joints]

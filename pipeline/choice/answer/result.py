@@ -17,7 +17,7 @@ from pipeline.choice.answer.break_even import known_candidate, rows
 from pipeline.choice.answer.sides import side_rows
 from pipeline.choice.answer.tables import ROBOT, tables_of, words
 from pipeline.choice.choose import Chosen, choose
-from pipeline.choice.mission import read_mission
+from pipeline.choice.missions.mission import read_mission
 from pipeline.choice.wanted import Wanted
 from pipeline.progress import Progress
 from reports.pages.choice_page import PartSource, write_choice_page
@@ -68,11 +68,12 @@ class Choice(Result):
         ]
         unknown = self.table("unknowns").frame()
         last = "nothing unprinted would change the choice"
-        if len(unknown) and unknown["worth_W"][0] > 0.0:
+        if len(unknown) and unknown["worth_W"][0] > 1e-6:
             top = unknown.iloc[0]
+            unit = "" if top["unit"] == "1" else f" {top['unit']}"
             last = (
                 f"measure next {top['part']}.{top['entry']} ({top['low']:.3g} to "
-                f"{top['high']:.3g} {top['unit']}): worth {top['worth_W']:.2g} W of the expected "
+                f"{top['high']:.3g}{unit}): worth {top['worth_W']:.2g} W of the expected "
                 f"regret of {robot['regret_W']:.2g} W"
             )
         return [first, "; ".join(each), last + self._even]
@@ -103,7 +104,7 @@ def choice(
 
     Args:
         machine: From `load`.
-        mission: CSV; see `pipeline.choice.mission`.
+        mission: CSV; see `pipeline.choice.missions.mission`.
         wanted: What is searched and counted.
         compare: Two candidates for the table ``break_even``: alternatives of the machine's actuator
             files, or ``answer``.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -10,12 +11,12 @@ from numpy.typing import NDArray
 
 from actuators.energy.energy import integral
 from actuators.loading.build import WINDING
-from actuators.units import from_si
+from actuators.units import from_si, known_units
 from pipeline.choice import heat
 from pipeline.choice.answer.full import Full, lasting
 from pipeline.choice.choose import Chosen
-from pipeline.choice.designs import Designs
 from pipeline.choice.loads import Load
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded
 from reports.table import Table, table_of
 from reports.tables.choice import (
@@ -64,6 +65,7 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
                 gear=gear,
                 ratio=float(design.ratio[0]),
                 brake=brake,
+                spring=_springs(chosen, found.demanded.joints),
                 driver=chosen.shelf.driver,
                 battery="",
                 power_W=power,
@@ -102,6 +104,7 @@ def _robot_row(chosen: Chosen, rows: Sequence[AnswerRow], day: Sequence[DayRow])
         gear="",
         ratio=None,
         brake="",
+        spring="",
         driver="",
         battery=chosen.battery.name,
         energy_Wh_per_day=energy,
@@ -112,6 +115,12 @@ def _robot_row(chosen: Chosen, rows: Sequence[AnswerRow], day: Sequence[DayRow])
         **totals,
         **powers,
     )
+
+
+def _springs(chosen: Chosen, joints: Sequence[str]) -> str:
+    """Those of the options that stand beside actuators of some joints."""
+    each = {text: text.partition("=")[0] for text in chosen.wanted.springs}
+    return ", ".join(t for t, p in each.items() if any(fnmatchcase(j, p) for j in joints))
 
 
 def words(design: tuple[str, str, str]) -> str:
@@ -130,9 +139,8 @@ def front_rows(chosen: Chosen) -> list[FrontRow]:
             f"{group}: {words(found.designs.parts[found.looked[found.front[i]]])}"
             for (group, found), i in zip(groups, which, strict=True)
         ]
-        own = float(p)
-        energy, hours = own * chosen.hours, float(lasts[k - 1])
-        rows.append(FrontRow(k, own, energy, hours, float(m), "; ".join(names)))
+        energy, hours = float(p) * chosen.hours, float(lasts[k - 1])
+        rows.append(FrontRow(k, float(p), energy, hours, float(m), "; ".join(names)))
     return rows
 
 
@@ -335,8 +343,8 @@ def unknown_rows(chosen: Chosen) -> list[UnknownRow]:
     for group, doubt in chosen.doubts.items():
         known = zip(doubt.unknowns, doubt.worth(), doubt.moves(), strict=True)
         for (part, entry, number), worth, moves in known:
-            low, high = (from_si(x, number.unit) for x in (number.low, number.high))
-            rows.append(
-                UnknownRow(group, part, entry, low, high, number.unit, float(worth), float(moves))
-            )
+            unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
+            ends = [from_si(x, unit) for x in (number.low, number.high)]
+            own = (group, part, entry, *ends, number.unit, float(worth), float(moves))
+            rows.append(UnknownRow(*own))
     return sorted(rows, key=lambda row: (-row.worth_W, -abs(row.moves_W)))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from actuators.loading.data_sheet import Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS
+from actuators.units import quantity
 from pipeline.cli.options import (
     OUT,
     AddVerb,
@@ -21,12 +22,15 @@ from pipeline.progress import Progress
 
 #: The day that comes with the project, of any walking robot.
 DAY = Path(__file__).parents[2] / "choice" / "missions" / "day.csv"
+#: Draws beyond which an answer changes no more, and memory ends.
+MOST_DRAWS = 100_000
 _NUMBERS = {
     "idle": Entry("power", "of a driver that is on", "0.672 W"),
     "hotel": Entry("power", "of the electronics", "10 W"),
     "battery": Entry("energy", "when full, in place of the pack's", "500 Wh"),
     "voltage": Entry("voltage", "of the supply", "48 V"),
     "present": Entry("mass", "of an actuator that the bodies hold already", "0.48 kg"),
+    "present-battery": Entry("mass", "of a battery that they hold; the pack's own", "0 kg"),
 }
 
 
@@ -62,6 +66,10 @@ def add_verb(add: AddVerb) -> None:
             metavar="NUMBER",
             help=f"{entry.kind} {entry.words}, such as '{entry.example}'",
         )
+    text = "spring beside actuators, such as '*_knee=3 N*m/rad@40 deg'; PATTERN alone: found"
+    sub.add_argument(
+        "--spring", action="append", default=[], metavar="PATTERN[=STIFFNESS@ANGLE]", help=text
+    )
     for word, usual in (("driver", DRIVER), ("pack", PACK)):
         text = f"part that is the {'battery' if word == 'pack' else word}; {usual}"
         sub.add_argument(f"--{word}", default=usual, metavar="NAME", help=text)
@@ -93,9 +101,10 @@ def run_choose(options: argparse.Namespace) -> int:
         from pipeline.simulation.settings import regeneration_of
 
         policy = regeneration_of(options.regeneration)
-        if options.draws < 8:
-            raise ChoiceError(f"--draws {options.draws}: at least 8")
-        numbers = {name: _number(name, getattr(options, name)) for name in _NUMBERS}
+        if not 8 <= options.draws <= MOST_DRAWS:
+            raise ChoiceError(f"--draws {options.draws}: expected 8 to {MOST_DRAWS}")
+        given = vars(options)
+        numbers = {name: _number(name, given[name.replace("-", "_")]) for name in _NUMBERS}
         value = {name: None if x is None else x.value for name, x in numbers.items()}
         machine = load(
             options.robot,
@@ -118,6 +127,8 @@ def run_choose(options: argparse.Namespace) -> int:
             pack=options.pack,
             battery=value["battery"],
             present=value["present"],
+            present_battery=value["present-battery"],
+            springs=tuple(options.spring),
             draws=options.draws,
         )
         result = choice(
@@ -139,6 +150,7 @@ def _number(name: str, words: str | None) -> Number | None:
     """An option with its unit, SI."""
     if words is None:
         return None
-    if words.strip() in ("0", "0 W"):
-        return Number(0.0, 0.0, 0.0, "W", "0")
+    nothing = words == "0" or (words[:1] == "0" and not quantity(words, _NUMBERS[name].kind))
+    if nothing and name not in ("voltage", "battery"):
+        return Number(0.0, 0.0, 0.0, "1", "0")
     return read_entry(name, words, _NUMBERS)

@@ -20,6 +20,8 @@ def add_export(add: AddVerb) -> None:
     sub.add_argument(
         "--robot", type=named_path, help="robot file or URDF; the one that the model file names"
     )
+    text = "folder of actuator files that the model was found with; actuators/catalog by default"
+    sub.add_argument("--actuators", type=named_path, metavar="DIR", help=text)
     sub.add_argument(
         "--mapping", type=named_path, help="mapping file with [pd_gains]: they become the gains"
     )
@@ -30,9 +32,12 @@ def run_export(given: argparse.Namespace) -> int:
     from pipeline.simulation.export.exported import exported
     from reports.atomic import write_text
 
-    made = exported(given.model, given.to, robot=given.robot, mapping=given.mapping)
+    files = {"robot": given.robot, "actuators": given.actuators, "mapping": given.mapping}
+    made = exported(given.model, given.to, **files)
     write_text(given.out, made.text)
     print(f"written to {given.out}: {made.joints} joints")
+    for words in made.remarks:
+        print(f"note: {words}")
     for words in made.left:
         print(f"not carried over: {one_line(words)}")
     return 0

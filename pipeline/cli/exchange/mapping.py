@@ -49,18 +49,25 @@ def run_mapping(given: argparse.Namespace) -> int:
         expected = _expected(given.robot) if given.robot else None
         made = first_mapping(given.log, expected)
     write_text(given.out, made.text)
-    print(f"written to {given.out}: {len(made.mapped)} columns, {len(made.open)} left for you")
+    counted = f"{len(made.mapped)} columns, {len(made.open)} left for you"
+    none = "nothing to map, the columns are those of the log format"
+    print(f"written to {given.out}: {counted if made.mapped or made.open else none}")
     if made.open:
         print(f"look at: {one_line(', '.join(made.open))}")
     robot = f" --robot {shlex.quote(str(given.robot))}" if given.robot else ""
+    steps = [""]
     if expected is not None:
         try:
-            plan_reading(given.log, expected, load_mapping(given.out))
+            plan = plan_reading(given.log, expected, load_mapping(given.out))
         except GapError as error:
             print(f"still missing: {error}")
+            if made.asks_gains:
+                print(f"gains: take the # off [pd_gains] at the end of {given.out}, put your own")
             return 1
+        steps = ["power "] if plan.supply_alone else ["", "power "] if plan.of_supply else [""]
     log, mapping = shlex.quote(str(given.log)), shlex.quote(str(given.out))
-    print(f"next: python -m pipeline gap {log} --mapping {mapping}{robot}")
+    for step in steps:
+        print(f"next: python -m pipeline gap {step}{log} --mapping {mapping}{robot}")
     return 0
 
 

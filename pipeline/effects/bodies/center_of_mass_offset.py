@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
-from pipeline.effects.bodies.link_mass import felt
+from pipeline.effects.bodies.link_mass import observable
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -25,8 +25,8 @@ class CenterOfMassOffset(Effect):
     excitation = "holds the link in postures all around its axis"
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """Every moving link whose body the torques feel."""
-        return [(link,) for link, joint in model.links.items() if felt(model, m, joint)]
+        """Every moving link whose body the torques can show."""
+        return [(link,) for link, joint in model.links.items() if observable(model, m, joint)]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Displace it."""

@@ -33,7 +33,7 @@ class LinkMass(Effect):
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
         """Every moving link; the base's own mass rests on measured feet unseen."""
-        return [(link,) for link, joint in model.links.items() if felt(model, m, joint)]
+        return [(link,) for link, joint in model.links.items() if observable(model, m, joint)]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Add the mass."""
@@ -89,7 +89,7 @@ def own_mass(model: MachineModel, link: str) -> float:
     return float(model.rigid.inertias[joint].mass)
 
 
-def felt(model: MachineModel, m: Measurement, joint: str) -> bool:
-    """Whether joint torques feel the body at a joint at all."""
+def observable(model: MachineModel, m: Measurement, joint: str) -> bool:
+    """Whether joint torques depend on the body at a joint at all."""
     floating = model.floating and model.rigid.getJointId(joint) == 1
     return not (floating and m.foot_force is not None and not np.isnan(m.foot_force).any())

@@ -20,7 +20,7 @@ class Backlash(Effect):
     The motor leads by width / 2 tanh(torque / crossing) + torque / stiffness: a describing
     function of backlash with seated flanks (Nordin and Gutman, Automatica 38, 2002, treat backlash
     with elastic flanks). Below the crossing torque the joint floats between the flanks, where its
-    place is not told by the torque alone; the flanks give, and their stiffness comes with the
+    place does not follow from the torque alone; the flanks give, and their stiffness comes with the
     width.
     """
 

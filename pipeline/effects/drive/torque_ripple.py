@@ -8,12 +8,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.elements.position_torque import Ripple
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
-Array = NDArray[np.float64]
 _LEAST_ORDER = 4.0  # periods per turn; below it is a spring rather than a ripple
 _PERIODS = 1.5  # least number of periods inside the travel
 
@@ -39,7 +39,7 @@ class TorqueRipple(Effect):
     signature = "position"
     excitation = "turns slowly and evenly through the whole travel"
 
-    def orders(self, m: Measurement, joint: int) -> NDArray[np.float64]:
+    def orders(self, m: Measurement, joint: int) -> Array:
         """Orders that this motion can show, so dense that none lies between two."""
         q, v = m.q[:, joint], m.v[:, joint]
         travel = float(np.ptp(q))

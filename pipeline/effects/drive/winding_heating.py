@@ -52,7 +52,7 @@ class WindingHeating(Effect):
 
 
 class SensedHeating(WindingHeating):
-    """The same where a sensor on the motor's housing is read: it tells what warmed it before."""
+    """The same where a sensor on the motor's housing is read: it shows what warmed it before."""
 
     coordinates: ClassVar[tuple[Coordinate, ...]] = (
         Coordinate("sensor_gain", 0.1, required=False),
@@ -60,7 +60,7 @@ class SensedHeating(WindingHeating):
     )
 
     def places(self, model: MachineModel, m: Measurement) -> list[Place]:
-        """Joints with a motor whose temperature is measured beside an electrical channel."""
+        """Joints with a motor whose temperature and an electrical channel are measured."""
         return _places(model, m) if m.temperature is not None else []
 
 

@@ -25,7 +25,7 @@ class EffortGain(Effect):
     """A column of torque, current, voltage or power that reads a multiple of what it should.
 
     It acts at one column, or at the like columns of all joints (``*__current_A``). A current
-    without a voltage beside it cannot tell the sensor's gain of one joint from the torque constant,
+    without a voltage cannot tell the sensor's gain of one joint from the torque constant,
     so that there the constant has the name. With a measured current, voltage is predicted from
     that current over its gain: the two columns together tell gain and constant apart.
     """

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.identification.compare.observe import observe_chunk
 from pipeline.logs.prepared.contact import Contact
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, UNUSED, Measurement
+from pipeline.logs.prepared.measurement import TEST, TRAIN, UNUSED, VALIDATION, Measurement
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.stream import CHUNK_ROWS, Stream, Survey, prepared_chunks
@@ -132,22 +132,22 @@ class LongLogs:
 
     def _part(self, k: int, one: Prepared) -> NDArray[np.int8]:
         """Which rows of a chunk prove, shape (N,)."""
-        proving = [not ((part == FIT).any()) for part in self.parts.part]
+        proving = [not ((part == TRAIN).any()) for part in self.parts.part]
         out = np.full(len(one), UNUSED, dtype=np.int8)
         survey = self.surveys[k]
         if proving[k]:
-            out[:] = PROVE
+            out[:] = TEST
         elif any(proving):
             pass
         elif np.isfinite(survey.proves_from):
-            out[one.time >= survey.proves_from + self.parts.guard] = PROVE
+            out[one.time >= survey.proves_from + self.parts.guard] = TEST
         else:
             # Around what naming worked on a filter's reach had a say, too.
             ready = self.prepared[k]
-            said = ready.time[np.isin(self.parts.part[k], (FIT, CHOOSE))]
+            said = ready.time[np.isin(self.parts.part[k], (TRAIN, VALIDATION))]
             after = np.clip(np.searchsorted(said, one.time), 1, said.size - 1)
             far = np.minimum(np.abs(one.time - said[after - 1]), np.abs(one.time - said[after]))
-            out[far > 0.999 * self.parts.guard] = PROVE
+            out[far > 0.999 * self.parts.guard] = TEST
         return out
 
 
@@ -162,9 +162,9 @@ def parts_of_surveys(
         surveys: Of the same logs.
     """
     if not any(np.isfinite(s.proves_from) for s in surveys):
-        if any(not (part == FIT).any() for part in parts.part):
+        if any(not (part == TRAIN).any() for part in parts.part):
             return parts
-        rule = "proved on every row that had no say in the naming"
+        rule = "tested on every row that had no say in the naming"
         return replace(parts, rule=rule)
     out = []
     for part, block, one, seen in zip(parts.part, parts.block, prepared, surveys, strict=True):
@@ -173,13 +173,13 @@ def parts_of_surveys(
             rows = block == b
             late = one.time[rows] >= seen.proves_from
             if late.all():
-                kinds[rows] = PROVE
+                kinds[rows] = TEST
             elif late.any():
                 kinds[rows] = UNUSED
-            elif kinds[rows][0] == PROVE:
-                kinds[rows] = FIT
+            elif kinds[rows][0] == TEST:
+                kinds[rows] = TRAIN
         out.append(kinds)
-    return replace(parts, part=tuple(out), rule="proved on the last share of every log")
+    return replace(parts, part=tuple(out), rule="tested on the last share of every log")
 
 
 class _Gathered:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.identification.compare.circumstances import gap_of
 from pipeline.identification.compare.long import LongLogs
 from pipeline.identification.regression.floor import floor_of
-from pipeline.logs.prepared.measurement import CHOOSE, PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 
@@ -56,15 +56,15 @@ def stages(
     """
     by_log = [_along(models, Simulator(m)) for m in measurements]
     held = list(zip(measurements, by_log, strict=True))
-    chosen = _root([_squares(m, predictions, CHOOSE) for m, predictions in held])
+    chosen = _root([_squares(m, predictions, VALIDATION) for m, predictions in held])
     if long is None:
-        proved = _root([_squares(m, predictions, PROVE) for m, predictions in held])
+        proved = _root([_squares(m, predictions, TEST) for m, predictions in held])
     else:
         proved = _root(
             [
-                _squares(simulator.measurement, _along(models, simulator), PROVE)
+                _squares(simulator.measurement, _along(models, simulator), TEST)
                 for _, simulator in long.chunks(models[0][1], measurements)
-                if (simulator.measurement.part == PROVE).any()
+                if (simulator.measurement.part == TEST).any()
             ]
         )
     return tuple(
@@ -109,4 +109,4 @@ def overall(gap: Array) -> float:
 
 def noise_floor(measurements: Sequence[Measurement]) -> Array:
     """Of the compared channel by joint, of the logs that prove, shape (J,)."""
-    return np.asarray(floor_of(measurements, PROVE)[:, 0])
+    return np.asarray(floor_of(measurements, TEST)[:, 0])

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.effects.base import REACH, Coordinate, Place
 from pipeline.logs.errors import NamingError
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 
@@ -105,7 +105,7 @@ def make_bench(measurement: Measurement, share: float = 1.0) -> Bench:
     for piece in m.pieces:
         kept.append(np.arange(piece.start, piece.stop, step))
     rows = np.concatenate(kept)
-    rows = rows[(m.part[rows] >= FIT) & m.mask[rows].any(axis=1)]
+    rows = rows[(m.part[rows] >= TRAIN) & m.mask[rows].any(axis=1)]
     order = np.lexsort((rows, m.block[rows], m.part[rows]))
     rows = rows[order]
     part, block = m.part[rows], m.block[rows]
@@ -113,7 +113,7 @@ def make_bench(measurement: Measurement, share: float = 1.0) -> Bench:
     edges = np.concatenate([[0], new, [rows.size]])
     parts = {
         p: slice(int(np.searchsorted(part, p)), int(np.searchsorted(part, p, side="right")))
-        for p in (FIT, CHOOSE, PROVE)
+        for p in (TRAIN, VALIDATION, TEST)
     }
     independent = 1.0
     if np.isfinite(m.bandwidth):
@@ -127,7 +127,7 @@ def make_benches(measurements: Sequence[Measurement]) -> tuple[Bench, ...]:
     Raises:
         NamingError: A part of the data has no usable row in any log.
     """
-    for part, name in ((FIT, "fit"), (CHOOSE, "choose"), (PROVE, "prove")):
+    for part, name in ((TRAIN, "fit"), (VALIDATION, "choose"), (TEST, "prove")):
         if not any(((m.part == part) & m.mask.any(axis=1)).any() for m in measurements):
             names = ", ".join(m.name for m in measurements)
             raise NamingError(f"{names}: no usable row is left to {name} with; log longer")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.identification.results import UNCERTAINTIES
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,7 @@ def floor_of(measurements: Sequence[Measurement], *parts: int) -> Array:
         measurements: One per log.
         parts: *fit* and *choose* by default: logs that only prove have no say, in this neither.
     """
-    own = [m for m in measurements if np.isin(m.part, parts or (FIT, CHOOSE)).any()]
+    own = [m for m in measurements if np.isin(m.part, parts or (TRAIN, VALIDATION)).any()]
     return np.asarray(np.sqrt(np.mean([m.noise**2 for m in own or measurements], axis=0)))
 
 
@@ -49,7 +49,7 @@ def left_open(problem: Problem) -> Array:
     there are any: another motion may ask for what the first did not show.
     """
     sums = problem.sums()
-    blocks = sums.blocks(FIT, CHOOSE)
+    blocks = sums.blocks(TRAIN, VALIDATION)
     spread = sums.covariance(sums.solve(blocks), blocks)
     count, precision = len(problem.tolerances), problem.precision
     refitted = problem.uncertainty > UNCERTAINTIES[0]
@@ -60,11 +60,11 @@ def left_open(problem: Problem) -> Array:
     spread[~known, :] = spread[:, ~known] = 0.0
     prior = 1.0 / np.maximum(precision[:count], 1e-12)
     spread[np.arange(count), np.arange(count)] += np.where(known[:count], 0.0, prior)
-    proves = any((b.measurement.part == PROVE).any() for b in problem.benches)
+    proves = any((b.measurement.part == TEST).any() for b in problem.benches)
     variance, rows = np.zeros(problem.sigma.shape), np.zeros(problem.sigma.shape)
     for stack in problem.stacks():
         bench = stack.bench
-        part = bench.parts[PROVE] if proves else problem.head(problem.benches.index(bench))
+        part = bench.parts[TEST] if proves else problem.head(problem.benches.index(bench))
         good = bench.measurement.mask[bench.rows[part]]
         for j, X in stack.X.items():
             own = spread[np.ix_(stack.ids[j], stack.ids[j])]

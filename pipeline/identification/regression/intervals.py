@@ -25,7 +25,7 @@ from pipeline.identification.regression.normal_equations import BlockSums, inver
 from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.identification.results import Estimate
-from pipeline.logs.prepared.measurement import CHOOSE, FIT
+from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 from pipeline.simulation.rigid_bodies import possible, strained
 
 LAW: Final = 0.01  # share to which a law holds at best
@@ -118,7 +118,7 @@ def _estimate(
 
 def _draws(sums: BlockSums) -> Array:
     """Deviations of the estimate in bootstrap samples, shape (SAMPLES, n)."""
-    blocks = sums.blocks(FIT, CHOOSE)
+    blocks = sums.blocks(TRAIN, VALIDATION)
     prior = np.diag(sums.precision)
     H, h = sums.H[blocks], sums.h[blocks]
     pull = sums.precision * sums.mean

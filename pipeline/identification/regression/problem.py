@@ -31,7 +31,7 @@ from pipeline.identification.regression.tolerances import (
     nuisances,
     of_own_leg,
 )
-from pipeline.logs.prepared.measurement import CHOOSE, FIT
+from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction
 from pipeline.simulation.rigid_bodies import legs_are_separate
@@ -459,4 +459,4 @@ class Problem:
     def head(self, log: int) -> slice:
         """Rows of *fit* and *choose* of one log's bench."""
         parts = self.benches[log].parts
-        return slice(parts[FIT].start, parts[CHOOSE].stop)
+        return slice(parts[TRAIN].start, parts[VALIDATION].stop)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Accepted, Problem
-from pipeline.logs.prepared.measurement import CHOOSE, FIT
+from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
 Array = NDArray[np.float64]
 #: Times the columns are computed, at most, and steps that are made with the same.
@@ -38,7 +38,7 @@ def refit(problem: Problem) -> Problem:
 
 def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
     stacks, sums = problem.stacks(), problem.sums()
-    A = sums.H[sums.blocks(FIT, CHOOSE)].sum(axis=0) + np.diag(sums.precision)
+    A = sums.H[sums.blocks(TRAIN, VALIDATION)].sum(axis=0) + np.diag(sums.precision)
     damping = 0.0
     for _ in range(_STEPS):
         D = np.diag(damping * np.diag(A))
@@ -100,7 +100,7 @@ def _stepped(problem: Problem, theta: Array) -> Problem:
 def tolerances_of(problem: Problem) -> dict[tuple[str, str], tuple[float, float]]:
     """Tolerances as *fit* and *choose* show them: (kind, place) to estimate and prior sigma."""
     sums = problem.sums()
-    theta = sums.solve(sums.blocks(FIT, CHOOSE))
+    theta = sums.solve(sums.blocks(TRAIN, VALIDATION))
     held = problem.held + theta[: len(problem.tolerances)]
     return {
         (n.kind, n.place): (float(v) * n.sigma, n.sigma)

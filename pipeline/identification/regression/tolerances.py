@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.elements.friction import Friction
-from pipeline.effects.bodies.link_mass import felt
+from pipeline.effects.bodies.link_mass import observable
 from pipeline.effects.drive.joint_elasticity import COMPLIANCE_TOLERANCE
 from pipeline.effects.drive.torque_constant_error import CONSTANT_TOLERANCE
 from pipeline.effects.sensing.position_offset import ENCODER_TOLERANCE
@@ -127,7 +127,7 @@ def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple
     m = measurements[0]
     out = []
     for link, joint in model.links.items():
-        if felt(model, m, joint):
+        if observable(model, m, joint):
             out += [Nuisance(k, link, UNCERTAINTY * s, "1") for k, s in STRAINS.items()]
     electrical = "torque" not in m.channels
     for k, actuator in enumerate(model.actuators):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from pipeline.effects.base import Effect, Place, Values
 from pipeline.effects.drive.torque_ripple import TorqueRipple
-from pipeline.logs.prepared.measurement import FIT, Measurement
+from pipeline.logs.prepared.measurement import TRAIN, Measurement
 from pipeline.logs.reading.expected import Expected
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
@@ -178,7 +178,7 @@ def _measurement(
         a=np.gradient(v, time, axis=0),
         effort=np.zeros((n, j, len(like.channels))),
         mask=np.ones((n, j), dtype=np.bool_),
-        part=np.full(n, FIT, dtype=np.int8),
+        part=np.full(n, TRAIN, dtype=np.int8),
         block=np.zeros(n, dtype=np.intp),
         pieces=(slice(0, n),),
         lowpass=_same,

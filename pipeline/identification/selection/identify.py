@@ -27,7 +27,7 @@ from pipeline.identification.results import UNCERTAINTIES, Candidate, Found, Mem
 from pipeline.identification.selection.pool import Key, Term
 from pipeline.identification.selection.search import BODIES, CLOSE, Search, State
 from pipeline.identification.selection.settle import Settled, settle, settle_without
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, Measurement
+from pipeline.logs.prepared.measurement import TRAIN, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.progress import Progress
 
@@ -371,7 +371,7 @@ def _errors(search: Search, state: State) -> Array:
     """RMS error of the first channel on *choose* by estimates from *fit*, (J,); NaN: no rows."""
     pool = search.pool
     columns = search.columns(state)
-    part = (pool.channels[0].part != FIT).astype(np.intp)
+    part = (pool.channels[0].part != TRAIN).astype(np.intp)
     H, h = pool.parts(columns, search.weights, part)
     prior = np.diag(search.precision(columns, state.uncertainty))
     x = solve_spd(H[0] + prior, h[0])
@@ -379,7 +379,7 @@ def _errors(search: Search, state: State) -> Array:
     full[columns] = x
     out = np.full(len(pool.problem.model.joints), np.nan)
     for c in pool.channels:
-        rows = c.part == CHOOSE
+        rows = c.part == VALIDATION
         if c.number or c.count[rows].sum() == 0:
             continue
         own = full[c.ids]

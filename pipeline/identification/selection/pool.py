@@ -21,7 +21,7 @@ from pipeline.effects.registry import catalogue
 from pipeline.identification.regression.design_matrix import Bench, effect_columns, residual
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Problem
-from pipeline.logs.prepared.measurement import CHOOSE, FIT
+from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -69,7 +69,7 @@ class Channel:
         h: X^T r, (B, n).
         s: r^T r, (B,).
         count: Independent samples, (B,).
-        part: FIT or CHOOSE, (B,).
+        part: TRAIN or VALIDATION, (B,).
         number: Of the channel.
         effort: Mean square of the measured effort, in the noise's variance.
         noise: Of the highest frequencies in the bandwidth, taken as white there, in standard
@@ -312,7 +312,7 @@ def _channels(
                     [own[k][j][:, c] if j in own[k] else np.zeros(bench.rows.size) for k in ids]
                 )
                 good = m.mask[bench.rows, j]
-                for b in np.flatnonzero(np.isin(bench.block_part, (FIT, CHOOSE))):
+                for b in np.flatnonzero(np.isin(bench.block_part, (TRAIN, VALIDATION))):
                     rows = slice(int(bench.edges[b]), int(bench.edges[b + 1]))
                     x, r = X[:, rows], rest[j][rows, c]
                     H.append(x @ x.T)
@@ -368,7 +368,7 @@ def _noise(
         step = int(np.median(np.diff(rows)))
         rho = _correlation(m.kernel, step)
         gain = 6.0 - 8.0 * rho[0] + 2.0 * rho[1]
-        good = m.mask[rows, j] & np.isin(m.part[rows], (FIT, CHOOSE))
+        good = m.mask[rows, j] & np.isin(m.part[rows], (TRAIN, VALIDATION))
         follows = np.diff(rows) == step
         inner = good[:-2] & good[1:-1] & good[2:] & follows[:-1] & follows[1:]
         second = (r[:-2] - 2.0 * r[1:-1] + r[2:])[inner] / bench.weight

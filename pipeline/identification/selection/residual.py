@@ -12,7 +12,7 @@ from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.compare.circumstances import gap_of
 from pipeline.identification.results import Remainder
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
 from pipeline.simulation.predict import Prediction
 
 Array = NDArray[np.float64]
@@ -43,9 +43,9 @@ def remainders(
     for c, channel in enumerate(first.channels):
         rests = [gap_of(m, p, c) for m, p in zip(measurements, predictions, strict=True)]
         for j, joint in enumerate(first.joints):
-            held = _known(measurements, rests, j, PROVE)
+            held = _known(measurements, rests, j, TEST)
             # Where no row proves, those that were fitted are better than none.
-            seen = held if held.size else _known(measurements, rests, j, FIT, CHOOSE)
+            seen = held if held.size else _known(measurements, rests, j, TRAIN, VALIDATION)
             error = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
             if proved is not None and np.isfinite(proved[j, c]):
                 error = float(proved[j, c])

@@ -12,7 +12,7 @@ from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.identification import results as limits
 from pipeline.identification.results import Estimate, Found
-from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.read_off import two_sides
@@ -48,7 +48,7 @@ def read_off_two(
     """
     out: dict[str, Found] = {}
     for one, part, m in zip(prepared, parts.part, measurements, strict=True):
-        known = (part >= 0) & (part != PROVE)
+        known = (part >= 0) & (part != TEST)
         if one.channel != "torque" or not known.any() or one.other.get("motor_position") is None:
             continue
         learnt = replace(one, mask=one.mask & known[:, None])

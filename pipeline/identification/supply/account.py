@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.identification.supply.drawn import Drawn, drawn_along
 from pipeline.identification.supply.regression import (
+    DRAWS,
     SEED,
     Problem,
     better,
     blocks_of,
     choose,
     drawn_coefficients,
+    intervals,
     rivals_of,
 )
 from pipeline.identification.supply.sag import Sag, sag_of
@@ -35,6 +38,8 @@ UNEXPLAINED, MEASURED = "unexplained", "measured"
 RECOGNISED = "recognised"
 #: Share of the power's variance that a sum may leave which the power is said to follow.
 FOLLOWS = 0.5
+#: Part of the measured power that is rounding.
+_ROUNDING: Final = 1e-9
 #: Part of the measured power below which what stays unexplained is no finding.
 SMALL = 0.02
 
@@ -98,7 +103,7 @@ class Account:
             terms [W].
         reading: How samples were read: ``"mean"`` or ``"instant"``.
         wrong_sum: ``"recognised"``, ``"possible"`` or empty: whether motor currents times the
-            supply's voltage were taken for its power.
+            supply's voltage were taken for its power; where that is recognised nothing is found.
         sag: Where voltage and current of the supply were both measured, else None.
         by_model: Joints whose torque no log tells.
         logs: Names.
@@ -158,6 +163,9 @@ def account(
         _refuse_few(rows, prepared)
         tried.append(_chosen(rows, terms, reading, holdout, prove_last))
     best = min(tried, key=lambda one: one.error)
+    wrong_sum = _wrong_sum(best.problem, best.names)
+    if wrong_sum == RECOGNISED:  # no term means anything in what is no power
+        best = replace(best, names=(), coefficients=np.zeros(0), draws=np.zeros((DRAWS, 0)))
     misses = [
         float(np.sqrt(np.mean((best.rows.power - x)[best.proves] ** 2)))
         for x in (best.rows.predicted, best.explained)
@@ -170,7 +178,7 @@ def account(
         explained=best.explained,
         rms=(misses[0], misses[1]),
         reading=best.reading,
-        wrong_sum=_wrong_sum(best.problem, best.names),
+        wrong_sum=wrong_sum,
         sag=sag_of(samples),
         by_model=tuple(dict.fromkeys(j for d in drawn for j in d.by_model)),
         logs=tuple(one.log.name for one in prepared),
@@ -245,10 +253,15 @@ def _shares(best: _Chosen) -> tuple[Share, ...]:
     proof, block = best.rows.only(best.proves), best.block[best.proves]
     terms = {t.name: t for t in best.problem.terms}
     rivals = rivals_of(best.problem, best.names)
-    out = [_own(name, float(proof.own[name].mean())) for name in OWN]
+    ends = intervals(best.problem, best.names, best.draws, rivals)
+    total = float(proof.power.mean())
+    out = []
+    for name in OWN:
+        mean = float(proof.own[name].mean())
+        out.append(_own(name, mean if abs(mean) > _ROUNDING * total else 0.0))
     for k, name in enumerate(best.names):
         mean = float(proof.columns[name].mean())
-        own = float(best.coefficients[k]), best.draws[:, k]
+        own = float(best.coefficients[k]), *ends[name]
         out.append(_found(terms[name], *own, mean, rivals[name]))
     left = proof.power - proof.predicted
     columns = [proof.columns[n] for n in best.names]
@@ -261,7 +274,6 @@ def _shares(best: _Chosen) -> tuple[Share, ...]:
         parts = zip(coefficients, columns, strict=True)
         spread.append(float(np.mean(left[kept])) - sum(c * np.mean(x[kept]) for c, x in parts))
     low, high = (float(x) for x in np.quantile(spread, [0.025, 0.975]))
-    total = float(proof.power.mean())
     watts = float((best.rows.power - best.explained)[best.proves].mean())
     return (
         *out,
@@ -286,9 +298,8 @@ def _own(name: str, watts: float) -> Share:
 
 
 def _found(
-    term: Term, coefficient: float, draws: Array, mean: float, rivals: tuple[str, ...]
+    term: Term, coefficient: float, low: float, high: float, mean: float, rivals: tuple[str, ...]
 ) -> Share:
-    low, high = (float(x) for x in np.quantile(draws, [0.025, 0.975]))
     ends = sorted((low * mean, high * mean))
     name = {"copper": "more_copper", "friction": "more_friction"}.get(term.name, term.name)
     watts = coefficient * mean, ends[0], ends[1]

@@ -9,7 +9,7 @@ are those of a bootstrap of blocks (Künsch 1989, Annals of Statistics 17(3)).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -157,6 +157,29 @@ def drawn_coefficients(problem: Problem, chosen: Sequence[str]) -> Array:
     for d in range(DRAWS):
         kept = np.concatenate([rows[b] for b in rng.integers(0, len(rows), len(rows))])
         out[d] = problem.fit(chosen, kept)
+    return out
+
+
+def intervals(
+    problem: Problem, chosen: Sequence[str], draws: Array, rivals: Mapping[str, Sequence[str]]
+) -> dict[str, tuple[float, float]]:
+    """95 % intervals of coefficients, whichever of the terms that do as well is in the sum.
+
+    Args:
+        problem: Rows and terms.
+        chosen: Terms.
+        draws: Their coefficients, shape (DRAWS, T).
+        rivals: Of each of them: with one in its place the others have other coefficients.
+    """
+    sets: list[tuple[int | None, Array]] = [(None, draws)]
+    for k, name in enumerate(chosen):
+        for other in rivals[name]:
+            exchanged = [*chosen[:k], other, *chosen[k + 1 :]]
+            sets.append((k, drawn_coefficients(problem, exchanged)))
+    out = {}
+    for k, name in enumerate(chosen):
+        ends = [np.quantile(d[:, k], [0.025, 0.975]) for out_of, d in sets if out_of != k]
+        out[name] = float(min(e[0] for e in ends)), float(max(e[1] for e in ends))
     return out
 
 

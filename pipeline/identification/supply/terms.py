@@ -22,6 +22,8 @@ from pipeline.identification.supply.samples import Samples
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+#: A coefficient of what the supply gives for a motor's work counts the losses on the way, too.
+_UNSEEN = "that no torque shows, at each joint, with what drivers and windings lose for it"
 #: Of the model's own sum.
 OWN = ("work", "friction", "copper")
 
@@ -98,18 +100,15 @@ def terms_of(legs: Sequence[str], *, switched: bool) -> tuple[Term, ...]:
     """
     out = [
         Term("constant", "electronics and idle drives, the same all the time", "W"),
-        Term("drivers", "drivers: share of the power into the motors, 1/efficiency - 1", "1"),
-        Term("switching", "drivers: share of bus voltage times motor current", "1", high=0.1),
+        Term("drivers", "drivers' losses over the power into the motors, 1/efficiency - 1", "1"),
+        Term("switching", "drivers' losses over bus voltage times motor current", "1", high=0.1),
         Term("returned", "share of what motors return that is used again", "1", high=1.0),
         Term("copper", "copper losses beyond the data sheet's, relative", "1", low=-1.0),
         Term("friction", "friction beyond the log's or the model's, relative", "1", low=-1.0),
-        Term("extra_friction", "dry friction that no torque shows, each joint", "N*m"),
-        Term("extra_viscous", "viscous friction that no torque shows, each joint", "N*m*s/rad"),
+        Term("extra_friction", f"dry friction {_UNSEEN}", "N*m"),
+        Term("extra_viscous", f"viscous friction {_UNSEEN}", "N*m*s/rad"),
     ]
-    out += [
-        Term(f"extra_friction {leg}", f"friction of {leg} that no torque shows, each joint", "N*m")
-        for leg in legs
-    ]
+    out += [Term(f"extra_friction {leg}", f"friction of {leg} {_UNSEEN}", "N*m") for leg in legs]
     if switched:
         out.append(Term("idle", "each drive that is on", "W"))
     return tuple(out)

@@ -23,7 +23,7 @@ from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Remaind
 from pipeline.identification.selection.residual import remainders
 from pipeline.identification.selection.two_positions import READ_OFF
 from pipeline.identification.workflow.locate import Whereabouts
-from pipeline.logs.prepared.measurement import PROVE
+from pipeline.logs.prepared.measurement import TEST
 from pipeline.machine.machine import MachineModel
 
 Array = NDArray[np.float64]
@@ -162,7 +162,7 @@ def _told(
 
 
 def _left(where: Whereabouts, last: Stage) -> tuple[Remainder, ...]:
-    floor = floor_of(where.measurements, PROVE)
+    floor = floor_of(where.measurements, TEST)
     return remainders(where.measurements, last.predictions, floor, last.gaps)
 
 

@@ -23,8 +23,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from actuators.arrays import Array, Mask
 
 #: Share of an effort, root mean square, that honest models leave: less says nothing about columns.
 FLOOR: Final = 0.1

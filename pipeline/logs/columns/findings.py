@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.columns.explaining import Bodies
 from pipeline.logs.columns.hypotheses import Hypothesis, Reading, as_named
 from pipeline.logs.columns.search import Mended
@@ -18,7 +19,6 @@ from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.reading.plan import AS_NAMED
 
-Array = NDArray[np.float64]
 #: Check under which a suspicion stands that no fit may explain away.
 SUSPECTED: Final = "columns"
 #: Relative distance from a factor that has a name, within which a factor is taken for it.

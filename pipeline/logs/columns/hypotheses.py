@@ -12,10 +12,8 @@ from itertools import combinations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
+from actuators.arrays import Array, Index
 
 #: Factors on an effort: nearer to one they are a gain or bodies that differ.
 LEAST, MOST = 2.5, 3000.0

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Final, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.columns.explaining import Bodies, Explaining, Score
 from pipeline.logs.columns.hypotheses import (
     CAUSES,
@@ -25,9 +25,6 @@ from pipeline.logs.columns.hypotheses import (
     of_efforts,
     of_positions,
 )
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Fall of the score from which a reading counts, in units of minus twice a log-likelihood.
 ENOUGH: Final = 20.0

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.first_mapping.names import Named, assign
 from pipeline.logs.first_mapping.numbers import (
     ANGLES,
@@ -21,8 +21,8 @@ from pipeline.logs.first_mapping.numbers import (
     rate_of,
 )
 from pipeline.logs.reading.expected import Expected
+from pipeline.logs.reading.log import SUPPLY
 
-Array = NDArray[np.float64]
 POSITIONS: Final = ("position", "motor_position")
 #: Factor between a position and its velocity beyond which the position is a motor's.
 _GEARED: Final = 1.5
@@ -38,7 +38,7 @@ class Guess:
 
     Attributes:
         column: Its name in the file.
-        quantity: Of the log format; empty where nothing tells.
+        quantity: Of the log format; empty where it is not known.
         joint: The robot's name of it, or the log's own without a robot.
         unit: Of the file; empty for the log format's own.
         scale: Factor.
@@ -91,7 +91,7 @@ def guesses(
         expected: The robot's names and limits, where one is given.
 
     Returns:
-        Guesses, gear ratios that the motion shows by joint, and how joints were told.
+        Guesses, gear ratios that the motion shows by joint, and how joints were recognised.
     """
     seen = _Seen({n.column: n for n in names if n.column in data}, data, time)
     seen.rates = {c: rate_of(time, data[c]) for c in seen.of(*POSITIONS)}
@@ -100,20 +100,20 @@ def guesses(
     owners = list(dict.fromkeys(seen.named[c].joint for c in seen.of(*POSITIONS)))
     _called_otherwise(seen, owners)
     if expected is None:
-        told, by = {o: _own_name(o) for o in owners}, "as the log calls it"
+        assigned, by = {o: _own_name(o) for o in owners}, "as the log calls it"
     else:
-        told, by = assign(owners, expected.joints)
+        assigned, by = assign(owners, expected.joints)
     ratios: dict[str, float] = {}
     out: list[Guess] = []
     units: dict[str, str] = {}
     for column in seen.of(*POSITIONS):
         follower = next((f for f in moved.values() if f and f.position == column), None)
-        guess = _position(seen, column, told, expected, follower, ratios)
+        guess = _position(seen, column, assigned, expected, follower, ratios)
         units[seen.named[column].joint] = guess.unit
         out.append(guess)
     for column, named in seen.named.items():
-        if named.quantity not in ("", "supply", *POSITIONS):
-            out.append(_other(seen, column, told, expected, units, moved.get(column), ratios))
+        if named.quantity not in ("", *SUPPLY, *POSITIONS):
+            out.append(_other(seen, column, assigned, expected, units, moved.get(column), ratios))
     return out, ratios, by
 
 
@@ -159,14 +159,14 @@ def _positions_of_velocities(seen: _Seen) -> None:
 
 def _called_otherwise(seen: _Seen, owners: Sequence[str]) -> None:
     """Joints that other quantities call by other names than positions do: `enc 1`, `motor 1 A`."""
-    for quantity in {n.quantity for n in seen.named.values()} - {"", "supply", *POSITIONS}:
+    for quantity in {n.quantity for n in seen.named.values()} - {"", *SUPPLY, *POSITIONS}:
         columns = seen.of(quantity)
         own = list(dict.fromkeys(seen.named[c].joint for c in columns))
         if owners and not {*own} <= {*owners}:
-            told, _ = assign(own, owners)
+            assigned, _ = assign(own, owners)
             for column in columns:
                 named = seen.named[column]
-                seen.named[column] = replace(named, joint=told.get(named.joint, named.joint))
+                seen.named[column] = replace(named, joint=assigned.get(named.joint, named.joint))
 
 
 def _limits(joint: str, expected: Expected | None) -> tuple[float, float]:
@@ -179,13 +179,13 @@ def _limits(joint: str, expected: Expected | None) -> tuple[float, float]:
 def _position(
     seen: _Seen,
     column: str,
-    told: Mapping[str, str],
+    assigned: Mapping[str, str],
     expected: Expected | None,
     velocity: Follows | None,
     ratios: dict[str, float],
 ) -> Guess:
     named, x = seen.named[column], seen.data[column]
-    joint = told.get(named.joint, "")
+    joint = assigned.get(named.joint, "")
     why = seen.why.get(column, "")
     if not joint:
         text = f"no joint of {expected.robot if expected else 'the log'} is called so: put its name"
@@ -222,7 +222,7 @@ def _position(
 def _other(
     seen: _Seen,
     column: str,
-    told: Mapping[str, str],
+    assigned: Mapping[str, str],
     expected: Expected | None,
     units: Mapping[str, str],
     velocity: Follows | None,
@@ -230,7 +230,7 @@ def _other(
 ) -> Guess:
     """Everything that is no position."""
     named, x = seen.named[column], seen.data[column]
-    joint, quantity = told.get(named.joint, ""), named.quantity
+    joint, quantity = assigned.get(named.joint, ""), named.quantity
     if not joint:
         return Guess(
             column, quantity, "JOINT", named.unit, "of no joint with a position", sure=False
@@ -247,7 +247,7 @@ def _other(
         )
     if quantity == "velocity" and velocity:
         return _velocity(column, joint, units.get(named.joint, ""), velocity, why, ratios)
-    if quantity == "current" and most > _AMPERES:
+    if quantity == "current" and current_unit(x):
         others = (("current", "A", "in amperes"),)
         return Guess(column, quantity, joint, "mA", f"{why}; up to {most:.4g}", others=others)
     if quantity == "torque":
@@ -258,6 +258,11 @@ def _other(
         unit = "mN*m" if limit < np.inf and most > _TORQUES * limit else ""
         return Guess(column, quantity, joint, unit, f"{why}; up to {most:.4g}", others=others)
     return Guess(column, quantity, joint, "", why)
+
+
+def current_unit(x: Array) -> str:
+    """Unit of a current that nothing states: milliamperes where amperes would be too many."""
+    return "mA" if float(np.nanmax(np.abs(x))) > _AMPERES else ""
 
 
 def _velocity(

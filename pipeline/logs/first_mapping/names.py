@@ -9,7 +9,7 @@ from typing import Final
 
 from actuators.units import dimension
 from pipeline.logs.reading.csv_head import unit_spelt
-from pipeline.logs.reading.log_format import JOINT_COLUMNS
+from pipeline.logs.reading.log_format import JOINT_COLUMNS, SUPPLY_COLUMNS
 
 #: Words of a name and what they say; a word of several letters may begin a longer one.
 _WORDS: Final = {
@@ -28,7 +28,11 @@ _GOALS: Final = {
 #: Words of columns that hold no measurement.
 _STATES: Final = {"enabled", "enable", "status", "error", "mode", "on", "off", "raw", "flag"}
 _MOTOR: Final = frozenset(("motor", "rotor"))
-_SUPPLY: Final = frozenset(("supply", "battery", "bus", "vbat", "bat", "rail"))
+_SUPPLY: Final = frozenset(
+    ("supply", "battery", "bus", "bat", "rail", "pack", "psu", "vbat", "vbus")
+)
+#: Quantities of a supply, by those of a joint.
+_OF_SUPPLY: Final = {"voltage": "supply", "current": "supply_current", "power": "supply_power"}
 #: Words that say nothing about which joint it is.
 _EMPTY: Final = {
     *("joint", "joints", "state", "states", "actual", "act", "measured", "meas", "present"),
@@ -48,7 +52,8 @@ class Named:
 
     Attributes:
         column: The name.
-        quantity: Of the log format; ``"supply"`` for a supply's voltage; empty where unknown.
+        quantity: Of the log format, those of the supply as in `SUPPLY_COLUMNS`; empty where
+            unknown.
         joint: What is left of the name; empty where nothing is.
         unit: Stated by the name or a row of units; empty where none is.
         motor: Whether the name speaks of a motor.
@@ -98,17 +103,18 @@ def _read(column: str, text: str, unit: str) -> Named:
         quantity = ""
     elif goal:
         quantity = {"": "goal_position", "position": "goal_position"}.get(quantity, "")
-    elif _SUPPLY & {*words} and quantity in ("voltage", "") and dimension(unit or "V") == "voltage":
-        quantity = "supply"
+    elif _SUPPLY & {*words} and (quantity in _OF_SUPPLY or not quantity):
+        volts = {"vbat", "vbus"} & {*words} or (unit and dimension(unit) == "voltage")
+        quantity = _OF_SUPPLY.get(quantity, "supply" if volts else "")
     elif motor and quantity == "position":
         quantity = "motor_position"
-    if quantity not in ("", "supply") and unit and not _fits(quantity, unit):
+    if quantity and unit and not _fits(quantity, unit):
         quantity = ""
     return Named(column, quantity, "_".join(rest), unit, motor)
 
 
 def _fits(quantity: str, unit: str) -> bool:
-    own = next(u for q, u in JOINT_COLUMNS.values() if q == quantity)
+    own = dict((*JOINT_COLUMNS.values(), *SUPPLY_COLUMNS.values()))[quantity]
     return dimension(own) == dimension(unit)
 
 
@@ -120,23 +126,23 @@ def assign(owners: Sequence[str], joints: Sequence[str]) -> tuple[dict[str, str]
         joints: Of the robot, in its order.
 
     Returns:
-        Name to joint, for those that can be told, and why; a guess by order is said to be one.
+        Name to joint, for those that are recognised, and why; a guess by order is said to be one.
     """
     plain = _plain(joints)
-    told = {
+    assigned = {
         owner: joints[plain.index(key)]
         for owner, key in zip(owners, _plain(owners), strict=True)
         if plain.count(key) == 1
     }
-    if len(told) == len(owners) and len({*told.values()}) == len(told):
-        return told, "by name"
+    if len(assigned) == len(owners) and len({*assigned.values()}) == len(assigned):
+        return assigned, "by name"
     if len(owners) == len(joints):
         ordered = sorted(owners, key=lambda o: [(w.isdigit(), w.zfill(8)) for w in words_of(o)])
         in_order = ordered if all(w.isdigit() for o in owners for w in words_of(o)) else owners
         return dict(zip(in_order, joints, strict=True)), "by order, a guess"
-    known = [owner for owner in told if [*told.values()].count(told[owner]) == 1]
+    known = [owner for owner in assigned if [*assigned.values()].count(assigned[owner]) == 1]
     numbered = [*owners] != known and all(owner.isdigit() for owner in owners)
-    return ({} if numbered else {owner: told[owner] for owner in known}), "by name"
+    return ({} if numbered else {owner: assigned[owner] for owner in known}), "by name"
 
 
 def _plain(names: Sequence[str]) -> list[str]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
+
 #: Rates at which robots log [Hz].
 _RATES: Final = (5.0, 20_000.0)
 #: Correlation from which a column is a derivative, ...

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.errors import GapError, LogFormatError
-from pipeline.logs.first_mapping.guess import Guess, guesses
-from pipeline.logs.first_mapping.names import read_name, words_of
+from pipeline.logs.first_mapping.guess import Guess, current_unit, guesses
+from pipeline.logs.first_mapping.names import Named, read_name, words_of
 from pipeline.logs.first_mapping.numbers import clock_units
 from pipeline.logs.formats.arrays import TIMES
 from pipeline.logs.reading.csv_head import unit_spelt
@@ -35,7 +35,6 @@ from pipeline.logs.reading.table_file import (
     stream_columns,
 )
 
-Array = NDArray[np.float64]
 _DIALECTS: Final = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))
 _SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _ROWS: Final = 100_000  # that are looked at
@@ -50,12 +49,14 @@ class FirstMapping:
         mapped: Columns that count.
         open: Columns that are remarks until somebody decides.
         unused: Columns that say nothing.
+        asks_gains: Whether there are targets and no effort: the servos' gains are to be put in.
     """
 
     text: str
     mapped: tuple[str, ...]
     open: tuple[str, ...]
     unused: tuple[str, ...]
+    asks_gains: bool
 
 
 def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
@@ -75,6 +76,7 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
     foreign = [c for c in table.header if c in data and c not in own | {clock} and "*" not in c]
     named = [read_name(c, units.get(c, "")) for c in foreign]
     found, ratios, by = guesses(named, data, time, expected)
+    found += _of_supply(named, data)
     lines, mapped, open_ = _lines(found, own)
     supply = next((n for n in named if n.quantity == "supply"), None)
     said = {g.column for g in found} | own | {clock} | ({supply.column} if supply else set())
@@ -84,12 +86,12 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
         "# Remarks in front of a column are other readings of it; put the right one in its place.",
         "# Signs and zeros are the joint's in the file as here; `gap` itself names those that are",
         "# not, with the line that mends them (flip = true, zero = ...).",
-        f"# Joints are told {by}." if lines else "# Its columns are those of the log format.",
+        f"# Joints are recognised {by}." if lines else "# Its columns are those of the log format.",
     ]
     if table.dialect != CsvTable():
-        told = table.dialect
-        text += ["", "[csv]", f"delimiter = {json.dumps(told.delimiter)}"]
-        text += [f"decimal = {json.dumps(told.decimal)}"]
+        dialect = table.dialect
+        text += ["", "[csv]", f"delimiter = {json.dumps(dialect.delimiter)}"]
+        text += [f"decimal = {json.dumps(dialect.decimal)}"]
     text += [*head, *(["", "[columns]", *lines] if lines else [])]
     if ratios:
         text += ["", "[gear_ratio]  # motor turns per joint turn, by the motion"]
@@ -97,10 +99,27 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
     if supply:
         unit = supply.unit or "V"
         text += ["", "[supply]", f"column = {json.dumps(supply.column)}", f'unit = "{unit}"']
-    text += _gains(found, own)
+    gains = _gains(found, own)
+    text += gains
     if unused:
         text += ["", "# Not used: " + json.dumps(list(unused), ensure_ascii=False)[1:-1]]
-    return FirstMapping("\n".join(text) + "\n", mapped, open_, unused)
+    return FirstMapping("\n".join(text) + "\n", mapped, open_, unused, bool(gains))
+
+
+def _of_supply(named: Sequence[Named], data: Mapping[str, Array]) -> list[Guess]:
+    """What the supply of all drives gives; of several columns of a kind none is it for sure."""
+    out = []
+    for quantity in ("supply_current", "supply_power"):
+        columns = [n for n in named if n.quantity == quantity]
+        why = "named of a supply; positive out of it: else add flip = true"
+        if len(columns) > 1:
+            why = "one of several named of a supply: put the one of all drives, or add them up"
+        for n in columns:
+            unit = n.unit
+            if not unit and quantity == "supply_current":
+                unit = current_unit(data[n.column])
+            out.append(Guess(n.column, quantity, "supply", unit, why, sure=len(columns) == 1))
+    return out
 
 
 def _known(column: str, expected: Expected | None, where: str) -> bool:
@@ -136,12 +155,16 @@ def _numbers(path: Path) -> tuple[TableFile, dict[str, Array]]:
 
 
 def _columns(table: TableFile) -> dict[str, Array]:
+    """Columns with finite numbers; others are NaN there."""
     if table.parquet:
-        return _each(table)
-    try:
-        return read_columns(table, table.header)
-    except GapError:
-        return _each(table)
+        data = _each(table)
+    else:
+        try:
+            data = read_columns(table, table.header)
+        except GapError:
+            data = _each(table)
+    finite = {name: np.where(np.isfinite(x), x, np.nan) for name, x in data.items()}
+    return {name: x for name, x in finite.items() if np.isfinite(x).any()}
 
 
 def _each(table: TableFile) -> dict[str, Array]:
@@ -155,7 +178,7 @@ def _each(table: TableFile) -> dict[str, Array]:
                 data[name] = read_columns(table, [name])[name]
         except (GapError, KeyError):
             continue
-    return {name: x for name, x in data.items() if np.isfinite(x).any()}
+    return data
 
 
 def _clock(
@@ -223,7 +246,7 @@ def _line(guess: Guess, quantity: str, unit: str) -> str:
 def _gains(found: Sequence[Guess], own: set[str]) -> list[str]:
     """What a log without any effort needs: the servos' law."""
     efforts = {"torque", "current", "voltage", "power"}
-    suffixes = {plotted(c).rpartition("__")[2] for c in own}
+    suffixes = {plotted(c).rpartition("__")[2] for c in own if not c.startswith("supply__")}
     have = {g.quantity for g in found if g.sure} | {
         JOINT_COLUMNS[s][0] for s in suffixes if s in JOINT_COLUMNS
     }
@@ -231,7 +254,7 @@ def _gains(found: Sequence[Guess], own: set[str]) -> list[str]:
         return []
     return [
         "",
-        "# Targets and no effort: with the gains of the servos their law tells the torque.",
+        "# Targets and no effort: with the gains of the servos their law gives the torque.",
         "# [pd_gains]",
         "# kp = 50.0  # [N*m/rad], of all joints; or {hip = 60.0, knee = 40.0}",
         "# kd = 1.0  # [N*m*s/rad]",

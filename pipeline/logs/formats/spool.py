@@ -14,10 +14,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.reading.log_format import JOINT_COLUMNS, TIME
 
-Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 _ROWS: Final = 50_000  # of the table that are put together at once
 #: Times the usual step beyond which nothing is drawn between two messages.
@@ -128,8 +128,12 @@ class Spool:
         apart = [s for s in others if not np.isin(s.times, main.times).all()]
         if apart:
             count = sum(len(sender.columns) for sender in apart)
-            told = f"{count} columns come at other times ({one_line(names[apart[0].columns[0]])}"
-            more.append(f"{told}, ...) and are brought to those of the others by straight lines")
+            apart_text = (
+                f"{count} columns come at other times ({one_line(names[apart[0].columns[0]])}"
+            )
+            more.append(
+                f"{apart_text}, ...) and are brought to those of the others by straight lines"
+            )
         return remarks + more
 
     def _senders(self, stamps: list[Stamps]) -> list[_Sender]:

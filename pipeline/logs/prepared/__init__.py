@@ -1,1 +1,1 @@
-"""Logs on one grid and bandwidth, in parts for training and proof."""
+"""Logs on one grid and bandwidth, in parts for training, validation and test."""

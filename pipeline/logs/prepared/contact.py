@@ -9,15 +9,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.errors import GaitError
 from pipeline.logs.errors import PreparationError
 from pipeline.logs.reading.log import Log
 from pipeline.motion.gait import gait_of
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: A foot stands above this share of the largest vertical force any foot carries ...
 TOUCH: Final = 0.05
@@ -47,7 +45,7 @@ class Contact:
 
 
 def log_contact(log: Log) -> Contact | None:
-    """Contact as the log itself tells it: from forces, else from contact columns, else None."""
+    """Contact as the log itself states it: from forces, else from contact columns, else None."""
     if log.foot_force is not None:
         return Contact(log.feet, _standing_by_force(log.foot_force[..., 2]), "forces")
     if log.contact is not None:

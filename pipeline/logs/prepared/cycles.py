@@ -8,9 +8,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.prepared.prepare import Prepared
-
-Array = NDArray[np.float64]
 
 #: Correlation from which a motion counts as repeated.
 REPEATED: Final = 0.98
@@ -69,7 +68,7 @@ def cycle_noise(prepared: Prepared, cycle: float) -> Array | None:
         cycle: Period [s].
 
     Returns:
-        Standard deviation, shape (J,), NaN where it cannot be told; None where nothing repeats.
+        Standard deviation, shape (J,), NaN where it is not known; None where nothing repeats.
     """
     pairs = []
     for piece in prepared.pieces:

@@ -17,9 +17,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.reading.log import Log
-
-Array = NDArray[np.float64]
 
 #: Rows of one stretch.
 STRETCH: Final = 4096

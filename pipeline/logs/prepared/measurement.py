@@ -9,14 +9,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from actuators.arrays import Array, Mask
+
 _SHORT = 300  # samples of a kernel up to which summing is quicker than transforming
 _PER_ROW: Final = (
     *("time", "q", "v", "a", "effort", "mask", "part", "block", "base_roll", "base_pitch"),
     *("standing", "foot_force", "open_winding", "temperature", "unsure"),
 )
-FIT, CHOOSE, PROVE, UNUSED = 0, 1, 2, -1
+TRAIN, VALIDATION, TEST, UNUSED = 0, 1, 2, -1
 
 
 #: Below this many rest speeds a joint counts as standing: friction may take any value there.
@@ -77,7 +77,7 @@ class Measurement:
         effort: Shape (N, J, C) in the channels' units.
         noise: Standard deviation of the noise in the bandwidth, shape (J, C).
         mask: Samples that count, shape (N, J).
-        part: FIT, CHOOSE, PROVE or UNUSED, shape (N,).
+        part: TRAIN, VALIDATION, TEST or UNUSED, shape (N,).
         block: Number of the block, shape (N,); blocks are what is resampled.
         pieces: Stretches without a gap.
         lowpass: Brings a series (N, ...) of this grid to the bandwidth.
@@ -146,7 +146,7 @@ class Measurement:
     @property
     def has_say(self) -> Mask:
         """Rows that estimate and choose; all where none does (to look, not to judge), (N,)."""
-        rows = np.isin(self.part, (FIT, CHOOSE))
+        rows = np.isin(self.part, (TRAIN, VALIDATION))
         return rows if rows.any() else np.ones_like(rows)
 
     def smooth(self, x: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Three parts of the data: *fit* estimates, *choose* decides between candidates, *prove* judges.
+"""Three parts of the data: *training* estimates, *validation* selects, *test* judges.
 
 Whole logs are held out where there are several, since cycles of one gait resemble each other;
 within a log, blocks of rows alternate, with a guard between them longer than what the filter sees
@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from pipeline.logs.errors import PreparationError
 from pipeline.logs.prepared.cycles import period
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, UNUSED
+from pipeline.logs.prepared.measurement import TEST, TRAIN, UNUSED, VALIDATION
 from pipeline.logs.prepared.prepare import Prepared
 
-NAMES: Final = ("fit", "choose", "prove")
+NAMES: Final = ("training", "validation", "test")
 #: Guard between blocks per reach of the filter to one side: more than both sides together.
 GUARD: Final = 2.2
 #: Blocks are at least this many guards long, so that little is lost between them.
@@ -27,9 +27,9 @@ BLOCK_GUARDS: Final = 5.0
 #: Blocks a log is cut into where it is long enough.
 MOST_BLOCKS: Final = 48
 FEWEST_BLOCKS: Final = 6
-#: The order in which blocks go to the parts: half to fit, a quarter each to choose and prove.
-PATTERN: Final = (FIT, CHOOSE, FIT, PROVE)
-PATTERN_WITHOUT_PROVE: Final = (FIT, CHOOSE, FIT)
+#: The order in which blocks go to the parts: half to training, a quarter each to the others.
+PATTERN: Final = (TRAIN, VALIDATION, TRAIN, TEST)
+PATTERN_WITHOUT_TEST: Final = (TRAIN, VALIDATION, TRAIN)
 
 
 @dataclass(frozen=True)
@@ -37,11 +37,11 @@ class Parts:
     """Which rows of which log belong to which part.
 
     Attributes:
-        part: Per log, shape (N,): `FIT`, `CHOOSE`, `PROVE` or `UNUSED` (guards).
+        part: Per log, shape (N,): `TRAIN`, `VALIDATION`, `TEST` or `UNUSED` (guards).
         block: Per log, shape (N,): number of the block, unique over all logs; -1 in guards.
         guard: Between blocks [s].
         rule: How the parts were cut, in words.
-        warning: What *prove* cannot prove, or empty.
+        warning: What the test cannot show, or empty.
     """
 
     part: tuple[NDArray[np.int8], ...]
@@ -57,12 +57,12 @@ def split(
     holdout: Sequence[Prepared] = (),
     prove_last: float | None = None,
 ) -> Parts:
-    """Cut logs into fit, choose and prove.
+    """Cut logs into training, validation and test.
 
     Args:
         prepared: Logs that may be fitted.
-        holdout: Logs that only prove.
-        prove_last: Share of every log, at its end, that proves instead.
+        holdout: Logs for the test only.
+        prove_last: Share of every log, at its end, for the test instead.
 
     Returns:
         Parts of `prepared` followed by `holdout`.
@@ -73,22 +73,22 @@ def split(
     every = [*prepared, *holdout]
     guard = GUARD * max(one.memory for one in every)
     if prove_last is not None and not 0.05 <= prove_last <= 0.8:
-        raise PreparationError(f"share to prove on is {prove_last:g}; expected 0.05 to 0.8")
-    proving = set(range(len(prepared), len(every)))
+        raise PreparationError(f"share to test on is {prove_last:g}; expected 0.05 to 0.8")
+    tested = set(range(len(prepared), len(every)))
     warning, last = "", 0.0
-    pattern: tuple[int, ...] = PATTERN_WITHOUT_PROVE
+    pattern: tuple[int, ...] = PATTERN_WITHOUT_TEST
     if holdout:
-        rule = "proved on the held-out logs"
+        rule = "tested on the held-out logs"
     elif prove_last is not None:
-        rule, last = f"proved on the last {100 * prove_last:g} % of every log", prove_last
+        rule, last = f"tested on the last {100 * prove_last:g} % of every log", prove_last
     elif len(prepared) > 1:
-        proving, rule = _held_out(prepared)
+        tested, rule = _held_out(prepared)
     else:
-        rule, pattern = "proved on every fourth block of the log", PATTERN
+        rule, pattern = "tested on every fourth block of the log", PATTERN
         warning = _periodic_warning(prepared)
     part, block, count = [], [], 0
     for k, one in enumerate(every):
-        kinds, numbers = _cut(one, guard, *(((PROVE,), 0.0) if k in proving else (pattern, last)))
+        kinds, numbers = _cut(one, guard, *(((TEST,), 0.0) if k in tested else (pattern, last)))
         block.append(np.where(numbers >= 0, numbers + count, -1).astype(np.int32))
         count += int(numbers.max(initial=-1)) + 1
         part.append(kinds)
@@ -106,7 +106,7 @@ def split(
 
 
 def _held_out(prepared: Sequence[Prepared]) -> tuple[set[int], str]:
-    """Which of several logs prove: one condition, else the last log.
+    """Which of several logs are for the test: one condition, else the last log.
 
     Of the condition that takes most values, the median one is left out: to predict between what
     was seen is fair, at the ends it is extrapolation.
@@ -120,11 +120,11 @@ def _held_out(prepared: Sequence[Prepared]) -> tuple[set[int], str]:
     key, values = best
     if not key:
         last = len(prepared) - 1
-        return {last}, f"proved on the log {prepared[last].log.name}"
+        return {last}, f"tested on the log {prepared[last].log.name}"
     # With two values the larger one; with more the one in the middle.
     left_out = values[len(values) // 2]
     chosen = {k for k, c in enumerate(conditions) if c[key] == left_out}
-    return chosen, f"proved on the logs with {key} = {left_out}"
+    return chosen, f"tested on the logs with {key} = {left_out}"
 
 
 def _periodic_warning(prepared: Sequence[Prepared]) -> str:
@@ -132,7 +132,7 @@ def _periodic_warning(prepared: Sequence[Prepared]) -> str:
     if cycle is None:
         return ""
     return (
-        f"the log repeats one motion every {cycle:.3g} s: held-out cycles of it prove nothing "
+        f"the log repeats one motion every {cycle:.3g} s: held-out cycles of it show nothing "
         "about other motions; give a log of another motion, speed or load with --holdout"
     )
 
@@ -152,16 +152,16 @@ def _cut(
         edges = np.round(np.linspace(0, fitted, count + 1)).astype(int).tolist()
         kinds = [pattern[b % len(pattern)] for b in range(count)]
         if prove_last:
-            # What proves is cut into blocks too: intervals are taken over blocks.
+            # The test is cut into blocks too: intervals are taken over blocks.
             more = _block_count(size - fitted, margin)
             edges += np.round(np.linspace(fitted, size, more + 1)).astype(int).tolist()[1:]
-            kinds += [PROVE] * more
+            kinds += [TEST] * more
         for b, kind in enumerate(kinds):
             start, stop = edges[b], edges[b + 1]
-            # Between two parts the guard is taken from the one that does not prove.
-            if b > 0 and kinds[b - 1] == PROVE != kind:
+            # Between two parts the guard is taken from the one that is not the test.
+            if b > 0 and kinds[b - 1] == TEST != kind:
                 start += margin
-            if b + 1 < len(kinds) and kinds[b + 1] != kind != PROVE:
+            if b + 1 < len(kinds) and kinds[b + 1] != kind != TEST:
                 stop -= margin
             if stop - start < 3:
                 continue

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.prepared.contact import Contact, changes_of_stance, log_contact
 from pipeline.logs.prepared.settings import Settings, choose_settings
 from pipeline.logs.reading.log import EFFORTS, Log
@@ -16,9 +17,6 @@ from pipeline.logs.signals.fusion import Fusion, fuse_by_noise, position_alone
 from pipeline.logs.signals.grid import GAP, Grid, busiest, fill_gaps, long_runs, uniform_grid
 from pipeline.logs.signals.noise import smoother_noise
 from pipeline.logs.signals.stamps import stamp_error
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Share of the kernel's weight that may fall on missing samples before the output is masked.
 TOLERATED_SHARE: Final = 0.05

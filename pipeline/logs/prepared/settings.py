@@ -7,16 +7,13 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.errors import PreparationError
 from pipeline.logs.reading.log import Log
 from pipeline.logs.signals.derivatives import LARGEST_SHARE, LowPass, choose_cutoff
 from pipeline.logs.signals.grid import busiest, fill_gaps, uniform_grid
 from pipeline.logs.signals.spacing import own_spacing
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: The kernel may not be longer than this share of the log.
 LONGEST_KERNEL: Final = 0.1

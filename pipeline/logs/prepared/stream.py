@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.formats.convert import sha256
 from pipeline.logs.prepared.contact import Contact
@@ -24,7 +24,6 @@ from pipeline.logs.reading.mapping import Mapping as MappingFile
 from pipeline.logs.reading.read import read_log, stream_log
 from pipeline.logs.reading.table_file import TableFile, open_table, row_count
 
-Array = NDArray[np.float64]
 #: Refusals that concern a log as a whole and not a chunk of it.
 FINE_IN_A_CHUNK: Final = ("rows", "constant", "empty")
 #: Rows that are surveyed, and that naming works on, per log.
@@ -94,7 +93,7 @@ class Survey:
     Attributes:
         log: The stretches that tell most; what lies between them is a gap.
         found: All stretches.
-        proves_from: Time from which the log only proves [s]; infinite where nothing was said.
+        proves_from: Time from which rows are for the test only [s]; infinite where none are.
     """
 
     log: Log
@@ -107,7 +106,7 @@ def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:
 
     Args:
         stream: The log.
-        prove_last: Share at its end that only proves: a quarter of the stretches come from there.
+        prove_last: Share at its end for the test only: a quarter of the stretches come from there.
 
     Raises:
         GapError: As for `read_log`.

@@ -8,10 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.reading.log import Log
-
-Array = NDArray[np.float64]
 
 #: Fast over slow speeds below which laws of speed look alike.
 _SPEEDS: Final = 4.0
@@ -42,8 +41,7 @@ def cannot_tell(log: Log, velocity: Array, effort: Array, ok: NDArray[np.bool_])
         )
     if log.torque is None or log.current is None:
         out.append(
-            "a torque constant but by gravity: log a torque beside the current, or hold known "
-            "weights"
+            "a torque constant but by gravity: log both torque and current, or hold known weights"
         )
     duration = float(log.time[-1] - log.time[0])
     if log.temperature is None and duration < _WARMING:

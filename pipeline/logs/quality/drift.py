@@ -1,7 +1,7 @@
 """Friction that changes from beginning to end, or from run to run: a machine that warms.
 
 What a simulation leaves of an effort is laid over the direction of motion and the direction times
-time, beside what else a model may have wrong (an offset, viscous friction, inertia, gravity's share
+time, with what else a model may have wrong (an offset, viscous friction, inertia, gravity's share
 and direction). The coefficient of the product is the drift; its scatter is that between blocks of
 the logs, since what is left is no white noise.
 """
@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
 
 #: Blocks per log.
 _BLOCKS: Final = 8

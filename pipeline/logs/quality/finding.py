@@ -6,12 +6,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
+from actuators.arrays import Mask
 from pipeline.logs.errors import LogContentError
-
-Mask = NDArray[np.bool_]
 
 #: What follows from a finding, from nothing to refusal.
 VERDICTS: Final = ("ok", "masked", "warning", "refused")

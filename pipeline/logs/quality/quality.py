@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.quality.finding import Findings, Quality
 from pipeline.logs.quality.sampling import (
     frozen,
@@ -30,9 +30,6 @@ from pipeline.logs.reading.log import EFFORTS, Log
 from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.signals.grid import GAP
 from pipeline.logs.signals.spacing import interpolated, own_spacing
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Fewer rows say nothing about anything.
 FEWEST_ROWS: Final = 100
@@ -64,7 +61,7 @@ def judge(
             from end to end.
     """
     found = Findings(log.name)
-    for remark in log.told:  # what holds for all of it comes first
+    for remark in log.notes:  # what holds for all of it comes first
         found.note("", "file", 1, "1", "warning", remark)
     verdict = "refused" if len(log) < FEWEST_ROWS else "ok"
     detail = f"{len(log)} rows; at least {FEWEST_ROWS} are needed"

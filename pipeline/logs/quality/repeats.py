@@ -1,4 +1,4 @@
-"""Rows that two logs share: data given twice prove nothing."""
+"""Rows that two logs share: data given twice test nothing."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def refuse_repeats(logs: Sequence[Log]) -> None:
         if rows > max(_RUN, _SHARE * len(short)):
             raise LogContentError(
                 f"{a.name} and {b.name} hold the same measurements ({rows} of {len(short)} rows): "
-                "what proves must be data of its own, and data given twice count twice; leave one "
+                "test data must be data of their own, and data given twice count twice; leave one "
                 "out"
             )
 

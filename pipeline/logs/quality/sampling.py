@@ -9,13 +9,10 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import median_filter, percentile_filter
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.signals.grid import runs_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Rows looked at for the lattice of values.
 LATTICE_ROWS: Final = 100_000

@@ -10,16 +10,13 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.quality.finding import Findings
 from pipeline.logs.quality.skew import Skew, skew
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import column_name
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 DEG: Final = 180.0 / math.pi
 #: Factors by which each channel is commonly wrong, and what the numbers then are.

@@ -1,4 +1,4 @@
-"""What stands above the numbers of a CSV file: remarks, a header, units; and how time is told."""
+"""What stands above the numbers of a CSV file: remarks, a header, units, the writing of time."""
 
 from __future__ import annotations
 
@@ -97,12 +97,12 @@ def read_head(head: bytes, dialect: CsvTable, where: str) -> CsvHead:
     following = first + 1
     if names and all(_is_value(name, dialect) for name in names):
         above = lines[first - 1].lstrip(b"# ") if first else b""
-        told = _cells(above, dialect, where, first - 1) if above.strip() else []
-        if len(told) != len(names) or all(_is_value(name, dialect) for name in told):
+        header = _cells(above, dialect, where, first - 1) if above.strip() else []
+        if len(header) != len(names) or all(_is_value(name, dialect) for name in header):
             raise LogFormatError(
                 f"{where}: line {first + 1} holds numbers; expected a header of column names"
             )
-        names, following = told, first
+        names, following = header, first
     names = [name.strip().removeprefix(_REMARK).strip() for name in names]
     skip, units = following, dict[str, str]()
     row = _row(lines, following, len(names), dialect, where)

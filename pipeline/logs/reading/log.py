@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from actuators.errors import closest
 from pipeline.logs.errors import LogContentError
 
 if TYPE_CHECKING:
     from pipeline.logs.reading.mapping import ColumnTable
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Channels in which measurement and simulation are compared, the most direct first, with unit.
 EFFORTS: Final[Mapping[str, str]] = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
-#: What servos are told.
+#: Commands to the servos.
 GOALS: Final = ("goal_position", "goal_velocity", "goal_torque")
 #: Of the supply: its voltage, and what it gives; seldom as often as the joints.
 SUPPLY: Final = ("supply", "supply_current", "supply_power")
@@ -91,7 +90,7 @@ class Log:
         left_out: Joints that cannot be compared, and why.
         remarks: Columns about which a reader should know something, and that.
         repeated_times: Rows that were dropped because their time stood in the row before.
-        told: What a reader should know of the file as a whole.
+        notes: What a reader should know of the file as a whole.
         derived: Channels that were computed from others by the mapping, with the formula.
         sha256: Of the file.
         source: The file's name.
@@ -135,7 +134,7 @@ class Log:
     left_out: Mapping[str, str] = field(default_factory=dict)
     remarks: Mapping[str, str] = field(default_factory=dict)
     repeated_times: int = 0
-    told: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     derived: Mapping[str, str] = field(default_factory=dict)
     sha256: str = ""
     source: Path = Path()

@@ -26,7 +26,6 @@ JOINT_COLUMNS: Final = {
     "goal_torque_Nm": ("goal_torque", "N*m"),
     "temperature_degC": ("temperature", "degC"),
 }
-_SUFFIX: Final = {quantity: suffix for suffix, (quantity, _) in JOINT_COLUMNS.items()}
 FOOT_COLUMNS: Final = {
     "force_x_N": ("force_x", "N"),
     "force_y_N": ("force_y", "N"),
@@ -43,6 +42,9 @@ SUPPLY_COLUMNS: Final = {
     "voltage_V": ("supply", "V"),
     "current_A": ("supply_current", "A"),
     "power_W": ("supply_power", "W"),
+}
+_SUFFIX: Final = {
+    quantity: suffix for suffix, (quantity, _) in (*JOINT_COLUMNS.items(), *SUPPLY_COLUMNS.items())
 }
 #: Letters that may be off in a header for it to be taken for a slip of the pen.
 _SLIPS: Final = 2
@@ -72,9 +74,9 @@ class Target:
     unit: str
 
 
-def column_name(joint: str, quantity: str) -> str:
-    """Header of a joint's channel in the log format."""
-    return f"{joint}__{_SUFFIX[quantity]}"
+def column_name(owner: str, quantity: str) -> str:
+    """Header in the log format of a channel of a joint, or of the owner ``supply``."""
+    return f"{owner}__{_SUFFIX[quantity]}"
 
 
 def parse_column(column: str, expected: Expected, where: str) -> Target | None:

@@ -88,14 +88,15 @@ class ReadingPlan:
         )
 
     @property
+    def of_supply(self) -> bool:
+        """Whether the file tells the supply's power or current."""
+        return bool({t.quantity for t in self.sources} & {"supply_power", "supply_current"})
+
+    @property
     def supply_alone(self) -> bool:
-        """Whether the supply's power or current is all that the file tells of effort."""
-        quantities = {t.quantity for t in self.sources}
-        return (
-            bool(quantities & {"supply_power", "supply_current"})
-            and not quantities & {*EFFORTS}
-            and not (self.derives_torque or self.derives_voltage)
-        )
+        """Whether that is all that it tells of effort."""
+        told = {t.quantity for t in self.sources} & {*EFFORTS}
+        return self.of_supply and not (told or self.derives_torque or self.derives_voltage)
 
     def has(self, owner: str, quantity: str) -> bool:
         """Whether the file has a quantity of a joint."""

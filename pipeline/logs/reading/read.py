@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from actuators.units import from_si
 from pipeline.logs.errors import LogContentError
@@ -22,7 +23,6 @@ from pipeline.logs.reading.servo_law import CANNOT
 from pipeline.logs.reading.sides import sides_of
 from pipeline.logs.reading.table_file import read_columns, stream_columns
 
-Array = NDArray[np.float64]
 _LARGEST: Final = 1e9  # nothing a robot measures is larger in the log's units
 _TIME: Final = Target("time", "", "time", "s")
 
@@ -122,7 +122,7 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
         source=plan.table.path,
         temperature=temperature,
         rules={(t.owner, t.quantity): source for t, source in plan.sources.items()},
-        **base | joints | feet | {"told": plan.table.remarks} | drive,
+        **base | joints | feet | {"notes": plan.table.remarks} | drive,
     )
     return log if fresh.all() else log.rows(fresh)
 
@@ -291,7 +291,7 @@ def _drive(
         if "torque_off" in out:
             out["torque"][out["torque_off"]] = 0.0
         out["derived"] = {"torque": gains.formula(joints)}
-        out["told"] = (*plan.table.remarks, f"the torque {CANNOT}")
+        out["notes"] = (*plan.table.remarks, f"the torque {CANNOT}")
     if plan.supply_alone:
         out["torque"], out["derived"] = np.full(position.shape, np.nan), {"torque": BY_MODEL}
         return out | {"valid": valid}

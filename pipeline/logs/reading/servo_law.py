@@ -10,19 +10,40 @@ not what is measured.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Self
+from typing import Annotated, Final, Self
 
 import numpy as np
-from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, model_validator
 
-from actuators.checked import Number, Table
+from actuators.arrays import Array
+from actuators.checked import Table, finite
 from actuators.errors import closest, one_line
 
-Array = NDArray[np.float64]
-Positive = Annotated[Number, Field(ge=0.0, le=1e6)]
+#: Beyond these a gain is a slip.
+_LARGEST: Final = 1e6
+
+
+def _gain(value: object) -> float:
+    number = finite(value)
+    if not 0.0 <= number <= _LARGEST:
+        raise ValueError(f"must lie from 0 to {_LARGEST:g}")
+    return number
+
+
+def _gains(value: object) -> object:
+    if not isinstance(value, Mapping):
+        return _gain(value)
+    out = {}
+    for joint, number in value.items():
+        try:
+            out[joint] = _gain(number)
+        except ValueError as error:
+            raise ValueError(f"of {one_line(joint)} {error}") from None
+    return out
+
+
 #: One number for all joints, or one for each by the robot's name of it.
-Gains = Positive | dict[str, Positive]
+Gains = Annotated[float | dict[str, float], BeforeValidator(_gains)]
 #: What a reader of results must know.
 CANNOT = (
     "is computed by the servos' law from targets and gains, not measured: the delay and bandwidth "

@@ -7,12 +7,10 @@ from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.reading.expected import Expected
-
-Array = NDArray[np.float64]
 
 #: Difference from a stated gear ratio, relative, from which the two positions contradict it.
 _CONTRADICTS: Final = 0.05

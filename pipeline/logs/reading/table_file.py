@@ -10,15 +10,14 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.formats.convert import plain
 from pipeline.logs.reading.csv_head import CsvHead, read_head
 from pipeline.logs.reading.mapping import CsvTable
 
-Array = NDArray[np.float64]
 _HEADER_BYTES: Final = 1 << 20
 _DECIMAL_COMMA: Final = re.compile(r"^\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*$")
 
@@ -55,7 +54,7 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
     """Open a file of columns and read its header.
 
     Args:
-        path: CSV, Parquet, or what becomes such a table; kinds are told by their first bytes.
+        path: CSV, Parquet, or what becomes such a table; kinds are recognised by their first bytes.
         dialect: Of a CSV file; the log format's own by default.
 
     Raises:

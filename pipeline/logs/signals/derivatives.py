@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import oaconvolve, welch
 
+from actuators.arrays import Array
 from pipeline.logs.errors import PreparationError
-
-Array = NDArray[np.float64]
 
 #: Half-length of the kernel in units of 1 / cut-off.
 HALF_LENGTH: Final = 2.0

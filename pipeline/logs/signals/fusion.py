@@ -15,13 +15,10 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.quality.skew import skew
 from pipeline.logs.signals.derivatives import LowPass
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Correlation with the position's rate below which a velocity column is another thing ...
 _SAME: Final = 0.9

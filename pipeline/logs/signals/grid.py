@@ -10,8 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from actuators.arrays import Array, Mask
 
 #: A step this many times the usual one is a gap; the filter never runs across it.
 GAP: Final = 2.5

@@ -8,13 +8,10 @@ from math import sqrt
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.signals.derivatives import LARGEST_SHARE, LowPass
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Median absolute deviation of a normal distribution per standard deviation.
 MAD: Final = 0.6744897501960817

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
 
 #: Chance at which noise may pass for a ripple somewhere among all orders of a joint.
 CHANCE: Final = 1e-4

@@ -9,12 +9,9 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.logs.signals.grid import runs_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Share of a log's time that may lie in longer steps: those are gaps, not the channel's rate.
 _IN_GAPS: Final = 0.02

@@ -1,4 +1,4 @@
-"""How far time stamps are off, told by positions: a stamp late by dt reads speed times dt wrong.
+"""How far time stamps are off, judged by positions: a stamp late by dt reads speed times dt wrong.
 
 Each sample is compared with the cubic through its four neighbours at their stamps. What it differs
 by has a variance of c (s_q^2 + s_t^2 v^2), with the encoder's noise s_q, the stamps' error s_t and
@@ -10,9 +10,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
 
 #: Groups of rows by speed through which the line is laid.
 _GROUPS: Final = 12

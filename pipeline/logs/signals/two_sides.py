@@ -16,10 +16,8 @@ from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from actuators.arrays import Array, Mask
 
 #: Standard deviations from which a slope or a step counts as seen.
 SEEN: Final = 4.0

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize.elementwise import find_root
 
+from actuators.arrays import Array
 from actuators.chain import Chain
 from pipeline.paper.calibration.prior import Free
 from pipeline.paper.calibration.problem import Problem, Target
@@ -48,7 +49,6 @@ from pipeline.paper.hexapod import (
 )
 from pipeline.paper.published import EXTRA, HELD, PAIR
 
-Array = NDArray[np.float64]
 #: Targets that take the place of a coordinate, in the order in which they are solved for: each
 #: rises or falls with it throughout. Where two want the same one, the first takes it.
 SOLVED = {

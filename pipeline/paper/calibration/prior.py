@@ -10,17 +10,16 @@ from pathlib import Path
 from typing import Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import model_validator
 from scipy.special import ndtr, ndtri
 
+from actuators.arrays import Array
 from actuators.checked import Number, Pair, Table, checked
 from actuators.errors import UnitError, one_line
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, to_si
 from pipeline.paper.errors import PriorError
 
-Array = NDArray[np.float64]
 PRIOR_FILE = Path(__file__).parent / "prior.toml"
 
 

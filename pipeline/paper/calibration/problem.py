@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
+from actuators.arrays import Array
 from actuators.loading.build import Catalog
 from actuators.units import from_si
 from pipeline.errors import PipelineError
@@ -34,7 +35,6 @@ from pipeline.paper.published import EVEN, EXTRA, Published
 from pipeline.paper.quantities import computed
 from pipeline.robot.robot_file import RobotSpec
 
-Array = NDArray[np.float64]
 #: Rows met exactly by solving the posture.
 EXACT = ("standing_reaction_rm", "standing_torque_2", "standing_torque_3")
 #: Met by the choice of the motor's constants, see `pipeline.paper.constants.motor_constants`.

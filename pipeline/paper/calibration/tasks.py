@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.energy.energy import stage_energy
 from actuators.loading.build import load_catalog
 from pipeline.errors import PipelineError
@@ -36,7 +36,6 @@ from pipeline.paper.hexapod import (
 from pipeline.paper.published import EVEN, EXTRA, load_published
 from pipeline.robot.robot_file import load_robot_file
 
-Array = NDArray[np.float64]
 #: A set of numbers with what follows from it, as it is stored.
 Point = dict[str, Any]
 #: Paths of the foot that the search may choose.

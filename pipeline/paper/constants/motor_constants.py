@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.paper.constants.table_entries import (
     LOADED,
     Entry,
@@ -26,7 +26,6 @@ from pipeline.paper.constants.table_entries import (
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.published import HELD, Published
 
-Array = NDArray[np.float64]
 TORQUE_CONSTANT = "motor_re40_24v.torque_constant"
 RESISTANCE = "motor_re40_24v.resistance"
 ROTOR_FRICTION = "rotor_re40.coulomb"

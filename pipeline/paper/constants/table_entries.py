@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.paper.published import ALTERNATIVES, CYCLE, Published
 
-Array = NDArray[np.float64]
 LOADED = ("2", "3")  # joints of Tables IV to VI
 _SLACK = 1e-9  # as `Published.reproduced` has it
 #: Powers of u and w in each kind of entry.

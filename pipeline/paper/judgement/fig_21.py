@@ -7,15 +7,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.paper.hexapod import Totals
 from pipeline.paper.judgement.evidence import BAND, Evidence, Point
 from pipeline.paper.judgement.rows import PREDICTED_BY, Row, judged
 from pipeline.paper.published import CYCLE, EVEN, PAIR
 from pipeline.simulation.energy_change import break_even
 
-Array = NDArray[np.float64]
 MINUTE = 60.0  # [s]
 #: Energy per cycle and power standing, by whose energy is meant.
 SUBJECTS = {

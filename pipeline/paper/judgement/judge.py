@@ -57,7 +57,6 @@ class Price:
         gear_known: 95 % of the posterior of it [mN*m]; NaN without.
         gear_heat: What it dissipates in the middle right leg in one cycle [J].
         leg_energy: What that leg draws in one cycle with the irreversible actuator [J].
-        no_load: No-load current of the motor [A].
         no_load_sheet: The data sheet's [A].
         no_load_share: Share of the posterior above `NOTABLE` times the data sheet's; NaN without.
     """
@@ -68,7 +67,6 @@ class Price:
     gear_known: Interval
     gear_heat: float
     leg_energy: float
-    no_load: float
     no_load_sheet: float
     no_load_share: float
 
@@ -193,7 +191,6 @@ def price(
             for m in results["sets"]
         ]
         share = float(np.mean(np.array(currents) > NOTABLE * sheet))
-    now = [catalog.parameter(k).value for k in (TORQUE_CONSTANT, ROTOR_FRICTION, ROTOR_VISCOUS)]
     return Price(
         from_si(catalog.parameter(GEAR_FRICTION).value, gear.unit),
         from_si(gear.centre, gear.unit),
@@ -201,7 +198,6 @@ def price(
         known,
         0.0 if heat is None else float(printed_leg(heat).sum()),
         irreversible.consumed(PUBLISHED_LEG),
-        no_load_current(*now),
         sheet,
         share,
     )

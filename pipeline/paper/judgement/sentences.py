@@ -175,7 +175,7 @@ def stage_values(outcomes: Mapping[str, Outcome]) -> dict[str, float]:
         rotor = chain.element("rotor_inertia")
         assert isinstance(rotor, Inertia)
         light = chain.replaced(replace(rotor, inertia=0.0))
-        walks["rotor without inertia"] = light.moving(walks["rotor"].joint)
+        walks["rotor without inertia"] = light.inverse(walks["rotor"].joint)
     out: dict[str, float] = {}
     for name, walk in walks.items():
         energies = {f"{e.stage}+": e.forward for e in stage_energies(walk)}

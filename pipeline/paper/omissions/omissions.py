@@ -18,9 +18,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from actuators.arrays import Array
 from actuators.chain import Chain
 from actuators.elements.heating import warm_resistance
 from actuators.elements.hypoid import Hypoid
@@ -39,7 +39,6 @@ from pipeline.paper.hexapod import (
 from pipeline.paper.published import ALTERNATIVES, CYCLE, EVEN, PAIR, Published
 from pipeline.paper.quantities import pair_break_even
 
-Array = NDArray[np.float64]
 ASSUMPTIONS_FILE = Path(__file__).parent / "assumptions.toml"
 _REVERSIBLE, _IRREVERSIBLE = PAIR
 _SCHEMA = {

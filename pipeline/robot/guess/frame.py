@@ -10,14 +10,13 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import RobotFileError
 from pipeline.robot.guess.limbs import Limb
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import LegChains
 
-Array = NDArray[np.float64]
 _AHEAD = {"front": 1, "fore": 1, "rear": -1, "hind": -1, "back": -1}
 _ASIDE = {"left": 1, "right": -1}
 #: Letters of two that name a corner; which of "rl" is the right and which the rear is usage.

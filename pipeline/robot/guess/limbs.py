@@ -12,13 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.errors import closest, one_line
 from pipeline.errors import RobotFileError
 from pipeline.robot.leg_chains import MOST_JOINTS
 
-Array = NDArray[np.float64]
 #: What nothing but feet is called, the plainest first; what other ends of chains are called, too.
 _FEET = ("foot", "feet", "sole", "toe", "paw", "hoof")
 _ENDS = ("contact", "tip", "end")

@@ -6,15 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.guess.stance import Stance
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse_kinematics import ACCEPTED, reach
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import LegChains
 
-Array = NDArray[np.float64]
 _FIRST = 0.3  # stroke over the height of the hips, if the legs allow
 _SHRINK = 0.85
 _TRIES = 20

@@ -28,6 +28,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import RobotFileError
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse.start_posture import spread
@@ -36,7 +37,6 @@ from pipeline.robot.kinematics import foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains
 from pipeline.robot.leg_columns import LegColumns
 
-Array = NDArray[np.float64]
 #: Feet (1, F, 3) and a point (1, 2) to the point's margin in their hull [m], (1,).
 Margin = Callable[[Array, Array], Array]
 _POSTURES = 4000  # drawn for each leg

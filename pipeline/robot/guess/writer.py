@@ -5,14 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import numpy as np
 import tomlkit
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.guess.guess import Guess
 from pipeline.robot.guess.pace import Pace
 
-Array = NDArray[np.float64]
 _PLACES = 4  # digits of feet and postures [m, rad]
 
 

@@ -15,9 +15,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.leg_chains import LegChains
 
-Array = NDArray[np.float64]
 _PARALLEL = 1e-12  # sine of the angle between axes 2 and 3: the result is as exact as they are
 _ACROSS = 1e-3  # sine of the angle between axes 1 and 2: below, the first angle is ill-determined
 #: Sine of an angle below which a start posture stands at the border of two branches.

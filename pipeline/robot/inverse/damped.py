@@ -9,12 +9,11 @@ from the start posture, those between start from a spline through them.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.kinematics import cross, foot_positions, samples_last, swept
 from pipeline.robot.leg_chains import LegChains
 
-Array = NDArray[np.float64]
 _ITERATIONS = 60
 _MAX_STEP = 0.35  # [rad] per iteration, keeps the knee on the branch of the start posture
 _CONVERGED = 1e-12  # [m]

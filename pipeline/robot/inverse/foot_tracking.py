@@ -10,14 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse_kinematics import ACCEPTED
 from pipeline.robot.kinematics import foot_jacobians
 from pipeline.robot.leg_chains import LegChains
 
-Array = NDArray[np.float64]
 Vector = tuple[float, float, float]
 
 

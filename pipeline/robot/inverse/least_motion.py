@@ -24,13 +24,12 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.inverse.damped import approach
 from pipeline.robot.kinematics import Swept, cross, foot_positions, samples_last, swept
 from pipeline.robot.leg_chains import LegChains
 
-Array = NDArray[np.float64]
 _ITERATIONS = 30
 _CONVERGED = 1e-12  # [m, rad]
 _LARGEST_STEP = 0.3  # [rad]

@@ -13,13 +13,13 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.errors import GaitError
 from pipeline.robot.inverse.damped import approach
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse_kinematics import ACCEPTED, beyond_reach, reach
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 _STARTS = 5  # per joint of a leg of three, inside its limits
 _TRIES = _STARTS**3
 _OTHER = 0.02  # [rad] two postures closer than this are one

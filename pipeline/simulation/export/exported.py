@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from actuators.errors import closest, one_line
-from pipeline.effects.model_file import apply_edits, base_model, file_sha256, read_model_file
+from pipeline.effects.model_file import apply_edits, base_model, read_model_file
 from pipeline.logs.errors import MappingError, ModelFileError
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.robot.robot import load_robot
@@ -26,15 +26,22 @@ class Exported:
         text: Its contents.
         left: What it cannot hold, in words.
         joints: How many joints it has.
+        remarks: What of the files the machine comes from is odd.
     """
 
     text: str
     left: tuple[str, ...]
     joints: int
+    remarks: tuple[str, ...]
 
 
 def exported(
-    model: Path, to: str, *, robot: Path | None = None, mapping: Path | None = None
+    model: Path,
+    to: str,
+    *,
+    robot: Path | None = None,
+    actuators: Path | None = None,
+    mapping: Path | None = None,
 ) -> Exported:
     """Write a machine with what was found on it for another tool.
 
@@ -42,6 +49,7 @@ def exported(
         model: Model file.
         to: ``mjcf``, ``urdf`` or ``ros2_control``.
         robot: Robot file or URDF instead of the one that the model file names.
+        actuators: Folder of actuator files; the robot file's or the project's by default.
         mapping: Mapping file whose ``[pd_gains]`` are the servos' gains.
 
     Raises:
@@ -51,10 +59,8 @@ def exported(
     """
     if to not in KINDS:
         raise ModelFileError(f"'{one_line(to)}' is none of the formats; {closest(to, KINDS)}")
-    file = read_model_file(model)
-    if robot is not None:
-        file = replace(file, robot=robot, robot_sha256=file_sha256(robot))
-    bare = base_model(file)
+    file = read_model_file(model, actuators, robot)
+    bare = base_model(file, actuators)
     machine = apply_edits(bare, file.edits)
     numbers = joint_numbers(machine)
     gains = None
@@ -84,4 +90,4 @@ def exported(
             read_urdf(file.robot) if bare_urdf else load_robot(load_robot_file(file.robot)).urdf
         )
         text = urdf.urdf(source, str(file.robot), bare, file.edits, numbers, remarks)
-    return Exported(text, left, len(numbers))
+    return Exported(text, left, len(numbers), file.changed)

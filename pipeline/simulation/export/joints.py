@@ -16,8 +16,8 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.shaft import ShaftSeries
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import Edit
@@ -26,7 +26,6 @@ from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.rigid_bodies import changed_model
 
-Array = NDArray[np.float64]
 #: Speed to which friction is asked where a joint has no limit [rad/s].
 USUAL_SPEED: Final = 10.0
 #: Slowest speed that is asked, over the largest.

@@ -8,12 +8,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.machine.machine import MachineModel, link_name
 from pipeline.simulation.export.joints import JointNumbers, bodies_of
 
-Array = NDArray[np.float64]
 #: What a MuJoCo model of this export has none of.
 LEFT: Final = ("meshes, collisions and contacts: bodies and joints alone are written",)
 

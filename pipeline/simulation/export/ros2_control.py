@@ -41,10 +41,13 @@ def ros2_control(
     for n in numbers:
         kp, kd = (gains or {}).get(n.joint, (0.0, 0.0))
         lines += [f"      {n.joint}:", f"        p: {float(kp)!r}", "        i: 0.0"]
-        lines += [f"        d: {float(kd)!r}", f"        ff_velocity_scale: {n.damping:.9g}"]
+        lines += [f"        d: {float(kd)!r}", f"        ff_velocity_scale: {_double(n.damping)}"]
         if np.isfinite(n.effort):
-            lines += [
-                f"        u_clamp_max: {n.effort:.9g}",
-                f"        u_clamp_min: {-n.effort:.9g}",
-            ]
+            lines += [f"        u_clamp_max: {_double(n.effort)}"]
+            lines += [f"        u_clamp_min: {_double(-n.effort)}"]
     return "\n".join(lines) + "\n"
+
+
+def _double(x: float) -> str:
+    """A number with its point: ROS 2 refuses a whole one where it expects a double."""
+    return repr(float(f"{x:.9g}") + 0.0)

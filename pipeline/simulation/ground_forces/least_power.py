@@ -23,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.force_rules import Descent, Stance
@@ -30,7 +31,6 @@ from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Segment
 from pipeline.simulation.ground_forces.power_law import NOTHING, PowerLaw, power_law
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 #: From the demand of bodies and ground to that on the actuators.
 Adjust = Callable[[Segment, JointDemand], JointDemand]
@@ -148,7 +148,7 @@ class PowerOfJoints:
             torque,
             s.direction[rows],
         )
-        result = self._rule.chain.moving(side)
+        result = self._rule.chain.inverse(side)
         return (
             result.motor.torque[:, self._loaded],
             result.electrical_power[:, self._loaded],

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
+
 #: From torques to the motor's torque and electrical power, all shaped (n, Q).
 Asked = Callable[[Array], tuple[Array, Array]]
 _NODES = np.sinh(np.linspace(-7.0, 7.0, 33)) / np.sinh(7.0)

@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from textwrap import shorten
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from actuators.arrays import Array
 from reports.figures.style import (
     CYCLE,
     QUIET,
@@ -22,8 +20,6 @@ from reports.figures.style import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @house_style()

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
+from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from reports.figures.style import (
     CYCLE,
     INK,
@@ -23,27 +24,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 #: The prior's bands are wide and overlap, so they are fainter than those of figures left out.
 PRIOR_ALPHA, LEFT_OUT_ALPHA = 0.10, 0.28
 _REACH = 4.0  # to either side of the crossing [%]
-
-
-@dataclass(frozen=True)
-class EnergyLine:
-    """One alternative.
-
-    Attributes:
-        name: Shown at the line.
-        energy: At each share of standing, shape (N,) [J].
-        prior: Ends of what is known without any fit, shape (2, N) [J], or None.
-        left_out: Ends of what is known without this line's own figure, shape (2, N) [J], or None.
-    """
-
-    name: str
-    energy: Array
-    prior: Array | None = None
-    left_out: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -63,8 +46,8 @@ class BreakEven:
 
 @house_style()
 def energy_per_minute_figure(
-    share: Array,
-    lines: Sequence[EnergyLine],
+    lines: Sequence[EnergyPerMinute],
+    names: Mapping[str, str],
     *,
     title: str,
     subtitle: str = "",
@@ -73,14 +56,15 @@ def energy_per_minute_figure(
     """One line per alternative, what is known without it as bands; the crossing enlarged beside it.
 
     Args:
-        share: Fraction of the time standing, increasing, shape (N,).
-        lines: The alternatives.
+        lines: The alternatives, at the same shares of the time standing.
+        names: Alternative to what the legend calls it.
         title: First line.
         subtitle: Second line.
         break_even: Marked and enlarged; None where there is none.
     """
     from matplotlib.lines import Line2D
 
+    share = lines[0].fraction
     figure = new_figure(4.8, title, subtitle)
     ratios = [2.0] if break_even is None else [2.0, 1.0]
     panels = figure.subplots(1, len(ratios), width_ratios=ratios, squeeze=False)[0]
@@ -93,7 +77,7 @@ def energy_per_minute_figure(
     panels[0].set_ylabel("energy per minute [J]")
     # Names below the panels, where no line crosses them, ordered as the lines at the left.
     handles = [
-        Line2D([], [], color=CYCLE[k % len(CYCLE)], label=lines[k].name)
+        Line2D([], [], color=CYCLE[k % len(CYCLE)], label=names[lines[k].alternative])
         for k in sorted(range(len(lines)), key=lambda k: -float(lines[k].energy[0]))
     ]
     columns = min(len(handles), 4)
@@ -103,7 +87,7 @@ def energy_per_minute_figure(
     return figure
 
 
-def _lines(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
+def _lines(axes: Axes, share: Array, lines: Sequence[EnergyPerMinute]) -> None:
     for k, line in enumerate(lines):
         color = CYCLE[k % len(CYCLE)]
         for band, alpha in ((line.prior, PRIOR_ALPHA), (line.left_out, LEFT_OUT_ALPHA)):
@@ -112,7 +96,9 @@ def _lines(axes: Axes, share: Array, lines: Sequence[EnergyLine]) -> None:
         axes.plot(share * 100, line.energy, color=color)
 
 
-def _enlarge(axes: Axes, share: Array, lines: Sequence[EnergyLine], break_even: BreakEven) -> None:
+def _enlarge(
+    axes: Axes, share: Array, lines: Sequence[EnergyPerMinute], break_even: BreakEven
+) -> None:
     at = 100 * break_even.share
     spread = [100 * end for end in break_even.prior or ()]
     low, high = max(at - _REACH, 100 * float(share[0])), min(at + _REACH, 100 * float(share[-1]))

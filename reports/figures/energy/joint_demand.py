@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.stretch import Stretch
 from reports.figures.style import (
     BLUE,
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 #: Torque in the air gets a panel of its own below this share of the torque on the ground.
 _READABLE = 0.2
 #: A phase shorter than this share of the cycle has no room for its name.

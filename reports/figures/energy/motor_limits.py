@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.energy.envelope import operating_region
 from actuators.energy.limits import rms_over_time
 from reports.figures.style import (
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from actuators.elements.motor import DCMotor
     from actuators.shaft import ShaftSeries
 
-Array = NDArray[np.float64]
 #: What the reader of the figure must know.
 SUBTITLE = "one gait cycle of the motor, closed; grey: out of its reach"
 _RPM = 60 / (2 * np.pi)

@@ -8,8 +8,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.style import (
     FORWARD,
     INK,
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from actuators.energy.energy import StageEnergy
 
-Array = NDArray[np.float64]
 #: Joints side by side.
 _IN_ROW = 4
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
+from pipeline.logs.signals.grid import runs_of
 from reports.figures.style import (
     BLUE,
     ORANGE,
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 _PALE = "#b4bac1"
 #: More points than a picture can show.
 _MOST_POINTS = 2500
@@ -45,18 +45,18 @@ class GapTrace:
         after: Predicted with everything found, shape (N,).
         noise_floor: Standard deviation of the noise.
         unit: Of the channel.
-        proves: Held-out rows, shape (N,), shaded; None for all of them.
+        held_out: Held-out rows, shape (N,), shaded; None for all of them.
     """
 
     joint: str
     time: Array
     measured: Array
-    compared: NDArray[np.bool_]
+    compared: Mask
     before: Array
     after: Array
     noise_floor: float
     unit: str
-    proves: NDArray[np.bool_] | None = None
+    held_out: Mask | None = None
 
 
 @house_style()
@@ -103,10 +103,9 @@ def _trace(top: Axes, bottom: Axes, trace: GapTrace, channel: str, *, first: boo
     bottom.plot(t, left_before, color=ORANGE, linewidth=1.0)
     bottom.plot(t, left_after, color=BLUE, linewidth=1.0)
     kept, where = np.ones(t.size, dtype=np.bool_), ""
-    if trace.proves is not None and np.isfinite(left_after[trace.proves]).any():
-        kept, where = trace.proves, "held out: "
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], kept.astype(np.int8), [0]])))
-        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    if trace.held_out is not None and np.isfinite(left_after[trace.held_out]).any():
+        kept, where = trace.held_out, "held out: "
+        for start, stop in np.column_stack(runs_of(kept)).tolist():
             for ax in (top, bottom):
                 ax.axvspan(t[start], t[stop - 1], color=YELLOW, alpha=0.18, linewidth=0, zorder=0)
     rms = [float(np.sqrt(np.nanmean(x[kept] ** 2))) for x in (left_before, left_after)]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.errors import FigureError
 from reports.figures.style import (
     BLUE,
@@ -25,58 +24,56 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 _MOST_POINTS = 3000
 _BINS = 40
 _FEWEST = 8  # rows in a bin that is drawn
 
 
-@dataclass(frozen=True)
-class Signature:
-    """The gap of one joint against one variable.
+@house_style()
+def gap_signature_figure(
+    variable: str,
+    x: Array,
+    gaps: tuple[Array, Array],
+    noise_floor: float,
+    unit: str,
+    *,
+    title: str,
+    subtitle: str = "",
+) -> Figure:
+    """Draw a joint's gap without (left) and with the effect (right), on one scale.
 
-    Attributes:
+    Args:
         variable: Name with unit, for the axis.
-        x: Shape (N,).
-        before: Measured minus predicted without the effect, shape (N,).
-        after: The same with it, shape (N,).
+        x: Of the variable, shape (N,).
+        gaps: Measured minus predicted without the effect, and with it, each shape (N,).
         noise_floor: Standard deviation of the noise.
         unit: Of the gap.
-    """
-
-    variable: str
-    x: Array
-    before: Array
-    after: Array
-    noise_floor: float
-    unit: str
-
-
-@house_style()
-def gap_signature_figure(signature: Signature, *, title: str, subtitle: str = "") -> Figure:
-    """Draw it without (left) and with the effect (right), on one scale.
+        title: Headline.
+        subtitle: Second line.
 
     Raises:
         FigureError: No rows.
     """
-    s = signature
-    keep = np.isfinite(s.x) & np.isfinite(s.before) & np.isfinite(s.after)
+    both = np.stack(gaps)
+    keep = np.isfinite(x) & np.isfinite(both).all(axis=0)
     if not keep.any():
-        raise FigureError(f"signature against {s.variable}: no rows; give at least 1")
-    x, before, after = s.x[keep], s.before[keep], s.after[keep]
+        raise FigureError(f"signature against {variable}: no rows; give at least 1")
+    x, both = x[keep], both[:, keep]
     figure = new_figure(4.2, title, subtitle)
-    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    _half(left, x, before, s, "without the effect", ORANGE)
-    _half(right, x, after, s, "with the effect", BLUE)
-    limit = 1.1 * float(np.quantile(np.abs(np.concatenate([before, after])), 0.998))
-    left.set_ylim(-limit, limit)
-    left.set_ylabel(f"measured minus predicted [{unit_text(s.unit)}]")
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    for ax, y, part, color in zip(axes, both, ("without", "with"), (ORANGE, BLUE), strict=True):
+        _half(ax, x, y, noise_floor, color)
+        ax.set_title(f"{part} the effect", color=QUIET, fontsize=9)
+        ax.set_xlabel(variable)
+    limit = 1.1 * float(np.quantile(np.abs(both), 0.998))
+    axes[0].set_ylim(-limit, limit)
+    axes[0].set_ylabel(f"measured minus predicted [{unit_text(unit)}]")
     return figure
 
 
-def _half(ax: Axes, x: Array, y: Array, s: Signature, title: str, color: str) -> None:
+def _half(ax: Axes, x: Array, y: Array, noise_floor: float, color: str) -> None:
     every = max(1, int(np.ceil(x.size / _MOST_POINTS)))
-    ax.axhspan(-2 * s.noise_floor, 2 * s.noise_floor, color=SHADE, zorder=0)
+    ax.axhspan(-2 * noise_floor, 2 * noise_floor, color=SHADE, zorder=0)
     zero_line(ax)
     ax.plot(
         x[::every],
@@ -90,8 +87,6 @@ def _half(ax: Axes, x: Array, y: Array, s: Signature, title: str, color: str) ->
     )
     centre, mean = binned(x, y)
     ax.plot(centre, mean, color=INK, linewidth=1.6)
-    ax.set_title(title, color=QUIET, fontsize=9)
-    ax.set_xlabel(s.variable)
 
 
 def binned(x: Array, y: Array, bins: int = _BINS) -> tuple[Array, Array]:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.style import INK, QUIET, WIDTH, house_style, new_figure
 
 if TYPE_CHECKING:
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-Array = NDArray[np.float64]
 #: Heights and widths of what surrounds the cells [in].
 _HEAD, _TITLE, _BANDS, _BAR, _ROW = 0.5, 0.3, 0.62, 0.75, 0.235
 #: A cell that holds a number of three signs, and one that is wide enough [in].

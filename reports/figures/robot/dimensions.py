@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.robot.projection import FRONT, SIDE, TOP, View, extent
 from reports.figures.robot.solids import Leg, Solid
 from reports.figures.style import INK, arrow
@@ -16,7 +16,6 @@ from reports.figures.style import INK, arrow
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 #: A link shorter than this share of its leg gets no dimension.
 _SHORT = 0.12
 #: A link is measured in a view that shows at least this share of its length.

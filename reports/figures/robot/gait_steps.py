@@ -11,14 +11,13 @@ from functools import cached_property
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.robot.projection import OBLIQUE, TOP, View
 from reports.figures.robot.solids import hull_points, outline, reach
 from reports.figures.robot.steps import Steps
 from reports.figures.style import BLUE, FAINT, GREEN, INK, QUIET, SHADE, VERMILION, YELLOW, number
 
-Array = NDArray[np.float64]
 _WIDTH, _HEIGHT = 950.0, 560.0
 Panel = tuple[float, float, float, float]
 #: Left, top, width and height of the panels [px]: the robot, support from above, footfall.

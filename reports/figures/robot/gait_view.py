@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.errors import FigureError
 from reports.figures.robot.dimensions import dimension
 from reports.figures.stretch import Stretch
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 #: Feet nearer than this share of the field of feet would have their names on one another.
 _NEAR = 0.1
 #: Instants of a support that are drawn, and how many of a gait with many sets of feet.

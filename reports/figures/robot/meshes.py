@@ -16,9 +16,9 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.robot.solids import GREY, Color, Solid, mesh
 
-Array = NDArray[np.float64]
 #: With more faces than this a mesh is thinned, to cells of this share of its length.
 _MANY, _CELL = 4000, 1 / 128
 _TEXELS = 256  # along the side of a texture; more than a face of a picture shows

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.robot.solids import Solid
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 #: Towards the lamp, in the camera's frame: right, up, towards the viewer.
 _LAMP = np.array([-0.35, 0.75, 0.56]) / np.linalg.norm([-0.35, 0.75, 0.56])
 _OVERSAMPLED = 2  # per pixel and direction, for smooth edges

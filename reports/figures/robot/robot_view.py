@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.robot.dimensions import (
     flat_links,
     front_dimensions,
@@ -22,8 +22,6 @@ from reports.figures.style import BLUE, GREEN, INK, QUIET, VERMILION, house_styl
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @house_style()

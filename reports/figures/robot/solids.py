@@ -10,7 +10,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
+
 Color = tuple[float, float, float]
 #: Of what has no colour of its own.
 GREY: Color = (0.6, 0.6, 0.6)

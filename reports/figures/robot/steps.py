@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from reports.figures.robot.solids import Solid
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from actuators.arrays import Array
 from reports.errors import FigureError
 from reports.figures.robot.meshes import mesh_file, read_mesh
 from reports.figures.robot.solids import GREY, Color, Solid, box, cylinder, mesh, sphere
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

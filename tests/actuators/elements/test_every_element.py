@@ -1,4 +1,4 @@
-"""What every element promises: driving inverts moving, energy balances, holding is a limit."""
+"""What every element promises: forward undoes inverse, energy balances, holding is a limit."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ ELEMENTS = (
 @given(ELEMENTS, torques, speeds, st.floats(-100, 100))
 def test_driving_inverts_moving(element, torque, speed, acceleration):
     s = constant(speed, torque, acceleration)
-    back = element.driving(element.moving(s))
+    back = element.forward(element.inverse(s))
     for name in ("torque", "velocity", "acceleration", "position", "direction"):
         slack = 1e-7 * (1 + abs(torque) + speed**2)
         np.testing.assert_allclose(getattr(back, name), getattr(s, name), rtol=1e-7, atol=slack)
@@ -60,7 +60,7 @@ def test_driving_inverts_moving(element, torque, speed, acceleration):
 @given(ELEMENTS, torques, speeds, st.floats(-100, 100))
 def test_what_goes_in_is_passed_on_lost_or_stored(element, torque, speed, acceleration):
     s = constant(speed, torque, acceleration)
-    m, loss, stored = element.moving(s), element.loss(s), element.stored(s)
+    m, loss, stored = element.inverse(s), element.loss(s), element.stored(s)
     drawn = element.drawn(s.torque, s.velocity, s.direction)
     taken = (0.0 if loss is None else loss) + (0.0 if stored is None else stored)
     assert loss is None or (loss >= 0.0).all()
@@ -71,7 +71,7 @@ def test_what_goes_in_is_passed_on_lost_or_stored(element, torque, speed, accele
 @given(FRICTIONS | hypoids(), torques)
 def test_holding_ends_where_motion_sets_in(element, torque):
     low, high = element.holding(np.array([torque]), np.array([torque]))
-    ends = sorted(element.moving(constant([2e-9, -2e-9], torque)).torque[0])
+    ends = sorted(element.inverse(constant([2e-9, -2e-9], torque)).torque[0])
     np.testing.assert_allclose([low[0], high[0]], ends, rtol=1e-6, atol=1e-6 * (1 + abs(torque)))
 
 
@@ -93,7 +93,7 @@ NOTHING = (
 @pytest.mark.parametrize("law", NOTHING, ids=lambda e: type(e).__name__)
 def test_a_law_without_parameters_is_absent(law):
     s = constant([1.0, -1.0, 2.0, 0.0], [3.0, 5.0, -7.0, 2.0], acceleration=4.0)
-    for side in (law.moving(s), law.driving(s)):
+    for side in (law.inverse(s), law.forward(s)):
         assert np.array_equal(side.torque, s.torque)
     for end in law.holding(s.torque, s.torque, s.position):
         assert np.array_equal(end, s.torque)
@@ -143,7 +143,7 @@ def test_unphysical_parameters_are_refused(build):
 
 def test_parameters_may_differ_by_joint():
     f = Friction("f", coulomb=np.array([1.0, 2.0]))
-    assert f.moving(constant([1.0, -1.0], 0.0)).torque[0].tolist() == [1.0, -2.0]
+    assert f.inverse(constant([1.0, -1.0], 0.0)).torque[0].tolist() == [1.0, -2.0]
 
 
 def test_inertia_stores_the_change_of_kinetic_energy():
@@ -156,4 +156,4 @@ def test_inertia_stores_the_change_of_kinetic_energy():
 
 def test_a_series_keeps_its_motion_through_an_element_without_ratio():
     s = series([0.0, 1.0], [0, 1], [1, 1], [0, 0], [2, 2])
-    assert Friction("f", coulomb=1.0).moving(s).position is s.position
+    assert Friction("f", coulomb=1.0).inverse(s).position is s.position

@@ -69,4 +69,4 @@ def test_a_softened_sense_near_rest_takes_that_share_of_its_own_level(law):
 
 
 def test_no_load_is_driven_without_load():
-    assert not QUADRANT.driving(constant([1.0, -1.0], 0.0)).torque.any()
+    assert not QUADRANT.forward(constant([1.0, -1.0], 0.0)).torque.any()

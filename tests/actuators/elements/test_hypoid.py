@@ -18,16 +18,16 @@ def hypoid(mu=MU):
 @pytest.mark.parametrize(("velocity", "sign"), [(1.0, 1.0), (-1.0, -1.0)])
 def test_efficiency_driving_and_driven_in_closed_form(velocity, sign):
     s = constant(velocity, 30.0)
-    loss_of_power = hypoid().moving(s).power / s.power
+    loss_of_power = hypoid().inverse(s).power / s.power
     expected = (1 + sign * MU * np.tan(B1)) / (1 + sign * MU * np.tan(B2))
     np.testing.assert_allclose(loss_of_power, expected, rtol=1e-13)
 
 
 def test_without_friction_it_is_its_ratio():
     s = constant([1.0, -1.0], 30.0)
-    np.testing.assert_allclose(hypoid(0.0).moving(s).torque, 1.0, rtol=1e-13)
+    np.testing.assert_allclose(hypoid(0.0).inverse(s).torque, 1.0, rtol=1e-13)
     h = Hypoid("h", ratio=4.0, pinion_angle=0.7)  # a wheel of 1 m, teeth along its axis
-    np.testing.assert_allclose(h.moving(s).torque, 7.5, rtol=1e-13)
+    np.testing.assert_allclose(h.inverse(s).torque, 7.5, rtol=1e-13)
     np.testing.assert_allclose(h.normal_force(s), 30.0)
     assert not h.loss(s).any()
 
@@ -35,8 +35,8 @@ def test_without_friction_it_is_its_ratio():
 @pytest.mark.parametrize("mu", [MU, LOCKING], ids=["reversible", "self-locking"])
 def test_without_a_load_it_needs_no_torque(mu):
     s = constant([1.0, -1.0], 0.0)
-    assert not hypoid(mu).moving(s).torque.any()
-    assert not hypoid(mu).driving(s).torque.any()
+    assert not hypoid(mu).inverse(s).torque.any()
+    assert not hypoid(mu).forward(s).torque.any()
 
 
 def test_a_self_locking_gear_holds_any_load_and_jams_when_its_pinion_pushes_back():
@@ -46,10 +46,10 @@ def test_a_self_locking_gear_holds_any_load_and_jams_when_its_pinion_pushes_back
     assert (low < 0).all()
     assert (high > 0).all()
     s = constant([1.0, -1.0], [30.0, -30.0])  # driven along its motion there is no trouble
-    np.testing.assert_allclose(h.driving(h.moving(s)).torque, s.torque)
+    np.testing.assert_allclose(h.forward(h.inverse(s)).torque, s.torque)
     s = series([0.0, 1.0, 2.0], [[0, 0]] * 3, [[1, 1]] * 3, [[0, 0]] * 3, [[1, 1], [1, 1], [1, -1]])
     with pytest.raises(SelfLockingError, match="joint 'j1' cannot keep moving in sample 2"):
-        h.driving(s)
+        h.forward(s)
 
 
 def test_sliding_speed_is_the_difference_along_the_teeth():

@@ -101,7 +101,7 @@ def test_friction_per_load_over_a_travel_is_undone_from_the_motors_side():
     t, q, v = swing()
     side = series(t, q, v, 0 * v, 5.0 * np.cos(t))
     law = friction(0.003, coulomb=0.5, when_driving=0.2, when_driven=0.1)
-    np.testing.assert_allclose(law.driving(law.moving(side)).torque, side.torque, atol=1e-12)
+    np.testing.assert_allclose(law.forward(law.inverse(side)).torque, side.torque, atol=1e-12)
 
 
 def test_a_vanishing_travel_is_the_same_law_as_a_jump():

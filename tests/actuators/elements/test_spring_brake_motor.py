@@ -37,7 +37,7 @@ def test_a_spring_supplies_what_hookes_law_says_and_a_ripple_repeats():
 @pytest.mark.parametrize("law", [ParallelSpring("s", 40.0, 0.3), Ripple("s", 5.0, 3.0, 0.4)])
 def test_a_position_torque_stores_no_net_energy_over_a_cycle(law):
     s = split(harmonic(4001, joints=2, seed=3))
-    result = chain(law).moving(s)
+    result = chain(law).inverse(s)
     rate = result.stored["s"]
     assert np.abs(integral(s.time, np.abs(rate))).min() > 1.0  # it does take and give
     np.testing.assert_allclose(integral(s.time, rate), 0.0, atol=1e-4)
@@ -76,13 +76,13 @@ def test_a_brake_holds_without_current_and_costs_its_coil(powers, at_rest, in_mo
     np.testing.assert_allclose(held.current, np.array([0.0, 0.0, 3.0]) / N / K, atol=1e-12)
     np.testing.assert_allclose(held.power, R * held.current**2 + at_rest)
 
-    moving = braked.moving(constant(2.0, 5.0))
-    bare = chain().moving(constant(2.0, 5.0))
+    moving = braked.inverse(constant(2.0, 5.0))
+    bare = chain().inverse(constant(2.0, 5.0))
     np.testing.assert_array_equal(moving.motor.torque, bare.motor.torque)
     np.testing.assert_allclose(moving.electrical_power, bare.electrical_power + in_motion)
     np.testing.assert_allclose(moving.losses["brake"], in_motion)
     zero = np.zeros((2, 2))
-    both = braked.moving(series([0, 1], zero, zero + [0.0, 2.0], zero, zero + [12.0, 5.0]))
+    both = braked.inverse(series([0, 1], zero, zero + [0.0, 2.0], zero, zero + [12.0, 5.0]))
     np.testing.assert_allclose(both.losses["brake"][0], [at_rest, in_motion])
     assert not both.current[:, 0].any()
     assert np.abs(balance_residual(both)).max() < 1e-12
@@ -91,7 +91,7 @@ def test_a_brake_holds_without_current_and_costs_its_coil(powers, at_rest, in_mo
 def test_two_equal_motors_that_share_lose_half_the_copper():
     s = split(harmonic(500, joints=2))
     alone, shared = chain(), chain(SecondMotor("second", K * N, R, share=0.5))
-    one, two = alone.moving(s), shared.moving(s)
+    one, two = alone.inverse(s), shared.inverse(s)
     copper = two.losses["winding"] + two.losses["second"]
     np.testing.assert_allclose(copper, 0.5 * one.losses["winding"], atol=1e-12)
     gone = one.losses["winding"] - copper
@@ -160,7 +160,7 @@ def test_all_three_are_written_into_an_alternative(balanced):
     # The brake carries 40 mN*m at the rotor; of the rest the second motor takes 40 %.
     left = (20.0 + stiffness * 0.1) / 400.0 - 0.04
     np.testing.assert_allclose(held.motor_torque, [0.01 * 0.6, left * 0.6])
-    result = made.moving(split(harmonic(300)))
+    result = made.inverse(split(harmonic(300)))
     assert np.abs(balance_residual(result)).max() < 1e-9
     np.testing.assert_allclose(result.losses["rotor_brake"], 6.0)
 

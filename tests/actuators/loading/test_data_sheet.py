@@ -121,7 +121,7 @@ def test_copper_loss_and_power_are_those_of_three_phases_in_every_convention(
 def test_without_load_the_motor_draws_its_no_load_current(tmp_path, share):
     own = chain(tmp_path, coulomb_share=share, no_load_voltage=None, gear_inertia=None)
     speed = 7580 * math.pi / 30 / 12.25
-    assert own.moving(steady(0.0, speed)).current == pytest.approx(0.137, rel=1e-9)
+    assert own.inverse(steady(0.0, speed)).current == pytest.approx(0.137, rel=1e-9)
 
 
 def test_the_no_load_speed_follows_from_the_voltage_where_it_is_not_printed():
@@ -133,7 +133,7 @@ def test_the_no_load_speed_follows_from_the_voltage_where_it_is_not_printed():
 def test_a_gear_drives_with_its_efficiency_and_loses_as_much_when_driven(tmp_path):
     own = chain(tmp_path, no_load_current="0 A", gear_efficiency="0.81")
     for torque, share in ((5.0, 1 / 0.81), (-5.0, 2 - 1 / 0.81)):
-        result = own.moving(steady(torque, 3.0))
+        result = own.inverse(steady(torque, 3.0))
         assert result.motor.power == pytest.approx(torque * 3.0 * share, rel=1e-9)
         lost = result.losses["gear_friction"]
         assert lost == pytest.approx(5.0 * 3.0 * (1 / 0.81 - 1), rel=1e-9)
@@ -142,7 +142,7 @@ def test_a_gear_drives_with_its_efficiency_and_loses_as_much_when_driven(tmp_pat
 
 def test_the_torque_that_drives_it_back_is_the_one_at_which_it_yields(tmp_path):
     own = chain(tmp_path, no_load_current=None, coulomb_share=None, back_drive_torque="0.51 N*m")
-    assert own.moving(steady(-0.51, 1e-9)).motor.torque == pytest.approx(0.0, abs=1e-10)
+    assert own.inverse(steady(-0.51, 1e-9)).motor.torque == pytest.approx(0.0, abs=1e-10)
     held = own.holding(np.array([0.509, 0.511]))
     assert held.motor_torque[0] == 0.0 < held.motor_torque[1]
 
@@ -196,7 +196,7 @@ def test_a_limit_of_torque_at_the_output_is_the_current_that_gives_it(tmp_path):
         max_speed=None,
         coulomb_share="1",
     )
-    result = own.moving(steady(20.0, 1.0))
+    result = own.inverse(steady(20.0, 1.0))
     assert result.current == pytest.approx(own.motor.peak_current, rel=1e-9)
     assert own.motor.max_speed == pytest.approx(24 / 0.0302)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from actuators.energy.limits import limit_rows
 from actuators.energy.regeneration import supply_of
-from pipeline.choice.designs import Designs
+from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded
 
 
@@ -16,7 +16,7 @@ def in_full(designs: Designs, i: int, demanded: Demanded) -> tuple[float, bool]:
     for track in demanded.tracks:
         mode = track.load.mode
         engaged = not mode.stands or mode.hold == "brake"
-        result = designs.chain(i, engaged=engaged).moving(track.series)
+        result = designs.chain(i, engaged=engaged).inverse(track.series)
         driver = designs.taken(np.array([i]))
         lost = driver.driver.loss(result.current, driver.bus) - driver.idle
         flow = supply_of(result.electrical_power + lost, result.joint.time, demanded.joints)

@@ -14,12 +14,12 @@ import pipeline as lw
 from actuators.loading.parts import PACK, load_parts
 from actuators.supply.battery import HOUR
 from pipeline.choice.answer.full import lasting, through
-from pipeline.choice.choose import _Asked
+from pipeline.choice.asked import Asked
 from pipeline.choice.group import groups_of
 from pipeline.choice.loads import loads_of
-from pipeline.choice.mission import read_mission
+from pipeline.choice.missions.mission import read_mission
+from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded, Feedback, shared
-from pipeline.choice.shelf import Shelf, combinations
 from pipeline.choice.track import Account
 from tests.pipeline.choice.brute import in_full
 from tests.pipeline.robot.walkers import robot_text, urdf_text
@@ -57,7 +57,7 @@ def quadruped(folder: Path, seed: int) -> lw.Machine:
     return lw.load(folder / "walker.toml")
 
 
-def asked(folder: Path, seed: int, policy: str = "none") -> _Asked:
+def asked(folder: Path, seed: int, policy: str = "none") -> Asked:
     (folder / "day.csv").write_text(DAY)
     machine = quadruped(folder, seed)
     known = load_parts()
@@ -65,7 +65,7 @@ def asked(folder: Path, seed: int, policy: str = "none") -> _Asked:
     groups = groups_of(machine.ready.robot.spec)
     account = Account(5.0, policy, 0.4 if policy == "fraction" else 0.0)
     modes = read_mission(folder / "day.csv")
-    return _Asked(machine, modes, groups, shelf, account, 0.0, known[PACK])
+    return Asked(machine, modes, groups, shelf, account, 0.0, known[PACK])
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])

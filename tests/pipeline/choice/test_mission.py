@@ -11,7 +11,7 @@ from pipeline.choice.answer.tables import tables_of
 from pipeline.choice.choose import choose
 from pipeline.choice.errors import ChoiceError, MissionError
 from pipeline.choice.loads import loads_of
-from pipeline.choice.mission import read_mission
+from pipeline.choice.missions.mission import read_mission
 from pipeline.choice.wanted import Wanted
 from pipeline.errors import StanceError
 

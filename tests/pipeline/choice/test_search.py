@@ -13,9 +13,9 @@ from actuators.loading.data_sheet import read_entry
 from actuators.loading.parts import KINDS, load_parts
 from pipeline.choice.group import front, merged, search
 from pipeline.choice.loads import Load, loads_of
-from pipeline.choice.mission import read_mission
+from pipeline.choice.missions.mission import read_mission
+from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded
-from pipeline.choice.shelf import Shelf, combinations
 from pipeline.choice.track import Account
 from tests.pipeline.choice.brute import in_full
 
@@ -124,9 +124,9 @@ def test_fronts_add() -> None:
 
 
 def test_mission_that_ships_is_read() -> None:
-    import pipeline.choice.mission as module
+    import pipeline.choice.missions.mission as module
 
-    modes = read_mission(Path(module.__file__).parent / "missions" / "day.csv")
+    modes = read_mission(Path(module.__file__).parent / "day.csv")
     assert sum(mode.hours for mode in modes) == pytest.approx(24.0)
 
 
@@ -145,3 +145,22 @@ def test_a_part_that_says_less_is_filled_from_its_class() -> None:
     # 2 to 50 % of what the worm loses at 40 N*m: 40 / 120 (1 / 0.25 - 1) = 1 N*m at its input.
     start = shelf.numbers["worm"]["gear_starting_torque"]
     assert (start.low, start.high) == pytest.approx((0.02, 0.5))
+
+
+def test_a_belt_of_ones_own_takes_part_in_place_of_a_gear() -> None:
+    """What its file leaves out has the ranges of its class; belts without pulleys stay out."""
+    parts = load_parts()
+    printed = {
+        name: read_entry(name, words, KINDS["belt"])
+        for name, words in (("gear_ratio", "9"), ("gear_continuous_torque", "5 N*m"))
+    }
+    own = replace(parts["gates_sync"], name="own", printed=printed)
+    some = {"own": own, "conti_at3_4": parts["conti_at3_4"]}
+    shelf = Shelf.of({"maxon_148867": parts["maxon_148867"]} | some)
+    every = combinations(shelf)
+    assert {gear for _, gear, _ in every} == {"", "own"}
+    designs = shelf.designs(every)
+    at = [gear for _, gear, _ in every].index("own")
+    assert designs.ratio[at] == 9.0
+    assert designs.load[at] > 0.0
+    assert designs.coulomb[at] > designs.coulomb[1 - at]

@@ -9,14 +9,14 @@ import pipeline as lw
 from actuators.elements.two_body import REFERENCE_K
 from actuators.loading.parts import PACK, load_parts
 from pipeline.choice import heat
-from pipeline.choice.choose import _Asked
+from pipeline.choice.asked import Asked
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.group import groups_of
 from pipeline.choice.loads import loads_of
-from pipeline.choice.mission import read_mission
+from pipeline.choice.missions.mission import read_mission
+from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded
 from pipeline.choice.settle import Robots
-from pipeline.choice.shelf import Shelf, combinations
 from pipeline.choice.track import Account
 
 PARTS = (
@@ -26,22 +26,22 @@ PARTS = (
 
 
 @pytest.fixture(scope="module")
-def asked(tmp_path_factory: pytest.TempPathFactory) -> _Asked:
+def asked(tmp_path_factory: pytest.TempPathFactory) -> Asked:
     path = tmp_path_factory.mktemp("mission") / "day.csv"
     path.write_text("mode,share,gait\nwalk,0.4,\nstand,0.6,stand\n")
     machine = lw.load("urdf/solo12.toml")
     known = load_parts()
     shelf = Shelf.of({name: known[name] for name in PARTS})
     groups = groups_of(machine.ready.robot.spec)
-    return _Asked(machine, read_mission(path), groups, shelf, Account(), 0.0, known[PACK])
+    return Asked(machine, read_mission(path), groups, shelf, Account(), 0.0, known[PACK])
 
 
 @pytest.fixture(scope="module")
-def robots(asked: _Asked) -> Robots:
+def robots(asked: Asked) -> Robots:
     return asked.robots(dict.fromkeys(asked.groups, 0.3))
 
 
-def test_demand_of_any_masses_is_that_computed_anew(asked: _Asked, robots: Robots) -> None:
+def test_demand_of_any_masses_is_that_computed_anew(asked: Asked, robots: Robots) -> None:
     mass = {g: 0.1 + 0.2 * k for k, g in enumerate(asked.groups)}
     added = {joint: mass[g] for g, joints in asked.groups.items() for joint in joints}
     anew = loads_of(asked.machine, asked.modes, added, along=robots.loads)
@@ -53,7 +53,7 @@ def test_demand_of_any_masses_is_that_computed_anew(asked: _Asked, robots: Robot
 
 
 def test_settled_robot_is_the_best_of_all_that_differ_in_one_group(
-    asked: _Asked, robots: Robots
+    asked: Asked, robots: Robots
 ) -> None:
     every = combinations(asked.shelf, brakes=False)
     pool = dict.fromkeys(asked.groups, [d for d in every if d[1]][:12])
@@ -65,7 +65,7 @@ def test_settled_robot_is_the_best_of_all_that_differ_in_one_group(
     assert robots.settled(answer, pool) == answer
 
 
-def test_what_exceeds_a_limit_with_its_own_mass_is_one_line(asked: _Asked, robots: Robots) -> None:
+def test_what_exceeds_a_limit_with_its_own_mass_is_one_line(asked: Asked, robots: Robots) -> None:
     weak = ("maxon_402687", "maxon_gp_22_hp_84", "")
     heavy = asked.robots(dict.fromkeys(asked.groups, 10.0))
     with pytest.raises(ChoiceError, match=r"own actuators' mass: group .* 10 kg a joint") as caught:

@@ -16,11 +16,11 @@ from pathlib import Path
 import pytest
 
 from pipeline.api import figures
-from pipeline.cli.demo import DEMO
 from pipeline.cli.main import main
 from reports.errors import FigureError
 from reports.folder import MANIFEST, holding, read_manifest
 from tests.command_line import Command, exit_code, in_another_process, results
+from tests.demo import DEMO
 
 
 def full(most: int) -> None:
@@ -249,6 +249,23 @@ def test_a_twin_asks_for_an_empty_folder(
     assert main(["twin", "--out", "."]) == 2
     assert "not empty" in capsys.readouterr().err
     assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--seed", "-1"], "--seed and --number start at 0"),
+        (["--number", "-1"], "--seed and --number start at 0"),
+        (["--supply", "--machine", "leg"], "no --machine, --source"),
+        (["--supply", "--source", "mujoco"], "no --machine, --source"),
+    ],
+)
+def test_a_twin_refuses_what_it_would_pass_over(
+    options: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["twin", *options, "--out", str(tmp_path / "trial")]) == 2
+    assert words in capsys.readouterr().err
+    assert not (tmp_path / "trial" / "given").exists()
 
 
 @pytest.mark.parametrize(

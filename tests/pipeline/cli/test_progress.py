@@ -14,9 +14,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.demo import DEMO
 from pipeline.progress import Progress
 from tests.command_line import Command
+from tests.demo import DEMO
 
 _RUN = [sys.executable, "-c", "import sys; from pipeline.cli.main import main; sys.exit(main())"]
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.demo import DEMO
 from tests.command_line import Command, exit_code, rows_of
+from tests.demo import DEMO
 
 pytestmark = [
     pytest.mark.slow,

@@ -11,7 +11,6 @@ from pipeline.effects.model_file import (
     EditParameter,
     apply_edits,
     base_model,
-    load_model,
     new_model_file,
     read_model_file,
 )
@@ -41,7 +40,8 @@ def test_round_trip(tmp_path: Path, root: Path) -> None:
     assert file.edits == (_edit(),)
     assert file.alternative == "rotor"
     assert file.changed == ()
-    names = [e.name for e in load_model(path).actuator("rm_joint_2").elements]
+    machine = apply_edits(base_model(file), file.edits)
+    names = [e.name for e in machine.actuator("rm_joint_2").elements]
     assert names[0] == "coulomb_friction"
 
 

@@ -12,7 +12,7 @@ from actuators.loading.build import load_catalog
 from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Remainder
 from pipeline.identification.selection.residual import remainders
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement, near_rest
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement, near_rest
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
@@ -43,7 +43,7 @@ def leg_motion(seed: int = 0, duration: float = 16.0) -> Measurement:
             v[:, j] += size * w * np.cos(w * t + phase)
             a[:, j] -= size * w * w * np.sin(w * t + phase)
     block = (np.arange(t.size) * 40) // t.size
-    part = np.array([FIT, CHOOSE, FIT, PROVE], dtype=np.int8)[block % 4]
+    part = np.array([TRAIN, VALIDATION, TRAIN, TEST], dtype=np.int8)[block % 4]
     rest = np.full(3, 2e-3)
     whole = (slice(0, t.size),)
     noise = np.tile([CURRENT, VOLTAGE], (3, 1))
@@ -102,4 +102,4 @@ def only(log: Measurement, channels: tuple[str, ...]) -> Measurement:
 def left_by(model: MachineModel, logs: Sequence[Measurement]) -> tuple[Remainder, ...]:
     """What a model leaves."""
     predictions = [Simulator(m).predict(model) for m in logs]
-    return remainders(logs, predictions, floor_of(logs, PROVE))
+    return remainders(logs, predictions, floor_of(logs, TEST))

@@ -16,7 +16,7 @@ from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.tolerances import grouped, nuisance_column
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.pool import make_pool
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from tests.pipeline.identification import bench_leg as leg
 from tests.pipeline.robot.walkers import MIXED, walker
@@ -35,7 +35,7 @@ def walking(tmp_path_factory: pytest.TempPathFactory) -> Problem:
     model = machine_of_robot(walker(tmp_path_factory.mktemp("mixed"), MIXED, arm=True), None)
     rng, n, j = np.random.default_rng(3), 60, len(model.joints)
     block = np.arange(n) // 6
-    part = np.array([FIT, CHOOSE, PROVE], dtype=np.int8)[block % 3]
+    part = np.array([TRAIN, VALIDATION, TEST], dtype=np.int8)[block % 3]
     q, v, a = (rng.normal(0.0, 0.3, (n, j)) for _ in range(3))
     log = Measurement(
         name="made",
@@ -115,7 +115,7 @@ def test_what_a_log_leaves_open_is_its_tolerances_and_the_scatter_of_estimates()
     none = none.judged(UNCERTAINTIES[0], none.weights)
     # Of tolerances alone, each by its stated size.
     bench, square = none.benches[0], np.zeros(3)
-    rows = bench.parts[PROVE]
+    rows = bench.parts[TEST]
     priors = none.precision[: len(none.tolerances)]
     for column, prior in zip(none.tolerance_columns(0), priors, strict=True):
         for j, x in column.items():

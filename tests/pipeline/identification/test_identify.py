@@ -10,7 +10,7 @@ import pytest
 from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification.results import CONFIRMED
 from pipeline.identification.selection.identify import identify
-from pipeline.logs.prepared.measurement import PROVE
+from pipeline.logs.prepared.measurement import TEST
 from tests.pipeline.identification import bench_leg as leg
 
 J2 = ("rm_joint_2",)
@@ -192,11 +192,11 @@ def test_what_only_proves_has_no_say(motion) -> None:  # type: ignore[no-untyped
     truth = effect_named("coulomb_friction").apply(nominal, ("rm_joint_1",), {"torque": 0.5})
     log = leg.measured(truth, motion)
     garbage = log.effort.copy()
-    garbage[log.part == PROVE] *= -7.0
+    garbage[log.part == TEST] *= -7.0
     # A whole log that only proves, of another noise.
     held = replace(
         leg.measured(nominal, motion, seed=9),
-        part=np.full_like(log.part, PROVE),
+        part=np.full_like(log.part, TEST),
         noise=9.0 * log.noise,
     )
     first = identify(nominal, [log, held]).naming

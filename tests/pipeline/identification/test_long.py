@@ -20,7 +20,7 @@ from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.locate import Whereabouts, find_where
 from pipeline.identification.workflow.setup import Setup, setup, take_in
 from pipeline.logs.prepared.informative import STRETCH, choose, scan
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
 from pipeline.logs.prepared.parts import GUARD
 from tests.leg_log import leg_logs
 from tests.pipeline.logs.made import made_log, motion
@@ -111,8 +111,8 @@ def test_chunks_hold_every_row_once_and_what_proves_had_no_say(
     assert all(a[-1] < b[0] for a, b in pairwise(counted))
     assert pq.read_metadata(log).num_rows == long.surveys[0].found.rows
     (seen,) = where.measurements
-    said = seen.time[np.isin(seen.part, (FIT, CHOOSE))]
-    proves = np.concatenate([m.time[m.part == PROVE] for m in chunks])
+    said = seen.time[np.isin(seen.part, (TRAIN, VALIDATION))]
+    proves = np.concatenate([m.time[m.part == TEST] for m in chunks])
     assert proves.size > 200
     index = np.clip(np.searchsorted(said, proves), 1, said.size - 1)
     nearest = np.minimum(np.abs(proves - said[index - 1]), np.abs(said[index] - proves))
@@ -147,12 +147,12 @@ def test_a_last_share_proves_and_says_nothing_else(
     assert long is not None
     (m,) = where.measurements
     border = long.surveys[0].proves_from
-    assert (m.time[m.part == PROVE] >= border).all()
-    assert (m.time[np.isin(m.part, (FIT, CHOOSE))] < border).all()
-    assert {FIT, CHOOSE, PROVE} <= set(m.part.tolist())
+    assert (m.time[m.part == TEST] >= border).all()
+    assert (m.time[np.isin(m.part, (TRAIN, VALIDATION))] < border).all()
+    assert {TRAIN, VALIDATION, TEST} <= set(m.part.tolist())
     for _, simulator in long.chunks(given.model, where.measurements):
         chunk = simulator.measurement
-        assert (chunk.time[chunk.part == PROVE] >= border).all()
+        assert (chunk.time[chunk.part == TEST] >= border).all()
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.cli.gap import options_of
 from pipeline.cli.main import main, parser
-from pipeline.effects.model_file import load_model
+from pipeline.effects.model_file import apply_edits, base_model, read_model_file
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.results import CONFIRMED, Found
 from pipeline.identification.workflow.locate import Whereabouts, find_where
@@ -25,7 +25,7 @@ from pipeline.identification.workflow.setup import Setup, setup, take_in
 from pipeline.identification.workflow.story import tell
 from pipeline.identification.workflow.validate import check
 from pipeline.identification.workflow.written import Weighed
-from pipeline.logs.prepared.measurement import PROVE, Measurement
+from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.progress import Progress
 from pipeline.simulation.predict import Simulator
 
@@ -74,7 +74,8 @@ def score(model: Path, log: Path, cutoff: float, rate: float, *, last: float = 1
     One Butterworth of order 4 forward and backward on everything, the velocity column where there
     is one, every row of the last share, no tolerance.
     """
-    machine, table = load_model(model), pd.read_csv(log)
+    file, table = read_model_file(model), pd.read_csv(log)
+    machine = apply_edits(base_model(file), file.edits)
     time = table["time_s"].to_numpy()
     dt = float(np.median(np.diff(time)))
     grid = np.arange(time[0], time[-1], dt)
@@ -239,7 +240,7 @@ def test_xl330_lacks_load_dependent_friction(friction: bool, xl330: Run, shared_
 
 @pytest.mark.slow
 def test_xl330_voltage_of_a_gain_that_had_no_say(xl330: Run) -> None:
-    proved = {m.name.split("_")[1] for m in xl330.where.measurements if (m.part == PROVE).any()}
+    proved = {m.name.split("_")[1] for m in xl330.where.measurements if (m.part == TEST).any()}
     assert proved == {"kp200"}
     before = xl330.weighed.found[0].gap_before
     assert before > 0.4

@@ -17,7 +17,7 @@ from pipeline.identification.regression.tolerances import UNCERTAINTY
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.pool import Channel, Pool, Term, saturated
 from pipeline.identification.selection.search import FOLDS, MARGIN, Search, State, noise_weights
-from pipeline.logs.prepared.measurement import CHOOSE, FIT
+from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
 Array = NDArray[np.float64]
 ROWS, BLOCKS = 160, 16
@@ -72,7 +72,7 @@ class Log:
             terms.append(Term(effect, place, shape, np.arange(at, at + n)))  # type: ignore[arg-type]
             at += n
         channels = []
-        part = np.array([FIT, CHOOSE] * (BLOCKS // 2), np.int8)
+        part = np.array([TRAIN, VALIDATION] * (BLOCKS // 2), np.int8)
         for j, (X, r) in enumerate(zip(self.X, self.r, strict=True)):
             x, y = X.reshape(len(X), BLOCKS, -1), r.reshape(BLOCKS, -1)
             channels.append(

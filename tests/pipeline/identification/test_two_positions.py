@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pipeline.identification.results import CONFIRMED, Found
 from pipeline.identification.selection import two_positions
 from pipeline.identification.selection.two_positions import READ_OFF, read_off_two
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
 
 N = 6000
 STIFF, WIDTH = 800.0, 0.004
@@ -84,7 +84,7 @@ def _friction_of_the_log(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def told(*logs: Made, part: NDArray[np.int8] | None = None) -> tuple[Found, ...]:
-    parts = np.full(N, FIT, np.int8) if part is None else part
+    parts = np.full(N, TRAIN, np.int8) if part is None else part
     split = SimpleNamespace(part=(parts,) * len(logs))
     return read_off_two(None, logs, split, logs, first=3)  # type: ignore[arg-type]
 
@@ -138,8 +138,8 @@ def test_motor_and_joint_that_agree_have_neither() -> None:
 
 
 def test_rows_that_prove_are_not_looked_at() -> None:
-    part = np.full(N, CHOOSE, np.int8)
-    part[N // 2 :] = PROVE
+    part = np.full(N, VALIDATION, np.int8)
+    part[N // 2 :] = TEST
     straight, spoilt = (
         told(made(stiff=STIFF, spoilt=s), part=part) for s in (slice(0, 0), slice(N // 2, N))
     )
@@ -150,7 +150,7 @@ def test_rows_that_prove_are_not_looked_at() -> None:
 
 
 def test_a_log_that_only_proves_tells_nothing() -> None:
-    assert told(made(stiff=STIFF), part=np.full(N, PROVE, np.int8)) == ()
+    assert told(made(stiff=STIFF), part=np.full(N, TEST, np.int8)) == ()
 
 
 def test_a_current_tells_no_stiffness() -> None:

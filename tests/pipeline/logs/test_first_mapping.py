@@ -124,6 +124,34 @@ def test_what_nothing_tells_is_left_to_the_reader(
     )
 
 
+def test_a_meter_of_the_supply_counts_unless_there_are_several(
+    columns: Columns, write: Callable[..., Path], two_joints: Expected, tmp_path: Path
+) -> None:
+    joints = {"t": columns["time_s"], "q_a": columns["a__position_rad"]}
+    joints["q_b"] = columns["b__position_rad"]
+    meter = {"bus_voltage": np.full(2000, 24.0), "bus_current": np.linspace(900.0, 1100.0, 2000)}
+    path = write(joints | meter, "foreign.csv")
+    (tmp_path / "first.toml").write_text(first_mapping(path, two_joints).text, encoding="utf-8")
+    log = read_log(path, two_joints, load_mapping(tmp_path / "first.toml"))
+    assert log.supply_alone
+    assert log.supply is not None
+    assert log.supply_current is not None
+    assert np.allclose(log.supply, 24.0)
+    assert np.allclose(log.supply_current, np.linspace(0.9, 1.1, 2000))
+    twice = {f"bus_current_{k}": meter["bus_current"] for k in range(2)}
+    made = first_mapping(write(joints | twice, "two.csv"), two_joints)
+    assert made.open == ("bus_current_0", "bus_current_1")
+
+
+def test_columns_without_a_finite_number_are_none(
+    columns: Columns, write: Callable[..., Path]
+) -> None:
+    nothing = {"q_7": np.full(2000, np.nan), "tau_7": np.full(2000, np.inf)}
+    foreign = at_the_motor(columns)
+    made = first_mapping(write(foreign | nothing, "foreign.csv"))
+    assert {*made.mapped} == {*foreign} - {"time"}
+
+
 def test_a_log_in_the_format_needs_nothing(
     columns: Columns, write: Callable[..., Path], two_joints: Expected
 ) -> None:
@@ -140,6 +168,10 @@ def test_a_log_in_the_format_needs_nothing(
         ("motorCurrent2 (mA)", "current", "2", "mA"),
         ("joint_vel_rad_s_4", "velocity", "rad_s_4", ""),
         ("battery_voltage", "supply", "battery", ""),
+        ("vbat", "supply", "vbat", ""),
+        ("battery_current_mA", "supply_current", "battery", "mA"),
+        ("psu power [W]", "supply_power", "psu", "W"),
+        ("battery_soc", "", "battery_soc", ""),
         ("/joint_states/position[2]", "position", "2", ""),
         ("shoulder.temperature", "temperature", "shoulder", ""),
     ],

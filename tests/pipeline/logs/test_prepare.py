@@ -15,7 +15,7 @@ from pipeline.identification.compare.intake import prepare_logs
 from pipeline.logs.errors import GapError, PreparationError
 from pipeline.logs.prepared.contact import log_contact, lowest_feet, scheduled_contact
 from pipeline.logs.prepared.cycles import cycle_noise, period, repeat_noise
-from pipeline.logs.prepared.measurement import CHOOSE, FIT, PROVE
+from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
 from pipeline.logs.prepared.parts import split
 from pipeline.logs.prepared.prepare import prepare
 from pipeline.logs.prepared.settings import Settings, choose_settings
@@ -220,20 +220,20 @@ def test_parts_are_further_apart_than_the_filter_sees() -> None:
     ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 10.0, "test"))
     parts = split([ready])
     kind = parts.part[0]
-    for one, other in ((FIT, CHOOSE), (FIT, PROVE), (CHOOSE, PROVE)):
+    for one, other in ((TRAIN, VALIDATION), (TRAIN, TEST), (VALIDATION, TEST)):
         a, b = np.flatnonzero(kind == one), np.flatnonzero(kind == other)
         nearest = np.abs(a - b[np.clip(np.searchsorted(b, a), 0, b.size - 1)]).min()
         before = np.abs(a - b[np.clip(np.searchsorted(b, a) - 1, 0, b.size - 1)]).min()
         assert min(nearest, before) / RATE > 2 * ready.memory
-    shares = [(parts.part[0] == k).mean() for k in (FIT, CHOOSE, PROVE)]
+    shares = [(parts.part[0] == k).mean() for k in (TRAIN, VALIDATION, TEST)]
     assert shares[0] > 0.3
     assert min(shares) > 0.1
-    assert np.unique(parts.block[0][parts.part[0] == FIT]).size >= 3
+    assert np.unique(parts.block[0][parts.part[0] == TRAIN]).size >= 3
     # An input changed in one part leaves the filtered values of the others untouched.
     changed = effort.copy()
-    changed[(parts.part[0] == PROVE)] += 100.0
+    changed[(parts.part[0] == TEST)] += 100.0
     again = prepare(made_log(q, changed, RATE), ready.settings)
-    others = (parts.part[0] == FIT) | (parts.part[0] == CHOOSE)
+    others = (parts.part[0] == TRAIN) | (parts.part[0] == VALIDATION)
     assert np.abs(again.effort - ready.effort)[others].max() < 1e-9
 
 
@@ -241,9 +241,9 @@ def test_the_last_share_proves() -> None:
     _, q, _, _, effort = noisy(10_000)
     ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
     parts = split([ready], prove_last=0.4)
-    assert (parts.part[0] == PROVE)[6000:].all()
-    assert not (parts.part[0] == PROVE)[:6000].any()
-    assert (parts.part[0] == FIT).any()
+    assert (parts.part[0] == TEST)[6000:].all()
+    assert not (parts.part[0] == TEST)[:6000].any()
+    assert (parts.part[0] == TRAIN).any()
 
 
 def test_whole_logs_are_held_out_by_condition() -> None:
@@ -254,11 +254,11 @@ def test_whole_logs_are_held_out_by_condition() -> None:
         logs.append(prepare(made_log(q, effort, RATE, condition={"gain": gain}), settings))
     parts = split(logs)
     assert "gain = 200" in parts.rule
-    proving = [bool((parts.part[k] == PROVE).any()) for k in range(6)]
+    proving = [bool((parts.part[k] == TEST).any()) for k in range(6)]
     assert proving == [False, False, True, True, False, False]
-    assert all(not (parts.part[k] == FIT).any() for k in (2, 3))
+    assert all(not (parts.part[k] == TRAIN).any() for k in (2, 3))
     explicit = split(logs[:2], holdout=logs[2:3])
-    assert (explicit.part[2] == PROVE).all()
+    assert (explicit.part[2] == TEST).all()
 
 
 def test_too_little_data_for_three_parts() -> None:

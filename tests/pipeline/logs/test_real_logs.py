@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipeline.identification.compare.intake import take_in
-from pipeline.logs.prepared.measurement import PROVE
+from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.prepared.parts import split
 from pipeline.logs.reading.expected import Expected, expected_of_model
 from pipeline.logs.reading.mapping import load_mapping
@@ -33,7 +33,7 @@ def test_tx40_is_accepted_as_it_is(shared_data: Path) -> None:
     still = [f.value for f in intake.findings if f.check == "standstill_share"]
     assert np.all(np.array(still) > 0.2)  # at rest at both ends
     parts = split(intake.prepared, prove_last=0.4)
-    assert np.flatnonzero(parts.part[0] == PROVE)[[0, -1]].tolist() == [13_500, 22_499]
+    assert np.flatnonzero(parts.part[0] == TEST)[[0, -1]].tolist() == [13_500, 22_499]
     # The motion stays within the velocities the maker states.
     limit = expected(folder / "tx40.urdf").velocity_limit
     assert (np.abs(ready.v).max(axis=0) <= 1.03 * limit).all()

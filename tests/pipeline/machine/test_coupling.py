@@ -88,7 +88,7 @@ def test_a_sensor_at_the_joint_sees_what_the_joint_needs(
 def test_walking_with_a_coupling_keeps_the_balance_of_power(motion: Measurement) -> None:
     torque = np.random.default_rng(0).normal(size=motion.q.shape) * 20.0
     joint = ShaftSeries.at_joint(motion.joints, motion.time, motion.q, motion.v, motion.a, torque)
-    result = Drivetrains("coupled", actuators()).moving(joint)
+    result = Drivetrains("coupled", actuators()).inverse(joint)
     for name in ("position", "velocity", "acceleration"):
         np.testing.assert_allclose(
             getattr(result.motor, name), RATIO * getattr(joint, name) @ C.T, atol=1e-9
@@ -116,7 +116,7 @@ def test_walking_with_a_coupling_and_losses_every_watt_is_accounted_for(
 ) -> None:
     torque = np.random.default_rng(1).normal(size=motion.q.shape) * 20.0
     joint = ShaftSeries.at_joint(motion.joints, motion.time, motion.q, motion.v, motion.a, torque)
-    result = Drivetrains("lossy", lossy()).moving(joint)
+    result = Drivetrains("lossy", lossy()).inverse(joint)
     lost = sum(x.sum(axis=1) for x in (*result.losses.values(), *result.stored.values()))
     taken = joint.power.sum(axis=1)
     drawn = result.electrical_power.sum(axis=1)
@@ -128,7 +128,7 @@ def test_walking_and_prediction_ask_the_same_of_coupled_motors(
 ) -> None:
     model = replace(machine, actuators=lossy())
     predicted = Simulator(motion).predict(model)
-    walked = model.drivetrains.moving(
+    walked = model.drivetrains.inverse(
         ShaftSeries.at_joint(
             motion.joints, motion.time, motion.q, motion.v, motion.a, predicted.torque
         )
@@ -179,11 +179,11 @@ def test_walking_tells_what_friction_at_a_coupled_joints_own_side_loses(
     seal = Friction("seal", coulomb=0.2, viscous=0.3)
     rubbing = machine.with_actuator(machine.actuators[2].with_output(seal))
     plain, dry = (Drivetrains("d", m.actuators) for m in (machine, rubbing))
-    lost = dry.moving(side).losses["seal"]
+    lost = dry.inverse(side).losses["seal"]
     expected = 0.2 * np.abs(side.velocity[:, 2]) + 0.3 * side.velocity[:, 2] ** 2
     assert np.allclose(lost[:, 2], expected)
     assert not lost[:, :2].any()
-    before, after = plain.moving(side).motor.power, dry.moving(side).motor.power
+    before, after = plain.inverse(side).motor.power, dry.inverse(side).motor.power
     assert np.allclose((after - before).sum(axis=1), lost.sum(axis=1))
 
 

@@ -104,9 +104,9 @@ def test_a_hypoid_is_irreversible_from_its_locking_friction_on() -> None:
         assert (gear.driven_factor <= 0.0) == locks
         if locks:
             with pytest.raises(SelfLockingError):
-                gear.driving(backwards)
+                gear.forward(backwards)
         else:
-            gear.driving(backwards)
+            gear.forward(backwards)
 
 
 def test_the_chain_holds_down_to_its_holding_friction(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -14,7 +15,13 @@ from ruamel.yaml import YAML
 
 from actuators.shaft import ShaftSeries
 from pipeline.cli.main import main
-from pipeline.effects.model_file import file_sha256, load_model
+from pipeline.effects.model_file import (
+    CATALOG,
+    apply_edits,
+    base_model,
+    file_sha256,
+    read_model_file,
+)
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export.joints import bodies_of
 
@@ -96,6 +103,11 @@ def motion(n: int = 200) -> tuple[Array, Array, Array]:
     return q[moves], v[moves], (-(w**2) * q)[moves]
 
 
+def machine_of(path: Path) -> MachineModel:
+    file = read_model_file(path)
+    return apply_edits(base_model(file), file.edits)
+
+
 def our_torque(machine: MachineModel, q: Array, v: Array, a: Array) -> Array:
     """What the motors give at the joints, by rigid bodies and the drivetrains' own laws."""
     model = bodies_of(machine)
@@ -139,7 +151,7 @@ def test_mujoco_computes_the_torques_that_we_do(
         "not carried over: meshes, collisions and contacts: bodies and joints alone are written"
     ]
     q, v, a = motion()
-    ours = our_torque(load_model(model), q, v, a)
+    ours = our_torque(machine_of(model), q, v, a)
     assert np.abs(mujoco_torque(out, q, v, a) - ours).max() < 1e-3 * np.abs(ours).max()
     # Without what was found they are far apart: the comparison can fail.
     bare = write(())
@@ -164,7 +176,7 @@ def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Pat
     model = write(PLAIN)
     out = tmp_path / "found.urdf"
     assert main(["gap", "export", str(model), "--to", "urdf", "--out", str(out)]) == 0
-    again, machine = pin.buildModelFromUrdf(str(out)), load_model(model)
+    again, machine = pin.buildModelFromUrdf(str(out)), machine_of(model)
     # Pinocchio reads `dynamics`: friction as dry friction, damping as viscous.
     assert np.allclose(again.upperDryFrictionLimit, [1.3, 0.0], atol=1e-7)
     assert np.allclose(again.damping, [0.7, 0.2], atol=1e-7)
@@ -183,6 +195,8 @@ def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
     out = tmp_path / "control.yaml"
     assert main([*export, "--to", "ros2_control", "--out", str(out)]) == 0
     gains = YAML(typ="safe").load(out)["joint_trajectory_controller"]["ros__parameters"]["gains"]
+    # A parameter of ROS 2 that is a double refuses a whole number.
+    assert {type(x) for own in gains.values() for x in own.values()} == {float}
     assert gains["shoulder"] == {
         "p": 80.0,
         "i": 0.0,
@@ -198,3 +212,31 @@ def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
     mapping.write_text("[pd_gains]\nkp = {knee = 80.0}\n")
     assert main([*export, "--to", "mjcf", "--out", str(tmp_path / "none.xml")]) == 2
     assert not (tmp_path / "none.xml").exists()
+
+
+def test_files_that_moved_and_actuators_of_ones_own(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The URDF may be named anew, a changed one is told, other actuators have a folder."""
+    model = write(PLAIN)
+    moved = tmp_path / "moved.urdf"
+    (tmp_path / "arm.urdf").rename(moved)
+    export = ["gap", "export", str(model), "--to", "mjcf", "--out", str(tmp_path / "arm.xml")]
+    assert main(export) == 2
+    assert "arm.urdf" in capsys.readouterr().err
+    assert main([*export, "--robot", str(moved)]) == 0
+    assert "note" not in capsys.readouterr().out
+    moved.write_text(URDF.replace('mass value="2.0"', 'mass value="2.1"'), encoding="utf-8")
+    assert main([*export, "--robot", str(moved)]) == 0
+    assert "note: model.toml: moved.urdf is not the one" in capsys.readouterr().out
+    own = tmp_path / "actuators"
+    shutil.copytree(CATALOG, own)
+    names = own / "alternatives.toml"
+    names.write_text(
+        names.read_text("utf-8").replace("[[rotor", "[[of_mine").replace("[rotor", "[of_mine"),
+        encoding="utf-8",
+    )
+    text = model.read_text(encoding="utf-8")
+    model.write_text(text + '\n[actuators]\nalternative = "of_mine"\n', encoding="utf-8")
+    assert main([*export, "--robot", str(moved)]) == 2
+    assert main([*export, "--robot", str(moved), "--actuators", str(own)]) == 0

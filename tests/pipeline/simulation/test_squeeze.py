@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
-from pipeline.logs.prepared.measurement import FIT, Measurement
+from pipeline.logs.prepared.measurement import TRAIN, Measurement
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import effects
@@ -92,7 +92,7 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
         effort=still[..., None],
         noise=np.ones((18, 1)),
         mask=np.ones((n, 18), dtype=bool),
-        part=np.full(n, FIT, dtype=np.int8),
+        part=np.full(n, TRAIN, dtype=np.int8),
         block=np.zeros(n, dtype=np.intp),
         pieces=(slice(0, n),),
         standing=standing,

@@ -14,11 +14,11 @@ import pinocchio as pin
 import pyarrow.parquet as pq
 import pytest
 
-from pipeline.cli.demo import DEMO
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup, take_in
 from pipeline.machine.machine import machine_of_urdf
 from tests.command_line import exit_code, rows_of, sidecar_of
+from tests.demo import DEMO
 from tests.leg_log import leg_logs
 
 Columns = dict[str, np.ndarray]

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.cli.demo import DEMO, HIDDEN
-from pipeline.effects.model_file import load_model, read_model_file
+from pipeline.effects.model_file import apply_edits, base_model, read_model_file
 from tests.command_line import exit_code, rows_of, sidecar_of
+from tests.demo import DEMO, HIDDEN
 from tests.reports.browser import layout, needs_chromium
 
 COLUMNS = {
@@ -100,7 +100,8 @@ def test_the_model_file_goes_round(run: tuple[int, Path], tmp_path: Path, root: 
     assert not file.changed
     found = {r["parameter"]: float(r["value"]) for r in rows_of(out / "found.csv")}
     assert edit.values == pytest.approx(found, rel=1e-12)
-    assert load_model(out / "model.toml").actuator("rm_joint_1").elements[0].name == HIDDEN.effect
+    machine = apply_edits(base_model(file), file.edits)
+    assert machine.actuator("rm_joint_1").elements[0].name == HIDDEN.effect
     text = tomllib.loads((out / "model.toml").read_text(encoding="utf-8"))
     assert not Path(text["robot"]["file"]).is_absolute()
     model = ["--model", str(out / "model.toml")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,13 @@ import pipeline as lw
 from pipeline.blind.machines.supply import make_supply
 from pipeline.identification.supply.account import MEASURED, UNEXPLAINED, Account, account
 from pipeline.identification.supply.drawn import Drawn
-from pipeline.identification.supply.regression import Problem, choose, rivals_of
+from pipeline.identification.supply.regression import (
+    Problem,
+    choose,
+    drawn_coefficients,
+    intervals,
+    rivals_of,
+)
 from pipeline.identification.supply.samples import Samples, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, joined, rows_of, terms_of
 from pipeline.identification.workflow.options import Options
@@ -25,6 +32,7 @@ from pipeline.identification.workflow.setup import setup, take_in
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.log import Log
 from tests.command_line import exit_code
+from tests.command_line import rows_of as table_rows
 
 Array = NDArray[np.float64]
 HEXAPOD = Path("urdf/hexapod.toml")
@@ -270,6 +278,27 @@ def test_command_writes_tables_and_says_the_answer(
     assert set(told["hidden"]) == set(hidden)
 
 
+def test_intervals_hold_whichever_of_two_terms_that_do_as_well_is_the_true_one() -> None:
+    """Two columns that differ by 3 do the same with another constant, which is known no better."""
+    one, terms = problem(5, {"constant": 20.0, "extra_friction": 2.0})
+    columns = dict(one.rows.columns)
+    columns["extra_viscous"] = columns["extra_friction"] + 3.0
+    same = Problem(replace(one.rows, columns=columns), one.block, terms)
+    for named, other, constant in (
+        ("extra_friction", "extra_viscous", 20.0),
+        ("extra_viscous", "extra_friction", 14.0),
+    ):
+        chosen = (named, "constant")
+        rivals = rivals_of(same, chosen)
+        assert other in rivals[named]
+        draws = drawn_coefficients(same, chosen)
+        ends = intervals(same, chosen, draws, rivals)
+        assert np.median(draws[:, 1]) == pytest.approx(constant, abs=0.5)
+        assert ends["constant"][0] < 14.5 < 19.5 < ends["constant"][1]
+        # Its own coefficient means nothing where another stands in its place.
+        assert ends[named] == tuple(np.quantile(draws[:, 0], [0.025, 0.975]))
+
+
 def test_motor_currents_times_the_supplys_voltage_are_no_power(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -281,3 +310,6 @@ def test_motor_currents_times_the_supplys_voltage_are_no_power(
     ]
     assert exit_code(["gap", *options, "--out", str(tmp_path / "answer")]) == 1
     assert "no power at the supply" in capsys.readouterr().out
+    # No term means anything in what is no power: none is listed.
+    terms = [row["term"] for row in table_rows(tmp_path / "answer" / "power.csv")]
+    assert terms == [*OWN, MEASURED, UNEXPLAINED]

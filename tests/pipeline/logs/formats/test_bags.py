@@ -55,7 +55,7 @@ def test_every_kind_of_bag_gives_the_numbers_that_were_sent(
         assert (log.velocity[:, j] == columns[f"{joint}__velocity_rad_s"][:400]).all()
         assert (log.torque[:, j] == columns[f"{joint}__torque_Nm"][:400]).all()
     assert plain(path) is plain(path)
-    assert log.told == ()
+    assert log.notes == ()
 
 
 def test_headers_without_stamps_fall_back_on_the_recording_and_say_so(
@@ -64,7 +64,7 @@ def test_headers_without_stamps_fall_back_on_the_recording_and_say_so(
     messages = [(topic, 0, logged, *rest) for topic, _, logged, *rest in sent(columns)]
     log = read_log(write_bag(tmp_path / "walk", messages), two_joints)  # type: ignore[arg-type]
     assert np.allclose(log.time, columns["time_s"][:400], atol=1e-9)
-    assert "400 messages have no stamp" in log.told[0]
+    assert "400 messages have no stamp" in log.notes[0]
 
 
 def test_joints_in_changing_order_and_efforts_that_are_no_numbers(
@@ -103,7 +103,7 @@ def test_publishers_with_stamps_of_their_own_are_brought_to_one_clock(
     held = np.interp(time, np.delete(time, np.s_[1:200:2]) + 7e-4, np.delete(q, np.s_[1:200:2]))
     assert np.isnan(log.position[0, 1])  # before the other's first message
     assert np.allclose(log.position[1:, 1], held[1:], atol=1e-12)
-    assert "brought to those of the others" in log.told[0]
+    assert "brought to those of the others" in log.notes[0]
 
 
 def test_interfaces_of_dynamic_joint_states_beside_joint_states(
@@ -133,7 +133,7 @@ def test_repeated_and_exchanged_stamps_are_told(
     log = read_log(write_bag(tmp_path / "walk", messages), two_joints)
     assert len(log) == 400
     assert log.repeated_times == 1
-    assert "1 messages are stamped before the one that came before" in log.told[0]
+    assert "1 messages are stamped before the one that came before" in log.notes[0]
 
 
 def test_a_folder_of_split_files_is_one_log(

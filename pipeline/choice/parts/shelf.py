@@ -21,10 +21,10 @@ from actuators.loading.converted import converted
 from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
 from actuators.loading.parts import DRIVER, Part, load_parts
 from actuators.supply.from_parts import driver_of
-from pipeline.choice.designs import Designs
 from pipeline.choice.errors import ChoiceError
+from pipeline.choice.parts.designs import Designs
 
-GEARS: Final = ("strain_wave", "planetary", "self_locking")
+GEARS: Final = ("strain_wave", "planetary", "self_locking", "belt")
 #: What a brake weighs per torque to the power 2/3 (assumed); no maker's table at hand prints it.
 BRAKE_MASS: Final = (0.15, 0.45)
 #: Torque without load over loss by load, both at rated torque, of gears that do not print it.
@@ -96,7 +96,14 @@ class Shelf:
         driver = driver or _shipped()[DRIVER]
         known = {**_shipped(), **parts}
         numbers = {name: _filled(part, known) for name, part in parts.items()}
-        numbers[driver.name] = {**driver.printed, **({"idle_power": idle} if idle else {})}
+        own = {**driver.printed, **({"idle_power": idle} if idle else {})}
+        others = [
+            p.printed["mass"].value
+            for p in known.values()
+            if p.kind == "driver" and "mass" in p.printed
+        ]
+        own.setdefault("mass", _range(min(others), max(others), 1.0, "kg"))
+        numbers[driver.name] = own
         return cls({**parts, driver.name: driver}, numbers, driver.name, voltage)
 
     def unknown(self, design: Sequence[str]) -> Iterator[tuple[str, str, Number]]:
@@ -179,9 +186,9 @@ class Shelf:
             out[key] = found[f"motor.{key}"]
         out |= {entry: x[entry] for entry in _OF_MOTORS}
         out["peak_current"] = max(found["motor.peak_current"], out["continuous_current"])
-        driver = driver_of(
-            self.driver, self._values(self.driver, drawn), current_of=x["current_of"]
-        )
+        sheet = self._values(self.driver, drawn)
+        driver = driver_of(self.driver, sheet, current_of=x["current_of"])
+        out["mass"] += sheet["mass"]
         bus = self.voltage or min(x["supply_voltage"], float(driver.most_voltage))
         for limit in ("continuous_current", "peak_current"):
             out[limit] = min(out[limit], float(getattr(driver, limit)))
@@ -213,7 +220,7 @@ def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, s
     for name, part in shelf.parts.items():
         kind = "gear" if part.kind in GEARS else part.kind
         if kind == "gear" and shelf.numbers[name].get("gear_ratio", _ONE).value == 1.0:
-            continue  # a screw: what lever it has at a joint, no sheet says
+            continue  # a screw, whose lever at a joint no sheet says, or a belt without pulleys
         by.setdefault(kind, []).append(name)
     motors = [
         name
@@ -262,7 +269,7 @@ def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
         for entry in sorted(_OF_BRAKES.keys() - own.keys()):
             own[entry] = _class(known, ("brake",), entry, _OF_BRAKES[entry], size)
     if part.kind not in GEARS or own.get("gear_ratio", _ONE).value == 1.0:
-        return own  # a screw: what lever it has at a joint, no sheet says
+        return own  # as in `combinations`
     torque = own.get("gear_rated_torque", own.get("gear_continuous_torque"))
     if torque is None:
         raise ChoiceError(f"{where}: no gear_continuous_torque; it has to be stated")
@@ -292,7 +299,7 @@ def _class(
     (unit, power), each = grows, []
     for part in known.values():
         printed = part.printed
-        if part.kind in kinds and entry in printed and (torque := _torque(printed)):
+        if part.kind in kinds and entry in printed and (torque := power == 0 or _torque(printed)):
             each.append(printed[entry].value / torque**power)
     low, high = np.quantile(each, [0.1, 0.9]).tolist()
     return _range(low, high, size**power, unit)

@@ -51,7 +51,7 @@ class Designs:
         gear_peak: At its output [N*m].
         brake_torque: With which the brake holds; 0 for none [N*m].
         brake_power: That keeps it open [W].
-        mass: Of motor, gear and brake [kg].
+        mass: Of motor, gear, brake and driver [kg].
         winding_to_housing: [K/W].
         housing_to_ambient: [K/W].
         winding_time: Thermal time constant [s].

@@ -1,0 +1,1 @@
+"""Robots' days as files."""

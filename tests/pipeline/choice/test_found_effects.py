@@ -1,0 +1,68 @@
+"""What a model file says of the robot is drawn from its intervals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pipeline as lw
+from actuators.loading.parts import load_parts
+from pipeline.api.machine import Machine
+from pipeline.choice.doubt import doubt, drawn_machines, effects_of
+from pipeline.choice.loads import loads_of
+from pipeline.choice.missions.mission import Mode
+from pipeline.choice.parts.shelf import Shelf
+from pipeline.choice.search import Demanded, Feedback
+from pipeline.choice.track import Account
+
+STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
+DESIGNS = [("maxon_607930", "maxon_gp_62_a_100", ""), ("maxon_353297", "hd_csg_25_100", "")]
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    """A payload on the base with an interval, and friction of a drive with one."""
+    out = lw.load("urdf/hexapod.toml").with_effect("link_mass", "base_link", {"mass": 3.0})
+    out = out.with_effect("coulomb_friction", "lf_joint_2", {"torque": 0.2})
+    file = out.model
+    assert file is not None
+    edits = []
+    for edit in file.edits:
+        (one, *rest) = edit.parameters
+        own = replace(one, interval=(0.5 * one.value, 1.5 * one.value))
+        edits.append(replace(edit, parameters=(own, *rest)))
+    return out.with_model(replace(file, edits=tuple(edits)))
+
+
+def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_value(machine: Machine) -> None:
+    parts = load_parts()
+    shelf = Shelf.of({name: parts[name] for design in DESIGNS for name in design if name})
+    effects = effects_of(machine)
+    assert [(part, entry) for part, entry, _ in effects] == [("link_mass of base_link", "mass")]
+    assert (effects[0][2].low, effects[0][2].high) == (1.5, 4.5)
+    own = [(x, m) for x, m in drawn_machines(machine)]
+    joints = [j for j in machine.ready.robot.joints if j.endswith("_2")]
+
+    def asked(one: Machine) -> Demanded:
+        return Demanded.of("2", joints, loads_of(one, [STAND]))
+
+    days = [(x, asked(m)) for x, m in own]
+    options = {"draws": 64, "effects": effects, "found": days}
+    found = doubt(asked(machine), shelf, DESIGNS, Account(), Feedback(), **options)  # type: ignore[arg-type]
+    names = [(part, entry) for part, entry, _ in found.unknowns]
+    k = names.index(("link_mass of base_link", "mass"))
+    for s in (0, 5, 37):
+        bare = lw.load("urdf/hexapod.toml")
+        again = bare.with_effect("link_mass", "base_link", {"mass": found.values[s, k]})
+        sheet = dict(zip(names, found.values[s].tolist(), strict=True))
+        power = asked(again).power(shelf.designs(DESIGNS, sheet), Account())
+        assert np.allclose(found.power[s], power, rtol=1e-9)
+    assert found.moves()[k] > 0.0
+
+
+def test_without_a_model_file_nothing_is_drawn_of_the_robot() -> None:
+    bare = lw.load("urdf/hexapod.toml")
+    assert effects_of(bare) == ()
+    assert not list(drawn_machines(bare))

@@ -1,0 +1,142 @@
+"""A spring beside the actuators, and what is on the base: against closed forms and full chains."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pipeline as lw
+from actuators.elements.position_torque import ParallelSpring
+from actuators.loading.parts import load_parts
+from pipeline.choice.errors import ChoiceError
+from pipeline.choice.loads import Load, loads_of, with_spring
+from pipeline.choice.missions.mission import Mode
+from pipeline.choice.parts.shelf import Shelf
+from pipeline.choice.search import Demanded
+from pipeline.choice.springs import found_springs, springs_of
+from pipeline.choice.track import Account
+
+STAND = Mode("stand", 6.0, True, None, {}, "motor", True, "standing")
+WALK = Mode("walk", 6.0, False, None, {}, "motor", True, "walking")
+DESIGN = ("maxon_148867", "maxon_gp_42_c_126", "mitsubishi_hc_mf_053b_13b")
+
+STRONG = ("maxon_607930", "maxon_gp_62_a_100")
+
+
+@pytest.fixture(scope="module")
+def shelf() -> Shelf:
+    parts = load_parts()
+    return Shelf.of({name: parts[name] for name in DESIGN})
+
+
+def test_power_beside_a_spring_is_that_of_chains_that_hold_the_spring(shelf: Shelf) -> None:
+    """The spring as an element of the chain, against demand that includes its torque."""
+    machine = lw.load("urdf/hexapod.toml")
+    joints = machine.ready.robot.joints
+    spring = springs_of(joints, ["*joint_2=3 N*m/rad@-20 deg", "l*_joint_3=2 N*m/rad@0.3 rad"])
+    assert spring is not None
+    bare = loads_of(machine, [STAND, WALK])
+    shifted = loads_of(machine, [STAND, WALK], spring=spring)
+    designs = shelf.designs([DESIGN])
+    for before, after in zip(bare, shifted, strict=True):
+        chain = designs.chain(0, engaged=False)
+        held = replace(chain, elements=(replace(spring, name="beside"), *chain.elements))
+        full = held.inverse(before.series)
+        (track,) = Demanded.of("all", joints, [after]).tracks
+        torque = track.torque(designs)[0]
+        moving = before.series.direction != 0.0
+        own = full.current * designs.torque_constant
+        assert np.allclose(torque[moving], own[moving], atol=1e-9)
+        if before.mode.stands:  # the brake is open: the motor holds
+            assert np.allclose(torque, own, atol=1e-9)
+
+
+def test_a_spring_that_carries_the_posture_leaves_nothing_to_the_windings(shelf: Shelf) -> None:
+    """Rest angle q - |tau| / k past the joint: k (q - q0) = -tau, no current, no copper loss."""
+    machine = lw.load("urdf/hexapod.toml")
+    (load,) = loads_of(machine, [STAND])
+    series, k = load.series, 5.0
+    rest = [
+        f"{joint}={k} N*m/rad@{q + tau / k!r} rad"
+        for joint, q, tau in zip(
+            series.joints, series.position[0].tolist(), series.torque[0].tolist(), strict=True
+        )
+    ]
+    spring = springs_of(machine.ready.robot.joints, rest)
+    (carried,) = loads_of(machine, [STAND], spring=spring)
+    # A motor alone, so that no friction holds: copper R (tau / k)^2 without the spring, 0 with it.
+    design = shelf.designs([(DESIGN[0], "", "")])
+    design = replace(design, coulomb=np.zeros(1), switching=np.zeros(1), idle=np.zeros(1))
+    before, after = (
+        Demanded.of("all", series.joints, [one]).power(design, Account())[0]
+        for one in (load, carried)
+    )
+    assert before == pytest.approx(float(design.ohmic[0] * (series.torque[0] ** 2).sum()))
+    assert after == pytest.approx(0.0, abs=1e-12 * before)
+
+
+def test_battery_on_the_base_asks_as_a_payload_there() -> None:
+    machine = lw.load("urdf/solo12.toml")
+    base = machine.ready.robot.model.names[1]
+    (own,) = loads_of(machine, [STAND], {base: 0.7})
+    (payload,) = loads_of(machine, [replace(STAND, changes={"gait.payload_mass": "0.7 kg"})])
+    (without,) = loads_of(machine, [STAND])
+    assert np.allclose(own.series.torque, payload.series.torque, atol=1e-9)
+    assert not np.allclose(own.series.torque, without.series.torque, atol=1e-3)
+
+
+def test_a_driver_adds_its_mass_and_one_without_has_the_range_of_its_class() -> None:
+    parts = load_parts()
+    motor = {DESIGN[0]: parts[DESIGN[0]]}
+    stated, other = (Shelf.of(motor, parts[name]) for name in ("moteus_x1", "odrive_s1"))
+    own = stated.designs([(DESIGN[0], "", "")]).mass - parts[DESIGN[0]].printed["mass"].value
+    assert own == pytest.approx(0.0238)
+    mass = other.numbers["odrive_s1"]["mass"]
+    assert (mass.low, mass.high) == (0.0089, 0.0238)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("*_2=", "expected PATTERN, or 'PATTERN=STIFFNESS@ANGLE'"),
+        ("*_2=3 N*m/rad", "expected PATTERN, or 'PATTERN=STIFFNESS@ANGLE'"),
+        ("*_2=3 N*m@4 deg", "N\\*m"),
+        ("*_2=3@4 deg", "N\\*m/rad"),
+        ("*_2=-3 N*m/rad@4 deg", "above 0"),
+        ("*_knee=3 N*m/rad@4 deg", "no joint '\\*_knee'"),
+    ],
+)
+def test_springs_that_cannot_be_are_one_line(text: str, says: str) -> None:
+    with pytest.raises(ChoiceError, match=says) as caught:
+        springs_of(["lf_1", "lf_2"], [text])
+    assert "\n" not in str(caught.value)
+
+
+def test_a_joint_has_one_spring() -> None:
+    with pytest.raises(ChoiceError, match="has a spring already"):
+        springs_of(["lf_1", "lf_2"], ["lf*=3 N*m/rad@4 deg", "lf_2=3 N*m/rad@4 deg"])
+    assert springs_of(["lf_1"], []) is None
+    assert isinstance(springs_of(["lf_1"], ["lf*=3 N*m/rad@-4 deg"]), ParallelSpring)
+
+
+def test_the_spring_that_is_found_is_the_best_of_a_grid_and_for_standing_carries_it() -> None:
+    machine = lw.load("urdf/hexapod.toml")
+    joints = [j for j in machine.ready.robot.joints if j.startswith("lf") and j.endswith("_2")]
+    design = Shelf.of({n: load_parts()[n] for n in STRONG}).designs([(*STRONG, "")])
+    still, walked = loads_of(machine, [STAND]), loads_of(machine, [STAND, WALK])
+
+    def power(text: str, loads: tuple[Load, ...]) -> float:
+        spring = springs_of(loads[0].series.joints, [text])
+        own = Demanded.of("one", joints, [with_spring(load, spring) for load in loads])
+        return float(own.power(design, Account())[0])
+
+    (text,) = found_springs(joints, {"one": joints}, still, design, Account())
+    assert power(text, still) == pytest.approx(float(design.idle[0]), rel=1e-3)
+    (text,) = found_springs(joints, {"one": joints}, walked, design, Account())
+    best, bare = power(text, walked), power(f"{joints[0]}=1e-9 N*m/rad@0 deg", walked)
+    assert best < bare
+    for k in np.geomspace(0.3, 100.0, 12):
+        for angle in range(-180, 181, 20):
+            assert best <= 1.002 * power(f"{joints[0]}={k:.6f} N*m/rad@{angle} deg", walked)
