@@ -151,7 +151,10 @@ def whose_motors(story: Story) -> str:
     """Which motors turn the log's currents into torque."""
     motors = story.given.motors
     if motors is None:
-        return "**Whose motors:** none; the log's torque is compared at the joints."
+        laws = (one.log.derived.get("torque") for one in story.where.intake.prepared)
+        law = next(filter(None, laws), "")
+        torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"
+        return f"**Whose motors:** none; {torque} is compared at the joints."
     return motors_text(motors)
 
 

@@ -6,8 +6,10 @@ import pytest
 
 import pipeline as lw
 from actuators.errors import CatalogError
-from pipeline.choice.answer.break_even import rows
+from pipeline.choice.answer.break_even import cost, rows
 from pipeline.choice.errors import ChoiceError
+from pipeline.choice.loads import loads_of
+from pipeline.choice.missions.mission import Mode
 from pipeline.paper.omissions.omissions import idle_break_even
 from pipeline.paper.published import PAIR
 
@@ -27,6 +29,27 @@ def test_map_passes_through_the_papers_94_percent() -> None:
     for row in map_:
         if row.break_even and abs(row.standing_share - row.break_even) > 1e-9:
             assert row.better == PAIR[row.standing_share > row.break_even]
+
+
+def test_the_papers_alternatives_have_its_numbers() -> None:
+    """Leg rm in 3 s of standing, section IV.B; walking over the ideal actuator's, section V."""
+    machine = lw.load("urdf/hexapod.toml")
+    stand = Mode("stand", 1.0, True, None, {}, "motor", True, "standing")
+    walk = Mode("walk", 1.0, False, None, {}, "motor", True, "walking")
+    still, walked = loads_of(machine, [stand, walk], samples=751)
+    leg = [k for k, joint in enumerate(still.series.joints) if joint.startswith("rm_")]
+    ideal = cost(machine, "ideal", walked, leg, None).power
+    printed = {
+        "ideal": (6.14, 1.0, 1e-9),
+        "rotor": (5.565, 4.0, 0.5),
+        "reversible": (2.60, 10.5, 0.5),
+        "irreversible": (0.0, 14.75, 0.25),
+    }
+    for name, (energy, ratio, half) in printed.items():
+        assert 3.0 * cost(machine, name, still, leg, None).power == pytest.approx(energy, abs=0.005)
+        assert cost(machine, name, walked, leg, None).power / ideal == pytest.approx(
+            ratio, abs=half
+        )
 
 
 def test_unknown_candidate_or_joint_is_one_line() -> None:
