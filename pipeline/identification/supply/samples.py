@@ -72,15 +72,16 @@ def supply_samples(log: Log, shortest: float) -> Samples:
     u = np.full(at.size, np.nan) if voltage is None else np.interp(at, *voltage)
     i = np.full(at.size, np.nan) if current is None else np.interp(at, *current)
     p = u * i if power is None else power[1]
-    if np.ptp(p) == 0.0:
-        raise LogContentError(
-            f"{log.name}: the supply gives {p[0]:.4g} W in every sample: a dead sensor, or a "
-            "stated value; log what it measures"
-        )
-    if np.median(p) <= 0.0:
+    dead = np.ptp(p) == 0.0
+    if np.median(p) <= 0.0 and not (dead and p[0] == 0.0):
         raise LogContentError(
             f"{log.name}: the supply gives {np.median(p):.4g} W at the middle sample; expected "
             "power out of it to be positive; flip the column in a mapping file"
+        )
+    if dead:
+        raise LogContentError(
+            f"{log.name}: the supply gives {p[0]:.4g} W in every sample: a dead sensor, or a "
+            "stated value; log what it measures"
         )
     group = np.concatenate([[0], np.cumsum(_groups(at, shortest))])
     end = at[np.flatnonzero(np.diff(np.append(group, group[-1] + 1)))]

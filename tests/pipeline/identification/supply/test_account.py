@@ -193,6 +193,7 @@ BAD: dict[str, tuple[dict[str, Array], str]] = {
     "a voltage alone": ({"supply": np.ones(200)}, "supply__current_A"),
     "negative voltage": ({"supply": -np.ones(200), "supply_current": np.ones(200)}, "positive"),
     "dead meter": ({"supply_power": np.full(200, 48.0)}, "dead sensor"),
+    "dead meter at zero": ({"supply_power": np.zeros(200)}, "dead sensor"),
     "power the other way": ({"supply_power": -np.ones(200)}, "flip"),
 }
 
