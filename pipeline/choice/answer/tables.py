@@ -344,7 +344,8 @@ def unknown_rows(chosen: Chosen) -> list[UnknownRow]:
         known = zip(doubt.unknowns, doubt.worth(), doubt.moves(), strict=True)
         for (part, entry, number), worth, moves in known:
             unit = number.unit if number.unit in known_units() else "1"  # a model file has SI
-            ends = [from_si(x, unit) for x in (number.low, number.high)]
-            own = (group, part, entry, *ends, number.unit, float(worth), float(moves))
-            rows.append(UnknownRow(*own))
+            low, high = (from_si(x, unit) for x in (number.low, number.high))
+            rows.append(
+                UnknownRow(group, part, entry, low, high, number.unit, float(worth), float(moves))
+            )
     return sorted(rows, key=lambda row: (-row.worth_W, -abs(row.moves_W)))
