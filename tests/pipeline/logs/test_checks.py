@@ -110,7 +110,7 @@ def test_what_a_log_cannot_tell_names_what_is_needed() -> None:
     ok = np.ones(q.shape, dtype=np.bool_)
     texts = [f.detail for f in cannot_tell(made_log(q, effort), v, effort, ok)]
     assert any("log the motors' positions" in text for text in texts)
-    assert any("beside the current" in text for text in texts)
+    assert any("log both torque and current" in text for text in texts)
     assert any("without a temperature" in text for text in texts)
     assert not any("both ways" in text for text in texts)
     one_way = np.abs(v) + 0.3
