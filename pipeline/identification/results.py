@@ -33,7 +33,7 @@ SHAPELESS: Final = "it is a curve, drawn where no law of the catalogue fits"
 BESIDE: Final = "beside it a curve is drawn over the same variable, whose law is not known"
 #: What a model leaves over the noise floor, in any channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
-MORE_LEFT: Final = "more than noise is left there; what causes that may stand behind it"
+MORE_LEFT: Final = "more than sensors' noise is left there; what causes that may stand behind it"
 IDLE: Final = "it closes none of the gap on validation data, or its size may be nothing at all"
 IDLE_NAME: Final = "it closes none of the gap on validation data"
 
