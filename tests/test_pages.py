@@ -8,7 +8,7 @@ import re
 import shlex
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
 
@@ -200,26 +200,30 @@ def test_options_and_targets_in_the_text_exist(page: Path) -> None:
         assert re.search(rf"^{target}:.*##", MAKEFILE, re.M), target
 
 
+def run_in(tree: Path, words: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """A command of a page in a copy of the tree, by this interpreter."""
+    return subprocess.run(
+        [sys.executable, *words[1:]],
+        cwd=tree,
+        env=os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("section", FROM_FILE_TO_ANSWER, ids=name_of)
 def test_logs_go_from_file_to_answer_to_the_letter(section: list[Block], tmp_path: Path) -> None:
     """Commands in order, each with an answer (exit code 0, or 1 for no), which the page quotes."""
     said = ""
     tree = copy_of_tree(tmp_path / "tree")
-    environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
     for block in section:
         if block.file:
             change(tree, block)
         elif block.language in SHELL:
             for words in Shell().commands(block.text):
-                run = subprocess.run(
-                    [sys.executable, *words[1:]],
-                    cwd=tree,
-                    env=environment,
-                    capture_output=True,
-                    text=True,
-                    check=False,
-                )
+                run = run_in(tree, words)
                 assert run.returncode in (0, 1), f"{block}: {shlex.join(words)}\n{run.stderr}"
                 assert run.stderr == "", f"{block}: {shlex.join(words)}"
                 said += run.stdout
@@ -239,21 +243,13 @@ def test_there_is_a_how_to_for_everything_that_people_add() -> None:
 @pytest.mark.parametrize("how_to", HOW_TOS, ids=name_of)
 def test_how_to_works_to_the_letter(how_to: list[Block], tmp_path: Path) -> None:
     tree = copy_of_tree(tmp_path / "tree")
-    environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
     for block in how_to:
         if block.language not in SHELL:
             change(tree, block)
             continue
         for words in Shell().commands(block.text):
             assert words[0] == PYTHON, f"{block}: a how-to runs {PYTHON} only"
-            run = subprocess.run(
-                [sys.executable, *words[1:]],
-                cwd=tree,
-                env=environment,
-                capture_output=True,
-                text=True,
-                check=False,
-            )
+            run = run_in(tree, words)
             assert run.returncode == 0, f"{block}: {shlex.join(words)}\n{run.stdout}{run.stderr}"
     for check in (["check"], ["format", "--check"]):
         run = subprocess.run(

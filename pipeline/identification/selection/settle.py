@@ -1,9 +1,9 @@
 """The set of names that explains a log best, at its own estimates.
 
 A search on columns about the files' model says where to look. Each of its answers is estimated
-anew with all nonlinearities (Gauss-Newton), the columns are made about that point, and the search
-goes on from there until nothing changes. Of all points visited the one with the most evidence, each
-judged with columns of its own, is the answer.
+anew with all nonlinearities (Gauss-Newton). From the likeliest of these points the columns are made
+anew and the search goes on, a few times at most. Of all points visited the one with the most
+evidence at its estimates is the answer.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 _ROUNDS: Final = 3
 #: Shares of the way to linear estimates that a nonlinear fit may start from.
 _SHARES: Final = (1.0, 0.3, 0.1, 0.0)
-#: Answers of the first search that are estimated in full.
+#: Answers of the first search from which it goes on: the likeliest at their own estimates.
 _STARTS: Final = 2
 
 
@@ -64,15 +64,14 @@ def settle(problem: Problem, progress: Progress | None = None) -> Settled:
     if progress:
         progress.step("letting all names compete")
     first = Search(make_pool(problem))
-    starts = [_estimated(problem, first, s) for s in dict.fromkeys(_starts(first))]
-    starts.sort(key=lambda start: -start[0])
+    starts = {s: _estimated(problem, first, s) for s in dict.fromkeys(_starts(first))}
     points: list[Settled] = []
-    for _, state, near in starts[:_STARTS]:
+    for state in sorted(starts, key=lambda s: -starts[s][0])[:_STARTS]:
         if any(names_of(first, state) == names_of(p.search, p.state) for p in points):
             continue
         if progress:
             progress.step(f"estimating {len(state.terms)} effects together")
-        points.append(_best_near(near, first))
+        points.append(_best_near(starts[state][1], first))
     return _likeliest(points)
 
 
@@ -102,14 +101,14 @@ def _starts(search: Search) -> Iterator[State]:
                 yield State(tuple(sorted(held.terms)), held.uncertainty)
 
 
-def _estimated(problem: Problem, search: Search, state: State) -> tuple[float, State, Problem]:
-    """A state's evidence by its likelihood at estimates of its own, the state, and the estimates.
+def _estimated(problem: Problem, search: Search, state: State) -> tuple[float, Problem]:
+    """A state's evidence by its likelihood at estimates of its own, and the estimates.
 
     About a model that is far off, columns promise what no estimate reaches.
     """
     problem = problem.judged(state.uncertainty, search.noise)
     problem = refit(_started(problem, search, state))
-    return search.reached(state, problem.cost()), state, problem
+    return search.reached(state, problem.cost()), problem
 
 
 def _best_near(problem: Problem, first: Search) -> Settled:
@@ -126,7 +125,7 @@ def _best_near(problem: Problem, first: Search) -> Settled:
             or _likeliest(points) is not points[-1]
         ):
             break
-        _, _, problem = _estimated(problem, search, state)
+        _, problem = _estimated(problem, search, state)
     return _likeliest(points)
 
 
@@ -134,7 +133,7 @@ def settle_without(settled: Settled, closed: frozenset[Key]) -> Settled:
     """The best set that the other names lead to where some are closed."""
     search = Search(settled.pool, settled.search.weights, closed)
     state = search.climbed(search.left(settled.state), search.uncertainties)
-    _, _, near = _estimated(settled.problem, search, state)
+    _, near = _estimated(settled.problem, search, state)
     return replace(_best_near(near, search), first=settled.first)
 
 
