@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pipeline.identification.workflow.setup as setup_module
 from pipeline.effects.registry import catalogue
 from pipeline.identification.compare.stages import stages
-from pipeline.identification.regression.design_matrix import make_benches
+from pipeline.identification.regression.design_matrix import make_data_sets
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.pool import make_pool
@@ -75,7 +75,7 @@ def _candidates(log: dict[str, np.ndarray], path: Path) -> None:
     spent_on: list[tuple[int, float]] = []
     for share in (SHARES[0], *SHARES):  # once more to warm up
         some = effects[: max(1, round(share * len(effects)))]
-        problem = Problem(given.model, make_benches(where.measurements), sigma)
+        problem = Problem(given.model, make_data_sets(where.measurements), sigma)
         start = time.process_time()
         search = Search(make_pool(problem, some))
         search.gains(State((), UNCERTAINTIES[0]))

@@ -29,8 +29,8 @@ EXCLUDED: Final = 5.0
 SURE: Final = 2.0
 #: Rivals of a name that are looked at.
 RIVALS: Final = 6
-SHAPELESS: Final = "it is a curve, drawn where no law of the catalogue fits"
-BESIDE: Final = "beside it a curve is drawn over the same variable, whose law is not known"
+SHAPELESS: Final = "it is a curve, fitted where no law of the catalogue fits"
+BESIDE: Final = "in addition to it a curve is fitted over the same variable, whose law is not known"
 #: What a model leaves over the noise floor, in any channel, that counts as unexplained.
 UNEXPLAINED: Final = 1.6
 MORE_LEFT: Final = "more than sensors' noise is left there; what causes that may stand behind it"
@@ -59,7 +59,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Member:
-    """One of several like findings that are told as one.
+    """One of several like findings that are reported as one.
 
     Attributes:
         place: Where.
@@ -84,14 +84,14 @@ class Candidate:
     Attributes:
         effect: Name.
         place: Joints, link, ground or effort channels.
-        before: Error on *choose*, by estimates from *fit*, of the joints it touches without it, in
-            `unit`.
+        before: Validation error of the joints it touches without it, by estimates from training
+            rows, in `unit`.
         after: The same with it; NaN where it was not tried in earnest.
         unit: Of the compared channel.
         identifiable: Whether this motion could show it.
         verdict: `ACCEPTED`, `REJECTED`, `NOT_IDENTIFIABLE` or `INDISTINGUISHABLE` + names.
         reason: In words.
-        gain: Fall of the penalised misfit on *fit* and *choose*, in noise variances.
+        gain: Fall of the penalised misfit on training and validation rows, in noise variances.
     """
 
     effect: str
@@ -115,17 +115,17 @@ class Found:
         place: Where.
         parameters: Estimates.
         rivals: Effects at places that explain the log as well.
-        valid_before: Error on *choose* by estimates from *fit* without it (with those before it),
-            RMS of the joints it touches, in `unit`; NaN where none of them has a row there.
+        valid_before: Validation error without it (with those before it) by estimates from training
+            rows, RMS of the joints it touches, in `unit`; NaN where none of them has a row there.
         valid_after: The same with it.
         unit: Of the compared channel.
         noise_floor: Of the same joints, in `unit`.
-        excitation: The motion that would tell it from its rivals.
+        excitation: The motion that would distinguish it from its rivals.
         level: `CONFIRMED`, `APPROXIMATE` or `SUSPECTED`.
         reason: Why it is not confirmed, or empty.
         law: Which of its laws, where the effect has several.
-        members: Where several like findings are told as one, each of them.
-        gap_before: Error on *prove* without it, where it shows most; NaN until the written model
+        members: Where several like findings are reported as one, each of them.
+        gap_before: Error on test rows without it, where it shows most; NaN until the written model
             was held against those rows, and where there is no row.
         gap_after: The same with it.
         written: Whether the model file holds it.
@@ -172,7 +172,7 @@ class Found:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What a model leaves at one joint on *prove*.
+    """What a model leaves at one joint on test rows.
 
     Attributes:
         joint: Name.

@@ -1,8 +1,8 @@
 """Logs too long to be held: surveyed once, then gone through chunk by chunk, every row once.
 
-Naming works on the stretches that tell most (`informative`); quality, the gap by circumstance and
-the proof on every row. What proves are the rows outside of those stretches, and the blocks left
-out within them: none had a say.
+Identification works on the most informative stretches (`informative`); quality, the gap by
+circumstance and the proof on every row. Test rows are those outside of the stretches, and the
+blocks left out within them: none had a say.
 """
 
 from __future__ import annotations
@@ -131,7 +131,7 @@ class LongLogs:
                 yield chunk
 
     def _part(self, k: int, one: Prepared) -> NDArray[np.int8]:
-        """Which rows of a chunk prove, shape (N,)."""
+        """Which rows of a chunk are for the test, shape (N,)."""
         proving = [not ((part == TRAIN).any()) for part in self.parts.part]
         out = np.full(len(one), UNUSED, dtype=np.int8)
         survey = self.surveys[k]
@@ -157,7 +157,7 @@ def parts_of_surveys(
     """Parts of stretches, as they follow from the whole logs.
 
     Args:
-        parts: As `split` cuts the stretches, without regard to a share that proves.
+        parts: As `split` cuts the stretches, without regard to a share for the test.
         prepared: The stretches.
         surveys: Of the same logs.
     """

@@ -47,7 +47,7 @@ def observe(
 
 
 def observe_all(model: MachineModel, prepared: Sequence[Prepared]) -> tuple[Measurement, ...]:
-    """Measurements whose rows all belong to *fit* and to one block: to look, not to judge."""
+    """Measurements with training rows alone, in one block: to look, not to judge."""
     rest = _rest_speed(prepared)
     return tuple(
         _observe(model, one, np.zeros(len(one), np.int8), np.zeros(len(one), np.intp), rest)
@@ -163,7 +163,7 @@ def _counted(
         one: The log.
         known: Where the effort is known, shape (N, J).
         rest: Rest speed, shape (J,) [rad/s].
-        idle: Rows in which a drive that is off tells what flows, shape (N, J), or None.
+        idle: Rows in which a drive that is off shows what flows, shape (N, J), or None.
         stepping: Whether the robot walks.
     """
     moved = np.asarray(one.motion_ok.all(axis=1, keepdims=True))
@@ -236,7 +236,7 @@ def _thinned(one: Prepared) -> tuple[NDArray[np.intp], tuple[slice, ...], int]:
 
 
 def _channels(model: MachineModel, one: Prepared) -> tuple[tuple[str, ...], Array, Array]:
-    """Compared channel, and voltage beside a current: it tells speed and resistance apart."""
+    """Compared channel, and voltage beside a current: it separates speed from resistance."""
     efforts, noise, names = [one.effort], [one.noise], [one.channel]
     motors = all(a.motor is not None for a in model.actuators)
     if one.channel == "current" and "voltage" in one.other and motors:

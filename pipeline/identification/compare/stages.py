@@ -25,9 +25,9 @@ class Stage:
     Attributes:
         label: What it has that the one before has not.
         predictions: One per log.
-        gaps: Root mean square on *prove* by joint and channel, shape (J, C), NaN where no row
+        gaps: Root mean square on test rows by joint and channel, shape (J, C), NaN where no row
             counts.
-        valid: The same on *choose*, of the compared channel, shape (J,).
+        valid: The same on validation rows, of the compared channel, shape (J,).
     """
 
     label: str
@@ -37,7 +37,7 @@ class Stage:
 
     @property
     def gap(self) -> Array:
-        """On *prove*, of the compared channel, by joint, shape (J,)."""
+        """On test rows, of the compared channel, by joint, shape (J,)."""
         return np.asarray(self.gaps[:, 0])
 
 
@@ -52,7 +52,7 @@ def stages(
         models: Label and model, each like the one before but for one effect.
         measurements: One per log.
         long: The logs in chunks, where measurements hold but stretches of them: the gap is then
-            that of every row that proves.
+            that of every test row.
     """
     by_log = [_along(models, Simulator(m)) for m in measurements]
     held = list(zip(measurements, by_log, strict=True))
@@ -108,5 +108,5 @@ def overall(gap: Array) -> float:
 
 
 def noise_floor(measurements: Sequence[Measurement]) -> Array:
-    """Of the compared channel by joint, of the logs that prove, shape (J,)."""
+    """Of the compared channel by joint, of the test logs, shape (J,)."""
     return np.asarray(floor_of(measurements, TEST)[:, 0])

@@ -44,7 +44,7 @@ LARGEST_ROWS = 50_000
 
 
 @dataclass(frozen=True, eq=False)
-class Bench:
+class DataSet:
     """One log made ready for least squares.
 
     Attributes:
@@ -86,7 +86,7 @@ class Bench:
         return out
 
 
-def make_bench(measurement: Measurement, share: float = 1.0) -> Bench:
+def make_data_set(measurement: Measurement, share: float = 1.0) -> DataSet:
     """Choose rows and order them.
 
     Rows beyond `ROWS_PER_PERIOD` per period of the cut-off repeat what their neighbours say and
@@ -118,28 +118,28 @@ def make_bench(measurement: Measurement, share: float = 1.0) -> Bench:
     independent = 1.0
     if np.isfinite(m.bandwidth):
         independent = min(1.0, 2.0 * m.bandwidth * step / m.rate)
-    return Bench(Simulator(m), rows, parts, edges, part[edges[:-1]], float(np.sqrt(independent)))
+    return DataSet(Simulator(m), rows, parts, edges, part[edges[:-1]], float(np.sqrt(independent)))
 
 
-def make_benches(measurements: Sequence[Measurement]) -> tuple[Bench, ...]:
+def make_data_sets(measurements: Sequence[Measurement]) -> tuple[DataSet, ...]:
     """Benches of several logs, with at most `LARGEST_ROWS` rows together.
 
     Raises:
         NamingError: A part of the data has no usable row in any log.
     """
-    for part, name in ((TRAIN, "fit"), (VALIDATION, "choose"), (TEST, "prove")):
+    for part, name in ((TRAIN, "training"), (VALIDATION, "validation"), (TEST, "test")):
         if not any(((m.part == part) & m.mask.any(axis=1)).any() for m in measurements):
             names = ", ".join(m.name for m in measurements)
-            raise NamingError(f"{names}: no usable row is left to {name} with; log longer")
-    benches = tuple(make_bench(m) for m in measurements)
-    rows = sum(b.rows.size for b in benches)
+            raise NamingError(f"{names}: no usable {name} row is left; log longer")
+    data_sets = tuple(make_data_set(m) for m in measurements)
+    rows = sum(b.rows.size for b in data_sets)
     if rows <= LARGEST_ROWS:
-        return benches
-    return tuple(make_bench(m, LARGEST_ROWS / rows) for m in measurements)
+        return data_sets
+    return tuple(make_data_set(m, LARGEST_ROWS / rows) for m in measurements)
 
 
 def effect_columns(
-    bench: Bench,
+    data_set: DataSet,
     base: Prediction,
     effect: Editing,
     place: Place,
@@ -150,7 +150,7 @@ def effect_columns(
     """Columns of one effect, one per coordinate, by finite differences.
 
     Args:
-        bench: The log.
+        data_set: The log.
         base: Prediction of the model without the effect.
         effect: The effect.
         place: Where.
@@ -163,14 +163,16 @@ def effect_columns(
     zero = dict.fromkeys((c.name for c in effect.coordinates), 0.0)
     centre = zero | dict(at or {})
     start = (
-        base if not at else bench.simulator.predict(_edit(effect, base, place, centre, shape), base)
+        base
+        if not at
+        else data_set.simulator.predict(_edit(effect, base, place, centre, shape), base)
     )
     out = []
     for c in effect.coordinates:
         step = reach * c.step
         moved = centre | {c.name: centre[c.name] + step}
-        change = bench.simulator.difference(start, _edit(effect, base, place, moved, shape))
-        out.append(bench.whitened(change.effort / step, change.joints, sigma))
+        change = data_set.simulator.difference(start, _edit(effect, base, place, moved, shape))
+        out.append(data_set.whitened(change.effort / step, change.joints, sigma))
     return out
 
 
@@ -184,14 +186,14 @@ def _edit(
     return effect.edit(base.model, place, x, shape)
 
 
-def residual(bench: Bench, prediction: Prediction, sigma: Array) -> dict[int, Array]:
+def residual(data_set: DataSet, prediction: Prediction, sigma: Array) -> dict[int, Array]:
     """Measured minus predicted effort, whitened, of every joint."""
-    m = bench.measurement
+    m = data_set.measurement
     predicted = m.smooth(prediction.effort)
-    rows = bench.rows
+    rows = data_set.rows
     out = {}
     for j in range(len(m.joints)):
-        rest = (m.effort[rows, j] - predicted[rows, j]) * (bench.weight / sigma[j])
+        rest = (m.effort[rows, j] - predicted[rows, j]) * (data_set.weight / sigma[j])
         rest[~m.mask[rows, j]] = 0.0
         out[j] = rest
     return out

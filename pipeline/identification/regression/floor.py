@@ -21,7 +21,7 @@ def floor_of(measurements: Sequence[Measurement], *parts: int) -> Array:
 
     Args:
         measurements: One per log.
-        parts: *fit* and *choose* by default: logs that only prove have no say, in this neither.
+        parts: Training and validation rows by default: test logs have no say, in this neither.
     """
     own = [m for m in measurements if np.isin(m.part, parts or (TRAIN, VALIDATION)).any()]
     return np.asarray(np.sqrt(np.mean([m.noise**2 for m in own or measurements], axis=0)))
@@ -42,13 +42,13 @@ def with_noise(
 
 
 def left_open(problem: Problem) -> Array:
-    """Effort that may be otherwise by what no log has told, one standard deviation, (J, C).
+    """Effort that may be otherwise by what no log has shown, one standard deviation, (J, C).
 
     Of what was estimated and is written (effects, refitted bodies) by the scatter of the estimates
-    over blocks, of every other tolerance of a part by its stated size. On rows that prove, where
+    over blocks, of every other tolerance of a part by its stated size. On test rows, where
     there are any: another motion may ask for what the first did not show.
     """
-    sums = problem.sums()
+    sums = problem.sums
     blocks = sums.blocks(TRAIN, VALIDATION)
     spread = sums.covariance(sums.solve(blocks), blocks)
     count, precision = len(problem.tolerances), problem.precision
@@ -60,16 +60,16 @@ def left_open(problem: Problem) -> Array:
     spread[~known, :] = spread[:, ~known] = 0.0
     prior = 1.0 / np.maximum(precision[:count], 1e-12)
     spread[np.arange(count), np.arange(count)] += np.where(known[:count], 0.0, prior)
-    proves = any((b.measurement.part == TEST).any() for b in problem.benches)
+    tested = any((b.measurement.part == TEST).any() for b in problem.data_sets)
     variance, rows = np.zeros(problem.sigma.shape), np.zeros(problem.sigma.shape)
-    for stack in problem.stacks():
-        bench = stack.bench
-        part = bench.parts[TEST] if proves else problem.head(problem.benches.index(bench))
-        good = bench.measurement.mask[bench.rows[part]]
-        for j, X in stack.X.items():
-            own = spread[np.ix_(stack.ids[j], stack.ids[j])]
+    for matrix in problem.matrices:
+        data_set = matrix.data_set
+        part = data_set.parts[TEST] if tested else problem.head(problem.data_sets.index(data_set))
+        good = data_set.measurement.mask[data_set.rows[part]]
+        for j, X in matrix.X.items():
+            own = spread[np.ix_(matrix.ids[j], matrix.ids[j])]
             for c in range(X.shape[2]):
                 x = X[:, part, c]
-                variance[j, c] += float(np.sum(x * (own @ x))) / bench.weight**2
+                variance[j, c] += float(np.sum(x * (own @ x))) / data_set.weight**2
             rows[j] += good[:, j].sum()
     return np.asarray(np.sqrt(np.maximum(variance, 0.0) / np.maximum(rows, 1.0)) * problem.sigma)

@@ -1,11 +1,11 @@
 """Intervals of the accepted effects' parameters by a block bootstrap of the normal equations.
 
-Blocks of *fit* and *choose* are drawn with replacement and the linearised problem is solved anew
-for each draw, all tolerances free within their priors. Nonlinear parameters (order of a ripple,
-Stribeck speed) have a column of their own here. With few blocks a bootstrap is too narrow: the
-spread is widened to what noise alone would give where that is more. Two things a log cannot know
-are added: that a law holds to about one per cent (`LAW`), and how much of a delay is the skew of
-sampling.
+Blocks of training and validation rows are drawn with replacement and the linearised problem is
+solved anew for each draw, all tolerances free within their priors. Nonlinear parameters (order of a
+ripple, Stribeck speed) have a column of their own here. With few blocks a bootstrap is too narrow:
+the spread is widened to what noise alone would give where that is more. Two things a log cannot
+know are added: that a law holds to about one per cent (`LAW`), and how much of a delay is the skew
+of sampling.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ def estimates(problem: Problem, channel: str) -> list[Sized]:
     """
     if not problem.accepted:
         return []
-    draws = _draws(problem.sums())
+    draws = _draws(problem.sums)
     out = []
     for a, (coordinates, shapes) in zip(problem.accepted, problem.spans(), strict=True):
         names = [c.name for c in a.effect.coordinates]
@@ -67,8 +67,8 @@ def estimates(problem: Problem, channel: str) -> list[Sized]:
             x = {n: a.x[n] + float(d) for n, d in zip(names, draw[coordinates], strict=True)}
             for c in a.effect.coordinates:
                 x[c.name] = x[c.name] if c.signed else max(x[c.name], 0.0)
-            bent = zip(a.bends.items(), draw[shapes], strict=True)
-            shape = {**a.shape, **{n: v + float(d) for (n, v), d in bent}}
+            nonlinear = zip(a.nonlinear.items(), draw[shapes], strict=True)
+            shape = {**a.shape, **{n: v + float(d) for (n, v), d in nonlinear}}
             samples.append(a.effect.physical(x, shape))
         best = a.effect.physical(a.x, a.shape)
         parameters = tuple(_estimate(a, n, best, samples, channel) for n in best)
@@ -151,7 +151,7 @@ def _draws(sums: BlockSums) -> Array:
 
 def bodies_of(problem: Problem) -> dict[str, tuple[Estimate, ...]]:
     """Ten inertial parameters of every link whose body is open, with intervals."""
-    sums = problem.sums()
+    sums = problem.sums
     draws = _draws(sums)
     out: dict[str, tuple[Estimate, ...]] = {}
     links = dict.fromkeys(n.place for n in problem.tolerances if n.kind in STRAINS)

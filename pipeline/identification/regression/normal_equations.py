@@ -2,7 +2,7 @@
 
 With the whitened residual r and columns X of the unknowns, each block b keeps H_b = X^T X,
 h_b = X^T r and s_b = r^T r. The loss of any estimate on any set of blocks, the scatter of its
-gradient over blocks (which tells significance in spite of autocorrelation) and every bootstrap
+gradient over blocks (which gives significance in spite of autocorrelation) and every bootstrap
 sample follow from these without going back to the rows.
 """
 
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.identification.regression.design_matrix import Bench
+from pipeline.identification.regression.design_matrix import DataSet
 
 Array = NDArray[np.float64]
 
@@ -108,25 +108,25 @@ def inverse_spd(A: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Stack:
+class DesignMatrix:
     """Columns of n unknowns and the residual, joint by joint, for one log.
 
     Attributes:
-        bench: The log.
+        data_set: The log.
         ids: By joint, numbers of the unknowns that touch it, shape (n_j,).
         X: By joint, their columns, shape (n_j, R, C).
         r: By joint, the residual, shape (R, C).
     """
 
-    bench: Bench
+    data_set: DataSet
     ids: Mapping[int, NDArray[np.intp]]
     X: Mapping[int, Array]
     r: Mapping[int, Array]
 
 
-def make_stack(
-    bench: Bench, columns: Sequence[Mapping[int, Array]], r: Mapping[int, Array]
-) -> Stack:
+def make_design_matrix(
+    data_set: DataSet, columns: Sequence[Mapping[int, Array]], r: Mapping[int, Array]
+) -> DesignMatrix:
     """Gather columns by joint."""
     ids: dict[int, NDArray[np.intp]] = {}
     X: dict[int, Array] = {}
@@ -135,37 +135,39 @@ def make_stack(
         ids[j] = np.array(touching, dtype=np.intp)
         shape = (len(touching), *r[j].shape)
         X[j] = np.stack([columns[k][j] for k in touching]) if touching else np.empty(shape)
-    return Stack(bench, ids, X, r)
+    return DesignMatrix(data_set, ids, X, r)
 
 
-def block_sums(stacks: Sequence[Stack], weights: Array, precision: Array, mean: Array) -> BlockSums:
+def block_sums(
+    matrices: Sequence[DesignMatrix], weights: Array, precision: Array, mean: Array
+) -> BlockSums:
     """Sum up the columns of several logs by block.
 
     Args:
-        stacks: One per log, the same unknowns in each.
+        matrices: One per log, the same unknowns in each.
         weights: Of squared residuals, shape (J, C).
         precision: Prior precision, shape (n,).
         mean: Where the prior is centred, shape (n,).
     """
     n = precision.size
-    total = sum(stack.bench.block_part.size for stack in stacks)
+    total = sum(matrix.data_set.block_part.size for matrix in matrices)
     H, h = np.zeros((total, n, n)), np.zeros((total, n))
     s, count = np.zeros(total), np.zeros(total)
-    part = np.concatenate([stack.bench.block_part for stack in stacks])
+    part = np.concatenate([matrix.data_set.block_part for matrix in matrices])
     at = 0
-    for stack in stacks:
-        bench = stack.bench
-        mask = bench.measurement.mask[bench.rows]
-        channels = len(bench.measurement.channels)
-        for b in range(bench.block_part.size):
-            rows = slice(int(bench.edges[b]), int(bench.edges[b + 1]))
-            for j, r in stack.r.items():
-                ids, root = stack.ids[j], np.sqrt(weights[j])
+    for matrix in matrices:
+        data_set = matrix.data_set
+        mask = data_set.measurement.mask[data_set.rows]
+        channels = len(data_set.measurement.channels)
+        for b in range(data_set.block_part.size):
+            rows = slice(int(data_set.edges[b]), int(data_set.edges[b + 1]))
+            for j, r in matrix.r.items():
+                ids, root = matrix.ids[j], np.sqrt(weights[j])
                 flat_r = (r[rows] * root).ravel()
-                flat_X = (stack.X[j][:, rows] * root).reshape(ids.size, -1)
+                flat_X = (matrix.X[j][:, rows] * root).reshape(ids.size, -1)
                 H[at, ids[:, None], ids[None, :]] += flat_X @ flat_X.T
                 h[at, ids] += flat_X @ flat_r
                 s[at] += float(flat_r @ flat_r)
-            count[at] = mask[rows].sum() * channels * bench.weight**2
+            count[at] = mask[rows].sum() * channels * data_set.weight**2
             at += 1
     return BlockSums(H, h, s, count, part, precision, mean)

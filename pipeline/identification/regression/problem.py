@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.effects.base import Effect, Place
 from pipeline.identification.regression.design_matrix import (
-    Bench,
+    DataSet,
     effect_columns,
     residual,
 )
-from pipeline.identification.regression.kept import EffectKey, Kept, ToleranceKey
 from pipeline.identification.regression.normal_equations import (
     BlockSums,
-    Stack,
+    DesignMatrix,
     block_sums,
-    make_stack,
+    make_design_matrix,
 )
 from pipeline.identification.regression.tolerances import (
     STRAINS,
@@ -37,7 +37,10 @@ from pipeline.simulation.predict import Prediction
 from pipeline.simulation.rigid_bodies import legs_are_separate
 
 Array = NDArray[np.float64]
-Columns = Sequence[Mapping[int, Array]]
+#: Log and form of a column, and its place.
+_Key = tuple[tuple[object, ...], Place]
+#: Whether effects of a joint hardly change them; one per coordinate, each by joint.
+_Columns = tuple[bool, list[dict[int, Array]]]
 
 
 #: Change of a tolerance, in sigmas, after which columns at its joint are computed anew.
@@ -85,7 +88,7 @@ class Accepted:
     shape: Mapping[str, float]
 
     @property
-    def bends(self) -> dict[str, float]:
+    def nonlinear(self) -> dict[str, float]:
         """Nonlinear parameters that are estimated."""
         return {n: v for n, v in self.shape.items() if n not in self.effect.fixed}
 
@@ -94,36 +97,13 @@ class Accepted:
         return self.effect.edit(model, self.place, self.x, self.shape)
 
 
-@dataclass
-class _Computed:
-    """What was computed of a problem; None where it was not yet.
-
-    Attributes:
-        start: Model with the tolerances as they are held.
-        before: Models with the first 0, 1, ... accepted effects.
-        own: Columns of accepted effects' coordinates, by log and effect.
-        near: Predictions of a problem that it was made from.
-        predictions: Of the present model.
-        stacks: Columns of all unknowns.
-        sums: Normal equations.
-    """
-
-    start: MachineModel | None = None
-    before: list[MachineModel] | None = None
-    own: dict[tuple[int, int], list[dict[int, Array]]] = field(default_factory=dict)
-    near: list[Prediction] | None = None
-    predictions: list[Prediction] | None = None
-    stacks: list[Stack] | None = None
-    sums: BlockSums | None = None
-
-
 @dataclass(eq=False)
 class Problem:
     """Everything linear about the machine at its present estimate.
 
     Attributes:
         model: Before any effect.
-        benches: One per log.
+        data_sets: One per log.
         sigma: Standard deviation that residuals are judged against, shape (J, C).
         accepted: Effects in the model, in order.
         tolerances: Always free within their priors.
@@ -135,7 +115,7 @@ class Problem:
     """
 
     model: MachineModel
-    benches: tuple[Bench, ...]
+    data_sets: tuple[DataSet, ...]
     sigma: Array
     accepted: tuple[Accepted, ...] = ()
     tolerances: tuple[Nuisance, ...] = ()
@@ -143,13 +123,17 @@ class Problem:
     floor: Array = field(default_factory=lambda: np.zeros(0))
     uncertainty: float = UNCERTAINTY
     weights: Array = field(default_factory=lambda: np.zeros(0))
-    _columns: Kept = field(default_factory=dict)
+    _columns: dict[_Key, _Columns] = field(default_factory=dict)
     _files: list[Prediction] = field(default_factory=list)
-    _computed: _Computed = field(default_factory=_Computed)
+    _start: MachineModel | None = None
+    _near: list[Prediction] | None = None
+    _at_estimates: dict[tuple[int, int], list[dict[int, Array]]] = field(
+        default_factory=dict, init=False
+    )
 
     def __post_init__(self) -> None:
         if not self.tolerances:
-            self.tolerances = nuisances(self.model, [b.measurement for b in self.benches])
+            self.tolerances = nuisances(self.model, [b.measurement for b in self.data_sets])
         if self.floor.size == 0:
             self.floor = self.sigma
         if self.held.size == 0:
@@ -161,7 +145,7 @@ class Problem:
     def names(self) -> int:
         """Number of unknowns: tolerances, then coordinates and shape of every accepted effect."""
         return len(self.tolerances) + sum(
-            len(a.effect.coordinates) + len(a.bends) for a in self.accepted
+            len(a.effect.coordinates) + len(a.nonlinear) for a in self.accepted
         )
 
     def spans(self) -> list[tuple[slice, slice]]:
@@ -169,42 +153,42 @@ class Problem:
         out, at = [], len(self.tolerances)
         for a in self.accepted:
             middle = at + len(a.effect.coordinates)
-            out.append((slice(at, middle), slice(middle, middle + len(a.bends))))
-            at = middle + len(a.bends)
+            out.append((slice(at, middle), slice(middle, middle + len(a.nonlinear))))
+            at = middle + len(a.nonlinear)
         return out
 
+    @property
     def current(self) -> MachineModel:
         """The model with tolerances as they are held and all accepted effects."""
-        return self._before(len(self.accepted))
+        return self._models[-1]
 
-    def without(self, number: int) -> MachineModel:
-        """The present model without one of the accepted effects."""
-        model = self._start()
-        for k, a in enumerate(self.accepted):
-            model = model if k == number else a.apply(model)
-        return model
-
-    def _start(self) -> MachineModel:
+    @property
+    def start(self) -> MachineModel:
         """The model with tolerances as they are held."""
-        if self._computed.start is None:
+        if self._start is None:
             model = self.model
             for n, value in zip(self.tolerances, self.held, strict=True):
                 if value:
                     model = n.edit(model, float(value) * n.sigma)
-            self._computed.start = model
-        return self._computed.start
+            self._start = model
+        return self._start
 
+    @cached_property
+    def _models(self) -> list[MachineModel]:
+        """With the first 0, 1, ... accepted effects."""
+        out = [self.start]
+        for a in self.accepted:
+            out.append(a.apply(out[-1]))
+        return out
+
+    @cached_property
     def predictions(self) -> list[Prediction]:
         """Of the present model, one per log."""
-        done = self._computed
-        if done.predictions is None:
-            model = self.current()
-            starts: Sequence[Prediction | None] = done.near or [None] * len(self.benches)
-            done.predictions = [
-                b.simulator.predict(model, start)
-                for b, start in zip(self.benches, starts, strict=True)
-            ]
-        return done.predictions
+        starts: Sequence[Prediction | None] = self._near or [None] * len(self.data_sets)
+        return [
+            d.simulator.predict(self.current, start)
+            for d, start in zip(self.data_sets, starts, strict=True)
+        ]
 
     def files(self) -> list[Prediction]:
         """Of the model before any effect, one per log.
@@ -213,7 +197,7 @@ class Problem:
         g and in (1 + g) x, so that leaving out F does not leave it in what g multiplies.
         """
         if not self._files:
-            self._files += [b.simulator.predict(self.model) for b in self.benches]
+            self._files += [b.simulator.predict(self.model) for b in self.data_sets]
         return self._files
 
     def with_accepted(self, accepted: Sequence[Accepted], held: Array | None = None) -> Problem:
@@ -228,9 +212,8 @@ class Problem:
             accepted=tuple(accepted),
             held=self.held if held is None else held,
             _columns=dict(self._columns),
-            _computed=_Computed(
-                start=self._start() if held is None else None, near=self.predictions()
-            ),
+            _start=self.start if held is None else None,
+            _near=self.predictions,
         )
         before = {id(a) for a in self.accepted}
         after = {id(a) for a in other.accepted}
@@ -238,9 +221,9 @@ class Problem:
         touched = {joint for a in moved for joint in self._touched(a)}
         scaled = {joint for a in moved if a.effect.rescales for joint in self._touched(a)}
         touched |= self._shifted(self.held, other.held)
-        for key, per_log in self._columns.items():
+        for key, (additive, per_log) in self._columns.items():
             joints = {j for column in per_log for j in column}
-            if joints & scaled or (joints & touched and not key.additive):
+            if joints & scaled or (joints & touched and not additive):
                 del other._columns[key]
         return other
 
@@ -259,7 +242,7 @@ class Problem:
             uncertainty=uncertainty,
             weights=weights,
             _columns=dict(self._columns),
-            _computed=_Computed(start=self._computed.start, near=self.predictions()),
+            _near=self.predictions,
         )
 
     def _touched(self, a: Accepted) -> set[int]:
@@ -272,40 +255,42 @@ class Problem:
         self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
     ) -> list[dict[int, Array]]:
         """Columns of a candidate in one log, kept until a joint they touch changes."""
-        form = tuple(c.name for c in effect.coordinates)
-        key = EffectKey(log, effect.name, place, tuple(sorted(shape.items())), form)
-        if key not in self._columns:
+        form = (log, effect.name, *(c.name for c in effect.coordinates), *sorted(shape.items()))
+        if (form, place) not in self._columns:
+            kept = effect.additive or effect.rescales
             for sibling, columns in self._columns_of_legs(log, effect, place, shape):
-                self._columns[replace(key, place=sibling)] = columns
-        return self._columns[key]
+                self._columns[form, sibling] = kept, columns
+        return self._columns[form, place][1]
 
     def _columns_of_legs(
         self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
     ) -> list[tuple[Place, list[dict[int, Array]]]]:
         """Columns of a candidate; of the like ones of all legs where one prediction serves all."""
-        bench = self.benches[log]
-        base = self.files()[log] if effect.rescales else self.predictions()[log]
-        if effect.name not in _OF_ONE_LEG or not legs_are_separate(self.model, bench.measurement):
-            return [(place, effect_columns(bench, base, effect, place, shape, self.sigma))]
-        places = effect.places(base.model, bench.measurement)
+        data_set = self.data_sets[log]
+        base = self.files()[log] if effect.rescales else self.predictions[log]
+        if effect.name not in _OF_ONE_LEG or not legs_are_separate(
+            self.model, data_set.measurement
+        ):
+            return [(place, effect_columns(data_set, base, effect, place, shape, self.sigma))]
+        places = effect.places(base.model, data_set.measurement)
         leg, number = leg_place(self.model, place[0])
         group = [p for p in places if leg_place(self.model, p[0])[1] == number]
         if leg < 0 or len(group) < 2:
-            return [(place, effect_columns(bench, base, effect, place, shape, self.sigma))]
-        whole = effect_columns(bench, base, _Everywhere(effect, group), place, shape, self.sigma)
+            return [(place, effect_columns(data_set, base, effect, place, shape, self.sigma))]
+        whole = effect_columns(data_set, base, _Everywhere(effect, group), place, shape, self.sigma)
         return [(p, [of_own_leg(self.model, p[0], column) for column in whole]) for p in group]
 
     def tolerance_columns(self, log: int) -> list[dict[int, Array]]:
         """Columns of the tolerances, per standard deviation of each."""
-        bench = self.benches[log]
-        keys = {id(n): ToleranceKey(log, n.kind, n.place) for n in self.tolerances}
-        for group in grouped(self.model, bench.measurement, self.tolerances):
+        data_set = self.data_sets[log]
+        keys = {id(n): ((log, n.kind), (n.place,)) for n in self.tolerances}
+        for group in grouped(self.model, data_set.measurement, self.tolerances):
             if any(keys[id(n)] not in self._columns for n in group):
-                base = self.predictions()[log]
-                columns = nuisance_columns(bench, base, group, self.sigma)
+                base = self.predictions[log]
+                columns = nuisance_columns(data_set, base, group, self.sigma)
                 for n, column in zip(group, columns, strict=True):
-                    self._columns[keys[id(n)]] = [column]
-        return [self._columns[keys[id(n)]][0] for n in self.tolerances]
+                    self._columns[keys[id(n)]] = True, [column]  # a tolerance is small
+        return [self._columns[keys[id(n)]][1][0] for n in self.tolerances]
 
     def accepted_columns(self, log: int) -> list[dict[int, Array]]:
         """Columns of the accepted effects' coordinates at their estimates, scales at the files."""
@@ -321,21 +306,21 @@ class Problem:
 
     def _own(self, log: int, number: int) -> list[dict[int, Array]]:
         """Columns of the coordinates of an accepted effect; what is additive has them at zero."""
-        a, kept = self.accepted[number], self._computed.own
+        a = self.accepted[number]
         if a.effect.additive:
             return self.columns(log, a.effect, a.place, a.shape)
-        if (log, number) not in kept:
+        if (log, number) not in self._at_estimates:
             steps = [(c.name, c.step) for c in a.effect.coordinates]
-            kept[log, number] = [
+            self._at_estimates[log, number] = [
                 self._moved(log, number, replace(a, x={**a.x, name: a.x[name] + step}), step)
                 for name, step in steps
             ]
-        return kept[log, number]
+        return self._at_estimates[log, number]
 
-    def _bent(self, log: int, number: int) -> list[dict[int, Array]]:
+    def _nonlinear_columns(self, log: int, number: int) -> list[dict[int, Array]]:
         """Columns of the nonlinear parameters of an accepted effect."""
         a, out = self.accepted[number], []
-        for name, value in a.bends.items():
+        for name, value in a.nonlinear.items():
             step = SHAPE_STEP * max(abs(value), 1e-3)
             moved = replace(a, shape={**a.shape, name: value + step})
             out.append(self._moved(log, number, moved, step))
@@ -343,7 +328,7 @@ class Problem:
 
     def _moved(self, log: int, number: int, a: Accepted, step: float) -> dict[int, Array]:
         """Column of a change of one accepted effect; joints that it leaves alone are as before."""
-        bench, model, now = self.benches[log], self._before(number), self.current()
+        data_set, model, now = self.data_sets[log], self._models[number], self.current
         own = self._touched(a)
         for other in (a, *self.accepted[number + 1 :]):
             if own & self._touched(other):
@@ -351,35 +336,23 @@ class Problem:
         pairs = enumerate(zip(now.actuators, model.actuators, strict=True))
         actuators = tuple(new if k in own else old for k, (old, new) in pairs)
         moved = replace(now, bodies=model.bodies, actuators=actuators)
-        change = bench.simulator.difference(self.predictions()[log], moved)
-        return bench.whitened(change.effort / step, change.joints, self.sigma)
+        change = data_set.simulator.difference(self.predictions[log], moved)
+        return data_set.whitened(change.effort / step, change.joints, self.sigma)
 
-    def _before(self, number: int) -> MachineModel:
-        """The model with the accepted effects that come before one."""
-        done = self._computed
-        if done.before is None:
-            done.before = [self._start()]
-            for a in self.accepted:
-                done.before.append(a.apply(done.before[-1]))
-        return done.before[number]
-
-    def stacks(self) -> list[Stack]:
+    @cached_property
+    def matrices(self) -> list[DesignMatrix]:
         """Columns of all unknowns and the residual of the present model."""
-        if self._computed.stacks is None:
-            self._computed.stacks = [
-                make_stack(
-                    bench,
-                    self._unknown_columns(k),
-                    residual(bench, self.predictions()[k], self.sigma),
-                )
-                for k, bench in enumerate(self.benches)
-            ]
-        return self._computed.stacks
+        return [
+            make_design_matrix(
+                d, self._unknown_columns(k), residual(d, self.predictions[k], self.sigma)
+            )
+            for k, d in enumerate(self.data_sets)
+        ]
 
     def _unknown_columns(self, log: int) -> list[dict[int, Array]]:
         out = self.tolerance_columns(log)
         for number in range(len(self.accepted)):
-            out += [*self._own(log, number), *self._bent(log, number)]
+            out += [*self._own(log, number), *self._nonlinear_columns(log, number)]
         return out
 
     @property
@@ -413,50 +386,48 @@ class Problem:
         out[: len(self.tolerances)] = -self.held
         return out
 
+    @cached_property
     def sums(self) -> BlockSums:
         """Normal equations of the present problem; an effect's torque is at most the effort's."""
-        if self._computed.sums is None:
-            stacks = self.stacks()
-            precision = self.precision + self._widths(stacks)
-            self._computed.sums = block_sums(stacks, self.weights, precision, self.mean)
-        return self._computed.sums
+        precision = self.precision + self._widths(self.matrices)
+        return block_sums(self.matrices, self.weights, precision, self.mean)
 
-    def _widths(self, stacks: Sequence[Stack]) -> Array:
+    def _widths(self, matrices: Sequence[DesignMatrix]) -> Array:
         """Prior precision of effects: a torque as large as the effort it touches, (n,)."""
         energy, square = np.zeros(self.names), np.zeros(self.names)
-        for k, stack in enumerate(stacks):
-            bench, rows = stack.bench, self.head(k)
-            m = bench.measurement
-            for j, ids in stack.ids.items():
-                seen = m.effort[bench.rows[rows], j] * m.mask[bench.rows[rows], j][:, None]
-                effort = np.sum((seen * bench.weight / self.sigma[j]) ** 2 * self.weights[j])
-                own = np.sum(stack.X[j][:, rows] ** 2 * self.weights[j], axis=(1, 2))
+        for k, matrix in enumerate(matrices):
+            data_set, rows = matrix.data_set, self.head(k)
+            m = data_set.measurement
+            for j, ids in matrix.ids.items():
+                seen = m.effort[data_set.rows[rows], j] * m.mask[data_set.rows[rows], j][:, None]
+                effort = np.sum((seen * data_set.weight / self.sigma[j]) ** 2 * self.weights[j])
+                own = np.sum(matrix.X[j][:, rows] ** 2 * self.weights[j], axis=(1, 2))
                 energy[ids] += own
                 square[ids] += np.where(own > 0.0, effort, 0.0)
         out = energy / np.maximum(square, 1e-300)
         out[: len(self.tolerances)] = 0.0
         return out
 
-    def gradient(self, stacks: Sequence[Stack]) -> Array:
-        """X^T W r (n,) on *fit* and *choose*, of this residual with columns of another estimate."""
+    def gradient(self, matrices: Sequence[DesignMatrix]) -> Array:
+        """X^T W r (n,) without test rows, of this residual with columns of another estimate."""
         h = self.precision * self.mean
-        for k, stack in enumerate(stacks):
-            rest, rows = residual(stack.bench, self.predictions()[k], self.sigma), self.head(k)
+        for k, matrix in enumerate(matrices):
+            rest, rows = residual(matrix.data_set, self.predictions[k], self.sigma), self.head(k)
             for j, r in rest.items():
                 weighted = r[rows] * self.weights[j]
-                h[stack.ids[j]] += np.tensordot(stack.X[j][:, rows], weighted, axes=2)
+                h[matrix.ids[j]] += np.tensordot(matrix.X[j][:, rows], weighted, axes=2)
         return h
 
     def cost(self) -> float:
         """Twice the negative logarithm of likelihood and prior of what the model holds."""
         out = float(self.precision @ self.mean**2)
-        for k, bench in enumerate(self.benches):
-            rest = residual(bench, self.predictions()[k], self.sigma)
+        for k, data_set in enumerate(self.data_sets):
+            rest = residual(data_set, self.predictions[k], self.sigma)
             for j, r in rest.items():
                 out += float(np.sum(r[self.head(k)] ** 2 * self.weights[j]))
         return out
 
     def head(self, log: int) -> slice:
-        """Rows of *fit* and *choose* of one log's bench."""
-        parts = self.benches[log].parts
+        """Rows of one log that are not for the test."""
+        parts = self.data_sets[log].parts
         return slice(parts[TRAIN].start, parts[VALIDATION].stop)

@@ -18,11 +18,11 @@ _COLUMNS, _STEPS = 3, 8
 _NOTHING = 0.1
 #: Damping, relative to the matrix's diagonal: where a step fails; above it columns are renewed.
 _DAMPED, _MOST_DAMPED = 0.01, 10.0
-_BEND = 0.3  # largest relative change of a nonlinear parameter in one step
+_LARGEST_CHANGE = 0.3  # largest relative change of a nonlinear parameter in one step
 
 
 def refit(problem: Problem) -> Problem:
-    """Estimate all accepted effects together with the tolerances on *fit* and *choose*.
+    """Estimate all accepted effects together with the tolerances on training and validation rows.
 
     Levenberg's damped Gauss-Newton steps (Marquardt 1963) with columns that are kept over several
     of them: a prediction costs little, the columns much. No step makes the log less likely.
@@ -37,12 +37,12 @@ def refit(problem: Problem) -> Problem:
 
 
 def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
-    stacks, sums = problem.stacks(), problem.sums()
+    matrices, sums = problem.matrices, problem.sums
     A = sums.H[sums.blocks(TRAIN, VALIDATION)].sum(axis=0) + np.diag(sums.precision)
     damping = 0.0
     for _ in range(_STEPS):
         D = np.diag(damping * np.diag(A))
-        after = _stepped(problem, _bounded(A + D, problem.gradient(stacks), *_bounds(problem)))
+        after = _stepped(problem, _bounded(A + D, problem.gradient(matrices), *_bounds(problem)))
         reached = after.cost()
         if reached >= cost:
             damping = max(_DAMPED, 10.0 * damping)
@@ -52,7 +52,7 @@ def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
         gain, problem, cost = cost - reached, after, reached
         if gain < _NOTHING and not damping:
             break
-        # Damping holds back what the log tells least of: the last step is without.
+        # Damping holds back what the log shows least of: the last step is without.
         damping = 0.0 if gain < _NOTHING else 0.1 * damping
     return problem, cost
 
@@ -98,8 +98,8 @@ def _stepped(problem: Problem, theta: Array) -> Problem:
 
 
 def tolerances_of(problem: Problem) -> dict[tuple[str, str], tuple[float, float]]:
-    """Tolerances as *fit* and *choose* show them: (kind, place) to estimate and prior sigma."""
-    sums = problem.sums()
+    """Tolerances as estimated without test rows: (kind, place) to estimate and prior sigma."""
+    sums = problem.sums
     theta = sums.solve(sums.blocks(TRAIN, VALIDATION))
     held = problem.held + theta[: len(problem.tolerances)]
     return {
@@ -108,7 +108,7 @@ def tolerances_of(problem: Problem) -> dict[tuple[str, str], tuple[float, float]
     }
 
 
-def _effect_stepped(problem: Problem, a: Accepted, step: Array, bend: Array) -> Accepted:
+def _effect_stepped(problem: Problem, a: Accepted, step: Array, change: Array) -> Accepted:
     """An effect moved by a Newton step, shortened until it stays inside what can be."""
     for share in (1.0, 0.5, 0.25, 0.1, 0.02):
         x = {}
@@ -116,10 +116,10 @@ def _effect_stepped(problem: Problem, a: Accepted, step: Array, bend: Array) -> 
             value = a.x[c.name] + share * float(d)
             x[c.name] = value if c.signed else max(value, 0.0)
         shape = dict(a.shape)
-        for (name, value), d in zip(a.bends.items(), bend, strict=True):
-            most = _BEND * abs(value)
+        for (name, value), d in zip(a.nonlinear.items(), change, strict=True):
+            most = _LARGEST_CHANGE * abs(value)
             shape[name] = value + share * float(np.clip(d, -most, most))
-        seen = any(a.effect.shown(b.measurement, a.place, shape) for b in problem.benches)
+        seen = any(a.effect.shown(b.measurement, a.place, shape) for b in problem.data_sets)
         if seen and a.effect.plausible(problem.model, a.place, x, shape):
             return replace(a, x=x, shape=shape)
     return a

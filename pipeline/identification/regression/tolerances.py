@@ -19,7 +19,7 @@ from pipeline.effects.drive.joint_elasticity import COMPLIANCE_TOLERANCE
 from pipeline.effects.drive.torque_constant_error import CONSTANT_TOLERANCE
 from pipeline.effects.sensing.position_offset import ENCODER_TOLERANCE
 from pipeline.effects.sensing.time_delay import SKEW_TOLERANCE
-from pipeline.identification.regression.design_matrix import Bench
+from pipeline.identification.regression.design_matrix import DataSet
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction
@@ -150,23 +150,23 @@ def nuisances(model: MachineModel, measurements: Sequence[Measurement]) -> tuple
 
 
 def nuisance_columns(
-    bench: Bench, base: Prediction, group: Sequence[Nuisance], sigma: Array
+    data_set: DataSet, base: Prediction, group: Sequence[Nuisance], sigma: Array
 ) -> list[dict[int, Array]]:
     """Columns of tolerances that touch different joints, from one prediction.
 
     Args:
-        bench: The log.
+        data_set: The log.
         base: The present prediction.
         group: One tolerance, or the like ones of all legs where legs are separate.
         sigma: Shape (J, C).
     """
     if len(group) == 1:
-        return [nuisance_column(bench, base, group[0], sigma)]
+        return [nuisance_column(data_set, base, group[0], sigma)]
     step, model = 0.1, base.model
     for nuisance in group:
         model = nuisance.edit(model, step * nuisance.sigma)
-    change = bench.simulator.difference(base, model)
-    whole = bench.whitened(change.effort / step, change.joints, sigma)
+    change = data_set.simulator.difference(base, model)
+    whole = data_set.whitened(change.effort / step, change.joints, sigma)
     return [of_own_leg(base.model, nuisance.place, whole) for nuisance in group]
 
 
@@ -198,10 +198,10 @@ def grouped(model: MachineModel, m: Measurement, every: Sequence[Nuisance]) -> l
 
 
 def nuisance_column(
-    bench: Bench, base: Prediction, nuisance: Nuisance, sigma: Array
+    data_set: DataSet, base: Prediction, nuisance: Nuisance, sigma: Array
 ) -> dict[int, Array]:
     """Its column, per standard deviation of the prior, so that its prior precision is one."""
     step = 0.1
     model = nuisance.edit(base.model, step * nuisance.sigma)
-    change = bench.simulator.difference(base, model)
-    return bench.whitened(change.effort / step, change.joints, sigma)
+    change = data_set.simulator.difference(base, model)
+    return data_set.whitened(change.effort / step, change.joints, sigma)

@@ -1,4 +1,4 @@
-"""The motion that decides between effects which a log cannot tell apart.
+"""The motion that decides between effects between which a log cannot decide.
 
 A few motions of the field (sweeps at several speeds, fast sines, slow turns through the travel,
 holds in different postures) are tried in simulation, each inside the limits of position and
@@ -98,7 +98,7 @@ def deciding_motion(
             they do.
 
     Returns:
-        None where no motion tells them apart by as much as the noise.
+        None where no motion separates them by as much as the noise.
     """
     assert named.values is not None
     middle = 0.5 * (m.q.min(axis=0) + m.q.max(axis=0)) if posture is None else posture

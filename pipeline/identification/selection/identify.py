@@ -1,7 +1,7 @@
 """Step 3 in one call: name what is missing, with values, intervals, rivals and how sure.
 
-All of it rests on *fit* and *choose*. What only proves (*prove*) has no say in any of it and is not
-looked at here: `written` holds the model file that came of it against those rows.
+Test rows have no say in any of it and are not looked at here: `written` holds the model file that
+came of it against them.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification import results as limits
-from pipeline.identification.regression.design_matrix import make_benches
+from pipeline.identification.regression.design_matrix import make_data_sets
 from pipeline.identification.regression.floor import floor_of, left_open
 from pipeline.identification.regression.intervals import bodies_of, estimates
 from pipeline.identification.regression.normal_equations import solve_spd
@@ -91,7 +91,7 @@ def identify(
         NamingError: A part of the data has no usable row.
         ModelError: Model and logs do not fit.
     """
-    start = Problem(model, make_benches(measurements), floor_of(measurements))
+    start = Problem(model, make_data_sets(measurements), floor_of(measurements))
     channel = measurements[0].channels[0]
     judged, found = _best_judged(settle(start, progress), channel)
     settled = judged.settled
@@ -368,7 +368,7 @@ def _joints(judged: Judgement, number: int | None) -> list[int]:
 
 
 def _errors(search: Search, state: State) -> Array:
-    """RMS error of the first channel on *choose* by estimates from *fit*, (J,); NaN: no rows."""
+    """RMS validation error of the first channel by estimates from training rows, (J,), or NaN."""
     pool = search.pool
     columns = search.columns(state)
     part = (pool.channels[0].part != TRAIN).astype(np.intp)
@@ -409,7 +409,7 @@ def _candidates(judged: Judgement, found: Sequence[Found]) -> Iterator[Candidate
     beside = _best_by_name(search, search.gains(state))
     kept = {f.key: f for f in found}
     close = {r: f for f in found for r in f.rivals}
-    unit = CHANNEL_UNITS[judged.settled.problem.benches[0].measurement.channels[0]]
+    unit = CHANNEL_UNITS[judged.settled.problem.data_sets[0].measurement.channels[0]]
     base = _errors(first, nothing)
     names = dict.fromkeys([*kept, *(r for r in close if r[1] or r == BODIES), *alone])
     for key in names:

@@ -18,7 +18,7 @@ from pipeline.effects.bodies.link_mass import AXES, AddedBody, LinkMass, last_li
 from pipeline.effects.drive.torque_ripple import TorqueRipple
 from pipeline.effects.friction.presets import FrictionPreset
 from pipeline.effects.registry import catalogue
-from pipeline.identification.regression.design_matrix import Bench, effect_columns, residual
+from pipeline.identification.regression.design_matrix import DataSet, effect_columns, residual
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Problem
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
@@ -28,7 +28,7 @@ Index = NDArray[np.intp]
 Key = tuple[str, Place]
 #: Orders of a ripple that compete at a joint.
 _PEAKS = 4
-#: Triples of neighbouring rows without which noise is not told by them.
+#: Triples of neighbouring rows below which they do not give the noise.
 _FOLLOWING = 50
 _RIDGE = 1e-9
 _TEN = len(AddedBody.coordinates)
@@ -143,13 +143,13 @@ def make_pool(problem: Problem, effects: Sequence[Effect] | None = None) -> Pool
         problem: With the effects accepted so far.
         effects: To offer; the whole catalogue by default.
     """
-    model = problem.current()
+    model = problem.current
     offered = catalogue(model) if effects is None else effects
     base = len(problem.tolerances)
     terms: list[Term] = []
     columns: list[list[dict[int, Array]]] = [
         [*problem.tolerance_columns(k), *problem.accepted_columns(k)]
-        for k in range(len(problem.benches))
+        for k in range(len(problem.data_sets))
     ]
     at = base
     for a in problem.accepted:
@@ -185,7 +185,7 @@ def make_pool(problem: Problem, effects: Sequence[Effect] | None = None) -> Pool
 
 
 def _forms(problem: Problem, effect: Effect) -> Iterator[tuple[Place, dict[str, float]]]:
-    model, m = problem.current(), problem.benches[0].measurement
+    model, m = problem.current, problem.data_sets[0].measurement
     for place in effect.places(model, m):
         for shape in effect.shapes(model, m, place):
             for reach in effect.reaches:
@@ -204,9 +204,9 @@ def _offer(
     """Append a term and its columns, where it changes the prediction; the next free column."""
     if any((t.effect, t.place, t.shape) == (effect, place, shape) for t in terms):
         return at  # accepted
-    if not any(effect.shown(b.measurement, place, shape) for b in problem.benches):
+    if not any(effect.shown(b.measurement, place, shape) for b in problem.data_sets):
         return at
-    own = [problem.columns(k, effect, place, shape) for k in range(len(problem.benches))]
+    own = [problem.columns(k, effect, place, shape) for k in range(len(problem.data_sets))]
     if not all(any(per_log[c] for per_log in own) for c in range(len(effect.coordinates))):
         return at
     for per_log, more in zip(columns, own, strict=True):
@@ -220,7 +220,7 @@ def _absolute(
     problem: Problem, log: int, columns: Sequence[Mapping[int, Array]], held: Array
 ) -> dict[int, Array]:
     """Residual of the model without tolerances and accepted effects, by joint, (R, C)."""
-    rest = residual(problem.benches[log], problem.predictions()[log], problem.sigma)
+    rest = residual(problem.data_sets[log], problem.predictions[log], problem.sigma)
     for k in np.flatnonzero(held).tolist():
         for j, x in columns[k].items():
             rest[j] = rest[j] + held[k] * x
@@ -240,14 +240,14 @@ def _payloads(
             beside += term.columns.tolist()
     full = np.zeros(len(columns[0]))
     full[: held.size] = held
-    model, n = problem.current(), len(beside)
+    model, n = problem.current, len(beside)
     prior = np.zeros(n)
     prior[: len(problem.tolerances)] = problem.precision[: len(problem.tolerances)]
     for link in last_links(model):
         H, h = np.zeros((n + _TEN, n + _TEN)), np.zeros(n + _TEN)
-        for k, (bench, own) in enumerate(zip(problem.benches, columns, strict=True)):
+        for k, (data_set, own) in enumerate(zip(problem.data_sets, columns, strict=True)):
             added = effect_columns(
-                bench, problem.predictions()[k], AddedBody(), (link,), {}, problem.sigma
+                data_set, problem.predictions[k], AddedBody(), (link,), {}, problem.sigma
             )
             every = [*(own[i] for i in beside), *added]
             rest = _absolute(problem, k, own, full)
@@ -300,34 +300,34 @@ def _point(H: Array, h: Array, prior: Array) -> list[float]:
 def _channels(
     problem: Problem, columns: Sequence[Sequence[Mapping[int, Array]]], held: Array
 ) -> Iterator[Channel]:
-    benches = problem.benches
-    rests = [_absolute(problem, k, columns[k], held) for k in range(len(benches))]
+    data_sets = problem.data_sets
+    rests = [_absolute(problem, k, columns[k], held) for k in range(len(data_sets))]
     for j in range(len(problem.model.joints)):
         ids = np.array(sorted({k for own in columns for k, c in enumerate(own) if j in c}), int)
         for c in range(problem.sigma.shape[1]):
             H, h, s, count, part, effort = [], [], [], [], [], []
-            for bench, own, rest in zip(benches, columns, rests, strict=True):
-                m = bench.measurement
+            for data_set, own, rest in zip(data_sets, columns, rests, strict=True):
+                m = data_set.measurement
                 X = np.stack(
-                    [own[k][j][:, c] if j in own[k] else np.zeros(bench.rows.size) for k in ids]
+                    [own[k][j][:, c] if j in own[k] else np.zeros(data_set.rows.size) for k in ids]
                 )
-                good = m.mask[bench.rows, j]
-                for b in np.flatnonzero(np.isin(bench.block_part, (TRAIN, VALIDATION))):
-                    rows = slice(int(bench.edges[b]), int(bench.edges[b + 1]))
+                good = m.mask[data_set.rows, j]
+                for b in np.flatnonzero(np.isin(data_set.block_part, (TRAIN, VALIDATION))):
+                    rows = slice(int(data_set.edges[b]), int(data_set.edges[b + 1]))
                     x, r = X[:, rows], rest[j][rows, c]
                     H.append(x @ x.T)
                     h.append(x @ r)
                     s.append(float(r @ r))
-                    part.append(bench.block_part[b])
-                    count.append(good[rows].sum() * bench.weight**2)
-                    seen = m.effort[bench.rows[rows], j, c][good[rows]] / problem.sigma[j, c]
-                    effort.append(float(np.sum(seen**2)) * bench.weight**2)
+                    part.append(data_set.block_part[b])
+                    count.append(good[rows].sum() * data_set.weight**2)
+                    seen = m.effort[data_set.rows[rows], j, c][good[rows]] / problem.sigma[j, c]
+                    effort.append(float(np.sum(seen**2)) * data_set.weight**2)
             n = np.array(count)
             if n.sum() == 0:
                 continue
             size = float(np.sum(effort) / n.sum())
             rich = saturated(np.sum(H, axis=0), np.sum(h, axis=0))[0]
-            noise = _noise(benches, columns, rests, rich, (j, c), ids)
+            noise = _noise(data_sets, columns, rests, rich, (j, c), ids)
             yield Channel(
                 j, ids, np.array(H), np.array(h), np.array(s), n, np.array(part), c, size, noise
             )
@@ -343,7 +343,7 @@ def saturated(H: Array, h: Array) -> tuple[Array, int]:
 
 
 def _noise(
-    benches: Sequence[Bench],
+    data_sets: Sequence[DataSet],
     columns: Sequence[Sequence[Mapping[int, Array]]],
     rests: Sequence[Mapping[int, Array]],
     x: Array,
@@ -357,8 +357,8 @@ def _noise(
     of neighbours that the low-pass gives it, the variance is (6 - 8 rho_1 + 2 rho_2) sigma^2.
     """
     (j, c), squares, count = of, 0.0, 0
-    for bench, own, rest in zip(benches, columns, rests, strict=True):
-        m, rows = bench.measurement, bench.rows
+    for data_set, own, rest in zip(data_sets, columns, rests, strict=True):
+        m, rows = data_set.measurement, data_set.rows
         if rows.size < 3:
             continue
         r = rest[j][:, c].copy()
@@ -371,7 +371,7 @@ def _noise(
         good = m.mask[rows, j] & np.isin(m.part[rows], (TRAIN, VALIDATION))
         follows = np.diff(rows) == step
         inner = good[:-2] & good[1:-1] & good[2:] & follows[:-1] & follows[1:]
-        second = (r[:-2] - 2.0 * r[1:-1] + r[2:])[inner] / bench.weight
+        second = (r[:-2] - 2.0 * r[1:-1] + r[2:])[inner] / data_set.weight
         squares += float(np.sum(second**2)) / gain
         count += int(inner.sum())
     return float(np.sqrt(squares / count)) if count > _FOLLOWING else float("nan")
@@ -398,7 +398,9 @@ def _rests(
     for j in range(len(problem.model.joints)):
         ids = sorted({i for own in columns for i, c in enumerate(own) if j in c})
         X = [
-            np.stack([_row(own[i], j, problem.benches[k].rows.size)[problem.head(k)] for i in ids])
+            np.stack(
+                [_row(own[i], j, problem.data_sets[k].rows.size)[problem.head(k)] for i in ids]
+            )
             for k, own in enumerate(columns)
         ]
         r = [rest[j][problem.head(k), 0] for k, rest in enumerate(rests)]
@@ -418,12 +420,12 @@ def _orders(
     problem: Problem, effect: TorqueRipple, joint: int, rests: Sequence[Sequence[Array]]
 ) -> list[dict[str, float]]:
     """Orders of the joint's angle that is left most of, none near another."""
-    orders = effect.orders(problem.benches[0].measurement, joint)
+    orders = effect.orders(problem.data_sets[0].measurement, joint)
     if orders.size == 0:
         return []
     power = np.zeros(orders.size)
-    for k, bench in enumerate(problem.benches):
-        q = bench.measurement.q[bench.rows[problem.head(k)], joint]
+    for k, data_set in enumerate(problem.data_sets):
+        q = data_set.measurement.q[data_set.rows[problem.head(k)], joint]
         power += abs(_fourier(rests[joint][k], q, orders)) ** 2
     spacing = orders[1] - orders[0] if orders.size > 1 else 1.0
     out: list[float] = []

@@ -27,15 +27,15 @@ def remainders(
     floor: Array,
     proved: Array | None = None,
 ) -> tuple[Remainder, ...]:
-    """What a model leaves on *prove*, by joint and channel, described where it is significant.
+    """What a model leaves on test rows, by joint and channel, described where it is significant.
 
-    Of a joint without rows there it is what is left on *fit* and *choose*.
+    Of a joint without rows there it is what is left on training and validation rows.
 
     Args:
         measurements: One per log.
         predictions: Of the model, one per log.
         floor: Standard deviation of the noise, shape (J, C).
-        proved: Root mean square on *prove* by joint and channel, shape (J, C), NaN without a row,
+        proved: Root mean square on test rows by joint and channel, shape (J, C), NaN without a row,
             where it is known from more rows than the measurements hold.
     """
     first = measurements[0]
@@ -44,7 +44,7 @@ def remainders(
         rests = [gap_of(m, p, c) for m, p in zip(measurements, predictions, strict=True)]
         for j, joint in enumerate(first.joints):
             held = _known(measurements, rests, j, TEST)
-            # Where no row proves, those that were fitted are better than none.
+            # Where there is no test row, those that were fitted are better than none.
             seen = held if held.size else _known(measurements, rests, j, TRAIN, VALIDATION)
             error = float(np.sqrt(np.mean(seen**2))) if seen.size else 0.0
             if proved is not None and np.isfinite(proved[j, c]):

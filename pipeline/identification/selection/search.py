@@ -82,11 +82,13 @@ class Search:
         names = len({t.key for t in pool.terms}) + 1
         # A nonlinear parameter costs what a coordinate that many rows tell does.
         rows = 0.5 * np.log(max(np.mean([c.count.sum() for c in pool.channels]), 1.0))
-        bent = [len([n for n in t.shape if n not in (REACH, *t.effect.fixed)]) for t in pool.terms]
+        nonlinear = [
+            len([n for n in t.shape if n not in (REACH, *t.effect.fixed)]) for t in pool.terms
+        ]
         self._name = -np.log(names) - MARGIN
         # A law that has another in it has to be worth more than that one by a name.
         each = [self._name * (1 + bool(t.effect.contains)) for t in pool.terms]
-        self._prior = np.array(each) - rows * np.array(bent)
+        self._prior = np.array(each) - rows * np.array(nonlinear)
         sums = [w * c.s.sum() for c, w in zip(pool.channels, self.weights, strict=True)]
         counts = [
             np.log(w) * c.count.sum() for c, w in zip(pool.channels, self.weights, strict=True)

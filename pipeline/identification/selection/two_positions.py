@@ -37,7 +37,7 @@ def read_off_two(
     measurements: Sequence[Measurement],
     first: int,
 ) -> tuple[Found, ...]:
-    """Findings of the logs that may be learnt from; rows that prove are not looked at.
+    """Findings of the logs that may be learnt from; test rows are not looked at.
 
     Args:
         model: With all that was named: friction does not deflect what lies behind it.

@@ -1,4 +1,4 @@
-"""What the supply gives, term by term, with what stays unexplained on samples that prove."""
+"""What the supply gives, term by term, with what stays unexplained on test samples."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ SMALL = 0.02
 
 @dataclass(frozen=True)
 class Share:
-    """One term's part of the mean power on samples that prove.
+    """One term's part of the mean power on test samples.
 
     Attributes:
         term: Name.
@@ -78,7 +78,7 @@ class Share:
 
 @dataclass(frozen=True)
 class DriveShare:
-    """One drive's mean power on samples that prove [W], by log and model."""
+    """One drive's mean power on test samples [W], by log and model."""
 
     joint: str
     leg: str
@@ -97,9 +97,9 @@ class Account:
         shares: Rows of `power.csv`, what was measured and what stays unexplained last.
         drives: By joint.
         rows: Every sample.
-        proves: Which of them prove, shape (K,).
+        proves: Which of them are test samples, shape (K,).
         explained: Power by all terms, shape (K,) [W].
-        rms: Of measured minus predicted on samples that prove, by the model's sum and with all
+        rms: Of measured minus predicted on test samples, by the model's sum and with all
             terms [W].
         reading: How samples were read: ``"mean"`` or ``"instant"``.
         wrong_sum: ``"recognised"``, ``"possible"`` or empty: whether motor currents times the
@@ -144,8 +144,8 @@ def account(
     Args:
         given: The machine.
         prepared: Logs.
-        holdout: How many at the end only prove.
-        prove_last: Share of every other log that proves.
+        holdout: How many at the end are for the test.
+        prove_last: Share of every other log that is for the test.
 
     Raises:
         GapError: A log has no power at the supply, too few samples of it, or a joint no motor.
@@ -233,7 +233,7 @@ def _refuse_few(rows: Rows, prepared: Sequence[Prepared]) -> None:
         names = ", ".join(one.log.name for one in prepared)
         raise LogContentError(
             f"{names}: {len(rows)} samples of the supply during which all joints are known; at "
-            f"least {FEWEST} are needed to tell terms apart and to prove them; log longer"
+            f"least {FEWEST} are needed to separate terms and to test them; log longer"
         )
 
 
@@ -265,7 +265,7 @@ def _shares(best: _Chosen) -> tuple[Share, ...]:
         out.append(_found(terms[name], *own, mean, rivals[name]))
     left = proof.power - proof.predicted
     columns = [proof.columns[n] for n in best.names]
-    # What is left scatters by the blocks that prove and by the coefficients.
+    # What is left scatters by the test blocks and by the coefficients.
     rng = np.random.default_rng(SEED)
     rows = [np.flatnonzero(block == b) for b in np.unique(block)]
     spread = []

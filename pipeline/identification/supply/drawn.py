@@ -6,7 +6,7 @@ What flows into a motor's terminals is what it turns into motion and what its wi
 
 with torque tau and speed v of the joint's bodies and speed w of the motor (Krishnan, Electric Motor
 Drives, 2001, section 2.2). The motor's torque is the log's own, or the model's at a joint whose
-effort the log does not tell; what the motor gives and the bodies do not take is friction: that of
+effort that is not in the log; what the motor gives and the bodies do not take is friction: that of
 gears, bearings and seals, what rotors store, and what the bodies' file has wrong.
 """
 

@@ -1,10 +1,11 @@
 """One bounded regression of the supply's power on terms, compared by what it predicts.
 
-Rows lie in blocks of consecutive samples. Some blocks only prove. Of the others each is predicted
-by a fit to the rest; a term is taken in where that predicts better, by Wilcoxon's signed-rank test
-over blocks at 5 % over all terms tried (Bonferroni), and by 5 % of the error at least. Terms that
-may stand in another's place without predicting worse by the same test are told with it. Intervals
-are those of a bootstrap of blocks (Künsch 1989, Annals of Statistics 17(3)).
+Rows lie in blocks of consecutive samples. Some blocks are for the test alone. Of the others each is
+predicted by a fit to the rest; a term is taken in where that predicts better, by Wilcoxon's
+signed-rank test over blocks at 5 % over all terms tried (Bonferroni), and by 5 % of the error at
+least. Terms that may stand in another's place without predicting worse by the same test are
+reported with it. Intervals are those of a bootstrap of blocks (Künsch 1989, Annals of Statistics
+17(3)).
 """
 
 from __future__ import annotations
@@ -26,12 +27,12 @@ Mask = NDArray[np.bool_]
 LEVEL: Final = 0.05
 #: Share of the root mean square error by which a prediction has to be better.
 LITTLE: Final = 0.05
-#: Share of the mean power that no meter at a supply tells from nothing.
+#: Share of the mean power that no meter at a supply distinguishes from nothing.
 METER: Final = 1e-3
 #: Blocks a log is cut into, and the fewest samples of one.
 BLOCKS: Final = 24
 SMALLEST: Final = 2
-#: Every so many blocks one proves.
+#: Every so many blocks one is for the test.
 PROVES: Final = 4
 #: Fits that leave blocks out, and draws of the bootstrap.
 FOLDS: Final = 6
@@ -45,7 +46,7 @@ class Problem:
     """Rows that estimate and choose, and terms that may be taken in.
 
     Attributes:
-        rows: That do not prove.
+        rows: Without test rows.
         block: Of each of them, shape (K,).
         terms: All of them.
     """
@@ -184,12 +185,13 @@ def intervals(
 
 
 def blocks_of(rows: Rows, holdout: int, prove_last: float | None) -> tuple[NDArray[np.intp], Mask]:
-    """Number of each row's block, (K,), and whether it proves, (K,).
+    """Number of each row's block, (K,), and whether it is for the test, (K,).
 
     Args:
         rows: Of all logs.
-        holdout: Logs at the end of the list that only prove.
-        prove_last: Share at the end of every other log that proves instead of blocks in between.
+        holdout: Logs at the end of the list that are for the test.
+        prove_last: Share at the end of every other log that is for the test instead of blocks in
+            between.
     """
     block, proves = np.empty(len(rows), dtype=np.intp), np.zeros(len(rows), dtype=np.bool_)
     logs, first = int(rows.log.max()) + 1, 0

@@ -13,7 +13,7 @@ from pipeline.logs.reading.log import Log
 
 Array = NDArray[np.float64]
 
-#: Samples that are the fewest from which terms can be told apart and proved.
+#: Samples that are the fewest from which terms can be separated and tested.
 FEWEST: Final = 24
 #: Intervals are no shorter than this many times the reach of the motion's low-pass.
 SHORTEST: Final = 1.0
@@ -94,7 +94,7 @@ def _own(log: Log, values: Array | None) -> tuple[Array, Array] | None:
     """Instants and values of a column where it has samples of its own; None without any.
 
     Raises:
-        LogContentError: Fewer than can be told apart.
+        LogContentError: Fewer than separate terms need.
     """
     if values is None or not np.isfinite(values).any():
         return None

@@ -1,1 +1,1 @@
-"""The steps of the workflow, from files to what a run tells."""
+"""The steps of the workflow, from files to the results of a run."""

@@ -1,4 +1,4 @@
-"""What a voltage log tells of torque constants and viscous friction, in words.
+"""What a voltage log shows of torque constants and viscous friction, in words.
 
 With k, R and n of motor and gear, and friction b v at the joint, the voltage has one part in
 proportion to the joint's speed,

@@ -26,7 +26,7 @@ CLEARANCE, APART = 0.01, 0.12
 def decide(
     given: Setup, model: MachineModel, measurements: Sequence[Measurement], found: Sequence[Found]
 ) -> tuple[Deciding, str] | None:
-    """The motion that tells a found effect from its rivals, and it in words.
+    """The motion that separates a found effect from its rivals, and it in words.
 
     Args:
         given: Robot and actuators.

@@ -30,7 +30,7 @@ class Options:
         robot: Robot file or URDF; the model file's or the hexapod by default.
         model: Model file with effects found earlier.
         gait: File with a table ``[gait]`` that was walked instead of the robot file's.
-        holdout: Logs that only prove.
+        holdout: Test logs.
         base: ``fixed``, ``level`` or ``measured``; as log and robot say by default.
         gait_start: Time in the log at which a period of the gait begins [s].
         mapping: Mapping file for foreign columns.
@@ -39,7 +39,7 @@ class Options:
         changes: Numbers that differ from the files', by their keys.
         effort: Channel to compare; the log's most direct by default.
         cutoff: Bandwidth of the comparison [Hz]; the data's own by default.
-        prove_last: Last share of every log that only proves; blocks in between by default.
+        prove_last: Last share of every log that is for the test; blocks in between by default.
         out: Folder for what is written; the model file names its robot relative to it.
         decimal: Sign of decimals in copies of the tables.
     """

@@ -275,7 +275,7 @@ def _ratio(actuators: Actuators | None, joints: tuple[str, ...]) -> np.ndarray |
 
 
 def open_logs(given: Setup, options: Options) -> list[Stream]:
-    """The logs that may be fitted, then those that only prove.
+    """Training logs, then test logs.
 
     Raises:
         GapError: The mapping cannot be used.
@@ -322,10 +322,10 @@ def _adjusted(log: Log, given: Setup, options: Options) -> Log:
 
 
 def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
-    """Step 1: read, judge and prepare all logs, and cut them into fit, choose and prove.
+    """Step 1: read, check, prepare and split all logs.
 
     All scores are taken at one bandwidth: `--cutoff`, else where the encoders' noise is silent.
-    Of logs with more than `LONG_ROWS` rows together only the stretches that tell most are held.
+    Of logs with more than `LONG_ROWS` rows together only the most informative stretches are held.
 
     Returns:
         The logs, their parts, and how many of them may be fitted (the first ones).
@@ -432,7 +432,7 @@ def _refuse_twice(paths: Sequence[Path]) -> None:
         digest = sha256(path)
         if digest in seen:
             raise LogContentError(
-                f"{path}: the same data as {seen[digest]}; what proves must be data of its own, "
+                f"{path}: the same data as {seen[digest]}; test data must be data of its own, "
                 "and data given twice count twice; leave one out"
             )
         seen[digest] = path

@@ -71,7 +71,7 @@ class Story:
 
     @property
     def noise(self) -> float:
-        """Noise floor of all joints in the compared channel, of the logs that prove."""
+        """Noise floor of all joints in the compared channel, of the test logs."""
         return overall(noise_floor(self.where.measurements))
 
 

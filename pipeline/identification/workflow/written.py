@@ -35,7 +35,7 @@ class Weighed:
     """A model file against the logs.
 
     Attributes:
-        found: Effects, with what each closes on *prove* and whether the file holds it.
+        found: Effects, with what each closes on test rows and whether the file holds it.
         stages: The model as it was, with one effect of the file after another.
         pairs: Per effect, the stage without it and the stage with it.
         joints: Per effect, the column at which it shows.
@@ -104,7 +104,7 @@ def weigh_edits(
     Args:
         model: Before the edits.
         where: Steps 1 and 2.
-        groups: Edits of the file, those together that are told as one.
+        groups: Edits of the file, those together that are reported as one.
         found: One per group.
     """
     seen = stages(_models(model, found, groups), where.measurements, where.intake.long)
@@ -185,9 +185,9 @@ def _worst(
     found: Sequence[Found],
     groups: Sequence[Sequence[Edit]],
 ) -> tuple[str, tuple[str, ...]] | None:
-    """The name without which the simulated gap on *choose* is smallest, if smaller than with it.
+    """The name without which the validation error is smallest, if smaller than with it.
 
-    Naming judges by a linear step; what two positions tell, the torque hardly shows.
+    Naming judges by a linear step; what two positions show, the torque hardly does.
     """
     judged = [k for k, f in enumerate(found) if f.law != READ_OFF]
     whole = [edit for group in groups for edit in group]

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from actuators.elements.friction_curve import FrictionCurve
 from pipeline.effects.base import Effect
 from pipeline.effects.registry import effect_named
-from pipeline.identification.regression.design_matrix import effect_columns, make_bench
+from pipeline.identification.regression.design_matrix import effect_columns, make_data_set
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg
@@ -90,14 +90,14 @@ def test_columns_are_what_a_large_change_does(name: str) -> None:
     """A curve is linear in its levels: a step a hundred times as large moves as much per size."""
     effect, model = effect_named(name), leg.leg_model()
     shape = shape_of(effect)
-    bench = make_bench(LOG)
-    base = bench.simulator.predict(model)
-    columns = effect_columns(bench, base, effect, J2, shape, LOG.noise)
+    data_set = make_data_set(LOG)
+    base = data_set.simulator.predict(model)
+    columns = effect_columns(data_set, base, effect, J2, shape, LOG.noise)
     zero = dict.fromkeys((c.name for c in effect.coordinates), 0.0)
     for c, column in zip(effect.coordinates, columns, strict=True):
         if c.name.startswith("share"):  # the load through a share is bent in it
             continue
         moved = effect.edit(model, J2, zero | {c.name: 100.0 * c.step}, shape)
         change = Simulator(LOG).predict(moved).effort - base.effort
-        expected = bench.whitened(change / (100.0 * c.step), range(3), LOG.noise)[1]
+        expected = data_set.whitened(change / (100.0 * c.step), range(3), LOG.noise)[1]
         np.testing.assert_allclose(column[1], expected, atol=1e-6 * np.abs(expected).max() + 1e-9)

@@ -10,7 +10,7 @@ import pytest
 from pipeline.effects.bodies.link_mass import AXES, LinkMass, last_links
 from pipeline.effects.drive.torque_ripple import TorqueRipple
 from pipeline.effects.registry import effect_named
-from pipeline.identification.regression.design_matrix import effect_columns, make_benches
+from pipeline.identification.regression.design_matrix import effect_columns, make_data_sets
 from pipeline.identification.regression.floor import left_open
 from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.tolerances import grouped, nuisance_column
@@ -26,7 +26,7 @@ COULOMB = effect_named("coulomb_friction")
 
 
 def problem_of(log: Measurement, model: MachineModel | None = None) -> Problem:
-    return Problem(leg.leg_model() if model is None else model, make_benches([log]), log.noise)
+    return Problem(leg.leg_model() if model is None else model, make_data_sets([log]), log.noise)
 
 
 @pytest.fixture(scope="module")
@@ -66,17 +66,17 @@ def same(one: dict[int, np.ndarray], other: dict[int, np.ndarray]) -> None:
 
 def test_columns_of_legs_alike_and_not_are_those_of_each_alone(walking: Problem) -> None:
     """One prediction serves the like tolerances of all legs, whatever legs and joints these are."""
-    bench, base = walking.benches[0], walking.predictions()[0]
-    groups = grouped(walking.model, bench.measurement, walking.tolerances)
+    data_set, base = walking.data_sets[0], walking.predictions[0]
+    groups = grouped(walking.model, data_set.measurement, walking.tolerances)
     assert max(len(g) for g in groups) == len(MIXED)
     for nuisance, column in zip(walking.tolerances, walking.tolerance_columns(0), strict=True):
-        same(column, nuisance_column(bench, base, nuisance, walking.sigma))
+        same(column, nuisance_column(data_set, base, nuisance, walking.sigma))
 
 
 def test_the_same_holds_of_a_payload(walking: Problem) -> None:
-    bench, base, payload = walking.benches[0], walking.predictions()[0], LinkMass()
-    for place in payload.places(walking.model, bench.measurement):
-        alone = effect_columns(bench, base, payload, place, {}, walking.sigma)
+    data_set, base, payload = walking.data_sets[0], walking.predictions[0], LinkMass()
+    for place in payload.places(walking.model, data_set.measurement):
+        alone = effect_columns(data_set, base, payload, place, {}, walking.sigma)
         for one, other in zip(walking.columns(0, payload, place, {}), alone, strict=True):
             same(one, other)
 
@@ -114,13 +114,13 @@ def test_what_a_log_leaves_open_is_its_tolerances_and_the_scatter_of_estimates()
     none = problem_of(log)
     none = none.judged(UNCERTAINTIES[0], none.weights)
     # Of tolerances alone, each by its stated size.
-    bench, square = none.benches[0], np.zeros(3)
-    rows = bench.parts[TEST]
+    data_set, square = none.data_sets[0], np.zeros(3)
+    rows = data_set.parts[TEST]
     priors = none.precision[: len(none.tolerances)]
     for column, prior in zip(none.tolerance_columns(0), priors, strict=True):
         for j, x in column.items():
-            square[j] += float(np.sum(x[rows, 0] ** 2)) / prior / bench.weight**2
-    count = log.mask[bench.rows[rows]].sum(axis=0)
+            square[j] += float(np.sum(x[rows, 0] ** 2)) / prior / data_set.weight**2
+    count = log.mask[data_set.rows[rows]].sum(axis=0)
     expected = np.sqrt(square / count) * none.sigma[:, 0]
     np.testing.assert_allclose(left_open(none)[:, 0], expected, rtol=1e-9)
     # An estimate that one log alone made adds its scatter, at its joint only.

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from pipeline.effects.registry import effect_named
-from pipeline.identification.regression.design_matrix import make_bench, make_benches
+from pipeline.identification.regression.design_matrix import make_data_set, make_data_sets
 from pipeline.identification.regression.intervals import _certain
 from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.refit import _bounded, refit
@@ -33,7 +33,7 @@ def log() -> Measurement:
 
 
 def problem_of(log: Measurement, *accepted: Accepted) -> Problem:
-    return Problem(leg.leg_model(), make_benches([log]), log.noise).with_accepted(accepted)
+    return Problem(leg.leg_model(), make_data_sets([log]), log.noise).with_accepted(accepted)
 
 
 def stribeck(coulomb: float, excess: float, speed: float) -> Accepted:
@@ -58,7 +58,7 @@ def test_estimating_anew_never_makes_a_log_less_likely(
 def test_the_gradient_is_that_of_the_cost(log: Measurement) -> None:
     """Half the fall of the cost per step of each unknown, by central differences."""
     problem = problem_of(log, stribeck(0.25, 0.5, 0.08))
-    downhill = problem.gradient(problem.stacks())
+    downhill = problem.gradient(problem.matrices)
     (coordinates, shape) = problem.spans()[0]
     assert (coordinates.stop - coordinates.start, shape.stop - shape.start) == (2, 1)
     for k, (c, v, s) in enumerate([(1e-4, 0, 0), (0, 1e-4, 0), (0, 0, 1e-5)]):
@@ -90,15 +90,15 @@ def test_noise_is_told_from_a_motion_by_second_differences(cutoff: float) -> Non
     finite = np.isfinite(cutoff)
     kernel = LowPass(rate=leg.RATE, cutoff=cutoff).kernels[0] if finite else None
     m = replace(m, kernel=kernel, bandwidth=cutoff)
-    bench = make_bench(m)
+    data_set = make_data_set(m)
     white = rng.standard_normal((len(m), 1))
     noise = white[:, 0] if kernel is None else np.convolve(white[:, 0], kernel, "same")
     deviation = float(noise.std())
     slow = 10.0 * np.sin(0.7 * m.time)
-    rest = (noise + slow)[bench.rows] * bench.weight
-    rest[~m.mask[bench.rows, 0]] = 0.0
+    rest = (noise + slow)[data_set.rows] * data_set.weight
+    rest[~m.mask[data_set.rows, 0]] = 0.0
     none = np.zeros(0, dtype=np.intp)
-    told = _noise([bench], [[]], [{0: rest[:, None]}], np.zeros(0), (0, 0), none)
+    told = _noise([data_set], [[]], [{0: rest[:, None]}], np.zeros(0), (0, 0), none)
     assert told == pytest.approx(deviation, rel=0.15)
 
 

@@ -173,10 +173,14 @@ def test_a_coordinate_may_be_as_large_as_the_effort_and_a_body_as_the_urdf_is_un
 
 
 def test_a_nonlinear_parameter_costs_what_a_coordinate_that_the_rows_tell_does() -> None:
-    bent: Offered = (made("bent"), ("a",), {"speed": 0.1})
-    knots: Offered = (Made("knots", bent[0].coordinates, fixed=("speed",)), ("a",), {"speed": 0.1})
+    nonlinear: Offered = (made("nonlinear"), ("a",), {"speed": 0.1})
+    knots: Offered = (
+        Made("knots", nonlinear[0].coordinates, fixed=("speed",)),
+        ("a",),
+        {"speed": 0.1},
+    )
     plain: Offered = (made("plain"), ("a",), {})
-    log = log_of((bent, knots, plain), {})
+    log = log_of((nonlinear, knots, plain), {})
     for x in log.X:
         x[3] = x[4] = x[2]  # the three are one column
     search = Search(log.pool, WEIGHTS)
