@@ -16,8 +16,9 @@ from pipeline.identification.compare.stages import stages
 from pipeline.identification.regression.design_matrix import make_data_sets
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.results import UNCERTAINTIES
+from pipeline.identification.selection.evidence import State
 from pipeline.identification.selection.pool import make_pool
-from pipeline.identification.selection.search import Search, State
+from pipeline.identification.selection.search import Search
 from pipeline.identification.workflow.locate import Whereabouts, find_where
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup, setup, take_in

@@ -19,8 +19,9 @@ from pipeline.effects.base import REACH
 from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.refit import refit
 from pipeline.identification.results import UNCERTAINTIES
+from pipeline.identification.selection.evidence import State, noise_weights
 from pipeline.identification.selection.pool import Key, Pool, make_pool
-from pipeline.identification.selection.search import Search, State, noise_weights
+from pipeline.identification.selection.search import Search
 from pipeline.progress import Progress
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ import pytest
 from pipeline.effects.bodies.link_mass import point_mass
 from pipeline.effects.registry import effect_named
 from pipeline.identification.selection.identify import identify
-from pipeline.identification.selection.pool import _point
+from pipeline.identification.selection.places import _point
 from pipeline.simulation.rigid_bodies import changed_model
 from tests.pipeline.identification import bench_leg as leg
 

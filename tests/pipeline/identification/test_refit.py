@@ -13,7 +13,8 @@ from pipeline.identification.regression.design_matrix import make_data_set, make
 from pipeline.identification.regression.intervals import _certain
 from pipeline.identification.regression.problem import Accepted, Problem
 from pipeline.identification.regression.refit import _bounded, refit
-from pipeline.identification.selection.pool import _correlation, _noise, make_pool
+from pipeline.identification.selection.noise import _correlation, fast_noise
+from pipeline.identification.selection.pool import make_pool
 from pipeline.identification.selection.search import Search
 from pipeline.identification.selection.settle import as_accepted, estimated
 from pipeline.logs.prepared.measurement import Measurement
@@ -98,7 +99,7 @@ def test_noise_is_told_from_a_motion_by_second_differences(cutoff: float) -> Non
     rest = (noise + slow)[data_set.rows] * data_set.weight
     rest[~m.mask[data_set.rows, 0]] = 0.0
     none = np.zeros(0, dtype=np.intp)
-    told = _noise([data_set], [[]], [{0: rest[:, None]}], np.zeros(0), (0, 0), none)
+    told = fast_noise([data_set], [[]], [{0: rest[:, None]}], np.zeros(0), (0, 0), none)
     assert told == pytest.approx(deviation, rel=0.15)
 
 

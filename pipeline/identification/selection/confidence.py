@@ -1,0 +1,238 @@
+"""How sure every name of a set is: against nothing, against rivals, and by what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.identification import results as limits
+from pipeline.identification.regression.normal_equations import solve_spd
+from pipeline.identification.results import UNCERTAINTIES
+from pipeline.identification.selection.evidence import BODIES, State
+from pipeline.identification.selection.pool import Key, Term
+from pipeline.identification.selection.search import CLOSE, Search
+from pipeline.identification.selection.settle import Settled
+from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Rival:
+    """What may stand in the place of a name.
+
+    Attributes:
+        key: Effect and place; None for nothing, or the URDF's bodies.
+        behind: Logarithm of how much less likely the log is with it.
+        sure: How many standard errors over blocks worse it predicts.
+        richer: Whether it has more coordinates, so that it may predict as well by having the name
+            in it.
+    """
+
+    key: Key | None
+    behind: float
+    sure: float
+    richer: bool = False
+
+    @property
+    def excluded(self) -> bool:
+        """Whether the log excludes it."""
+        return self.behind > limits.EXCLUDED and (self.richer or self.sure > limits.SURE)
+
+
+@dataclass(eq=False)
+class Confidence:
+    """How sure every name of a settled set is."""
+
+    settled: Settled
+
+    @property
+    def search(self) -> Search:
+        """On columns about the estimates."""
+        return self.settled.search
+
+    @property
+    def state(self) -> State:
+        """The set."""
+        return self.settled.state
+
+    @property
+    def refitted(self) -> bool:
+        """Whether the URDF's bodies are not its own."""
+        return self.state.uncertainty > UNCERTAINTIES[0]
+
+    @cached_property
+    def noise(self) -> Array:
+        """Noise of the first channel, (J,)."""
+        return sensor_noise(self.settled)[:, 0]
+
+    @cached_property
+    def losses(self) -> Array:
+        """Of every block by estimates from others, (B,)."""
+        return self.search.block_losses(self.state)
+
+    def rivals(self, number: int | None) -> list[Rival]:
+        """What may stand in the place of a term, or of refitted bodies (None), nothing first."""
+        search, state = self.search, self.state
+        if number is None:
+            rest = search.at(state, UNCERTAINTIES[0])
+        else:
+            rest = search.without(state, number)
+        out = [self._rival(None, rest)]
+        own = None if number is None else search.pool.terms[number]
+        if number is not None:
+            for u in UNCERTAINTIES:
+                if u > state.uncertainty:
+                    other = search.pruned(search.at(rest, u))
+                    if state.evidence - other.evidence < CLOSE:
+                        out.append(self._rival(BODIES, other))
+        gains = search.gains(rest)
+        for k in np.argsort(-gains)[: limits.RIVALS]:
+            term = search.pool.terms[k]
+            if rest.evidence + gains[k] < state.evidence - CLOSE:
+                break
+            known = own is not None and _within(own, term)
+            if not known and term.key not in [r.key for r in out]:
+                out.append(self._rival(term.key, search.with_term(rest, int(k))))
+        return out
+
+    def _rival(self, key: Key | None, other: State) -> Rival:
+        """How a set does against the one found."""
+        sure = _worse(self.search.block_losses(other), self.losses)
+        richer = sum(len(u) for _, u in other.terms) > sum(len(u) for _, u in self.state.terms)
+        return Rival(key, self.state.evidence - other.evidence, sure, richer)
+
+    def beside_curve(self, number: int) -> bool:
+        """Whether a curve without a law stands at a name's joint over the same variable."""
+        own = self.settled.pool.terms[number]
+        return any(
+            not t.effect.has_law
+            and t.effect.signature == own.effect.signature
+            and set(owners(t)) & set(owners(own))
+            for t in (self.settled.pool.terms[k] for k in self.state.numbers)
+        )
+
+    def notes(self) -> Iterator[str]:
+        """What has no name, in words."""
+        terms = [self.settled.pool.terms[t] for t in self.state.numbers]
+        names = dict.fromkeys(t.place[0] for t in terms if not t.effect.has_law)
+        if names:
+            yield (
+                f"in {', '.join(names)} friction or a torque over position is left whose law is "
+                "not in the catalogue"
+            )
+
+
+def owners(term: Term) -> tuple[str, ...]:
+    """Joints that a term names."""
+    return tuple(p.partition("__")[0] for p in term.place)
+
+
+def _within(a: Term, b: Term) -> bool:
+    """Whether a name is another or a special case of it at the same place.
+
+    What has the name in it explains as much; a special case has to be excluded like any other name.
+    """
+    return a.key == b.key or (a.effect.name in b.effect.contains and a.place == b.place)
+
+
+def _worse(losses: Array, others: Array) -> float:
+    """By how many standard errors over blocks losses (B,) are larger than others."""
+    d = losses - others
+    error = float(np.sqrt(d.size) * d.std(ddof=1)) if d.size > 1 else np.inf
+    return float(d.sum()) / max(error, 1e-12)
+
+
+def level_of(
+    confidence: Confidence,
+    number: int | None,
+    rivals: Sequence[Rival],
+    joints: Sequence[int],
+    certain: bool,
+) -> tuple[str, str]:
+    """How far a name is to be trusted, and why not further."""
+    nothing, *others = rivals
+    search, state = confidence.search, confidence.state
+    less = search.at(state, UNCERTAINTIES[0]) if number is None else search.without(state, number)
+    left, before = (rms(validation_errors(search, x), joints) for x in (state, less))
+    if nothing.sure < limits.SURE and left > before:
+        return limits.SUSPECTED, limits.IDLE_NAME
+    if nothing.behind <= 0.0 or not certain:
+        return limits.SUSPECTED, limits.NOTHING
+    open_ = [r for r in others if not r.excluded]
+    if open_:
+        words = "; ".join(words_of(r.key) for r in open_ if r.key)
+        return limits.APPROXIMATE, f"{words} would explain the log as well"
+    if not nothing.excluded:
+        return limits.APPROXIMATE, "parts of the log disagree whether it is there"
+    if number is not None and not confidence.settled.pool.terms[number].effect.has_law:
+        return limits.APPROXIMATE, limits.SHAPELESS
+    if number is not None and confidence.beside_curve(number):
+        return limits.APPROXIMATE, limits.BESIDE
+    if (validation_errors(search, state) > limits.UNEXPLAINED * confidence.noise)[joints].any():
+        return limits.APPROXIMATE, limits.MORE_LEFT
+    return limits.CONFIRMED, ""
+
+
+def words_of(key: Key) -> str:
+    """An effect and its place."""
+    effect, place = key
+    return f"{effect} at {' with '.join(place)}" if place else effect
+
+
+def joints_of(confidence: Confidence, number: int | None) -> list[int]:
+    """Joints at which a name acts, of those with rows."""
+    model, pool = confidence.settled.problem.model, confidence.settled.pool
+    seen = sorted({c.joint for c in pool.channels})
+    if number is None:
+        return seen
+    named = [model.index(p) for p in owners(pool.terms[number]) if p in model.joints]
+    columns = set(pool.terms[number].columns.tolist())
+    touched = sorted({c.joint for c in pool.channels if columns & set(c.ids.tolist())})
+    return [j for j in named if j in seen] or touched or seen
+
+
+def validation_errors(search: Search, state: State) -> Array:
+    """RMS validation error of the first channel by estimates from training rows, (J,), or NaN."""
+    pool = search.pool
+    columns = search.columns(state)
+    part = (pool.channels[0].part != TRAIN).astype(np.intp)
+    H, h = pool.parts(columns, search.weights, part)
+    prior = np.diag(search.precision(columns, state.uncertainty))
+    x = solve_spd(H[0] + prior, h[0])
+    full = np.zeros(pool.size)
+    full[columns] = x
+    out = np.full(len(pool.problem.model.joints), np.nan)
+    for c in pool.channels:
+        rows = c.part == VALIDATION
+        if c.number or c.count[rows].sum() == 0:
+            continue
+        own = full[c.ids]
+        loss = c.s[rows].sum() - 2.0 * c.h[rows].sum(axis=0) @ own
+        loss += own @ c.H[rows].sum(axis=0) @ own
+        out[c.joint] = np.sqrt(max(loss, 0.0) / c.count[rows].sum())
+    return out * pool.problem.sigma[:, 0]
+
+
+def rms(errors: Array, joints: Sequence[int]) -> float:
+    """Over those of some joints that are known; NaN without any."""
+    known = errors[list(joints)]
+    known = known[np.isfinite(known)]
+    return float(np.sqrt(np.mean(known**2))) if known.size else float("nan")
+
+
+def sensor_noise(settled: Settled) -> Array:
+    """Standard deviation of the noise, (J, C).
+
+    The sensors' own, or what a fit of everything together leaves at the highest frequencies where
+    that is more.
+    """
+    out = settled.problem.floor.copy()
+    for c in settled.first.pool.channels:
+        if np.isfinite(c.noise):
+            out[c.joint, c.number] *= max(1.0, c.noise)
+    return out
