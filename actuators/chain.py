@@ -18,48 +18,29 @@ SUPPLY_STAGE: Final = "el"
 
 @dataclass(frozen=True, eq=False)
 class HoldingResult:
-    """What holds given joint torques at standstill; arrays have the shape of the joint torques.
+    """What holds given joint torques at standstill; arrays have the shape of the joint torques."""
 
-    Attributes:
-        low: Least motor torque that holds [N*m].
-        high: Greatest motor torque that holds [N*m].
-        motor_torque: The one of least magnitude between them [N*m].
-        current: [A].
-        voltage: [V].
-        power: Electrical power, of the motor and of what elements draw themselves [W].
-    """
-
-    low: Array
-    high: Array
-    motor_torque: Array
-    current: Array
-    voltage: Array
-    power: Array
+    low: Array  #: Least motor torque that holds [N*m].
+    high: Array  #: Greatest motor torque that holds [N*m].
+    motor_torque: Array  #: The one of least magnitude between them [N*m].
+    current: Array  #: [A].
+    voltage: Array  #: [V].
+    power: Array  #: Electrical power, of the motor and of what elements draw themselves [W].
 
 
 @dataclass(frozen=True, eq=False)
 class ChainResult:
-    """What a chain needs for a motion.
+    """What a chain needs for a motion."""
 
-    Attributes:
-        chain: The chain's name.
-        shafts: Series at every named stage, from `out` to the motor's.
-        losses: Dissipated power by element (N, J) [W], copper loss of the motor last.
-        stored: Rate of stored energy by element (N, J) [W].
-        current: (N, J) [A].
-        voltage: (N, J) [V].
-        electrical_power: From the supply to motor and elements (N, J) [W].
-        motors: One per joint.
-    """
-
-    chain: str
-    shafts: Mapping[str, ShaftSeries]
+    chain: str  #: The chain's name.
+    shafts: Mapping[str, ShaftSeries]  #: Series at every named stage, from `out` to the motor's.
+    #: Dissipated power by element (N, J) [W], copper loss of the motor last.
     losses: Mapping[str, Array]
-    stored: Mapping[str, Array]
-    current: Array
-    voltage: Array
-    electrical_power: Array
-    motors: tuple[DCMotor, ...]
+    stored: Mapping[str, Array]  #: Rate of stored energy by element (N, J) [W].
+    current: Array  #: (N, J) [A].
+    voltage: Array  #: (N, J) [V].
+    electrical_power: Array  #: From the supply to motor and elements (N, J) [W].
+    motors: tuple[DCMotor, ...]  #: One per joint.
 
     @property
     def joint(self) -> ShaftSeries:
@@ -93,20 +74,15 @@ class ChainResult:
 class Chain:
     """An actuator: elements in order from the joint to the motor, and the motor.
 
-    Attributes:
-        name: Name of the alternative.
-        elements: From the joint to the motor.
-        motor: The converter at the end.
-        stages: Stage name to the element whose motor side it is, for the stages between `out` and
-            `el`; the last one is at the motor.
-
     Raises:
         ChainError: A name stands twice, a stage names no element, or the motor's shaft is unnamed.
     """
 
-    name: str
-    elements: tuple[Element, ...]
-    motor: DCMotor
+    name: str  #: Name of the alternative.
+    elements: tuple[Element, ...]  #: From the joint to the motor.
+    motor: DCMotor  #: The converter at the end.
+    #: Stage name to the element whose motor side it is, for the stages between `out` and `el`; the
+    #: last one is at the motor.
     stages: Mapping[str, str]
 
     def __post_init__(self) -> None:

@@ -47,18 +47,13 @@ _Table = TypeVar("_Table", bound="Table")
 
 
 class Table(BaseModel):
-    """A table of a TOML file: its fields are its keys, and it has no others.
-
-    Attributes:
-        noun: What its keys are called.
-        expected: How it is written, where something else stands.
-    """
+    """A table of a TOML file: its fields are its keys, and it has no others."""
 
     model_config = ConfigDict(
         extra="forbid", strict=True, frozen=True, protected_namespaces=(), populate_by_name=True
     )
-    noun: ClassVar[str] = "key"
-    expected: ClassVar[str] = ""
+    noun: ClassVar[str] = "key"  #: What its keys are called.
+    expected: ClassVar[str] = ""  #: How it is written, where something else stands.
 
 
 def finite(value: object) -> float:

@@ -28,30 +28,20 @@ Interval = tuple[float, float]
 class Parameter:
     """One number with everything needed to judge it.
 
-    Attributes:
-        name: Key in its set.
-        value: Value in SI units.
-        unit: Unit as written in the file.
-        value_as_written: Value in `unit`.
-        basis: One of `BASES`.
-        source: Where the number comes from: table, data sheet, formula.
-        interval: Where the true value is thought to lie, SI; required by `UNCERTAIN_BASES`.
-        bounds: Outside of these the value is refused, SI.
-        reason: Why this value, for an assumption.
-
     Raises:
         ParameterError: On construction, where an attribute contradicts another.
     """
 
-    name: str
-    value: float
-    unit: str
-    value_as_written: float
-    basis: str
-    source: str
+    name: str  #: Key in its set.
+    value: float  #: Value in SI units.
+    unit: str  #: Unit as written in the file.
+    value_as_written: float  #: Value in `unit`.
+    basis: str  #: One of `BASES`.
+    source: str  #: Where the number comes from: table, data sheet, formula.
+    #: Where the true value is thought to lie, SI; required by `UNCERTAIN_BASES`.
     interval: Interval | None = None
-    bounds: Interval | None = None
-    reason: str = ""
+    bounds: Interval | None = None  #: Outside of these the value is refused, SI.
+    reason: str = ""  #: Why this value, for an assumption.
 
     @property
     def spread(self) -> float:

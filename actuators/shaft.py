@@ -30,25 +30,15 @@ REST_SPEED: Final = 1e-9  # [rad/s]
 
 @dataclass(frozen=True, eq=False)
 class ShaftSeries:
-    """Samples of every joint at one shaft; build it with `at_joint`.
+    """Samples of every joint at one shaft; build it with `at_joint`."""
 
-    Attributes:
-        joints: Names of the J joints.
-        time: (N,) [s], not decreasing; a repeated stamp is a break.
-        position: (N, J) [rad].
-        velocity: (N, J) [rad/s].
-        acceleration: (N, J) [rad/s^2].
-        torque: (N, J) [N*m].
-        direction: (N, J) in {-1, 0, +1}: sgn(velocity) as decided by this module.
-    """
-
-    joints: tuple[str, ...]
-    time: Array
-    position: Array
-    velocity: Array
-    acceleration: Array
-    torque: Array
-    direction: Array
+    joints: tuple[str, ...]  #: Names of the J joints.
+    time: Array  #: (N,) [s], not decreasing; a repeated stamp is a break.
+    position: Array  #: (N, J) [rad].
+    velocity: Array  #: (N, J) [rad/s].
+    acceleration: Array  #: (N, J) [rad/s^2].
+    torque: Array  #: (N, J) [N*m].
+    direction: Array  #: (N, J) in {-1, 0, +1}: sgn(velocity) as decided by this module.
 
     @classmethod
     def at_joint(

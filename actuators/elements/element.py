@@ -21,12 +21,9 @@ class Element:
     Every element is local: a sample of a joint depends on no other joint, and but for friction over
     a presliding displacement on no other sample. What is not (a warming winding, elastic
     deflection, a coupled wrist) is kept by `pipeline.machine`.
-
-    Attributes:
-        name: Unique in its chain; names the row of its loss.
     """
 
-    name: str
+    name: str  #: Unique in its chain; names the row of its loss.
 
     def added(self, side: ShaftSeries) -> Array:
         """Return the torque that the motor side supplies on top of the joint side's, (N, J) [N*m].

@@ -40,15 +40,13 @@ from actuators.shaft import ShaftSeries
 class FrictionLaw(Element):
     """Friction with a part of its own and a share of the transmitted torque, below 1.
 
-    Attributes:
-        rise: Transition velocity of dry friction after a reversal; 0 for a jump [rad/s].
-        travel: Presliding displacement, in place of a velocity; 0 for none [rad].
-
     Note:
         At standstill dry friction holds with its whole level, whatever `rise` and `travel`.
     """
 
+    #: Transition velocity of dry friction after a reversal; 0 for a jump [rad/s].
     rise: Scalars = field(default=0.0, kw_only=True)
+    #: Presliding displacement, in place of a velocity; 0 for none [rad].
     travel: float = field(default=0.0, kw_only=True)
 
     def __post_init__(self) -> None:
@@ -112,36 +110,24 @@ class FrictionLaw(Element):
 class Friction(FrictionLaw):
     """Friction as a sum of terms; those that a shaft does not have are zero.
 
-    Attributes:
-        coulomb: Dry friction at every speed and load [N*m].
-        load: Per transmitted torque, dimensionless; below 1, or no load could drive the shaft.
-        viscous: Per speed [N*m*s/rad].
-        skew: By which dry friction is larger forward and smaller backward [N*m].
-        excess: Break-away less Coulomb friction [N*m].
-        stribeck_speed: At which 1/e of the excess is left [rad/s].
-        asymmetry: By which viscous friction is larger forward and smaller backward [N*m*s/rad].
-        quadratic: Per squared speed [N*m*s^2/rad^2].
-        saturating: Level of friction that grows less and less with speed [N*m].
-        saturation_speed: Over which it grows [rad/s].
-        when_driving: Besides `load` while the motor drives the load, dimensionless.
-        when_driven: Besides `load` while the load drives the motor; together below 1.
-
     Raises:
         UnphysicalElementError: A term would give energy, or a speed is not positive.
     """
 
-    coulomb: Scalars = 0.0
+    coulomb: Scalars = 0.0  #: Dry friction at every speed and load [N*m].
+    #: Per transmitted torque, dimensionless; below 1, or no load could drive the shaft.
     load: Scalars = 0.0
-    viscous: Scalars = 0.0
-    skew: Scalars = 0.0
-    excess: Scalars = 0.0
-    stribeck_speed: Scalars = 1.0
+    viscous: Scalars = 0.0  #: Per speed [N*m*s/rad].
+    skew: Scalars = 0.0  #: By which dry friction is larger forward and smaller backward [N*m].
+    excess: Scalars = 0.0  #: Break-away less Coulomb friction [N*m].
+    stribeck_speed: Scalars = 1.0  #: At which 1/e of the excess is left [rad/s].
+    #: By which viscous friction is larger forward and smaller backward [N*m*s/rad].
     asymmetry: Scalars = 0.0
-    quadratic: Scalars = 0.0
-    saturating: Scalars = 0.0
-    saturation_speed: Scalars = 1.0
-    when_driving: Scalars = 0.0
-    when_driven: Scalars = 0.0
+    quadratic: Scalars = 0.0  #: Per squared speed [N*m*s^2/rad^2].
+    saturating: Scalars = 0.0  #: Level of friction that grows less and less with speed [N*m].
+    saturation_speed: Scalars = 1.0  #: Over which it grows [rad/s].
+    when_driving: Scalars = 0.0  #: Besides `load` while the motor drives the load, dimensionless.
+    when_driven: Scalars = 0.0  #: Besides `load` while the load drives the motor; together below 1.
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -21,26 +21,20 @@ _MOST_SHARE = 0.99  # of the load: at 1 no load could drive the shaft
 class FrictionCurve(FrictionLaw):
     """Friction over speed, load and position, for one joint.
 
-    Attributes:
-        speeds: Knots, ascending from 0, (K,) [rad/s].
-        levels: Mean of both directions at the knots, (K,) [N*m].
-        asymmetries: By which it is larger forward and smaller backward, (K,) [N*m].
-        shares: Friction per transmitted torque at the knots, (K,), dimensionless.
-        viscous: Per speed, in addition to the curves [N*m*s/rad].
-        places: Knots of the position, ascending, (P,) [rad]; none by default.
-        spots: Dry friction more at those, (P,) [N*m].
-
     Raises:
         UnphysicalElementError: Knots do not ascend, or the curves would give energy at a knot.
     """
 
-    speeds: tuple[float, ...] = (0.0, 1.0)
-    levels: tuple[float, ...] = (0.0, 0.0)
+    speeds: tuple[float, ...] = (0.0, 1.0)  #: Knots, ascending from 0, (K,) [rad/s].
+    levels: tuple[float, ...] = (0.0, 0.0)  #: Mean of both directions at the knots, (K,) [N*m].
+    #: By which it is larger forward and smaller backward, (K,) [N*m].
     asymmetries: tuple[float, ...] = (0.0, 0.0)
+    #: Friction per transmitted torque at the knots, (K,), dimensionless.
     shares: tuple[float, ...] = (0.0, 0.0)
-    viscous: float = 0.0
+    viscous: float = 0.0  #: Per speed, in addition to the curves [N*m*s/rad].
+    #: Knots of the position, ascending, (P,) [rad]; none by default.
     places: tuple[float, ...] = ()
-    spots: tuple[float, ...] = ()
+    spots: tuple[float, ...] = ()  #: Dry friction more at those, (P,) [N*m].
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -26,21 +26,14 @@ REFERENCE: Final = 25.0  # temperature for which data sheets hold [degC]
 
 @dataclass(frozen=True)
 class Heating:
-    """The thermal node of one motor.
+    """The thermal node of one motor."""
 
-    Attributes:
-        thermal_resistance: Winding to surroundings [K/W].
-        time_constant: [s].
-        rise: Warming that is not the motor's own, reached after some time constants [K].
-        initial: Warmer than the data sheet's temperature when the log starts [K].
-        sensor_gain: Warming of the winding over that of the housing's sensor [1].
-    """
-
-    thermal_resistance: float = 0.0
-    time_constant: float = 10.0
+    thermal_resistance: float = 0.0  #: Winding to surroundings [K/W].
+    time_constant: float = 10.0  #: [s].
+    #: Warming that is not the motor's own, reached after some time constants [K].
     rise: float = 0.0
-    initial: float = 0.0
-    sensor_gain: float = 0.0
+    initial: float = 0.0  #: Warmer than the data sheet's temperature when the log starts [K].
+    sensor_gain: float = 0.0  #: Warming of the winding over that of the housing's sensor [1].
 
     def __post_init__(self) -> None:
         require_non_negative("heating", thermal_resistance=self.thermal_resistance)

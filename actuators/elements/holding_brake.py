@@ -18,11 +18,6 @@ from actuators.shaft import ShaftSeries
 class HoldingBrake(Element):
     """A brake that engages wherever its shaft is at rest, and adds nothing in motion.
 
-    Attributes:
-        static_torque: With which it holds at its own shaft [N*m].
-        released_power: Of the coil in motion; zero for a brake that current closes [W].
-        engaged_power: Of the coil at rest; zero for a brake that springs close [W].
-
     Raises:
         UnphysicalElementError: A value is negative.
 
@@ -31,9 +26,10 @@ class HoldingBrake(Element):
         (a `friction` of its own) are left out.
     """
 
-    static_torque: Scalars = 0.0
+    static_torque: Scalars = 0.0  #: With which it holds at its own shaft [N*m].
+    #: Of the coil in motion; zero for a brake that current closes [W].
     released_power: Scalars = 0.0
-    engaged_power: Scalars = 0.0
+    engaged_power: Scalars = 0.0  #: Of the coil at rest; zero for a brake that springs close [W].
 
     def __post_init__(self) -> None:
         require_non_negative(

@@ -29,14 +29,6 @@ from actuators.shaft import ShaftSeries
 class Hypoid(Element):
     """A hypoid gear; reversible or self-locking as its angles and friction decide.
 
-    Attributes:
-        ratio: n, pinion speed over wheel speed, positive.
-        pinion_angle: b1, spiral angle of the pinion [rad].
-        wheel_angle: b2, spiral angle of the wheel [rad], smaller than b1.
-        wheel_radius: r2, mean radius of the wheel [m]; it sets forces and sliding speed, the
-            pinion's torque does not depend on it.
-        friction: mu at the tooth contact, dimensionless; mu tan b2 must stay below 1.
-
     Raises:
         UnphysicalElementError: Angles or friction outside the law's reach.
 
@@ -45,11 +37,13 @@ class Hypoid(Element):
         at standstill as in motion.
     """
 
-    ratio: Scalars = 1.0
-    pinion_angle: Scalars = 0.0
-    wheel_angle: Scalars = 0.0
+    ratio: Scalars = 1.0  #: n, pinion speed over wheel speed, positive.
+    pinion_angle: Scalars = 0.0  #: b1, spiral angle of the pinion [rad].
+    wheel_angle: Scalars = 0.0  #: b2, spiral angle of the wheel [rad], smaller than b1.
+    #: r2, mean radius of the wheel [m]; it sets forces and sliding speed, the pinion's torque does
+    #: not depend on it.
     wheel_radius: Scalars = 1.0
-    friction: Scalars = 0.0
+    friction: Scalars = 0.0  #: mu at the tooth contact, dimensionless; mu tan b2 must stay below 1.
 
     def __post_init__(self) -> None:
         require_non_negative(

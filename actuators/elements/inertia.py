@@ -11,9 +11,6 @@ from actuators.shaft import ShaftSeries
 class Inertia(Element):
     """Torque for the acceleration of a shaft; stores kinetic energy and dissipates nothing.
 
-    Attributes:
-        inertia: Moment of inertia about the shaft [kg*m^2].
-
     Raises:
         UnphysicalElementError: The inertia is negative.
 
@@ -21,7 +18,7 @@ class Inertia(Element):
         Counted here, reflected rotor inertia must not stand in the rigid-body model as well.
     """
 
-    inertia: Scalars = 0.0
+    inertia: Scalars = 0.0  #: Moment of inertia about the shaft [kg*m^2].
 
     def __post_init__(self) -> None:
         require_non_negative(self.name, inertia=self.inertia)

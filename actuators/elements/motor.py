@@ -15,18 +15,6 @@ from actuators.arrays import Array, Scalars, require, require_non_negative
 class DCMotor:
     """Conversion only: rotor friction and inertia are elements of their own.
 
-    Attributes:
-        name: Names the row of its copper loss.
-        torque_constant: k, of torque per current and of voltage per speed [N*m/A = V*s/rad].
-        resistance: R of the winding at its working temperature [ohm].
-        max_speed: Permissible speed [rad/s].
-        supply_voltage: Voltage at hand [V].
-        continuous_current: Permissible root mean square current [A].
-        peak_current: Permissible instantaneous current [A].
-        mass: [kg]; no law uses it, and 0 says that no file states it.
-        torque_constant_spread: Standard deviation of k as its file states it, relative [1].
-        resistance_spread: Of R likewise [1].
-
     Raises:
         UnphysicalElementError: A constant or limit is not positive, or the peak current is below
             the continuous one.
@@ -35,16 +23,18 @@ class DCMotor:
         Inductance is left out: with 0.08 mH and 0.3 ohm it matters below a millisecond.
     """
 
-    name: str
+    name: str  #: Names the row of its copper loss.
+    #: k, of torque per current and of voltage per speed [N*m/A = V*s/rad].
     torque_constant: Scalars
-    resistance: Scalars
-    max_speed: float = math.inf
-    supply_voltage: float = math.inf
-    continuous_current: float = math.inf
-    peak_current: float = math.inf
-    mass: float = 0.0
+    resistance: Scalars  #: R of the winding at its working temperature [ohm].
+    max_speed: float = math.inf  #: Permissible speed [rad/s].
+    supply_voltage: float = math.inf  #: Voltage at hand [V].
+    continuous_current: float = math.inf  #: Permissible root mean square current [A].
+    peak_current: float = math.inf  #: Permissible instantaneous current [A].
+    mass: float = 0.0  #: [kg]; no law uses it, and 0 says that no file states it.
+    #: Standard deviation of k as its file states it, relative [1].
     torque_constant_spread: float = 0.0
-    resistance_spread: float = 0.0
+    resistance_spread: float = 0.0  #: Of R likewise [1].
 
     def __post_init__(self) -> None:
         require_non_negative(

@@ -49,14 +49,10 @@ class ParallelSpring(PositionTorque):
     """A spring beside the drive, between the two links: stiffness (position - rest).
 
     Its torque acts on the joint against the displacement, so that the drive supplies it on top.
-
-    Attributes:
-        stiffness: [N*m/rad].
-        rest: Position without torque [rad].
     """
 
-    stiffness: Scalars = 0.0
-    rest: Scalars = 0.0
+    stiffness: Scalars = 0.0  #: [N*m/rad].
+    rest: Scalars = 0.0  #: Position without torque [rad].
 
     def __post_init__(self) -> None:
         for values in (self.stiffness, self.rest):
@@ -73,16 +69,11 @@ class Ripple(PositionTorque):
 
     Harmonic Drives disturb twice per turn of the wave generator (Tuttle and Seering, IEEE T-RA
     12(3), 1996), motors with slots by their cogging order.
-
-    Attributes:
-        amplitude: [N*m].
-        order: Periods per turn of the shaft.
-        phase: [rad].
     """
 
-    amplitude: float = 0.0
-    order: float = 1.0
-    phase: float = 0.0
+    amplitude: float = 0.0  #: [N*m].
+    order: float = 1.0  #: Periods per turn of the shaft.
+    phase: float = 0.0  #: [rad].
 
     def __post_init__(self) -> None:
         values = [self.amplitude, self.order, self.phase]
@@ -96,15 +87,10 @@ class Ripple(PositionTorque):
 
 @dataclass(frozen=True, eq=False)
 class PositionCurve(PositionTorque):
-    """Torque over position that has no law: straight lines between knots, even beyond them.
+    """Torque over position that has no law: straight lines between knots, even beyond them."""
 
-    Attributes:
-        places: Knots, ascending, (P,) [rad].
-        levels: There, (P,) [N*m].
-    """
-
-    places: tuple[float, ...] = (0.0,)
-    levels: tuple[float, ...] = (0.0,)
+    places: tuple[float, ...] = (0.0,)  #: Knots, ascending, (P,) [rad].
+    levels: tuple[float, ...] = (0.0,)  #: There, (P,) [N*m].
 
     def __post_init__(self) -> None:
         ascending = len(self.places) == len(self.levels) and (np.diff(self.places) > 0.0).all()

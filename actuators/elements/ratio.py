@@ -13,14 +13,11 @@ from actuators.shaft import ShaftSeries
 class Ratio(Element):
     """Speed divided from motor side to joint side, torque multiplied, power kept.
 
-    Attributes:
-        ratio: Motor-side over joint-side speed, positive, dimensionless.
-
     Raises:
         UnphysicalElementError: The ratio is not positive and finite.
     """
 
-    ratio: Scalars = 1.0
+    ratio: Scalars = 1.0  #: Motor-side over joint-side speed, positive, dimensionless.
 
     def __post_init__(self) -> None:
         ratio = np.asarray(self.ratio, dtype=float)

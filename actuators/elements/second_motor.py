@@ -14,11 +14,6 @@ class SecondMotor(Element):
     At standstill it gives its share of the least torque that holds. Two motors lose least copper
     where each takes a share in proportion to its k^2 / R.
 
-    Attributes:
-        torque_constant: k [N*m/A].
-        resistance: R of its winding [ohm].
-        share: Of the shaft's torque, from 0 to below 1, dimensionless.
-
     Raises:
         UnphysicalElementError: A constant is not positive, or the share is not below 1.
 
@@ -27,9 +22,9 @@ class SecondMotor(Element):
         and voltage are held against no limits.
     """
 
-    torque_constant: Scalars = 1.0
-    resistance: Scalars = 0.0
-    share: Scalars = 0.0
+    torque_constant: Scalars = 1.0  #: k [N*m/A].
+    resistance: Scalars = 0.0  #: R of its winding [ohm].
+    share: Scalars = 0.0  #: Of the shaft's torque, from 0 to below 1, dimensionless.
 
     def __post_init__(self) -> None:
         require_non_negative(self.name, resistance=self.resistance, share=self.share)

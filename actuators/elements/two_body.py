@@ -35,16 +35,14 @@ class Temperatures:
     """What recurring modes lead to once every round is like the one before.
 
     Attributes:
-        peak: Highest of the winding over the round, (...) [K]; infinite where it runs away.
-        winding: Mean of the winding over each mode, (..., M) [K]; infinite where it runs away.
-        housing: Mean of the housing over each mode, (..., M) [K]; infinite likewise.
-        resistance: Mean resistance over the data sheet's, by mode, (..., M) [1]: with it the
-            copper's energy in a mode is P times the mode's time.
+        resistance: Mean resistance over the data sheet's, by mode, (..., M) [1]: with it
+            the copper's energy in a mode is P times the mode's time.
     """
 
-    peak: Array
+    peak: Array  #: Highest of the winding over the round, (...) [K]; infinite where it runs away.
+    #: Mean of the winding over each mode, (..., M) [K]; infinite where it runs away.
     winding: Array
-    housing: Array
+    housing: Array  #: Mean of the housing over each mode, (..., M) [K]; infinite likewise.
 
     @property
     def resistance(self) -> Array:
@@ -61,20 +59,14 @@ class Temperatures:
 class TwoBody:
     """The thermal model of a motor; numbers may be arrays (...) that broadcast against losses.
 
-    Attributes:
-        winding_to_housing: R_wh [K/W].
-        housing_to_ambient: R_ha [K/W].
-        winding_time: Time constant of the winding [s].
-        housing_time: Time constant of the housing [s].
-
     Raises:
         UnphysicalElementError: A number is not positive and finite.
     """
 
-    winding_to_housing: Scalars
-    housing_to_ambient: Scalars
-    winding_time: Scalars
-    housing_time: Scalars
+    winding_to_housing: Scalars  #: R_wh [K/W].
+    housing_to_ambient: Scalars  #: R_ha [K/W].
+    winding_time: Scalars  #: Time constant of the winding [s].
+    housing_time: Scalars  #: Time constant of the housing [s].
 
     def __post_init__(self) -> None:
         require_non_negative("thermal model", **vars(self))

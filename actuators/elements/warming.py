@@ -22,18 +22,13 @@ ZERO_CELSIUS: Final = 273.15  # [K]
 class Warming:
     """By how much one joint's friction falls.
 
-    Attributes:
-        coulomb: Dry friction per kelvin [N*m/K].
-        viscous: Viscous friction per kelvin [N*m*s/(rad*K)].
-        reference: Temperature at which nothing is taken off [K].
-
     Raises:
         UnphysicalElementError: Friction would grow, or the reference is not above absolute zero.
     """
 
-    coulomb: float = 0.0
-    viscous: float = 0.0
-    reference: float = 298.15
+    coulomb: float = 0.0  #: Dry friction per kelvin [N*m/K].
+    viscous: float = 0.0  #: Viscous friction per kelvin [N*m*s/(rad*K)].
+    reference: float = 298.15  #: Temperature at which nothing is taken off [K].
 
     def __post_init__(self) -> None:
         require_non_negative("warming", coulomb=self.coulomb, viscous=self.viscous)

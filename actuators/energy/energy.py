@@ -15,19 +15,12 @@ from actuators.errors import EnergyError
 
 @dataclass(frozen=True, eq=False)
 class StageEnergy:
-    """Energy over the series through one stage.
+    """Energy over the series through one stage."""
 
-    Attributes:
-        stage: Name of the stage, as in Fig. 14, 16, 18 and 20 of the paper.
-        joints: Names of the J joints.
-        forward: E(+), from the supply towards the joint (J,) [J], not negative.
-        reverse: E(-), from the joint towards the supply (J,) [J], not negative.
-    """
-
-    stage: str
-    joints: tuple[str, ...]
-    forward: Array
-    reverse: Array
+    stage: str  #: Name of the stage, as in Fig. 14, 16, 18 and 20 of the paper.
+    joints: tuple[str, ...]  #: Names of the J joints.
+    forward: Array  #: E(+), from the supply towards the joint (J,) [J], not negative.
+    reverse: Array  #: E(-), from the joint towards the supply (J,) [J], not negative.
 
     @property
     def net(self) -> Array:

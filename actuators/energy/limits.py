@@ -13,27 +13,16 @@ from actuators.energy.energy import duration, weighted
 
 @dataclass(frozen=True)
 class LimitRow:
-    """One quantity of one joint's motor against its limit, over the whole series.
+    """One quantity of one joint's motor against its limit, over the whole series."""
 
-    Attributes:
-        joint: Name.
-        quantity: speed, voltage, current or rms_current.
-        unit: rad/s, V or A.
-        limit: Permitted magnitude.
-        peak: Greatest magnitude; for rms_current the root mean square.
-        peak_time: When the peak occurs [s]; start of the series for rms_current.
-        share_over: Share of the time above the limit; for rms_current 1 or 0.
-        breach: Whether the peak exceeds the limit.
-    """
-
-    joint: str
-    quantity: str
-    unit: str
-    limit: float
-    peak: float
-    peak_time: float
-    share_over: float
-    breach: bool
+    joint: str  #: Name.
+    quantity: str  #: speed, voltage, current or rms_current.
+    unit: str  #: rad/s, V or A.
+    limit: float  #: Permitted magnitude.
+    peak: float  #: Greatest magnitude; for rms_current the root mean square.
+    peak_time: float  #: When the peak occurs [s]; start of the series for rms_current.
+    share_over: float  #: Share of the time above the limit; for rms_current 1 or 0.
+    breach: bool  #: Whether the peak exceeds the limit.
 
 
 def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:

@@ -16,21 +16,13 @@ BUS: Final = "bus"  # the row under which a shared bus is accounted
 
 @dataclass(frozen=True, eq=False)
 class Supply:
-    """Power drawn from the supply and power dumped in the braking resistor.
+    """Power drawn from the supply and power dumped in the braking resistor."""
 
-    Attributes:
-        policy: One of `POLICIES`.
-        accounts: What each column stands for: the joints, or the one bus.
-        time: (N,) [s].
-        electrical: Power into the motors, per account (N, K) [W].
-        recovered: Share of the returned power that goes back into the supply.
-    """
-
-    policy: str
-    accounts: tuple[str, ...]
-    time: Array
-    electrical: Array
-    recovered: float
+    policy: str  #: One of `POLICIES`.
+    accounts: tuple[str, ...]  #: What each column stands for: the joints, or the one bus.
+    time: Array  #: (N,) [s].
+    electrical: Array  #: Power into the motors, per account (N, K) [W].
+    recovered: float  #: Share of the returned power that goes back into the supply.
 
     @property
     def supplied(self) -> Array:

@@ -27,17 +27,12 @@ NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
 
 @dataclass(frozen=True)
 class Law:
-    """What a law's arguments are.
+    """What a law's arguments are."""
 
-    Attributes:
-        element: Its class.
-        needed: Arguments it must have, with the dimension of each.
-        possible: Arguments it may have, likewise.
-    """
-
-    element: Callable[..., Element]
+    element: Callable[..., Element]  #: Its class.
+    #: Arguments it must have, with the dimension of each.
     needed: Mapping[str, str] = field(default_factory=dict)
-    possible: Mapping[str, str] = field(default_factory=dict)
+    possible: Mapping[str, str] = field(default_factory=dict)  #: Arguments it may have, likewise.
 
     @property
     def arguments(self) -> Mapping[str, str]:
@@ -73,22 +68,15 @@ LAWS: Final[Mapping[str, Law]] = {
 
 
 class ElementEntry(Table):
-    """One element of an alternative as written: what is none of its keys is a law's argument.
-
-    Attributes:
-        name: The element's name.
-        law: Key of the table of laws.
-        stage: Name of the shaft on its motor side, or empty.
-        shaft: Where that shaft is, in words, or empty.
-    """
+    """One element of an alternative as written: what is none of its keys is a law's argument."""
 
     model_config = ConfigDict(extra="allow")
     expected = "name, law, arguments, and for the last element stage"
     __pydantic_extra__: dict[str, str] = Field(init=False)
-    name: Text
-    law: str
-    stage: str = ""
-    shaft: str = ""
+    name: Text  #: The element's name.
+    law: str  #: Key of the table of laws.
+    stage: str = ""  #: Name of the shaft on its motor side, or empty.
+    shaft: str = ""  #: Where that shaft is, in words, or empty.
 
     @property
     def arguments(self) -> Mapping[str, str]:
@@ -118,21 +106,13 @@ class ElementEntry(Table):
 
 @dataclass(frozen=True)
 class Alternative:
-    """One alternative as written.
+    """One alternative as written."""
 
-    Attributes:
-        name: Its key, such as `reversible`.
-        title: In words.
-        motor: Component of the motor.
-        ratio: `component.parameter` that the product of all ratios has to equal.
-        elements: From the joint to the motor.
-    """
-
-    name: str
-    title: str
-    motor: str
-    ratio: str
-    elements: tuple[ElementEntry, ...]
+    name: str  #: Its key, such as `reversible`.
+    title: str  #: In words.
+    motor: str  #: Component of the motor.
+    ratio: str  #: `component.parameter` that the product of all ratios has to equal.
+    elements: tuple[ElementEntry, ...]  #: From the joint to the motor.
 
     @property
     def stage_names(self) -> Mapping[str, str]:

@@ -27,15 +27,10 @@ _logger: Final = logging.getLogger("legwatt")
 
 @dataclass(frozen=True)
 class Catalog:
-    """Components and the alternatives built from them; edits return a new catalogue.
+    """Components and the alternatives built from them; edits return a new catalogue."""
 
-    Attributes:
-        components: By name.
-        alternatives: By name, in the file's order.
-    """
-
-    components: Mapping[str, Component]
-    alternatives: Mapping[str, Alternative]
+    components: Mapping[str, Component]  #: By name.
+    alternatives: Mapping[str, Alternative]  #: By name, in the file's order.
 
     def parameter(self, reference: str) -> Parameter:
         """Return the parameter that `component.parameter` names.

@@ -77,21 +77,13 @@ class _Written(Table):
 
 @dataclass(frozen=True)
 class Component:
-    """One component file of the catalogue.
+    """One component file of the catalogue."""
 
-    Attributes:
-        name: The file's stem.
-        kind: One of `KINDS`.
-        title: What it is, in words.
-        note: What its values claim and what they do not; may be empty.
-        parameters: Its values.
-    """
-
-    name: str
-    kind: str
-    title: str
-    note: str
-    parameters: ParameterSet
+    name: str  #: The file's stem.
+    kind: str  #: One of `KINDS`.
+    title: str  #: What it is, in words.
+    note: str  #: What its values claim and what they do not; may be empty.
+    parameters: ParameterSet  #: Its values.
 
 
 def load_component(path: Path) -> Component:

@@ -104,29 +104,17 @@ class _Written(Table):
 
 @dataclass(frozen=True)
 class Part:
-    """A part by its data sheet.
+    """A part by its data sheet."""
 
-    Attributes:
-        name: Of its file.
-        kind: One of `KINDS`.
-        title: What it is.
-        part: The maker's number; may be empty.
-        basis: Of its numbers.
-        source: Where they were read.
-        note: What is doubtful or filled in from its class.
-        words: As printed.
-        printed: The same as numbers, SI.
-    """
-
-    name: str
-    kind: str
-    title: str
-    part: str
-    basis: str
-    source: str
-    note: str
-    words: Mapping[str, str]
-    printed: Mapping[str, Number]
+    name: str  #: Of its file.
+    kind: str  #: One of `KINDS`.
+    title: str  #: What it is.
+    part: str  #: The maker's number; may be empty.
+    basis: str  #: Of its numbers.
+    source: str  #: Where they were read.
+    note: str  #: What is doubtful or filled in from its class.
+    words: Mapping[str, str]  #: As printed.
+    printed: Mapping[str, Number]  #: The same as numbers, SI.
 
     @property
     def filled(self) -> tuple[str, ...]:

@@ -29,27 +29,18 @@ HOUR: Final = 3600.0  # [s]
 class Battery:
     """One battery.
 
-    Attributes:
-        name: Of the part.
-        energy: From full to empty at a small current [J].
-        full: Open-circuit voltage when full [V].
-        empty: Open-circuit voltage when it counts as empty [V].
-        resistance: Internal [ohm].
-        returned: Share of the charge fed into it that can be drawn again [1].
-        mass: [kg]; no law uses it.
-
     Raises:
         UnphysicalElementError: A number is negative or not finite, nothing is in it, or it is
             emptier than full.
     """
 
-    name: str
-    energy: float
-    full: float
-    empty: float
-    resistance: float = 0.0
-    returned: float = 1.0
-    mass: float = 0.0
+    name: str  #: Of the part.
+    energy: float  #: From full to empty at a small current [J].
+    full: float  #: Open-circuit voltage when full [V].
+    empty: float  #: Open-circuit voltage when it counts as empty [V].
+    resistance: float = 0.0  #: Internal [ohm].
+    returned: float = 1.0  #: Share of the charge fed into it that can be drawn again [1].
+    mass: float = 0.0  #: [kg]; no law uses it.
 
     def __post_init__(self) -> None:
         numbers = {n: v for n, v in vars(self).items() if n != "name"}

@@ -24,30 +24,20 @@ from actuators.arrays import Array, Scalars, require, require_non_negative
 class Driver:
     """One driver; numbers may be arrays that broadcast against current and voltage.
 
-    Attributes:
-        name: Of the part.
-        resistance: In series with the winding, 2 c R_on [ohm].
-        idle: Power while it is enabled, whatever the current [W]; none while it is off.
-        switching: Loss over bus voltage times current [1].
-        voltage_share: Greatest motor voltage over bus voltage, without current [1].
-        continuous_current: Permissible root mean square current [A].
-        peak_current: Permissible instantaneous current [A].
-        least_voltage: Of the bus, below which it switches off [V].
-        most_voltage: Of the bus [V].
-
     Raises:
         UnphysicalElementError: A loss is negative or not finite, or a limit not positive.
     """
 
-    name: str
-    resistance: Scalars = 0.0
+    name: str  #: Of the part.
+    resistance: Scalars = 0.0  #: In series with the winding, 2 c R_on [ohm].
+    #: Power while it is enabled, whatever the current [W]; none while it is off.
     idle: Scalars = 0.0
-    switching: Scalars = 0.0
-    voltage_share: Scalars = 1.0
-    continuous_current: Scalars = math.inf
-    peak_current: Scalars = math.inf
-    least_voltage: Scalars = 0.0
-    most_voltage: Scalars = math.inf
+    switching: Scalars = 0.0  #: Loss over bus voltage times current [1].
+    voltage_share: Scalars = 1.0  #: Greatest motor voltage over bus voltage, without current [1].
+    continuous_current: Scalars = math.inf  #: Permissible root mean square current [A].
+    peak_current: Scalars = math.inf  #: Permissible instantaneous current [A].
+    least_voltage: Scalars = 0.0  #: Of the bus, below which it switches off [V].
+    most_voltage: Scalars = math.inf  #: Of the bus [V].
 
     def __post_init__(self) -> None:
         require_non_negative(

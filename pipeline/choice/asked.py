@@ -34,31 +34,18 @@ _FEW: Final = 8  # draws of a design while it is settled
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """What stays the same while mass is fed back: robot, day, parts and what is counted.
+    """What stays the same while mass is fed back: robot, day, parts and what is counted."""
 
-    Attributes:
-        machine: The robot.
-        modes: Of the mission.
-        groups: Joints of each group.
-        shelf: The parts.
-        account: What is counted.
-        present: Mass of an actuator that the bodies hold already [kg].
-        pack: The battery.
-        energy: Of it, in place of its part's [J].
-        on_base: Mass on the base beside what the bodies hold [kg].
-        spring: Beside the actuators of all joints; None without any.
-    """
-
-    machine: Machine
-    modes: Sequence[Mode]
-    groups: Mapping[str, tuple[str, ...]]
-    shelf: Shelf
-    account: Account
-    present: float
-    pack: Part
-    energy: float | None = None
-    on_base: float = 0.0
-    spring: ParallelSpring | None = None
+    machine: Machine  #: The robot.
+    modes: Sequence[Mode]  #: Of the mission.
+    groups: Mapping[str, tuple[str, ...]]  #: Joints of each group.
+    shelf: Shelf  #: The parts.
+    account: Account  #: What is counted.
+    present: float  #: Mass of an actuator that the bodies hold already [kg].
+    pack: Part  #: The battery.
+    energy: float | None = None  #: Of it, in place of its part's [J].
+    on_base: float = 0.0  #: Mass on the base beside what the bodies hold [kg].
+    spring: ParallelSpring | None = None  #: Beside the actuators of all joints; None without any.
 
     def searched(
         self, designs: Designs, loads: Sequence[Load], price: Mapping[str, Feedback]

@@ -35,40 +35,27 @@ _POOL: Final = 8  # designs of each search, by score and by mass, among which a 
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """The answer.
+    """The answer."""
 
-    Attributes:
-        machine: The robot.
-        wanted: What was asked.
-        loads: The mission's modes, with the answer's masses in the robot.
-        found: The search of each group.
-        candidates: Designs of each group that are drawn: the answer, the best by the middle of
-            every range, and those among which the answer settled.
-        doubts: Draws over the candidates of each group.
-        answer: Design of each group.
-        sides: The best of each group that can be driven back, ``reversible``, and that locks by a
-            gear or a closed brake, ``irreversible``; the answer's where none is within limits.
-            Each with its own demand.
-        first: What the first search, before mass was fed back, took the answer's power for [W].
-        present: Mass of an actuator that the bodies hold already [kg].
-        spring: Beside the actuators of all joints; None without any.
-        shelf: The parts.
-        battery: Of the answer, at the highest voltage of its groups.
-    """
-
-    machine: Machine
-    wanted: Wanted
-    loads: Sequence[Load]
-    found: Mapping[str, Found]
+    machine: Machine  #: The robot.
+    wanted: Wanted  #: What was asked.
+    loads: Sequence[Load]  #: The mission's modes, with the answer's masses in the robot.
+    found: Mapping[str, Found]  #: The search of each group.
+    #: Designs of each group that are drawn: the answer, the best by the middle of every range, and
+    #: those among which the answer settled.
     candidates: Mapping[str, list[Design]]
-    doubts: Mapping[str, Doubt]
-    answer: Mapping[str, Design]
+    doubts: Mapping[str, Doubt]  #: Draws over the candidates of each group.
+    answer: Mapping[str, Design]  #: Design of each group.
+    #: The best of each group that can be driven back, ``reversible``, and that locks by a gear or a
+    #: closed brake, ``irreversible``; the answer's where none is within limits. Each with its own
+    #: demand.
     sides: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
+    #: What the first search, before mass was fed back, took the answer's power for [W].
     first: Mapping[str, float]
-    present: float
-    spring: ParallelSpring | None
-    shelf: Shelf
-    battery: Battery
+    present: float  #: Mass of an actuator that the bodies hold already [kg].
+    spring: ParallelSpring | None  #: Beside the actuators of all joints; None without any.
+    shelf: Shelf  #: The parts.
+    battery: Battery  #: Of the answer, at the highest voltage of its groups.
 
     @property
     def hours(self) -> float:

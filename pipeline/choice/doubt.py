@@ -46,21 +46,13 @@ _BODIES: Final = ("link", "ground")  # places of effects that change what is ask
 
 @dataclass(frozen=True, eq=False)
 class Doubt:
-    """Designs of one group over the draws; the first is the answer.
+    """Designs of one group over the draws; the first is the answer."""
 
-    Attributes:
-        power: (S, D) [W].
-        score: With what their mass costs elsewhere (S, D) [W].
-        within: Whether every limit is kept (S, D).
-        unknowns: Part, entry and range of what was drawn, U of them.
-        values: Of these (S, U).
-    """
-
-    power: Array
-    score: Array
-    within: NDArray[np.bool_]
-    unknowns: tuple[Unknown, ...]
-    values: Array
+    power: Array  #: (S, D) [W].
+    score: Array  #: With what their mass costs elsewhere (S, D) [W].
+    within: NDArray[np.bool_]  #: Whether every limit is kept (S, D).
+    unknowns: tuple[Unknown, ...]  #: Part, entry and range of what was drawn, U of them.
+    values: Array  #: Of these (S, U).
 
     @property
     def expected(self) -> Array:

@@ -27,25 +27,16 @@ _FIRST: Final = 400  # looked at sample by sample before bounds decide
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """What a search of one group found.
+    """What a search of one group found."""
 
-    Attributes:
-        demanded: What the day asks.
-        designs: All of them.
-        use: Share of each limit that is used, by its name (D,).
-        within: Those within every limit.
-        looked: Of these, the ones evaluated sample by sample; nothing better is among the others.
-        power: Of those [W].
-        score: Power and what their mass costs elsewhere [W].
-    """
-
-    demanded: Demanded
-    designs: Designs
-    use: Mapping[str, Array]
-    within: Index
+    demanded: Demanded  #: What the day asks.
+    designs: Designs  #: All of them.
+    use: Mapping[str, Array]  #: Share of each limit that is used, by its name (D,).
+    within: Index  #: Those within every limit.
+    #: Of these, the ones evaluated sample by sample; nothing better is among the others.
     looked: Index
-    power: Array
-    score: Array
+    power: Array  #: Of those [W].
+    score: Array  #: Power and what their mass costs elsewhere [W].
 
     def best(
         self, which: NDArray[np.bool_], account: Account, feedback: Feedback

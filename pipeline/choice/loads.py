@@ -30,21 +30,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """One mode at the joints.
+    """One mode at the joints."""
 
-    Attributes:
-        mode: What the robot does.
-        series: Of all joints; standing is two samples a second apart, at rest.
-        weight: Of the robot [N].
-        speed: Of walking [m/s]; 0 standing.
-        motion: That was followed; None standing.
-    """
-
-    mode: Mode
-    series: ShaftSeries
-    weight: float
-    speed: float
-    motion: Motion | None = None
+    mode: Mode  #: What the robot does.
+    series: ShaftSeries  #: Of all joints; standing is two samples a second apart, at rest.
+    weight: float  #: Of the robot [N].
+    speed: float  #: Of walking [m/s]; 0 standing.
+    motion: Motion | None = None  #: That was followed; None standing.
 
     @property
     def duration(self) -> float:

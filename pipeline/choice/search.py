@@ -44,17 +44,11 @@ _MANY = 50  # samples, or designs, from which on a hull is worth finding
 
 @dataclass(frozen=True, eq=False)
 class Demanded:
-    """What a day asks of one group of joints.
+    """What a day asks of one group of joints."""
 
-    Attributes:
-        name: Of the group.
-        joints: Its joints.
-        tracks: The modes.
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    tracks: tuple[Track, ...]
+    name: str  #: Of the group.
+    joints: tuple[str, ...]  #: Its joints.
+    tracks: tuple[Track, ...]  #: The modes.
 
     @classmethod
     def of(cls, name: str, joints: Sequence[str], loads: Sequence[Load]) -> Demanded:
@@ -163,19 +157,13 @@ class Demanded:
 
 @dataclass(frozen=True, eq=False)
 class Feedback:
-    """What the mass of a group's actuators costs the robot, about the mass it was computed with.
+    """What the mass of a group's actuators costs the robot, about the mass it was computed with."""
 
-    Attributes:
-        mass: Of one actuator, in the demand that is searched [kg].
-        others: What other groups take for a kilogram at every joint of this one [W/kg].
-        heavier: The group's demand with `step` more at every joint of it; None for no feedback.
-        step: [kg].
-    """
-
-    mass: float = 0.0
-    others: float = 0.0
+    mass: float = 0.0  #: Of one actuator, in the demand that is searched [kg].
+    others: float = 0.0  #: What other groups take for a kilogram at every joint of this one [W/kg].
+    #: The group's demand with `step` more at every joint of it; None for no feedback.
     heavier: Demanded | None = None
-    step: float = 0.1
+    step: float = 0.1  #: [kg].
 
     def cost(self, demanded: Demanded, designs: Designs) -> Array:
         """Of the mass of designs beside `mass`, linear in it, (D,) [W]."""

@@ -33,22 +33,15 @@ _BETTER: Final = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Robots:
-    """Every robot's power, about the masses of one.
+    """Every robot's power, about the masses of one."""
 
-    Attributes:
-        groups: Joints of each group.
-        mass: Of one actuator of each group in `loads` [kg].
-        loads: The mission's demand.
-        nudged: The same with `NUDGE` more at every joint of a group, along the same motions.
-        account: What is counted.
-        drawn: A design in the middle of its ranges, then in draws of them.
-    """
-
-    groups: Mapping[str, tuple[str, ...]]
-    mass: Mapping[str, float]
-    loads: Sequence[Load]
+    groups: Mapping[str, tuple[str, ...]]  #: Joints of each group.
+    mass: Mapping[str, float]  #: Of one actuator of each group in `loads` [kg].
+    loads: Sequence[Load]  #: The mission's demand.
+    #: The same with `NUDGE` more at every joint of a group, along the same motions.
     nudged: Mapping[str, Sequence[Load]]
-    account: Account
+    account: Account  #: What is counted.
+    #: A design in the middle of its ranges, then in draws of them.
     drawn: Callable[[Design], Designs]
 
     def at(self, mass: Mapping[str, float]) -> list[Load]:

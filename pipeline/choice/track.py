@@ -20,18 +20,13 @@ SPEED = 3  # the series w among the five
 
 @dataclass(frozen=True)
 class Account:
-    """What is counted besides motors and drivers.
+    """What is counted besides motors and drivers."""
 
-    Attributes:
-        hotel: Of the robot's electronics [W].
-        policy: What becomes of returned power, see `actuators.energy.regeneration`; on a bus, all
-            that a group returns counts as used, and `shared` tells what is not.
-        fraction: Share of it that is used again, with policy ``fraction`` [1].
-    """
-
-    hotel: float = 0.0
+    hotel: float = 0.0  #: Of the robot's electronics [W].
+    #: What becomes of returned power, see `actuators.energy.regeneration`; on a bus, all that a
+    #: group returns counts as used, and `shared` tells what is not.
     policy: str = "none"
-    fraction: float = 0.0
+    fraction: float = 0.0  #: Share of it that is used again, with policy ``fraction`` [1].
 
     @property
     def recovered(self) -> float:
@@ -41,17 +36,11 @@ class Account:
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """One mode at the joints of a group.
+    """One mode at the joints of a group."""
 
-    Attributes:
-        load: The mode, of all joints.
-        series: Of the group's joints.
-        share: Of the mission's time.
-    """
-
-    load: Load
-    series: ShaftSeries
-    share: float
+    load: Load  #: The mode, of all joints.
+    series: ShaftSeries  #: Of the group's joints.
+    share: float  #: Of the mission's time.
 
     @cached_property
     def x(self) -> Array:

@@ -16,45 +16,32 @@ from pipeline.choice.track import Account
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is searched, and what is counted.
+    """What is searched, and what is counted."""
 
-    Attributes:
-        parts: Folder of parts.
-        kinds: Kinds of gears; all where empty.
-        only: Names of which a design's motors and gears must be, or begin with; all where empty.
-        without: Names that no part may be, or begin with.
-        voltage: Of the supply: motors for less are left out [V]; by default that of each motor.
-        driver: Part that drives every motor.
-        idle: Of a driver that is on, in place of its part's [W].
-        brakes: Whether brakes are among the parts.
-        groups: ``NAME=PATTERN,...``; by default joints that are alike in all legs.
-        account: Hotel load, returned energy.
-        pack: Part that is the battery.
-        battery: Energy of it when full, in place of its part's [J].
-        present: Mass of an actuator, with its driver, that the robot's bodies hold already, each
-            joint's [kg]; by default that of the motors of its actuator files.
-        present_battery: Mass of a battery that they hold already [kg]; by default the pack's own.
-        springs: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints; a
-            PATTERN alone is for one that is to be found.
-        draws: Over what is not printed.
-    """
-
-    parts: Path = PARTS
-    kinds: tuple[str, ...] = ()
+    parts: Path = PARTS  #: Folder of parts.
+    kinds: tuple[str, ...] = ()  #: Kinds of gears; all where empty.
+    #: Names of which a design's motors and gears must be, or begin with; all where empty.
     only: tuple[str, ...] = ()
-    without: tuple[str, ...] = ()
+    without: tuple[str, ...] = ()  #: Names that no part may be, or begin with.
+    #: Of the supply: motors for less are left out [V]; by default that of each motor.
     voltage: float | None = None
-    driver: str = DRIVER
-    idle: Number | None = None
-    brakes: bool = True
+    driver: str = DRIVER  #: Part that drives every motor.
+    idle: Number | None = None  #: Of a driver that is on, in place of its part's [W].
+    brakes: bool = True  #: Whether brakes are among the parts.
+    #: ``NAME=PATTERN,...``; by default joints that are alike in all legs.
     groups: tuple[str, ...] = ()
-    account: Account = field(default_factory=Account)
-    pack: str = PACK
-    battery: float | None = None
+    account: Account = field(default_factory=Account)  #: Hotel load, returned energy.
+    pack: str = PACK  #: Part that is the battery.
+    battery: float | None = None  #: Energy of it when full, in place of its part's [J].
+    #: Mass of an actuator, with its driver, that the robot's bodies hold already, each joint's
+    #: [kg]; by default that of the motors of its actuator files.
     present: float | None = None
+    #: Mass of a battery that they hold already [kg]; by default the pack's own.
     present_battery: float | None = None
+    #: ``PATTERN=STIFFNESS@ANGLE`` of springs beside the actuators of some joints; a PATTERN alone
+    #: is for one that is to be found.
     springs: tuple[str, ...] = ()
-    draws: int = 256
+    draws: int = 256  #: Over what is not printed.
 
 
 def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:

@@ -36,17 +36,12 @@ Choice = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Prediction:
-    """Power of one quantity by every choice [W].
+    """Power of one quantity by every choice [W]."""
 
-    Attributes:
-        power: By choice; a choice that the robot cannot walk or stand in has none.
-        nominal: The choice of the likeliest ways and the middles.
-        refused: Of a choice that cannot be, in one line; empty where all can.
-    """
-
+    #: By choice; a choice that the robot cannot walk or stand in has none.
     power: Mapping[Choice, float]
-    nominal: Choice
-    refused: str = ""
+    nominal: Choice  #: The choice of the likeliest ways and the middles.
+    refused: str = ""  #: Of a choice that cannot be, in one line; empty where all can.
 
     @property
     def range(self) -> tuple[float, float, float]:

@@ -18,120 +18,74 @@ FACTS: Final = Path(__file__).parent / "facts"
 
 
 class Spring(Table):
-    """A spring beside joints.
+    """A spring beside joints."""
 
-    Attributes:
-        joints: End of their names.
-        stiffness: [N*m/rad].
-        rest: Where it gives no torque [rad].
-    """
-
-    joints: Text
-    stiffness: Number
-    rest: Number = 0.0
+    joints: Text  #: End of their names.
+    stiffness: Number  #: [N*m/rad].
+    rest: Number = 0.0  #: Where it gives no torque [rad].
 
 
 class Way(Table):
-    """One of the ways in which something that is not published may be.
+    """One of the ways in which something that is not published may be."""
 
-    Attributes:
-        name: In words.
-        set: Numbers that differ, as ``--set`` takes them.
-        forces: Rule of the ground's forces, where it decides that.
-        spread: Factor on the feet's distance from the middle of the body [1].
-        spring: Beside joints.
-        less_standing: Whether what standing takes counts as idle; motion is what is over it.
-    """
-
-    name: Text
-    set: dict[str, Any] = Field(default={})
-    forces: str = ""
-    spread: Number = 1.0
-    spring: Spring | None = None
+    name: Text  #: In words.
+    set: dict[str, Any] = Field(default={})  #: Numbers that differ, as ``--set`` takes them.
+    forces: str = ""  #: Rule of the ground's forces, where it decides that.
+    spread: Number = 1.0  #: Factor on the feet's distance from the middle of the body [1].
+    spring: Spring | None = None  #: Beside joints.
+    #: Whether what standing takes counts as idle; motion is what is over it.
     less_standing: bool = False
 
 
 class Unknown(Table):
-    """Something that decides the power and is not published.
+    """Something that decides the power and is not published."""
 
-    Attributes:
-        name: In words.
-        way: Ways in which it may be, the likeliest first.
-        numbers: Instead, numbers of the actuator files, which go to the ends of their intervals
-            together.
-    """
-
-    name: Text
+    name: Text  #: In words.
+    #: Ways in which it may be, the likeliest first.
     way: Annotated[tuple[Way, ...], Strict(False)] = ()
+    #: Instead, numbers of the actuator files, which go to the ends of their intervals together.
     numbers: Annotated[tuple[str, ...], Strict(False)] = ()
 
 
 class Quantity(Table):
-    """A power that was measured.
+    """A power that was measured."""
 
-    Attributes:
-        name: What of the robot.
-        watts: Measured [W]; least and greatest where a range is told, none where it was not.
-        does: What is computed for it; nothing where the model says nothing of it.
-        set: Numbers that differ, as ``--set`` takes them.
-        spring: Beside joints.
-        note: What a reader should know of it.
-    """
-
-    name: Text
+    name: Text  #: What of the robot.
+    #: Measured [W]; least and greatest where a range is told, none where it was not.
     watts: Annotated[tuple[Number, ...], Strict(False), Field(max_length=2)] = ()
+    #: What is computed for it; nothing where the model says nothing of it.
     does: Literal["walk", "stand", ""] = ""
-    set: dict[str, Any] = Field(default={})
-    spring: Spring | None = None
-    note: str = ""
+    set: dict[str, Any] = Field(default={})  #: Numbers that differ, as ``--set`` takes them.
+    spring: Spring | None = None  #: Beside joints.
+    note: str = ""  #: What a reader should know of it.
 
 
 class Ratio(Table):
-    """A quotient of two powers, in which much of what is not known cancels.
+    """A quotient of two powers, in which much of what is not known cancels."""
 
-    Attributes:
-        name: In words.
-        over: Name of a quantity.
-        under: Of another.
-        measured: Their quotient [1]; None to take it of their watts.
-        note: What a reader should know of it.
-    """
-
-    name: Text
-    over: Text
-    under: Text
-    measured: Number | None = None
-    note: str = ""
+    name: Text  #: In words.
+    over: Text  #: Name of a quantity.
+    under: Text  #: Of another.
+    measured: Number | None = None  #: Their quotient [1]; None to take it of their watts.
+    note: str = ""  #: What a reader should know of it.
 
 
 class Facts(Table):
-    """A robot whose power was measured.
+    """A robot whose power was measured."""
 
-    Attributes:
-        title: Which robot.
-        order: Place among the others.
-        robot: Its robot file, from the folder of robots.
-        actuator: Alternative as which it is built.
-        source: Who measured.
-        note: What stands for what.
-        regeneration: What becomes of returned energy.
-        set: Numbers as they were at the measurement, as ``--set`` takes them.
-        unknown: What is not published.
-        quantity: What was measured.
-        ratio: Quotients.
-    """
-
-    title: Text
-    order: int
-    robot: Text
-    actuator: Text
-    source: Text
-    note: str = ""
-    regeneration: str = "none"
+    title: Text  #: Which robot.
+    order: int  #: Place among the others.
+    robot: Text  #: Its robot file, from the folder of robots.
+    actuator: Text  #: Alternative as which it is built.
+    source: Text  #: Who measured.
+    note: str = ""  #: What stands for what.
+    regeneration: str = "none"  #: What becomes of returned energy.
+    #: Numbers as they were at the measurement, as ``--set`` takes them.
     set: dict[str, Any] = Field(default={})
-    unknown: Annotated[tuple[Unknown, ...], Strict(False)]
+    unknown: Annotated[tuple[Unknown, ...], Strict(False)]  #: What is not published.
+    #: What was measured.
     quantity: Annotated[tuple[Quantity, ...], Strict(False), Field(min_length=1)]
-    ratio: Annotated[tuple[Ratio, ...], Strict(False)] = ()
+    ratio: Annotated[tuple[Ratio, ...], Strict(False)] = ()  #: Quotients.
 
 
 #: Where nothing is said of the ground's forces.

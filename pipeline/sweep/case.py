@@ -44,33 +44,19 @@ class SweepRow(RobotEnergy):
 
 @dataclass(frozen=True)
 class Order:
-    """A machine and how it walks, so that any process can load it again.
+    """A machine and how it walks, so that any process can load it again."""
 
-    Attributes:
-        robot: File or name; None for the default.
-        model: Model file.
-        gait: Gait file.
-        actuators: Folder.
-        changes: Of ``--set``, key and value.
-        samples: Per half period.
-        quasi_static: See `walk`.
-        regeneration: See `walk`.
-        forces: See `walk`.
-        axes: What is varied.
-        digest: Of everything read; empty until it is known.
-    """
-
-    robot: Path | None = None
-    model: Path | None = None
-    gait: Path | None = None
-    actuators: Path | None = None
-    changes: tuple[tuple[str, object], ...] = ()
-    samples: int = SAMPLES
-    quasi_static: bool = False
-    regeneration: str = "none"
-    forces: ForceChoice = PAPER_FORCES
-    axes: tuple[Axis, ...] = ()
-    digest: str = ""
+    robot: Path | None = None  #: File or name; None for the default.
+    model: Path | None = None  #: Model file.
+    gait: Path | None = None  #: Gait file.
+    actuators: Path | None = None  #: Folder.
+    changes: tuple[tuple[str, object], ...] = ()  #: Of ``--set``, key and value.
+    samples: int = SAMPLES  #: Per half period.
+    quasi_static: bool = False  #: See `walk`.
+    regeneration: str = "none"  #: See `walk`.
+    forces: ForceChoice = PAPER_FORCES  #: See `walk`.
+    axes: tuple[Axis, ...] = ()  #: What is varied.
+    digest: str = ""  #: Of everything read; empty until it is known.
 
     def walking(self, machine: Machine) -> Settings:
         """A machine ready to walk."""

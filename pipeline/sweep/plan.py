@@ -50,19 +50,12 @@ class SweepError(PipelineError):
 
 @dataclass(frozen=True)
 class Axis:
-    """One number or choice that is varied.
+    """One number or choice that is varied."""
 
-    Attributes:
-        key: As ``--set`` writes it.
-        unit: Of the values; empty for pure numbers and words.
-        values: In their order; the two ends of a range.
-        ranged: Whether everything between two ends is meant.
-    """
-
-    key: str
-    unit: str
-    values: tuple[Value, ...]
-    ranged: bool = False
+    key: str  #: As ``--set`` writes it.
+    unit: str  #: Of the values; empty for pure numbers and words.
+    values: tuple[Value, ...]  #: In their order; the two ends of a range.
+    ranged: bool = False  #: Whether everything between two ends is meant.
 
     @property
     def header(self) -> str:

@@ -23,19 +23,12 @@ BLOCK: Final = 4
 
 @dataclass(frozen=True)
 class Swept:
-    """A finished sweep.
+    """A finished sweep."""
 
-    Attributes:
-        file: The Parquet file.
-        cases: How many.
-        kept: How many of them an earlier run had done.
-        refused: First words of the reasons, and how many cases each refused.
-    """
-
-    file: Path
-    cases: int
-    kept: int
-    refused: Counter[str]
+    file: Path  #: The Parquet file.
+    cases: int  #: How many.
+    kept: int  #: How many of them an earlier run had done.
+    refused: Counter[str]  #: First words of the reasons, and how many cases each refused.
 
     def __str__(self) -> str:
         lost = sum(self.refused.values())

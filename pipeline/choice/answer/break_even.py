@@ -46,15 +46,10 @@ _GREAT: Final = 1e9
 
 @dataclass(frozen=True)
 class Cost:
-    """Of one candidate in one mode.
+    """Of one candidate in one mode."""
 
-    Attributes:
-        power: Without drivers [W].
-        drivers: That are on.
-    """
-
-    power: float
-    drivers: float
+    power: float  #: Without drivers [W].
+    drivers: float  #: That are on.
 
 
 def break_even(first: tuple[Cost, Cost], second: tuple[Cost, Cost], idle: float) -> float | None:

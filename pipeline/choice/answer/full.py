@@ -29,31 +29,18 @@ Built = Mapping[str, tuple[tuple[str, ...], Designs]]
 
 @dataclass(frozen=True, eq=False)
 class Full:
-    """One mode of one robot.
+    """One mode of one robot."""
 
-    Attributes:
-        load: The mode.
-        result: Of the chains.
-        driver: Mean of conduction and switching, (J,) [W].
-        idle: Of the drivers that are on, (J,) [W].
-        on: Drivers that are, (J,).
-        power: Mean out of the supply, idle power included, (J,) [W].
-        dumped: Mean that flows back and is lost, (J,); none on a bus [W].
-        total: Mean of the robot out of the supply, with the hotel load [W].
-        lost: Mean that the robot dumps [W].
-        peak: Greatest of the robot out of the supply [W].
-    """
-
-    load: Load
-    result: ChainResult
-    driver: Array
-    idle: Array
-    on: Array
-    power: Array
-    dumped: Array
-    total: float
-    lost: float
-    peak: float
+    load: Load  #: The mode.
+    result: ChainResult  #: Of the chains.
+    driver: Array  #: Mean of conduction and switching, (J,) [W].
+    idle: Array  #: Of the drivers that are on, (J,) [W].
+    on: Array  #: Drivers that are, (J,).
+    power: Array  #: Mean out of the supply, idle power included, (J,) [W].
+    dumped: Array  #: Mean that flows back and is lost, (J,); none on a bus [W].
+    total: float  #: Mean of the robot out of the supply, with the hotel load [W].
+    lost: float  #: Mean that the robot dumps [W].
+    peak: float  #: Greatest of the robot out of the supply [W].
 
 
 def through(load: Load, built: Built, account: Account) -> Full:

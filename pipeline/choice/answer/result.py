@@ -30,13 +30,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Choice(Result):
-    """What to build.
+    """What to build."""
 
-    Attributes:
-        chosen: The search, with its arrays.
-    """
-
-    chosen: Chosen = field(repr=False)
+    chosen: Chosen = field(repr=False)  #: The search, with its arrays.
 
     def _write(self, out: Path, decimal: str) -> None:
         """The page, too."""

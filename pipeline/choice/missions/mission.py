@@ -50,27 +50,17 @@ _SUM: Final = 1e-6
 
 @dataclass(frozen=True)
 class Mode:
-    """What the robot does for some of the day.
+    """What the robot does for some of the day."""
 
-    Attributes:
-        name: Of the mode.
-        hours: In a day.
-        stands: Whether it stands still.
-        motion: File of a motion in place of the gait; None to walk.
-        changes: Numbers of the robot's file that differ; see `Machine.with_values`.
-        hold: ``motor``, ``brake`` or ``none``.
-        drivers: Whether drivers stay on where a joint locks and needs no current.
-        where: File and row, for messages.
-    """
-
-    name: str
-    hours: float
-    stands: bool
-    motion: Path | None
+    name: str  #: Of the mode.
+    hours: float  #: In a day.
+    stands: bool  #: Whether it stands still.
+    motion: Path | None  #: File of a motion in place of the gait; None to walk.
+    #: Numbers of the robot's file that differ; see `Machine.with_values`.
     changes: Mapping[str, object]
-    hold: str
-    drivers: bool
-    where: str
+    hold: str  #: ``motor``, ``brake`` or ``none``.
+    drivers: bool  #: Whether drivers stay on where a joint locks and needs no current.
+    where: str  #: File and row, for messages.
 
 
 def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:

@@ -31,67 +31,37 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Designs:
-    """D designs; arrays (D,), SI, at the motor's shaft where nothing else is said.
+    """D designs; arrays (D,), SI, at the motor's shaft where nothing else is said."""
 
-    Attributes:
-        parts: Names of motor, gear and brake of each; empty for none.
-        ratio: n [1].
-        load: c, friction per transmitted torque [1].
-        coulomb: Dry friction [N*m].
-        viscous: [N*m*s/rad].
-        inertia: [kg*m^2].
-        torque_constant: k [N*m/A].
-        resistance: R [ohm].
-        voltage: That the driver can give to the motor without current [V].
-        continuous_current: Of motor and driver [A].
-        peak_current: Likewise [A].
-        max_speed: Of the motor [rad/s].
-        gear_speed: Of the gear's input, at most [rad/s].
-        gear_continuous: At its output, root mean square [N*m].
-        gear_peak: At its output [N*m].
-        brake_torque: With which the brake holds; 0 for none [N*m].
-        brake_power: That keeps it open [W].
-        mass: Of motor, gear, brake and driver [kg].
-        winding_to_housing: [K/W].
-        housing_to_ambient: [K/W].
-        winding_time: Thermal time constant [s].
-        housing_time: Likewise [s].
-        winding_limit: Permitted temperature [K].
-        bus: Voltage of the supply [V].
-        bus_use: Share of the driver's range of it that is used [1].
-        driver_resistance: In the motor's ampere [ohm].
-        switching: Of the driver, over bus voltage times current [1].
-        idle: Of the driver while it is on [W].
-    """
-
+    #: Names of motor, gear and brake of each; empty for none.
     parts: tuple[tuple[str, str, str], ...]
-    ratio: Array
-    load: Array
-    coulomb: Array
-    viscous: Array
-    inertia: Array
-    torque_constant: Array
-    resistance: Array
-    voltage: Array
-    continuous_current: Array
-    peak_current: Array
-    max_speed: Array
-    gear_speed: Array
-    gear_continuous: Array
-    gear_peak: Array
-    brake_torque: Array
-    brake_power: Array
-    mass: Array
-    winding_to_housing: Array
-    housing_to_ambient: Array
-    winding_time: Array
-    housing_time: Array
-    winding_limit: Array
-    bus: Array
-    bus_use: Array
-    driver_resistance: Array
-    switching: Array
-    idle: Array
+    ratio: Array  #: n [1].
+    load: Array  #: c, friction per transmitted torque [1].
+    coulomb: Array  #: Dry friction [N*m].
+    viscous: Array  #: [N*m*s/rad].
+    inertia: Array  #: [kg*m^2].
+    torque_constant: Array  #: k [N*m/A].
+    resistance: Array  #: R [ohm].
+    voltage: Array  #: That the driver can give to the motor without current [V].
+    continuous_current: Array  #: Of motor and driver [A].
+    peak_current: Array  #: Likewise [A].
+    max_speed: Array  #: Of the motor [rad/s].
+    gear_speed: Array  #: Of the gear's input, at most [rad/s].
+    gear_continuous: Array  #: At its output, root mean square [N*m].
+    gear_peak: Array  #: At its output [N*m].
+    brake_torque: Array  #: With which the brake holds; 0 for none [N*m].
+    brake_power: Array  #: That keeps it open [W].
+    mass: Array  #: Of motor, gear, brake and driver [kg].
+    winding_to_housing: Array  #: [K/W].
+    housing_to_ambient: Array  #: [K/W].
+    winding_time: Array  #: Thermal time constant [s].
+    housing_time: Array  #: Likewise [s].
+    winding_limit: Array  #: Permitted temperature [K].
+    bus: Array  #: Voltage of the supply [V].
+    bus_use: Array  #: Share of the driver's range of it that is used [1].
+    driver_resistance: Array  #: In the motor's ampere [ohm].
+    switching: Array  #: Of the driver, over bus voltage times current [1].
+    idle: Array  #: Of the driver while it is on [W].
 
     def __len__(self) -> int:
         return len(self.parts)

@@ -59,18 +59,13 @@ Sheet = Mapping[str, Number]
 
 @dataclass(frozen=True)
 class Shelf:
-    """Parts that designs are made of, and what is known of each.
+    """Parts that designs are made of, and what is known of each."""
 
-    Attributes:
-        parts: By name.
-        numbers: Part to its entries; what it does not print is a range of its class.
-        driver: Name of the part that drives every motor.
-        voltage: Of the supply [V]; None for that of each motor's sheet, as far as the driver goes.
-    """
-
-    parts: Mapping[str, Part]
+    parts: Mapping[str, Part]  #: By name.
+    #: Part to its entries; what it does not print is a range of its class.
     numbers: Mapping[str, Mapping[str, Number]]
-    driver: str
+    driver: str  #: Name of the part that drives every motor.
+    #: Of the supply [V]; None for that of each motor's sheet, as far as the driver goes.
     voltage: float | None = None
 
     @classmethod
