@@ -29,38 +29,24 @@ _THREADS: Final = tuple(f"{name}_NUM_THREADS" for name in ("OMP", "OPENBLAS", "M
 
 @dataclass(frozen=True)
 class Name:
-    """One name that the model file holds.
+    """One name that the model file holds."""
 
-    Attributes:
-        effect: In the catalogue's words.
-        place: Where.
-        level: ``"confirmed"`` or ``"approximate"``.
-        values: Parameter to value and ends of the 95 % interval; NaN where there is none.
-        rivals: Names that the answer calls indistinguishable from it.
-    """
-
-    effect: str
-    place: tuple[str, ...]
-    level: str
+    effect: str  #: In the catalogue's words.
+    place: tuple[str, ...]  #: Where.
+    level: str  #: ``"confirmed"`` or ``"approximate"``.
+    #: Parameter to value and ends of the 95 % interval; NaN where there is none.
     values: dict[str, tuple[float, float, float]]
-    rivals: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()  #: Names that the answer calls indistinguishable from it.
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What `gap` said about one log.
+    """What `gap` said about one log."""
 
-    Attributes:
-        code: 0 explained, 1 a part unexplained, 2 refused, `FAILED` none.
-        seconds: Of computing.
-        names: Of the model file, in its order.
-        message: Last line on standard error where no answer was given.
-    """
-
-    code: int
-    seconds: float
-    names: tuple[Name, ...]
-    message: str = ""
+    code: int  #: 0 explained, 1 a part unexplained, 2 refused, `FAILED` none.
+    seconds: float  #: Of computing.
+    names: tuple[Name, ...]  #: Of the model file, in its order.
+    message: str = ""  #: Last line on standard error where no answer was given.
 
     @property
     def given(self) -> bool:

@@ -17,20 +17,13 @@ _QUANTILE: Final = NormalDist().inv_cdf(0.975)
 
 @dataclass(frozen=True)
 class Rate:
-    """How often something came out as it should, or should not.
+    """How often something came out as it should, or should not."""
 
-    Attributes:
-        name: Key.
-        meaning: In words.
-        hits: How often.
-        count: Out of how many.
-        aim: Least and largest share that is aimed at; None where nothing is.
-    """
-
-    name: str
-    meaning: str
-    hits: int
-    count: int
+    name: str  #: Key.
+    meaning: str  #: In words.
+    hits: int  #: How often.
+    count: int  #: Out of how many.
+    #: Least and largest share that is aimed at; None where nothing is.
     aim: tuple[float, float] | None
 
     @property

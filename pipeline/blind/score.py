@@ -62,40 +62,24 @@ RIGHT, CLASS, WRONG, DRAWN = "right", "class", "wrong", "flexible"
 
 @dataclass(frozen=True)
 class Verdict:
-    """A written name, judged.
+    """A written name, judged."""
 
-    Attributes:
-        name: As written.
-        verdict: `RIGHT`, `CLASS` (right, as one of a class), `WRONG` or `DRAWN` (no name).
-        why: What it is right by, or what is not in the machine.
-        intervals: Of hidden parameters.
-        covered: Of them, those that hold the truth.
-        kilograms: Mass of a payload over the true one; None where it is none.
-    """
-
-    name: Name
-    verdict: str
-    why: str
-    intervals: int = 0
-    covered: int = 0
-    kilograms: float | None = None
+    name: Name  #: As written.
+    verdict: str  #: `RIGHT`, `CLASS` (right, as one of a class), `WRONG` or `DRAWN` (no name).
+    why: str  #: What it is right by, or what is not in the machine.
+    intervals: int = 0  #: Of hidden parameters.
+    covered: int = 0  #: Of them, those that hold the truth.
+    kilograms: float | None = None  #: Mass of a payload over the true one; None where it is none.
 
 
 @dataclass(frozen=True)
 class Score:
-    """A trial, judged.
+    """A trial, judged."""
 
-    Attributes:
-        truth: As `pipeline.blind.machines.trial.make` wrote it.
-        answer: Of the workflow.
-        names: Every written name.
-        found: For every hidden effect whether it is named and written.
-    """
-
-    truth: Mapping[str, Any]
-    answer: Answer
-    names: tuple[Verdict, ...]
-    found: tuple[bool, ...]
+    truth: Mapping[str, Any]  #: As `pipeline.blind.machines.trial.make` wrote it.
+    answer: Answer  #: Of the workflow.
+    names: tuple[Verdict, ...]  #: Every written name.
+    found: tuple[bool, ...]  #: For every hidden effect whether it is named and written.
 
     @property
     def wrong(self) -> list[Verdict]:

@@ -40,36 +40,22 @@ IDLE_NAME: Final = "it closes none of the gap on validation data"
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter of an accepted effect.
+    """One parameter of an accepted effect."""
 
-    Attributes:
-        name: Of the parameter.
-        value: Best estimate.
-        low: Of the 95 % interval.
-        high: Of the 95 % interval.
-        unit: Unit.
-    """
-
-    name: str
-    value: float
-    low: float
-    high: float
-    unit: str
+    name: str  #: Of the parameter.
+    value: float  #: Best estimate.
+    low: float  #: Of the 95 % interval.
+    high: float  #: Of the 95 % interval.
+    unit: str  #: Unit.
 
 
 @dataclass(frozen=True)
 class Member:
-    """One of several like findings that are reported as one.
+    """One of several like findings that are reported as one."""
 
-    Attributes:
-        place: Where.
-        parameters: Estimates.
-        level: Of this one.
-    """
-
-    place: tuple[str, ...]
-    parameters: tuple[Estimate, ...]
-    level: str
+    place: tuple[str, ...]  #: Where.
+    parameters: tuple[Estimate, ...]  #: Estimates.
+    level: str  #: Of this one.
 
     @property
     def values(self) -> dict[str, float]:
@@ -79,75 +65,49 @@ class Member:
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect at one place and what became of it.
+    """One effect at one place and what became of it."""
 
-    Attributes:
-        effect: Name.
-        place: Joints, link, ground or effort channels.
-        before: Validation error of the joints it touches without it, by estimates from training
-            rows, in `unit`.
-        after: The same with it; NaN where it was not tried in earnest.
-        unit: Of the compared channel.
-        identifiable: Whether this motion could show it.
-        verdict: `ACCEPTED`, `REJECTED`, `NOT_IDENTIFIABLE` or `INDISTINGUISHABLE` + names.
-        reason: In words.
-        gain: Fall of the penalised misfit on training and validation rows, in noise variances.
-    """
-
-    effect: str
-    place: tuple[str, ...]
+    effect: str  #: Name.
+    place: tuple[str, ...]  #: Joints, link, ground or effort channels.
+    #: Validation error of the joints it touches without it, by estimates from training rows, in
+    #: `unit`.
     before: float
-    after: float
-    unit: str
-    identifiable: bool
-    verdict: str
-    reason: str
+    after: float  #: The same with it; NaN where it was not tried in earnest.
+    unit: str  #: Of the compared channel.
+    identifiable: bool  #: Whether this motion could show it.
+    verdict: str  #: `ACCEPTED`, `REJECTED`, `NOT_IDENTIFIABLE` or `INDISTINGUISHABLE` + names.
+    reason: str  #: In words.
+    #: Fall of the penalised misfit on training and validation rows, in noise variances.
     gain: float = 0.0
 
 
 @dataclass(frozen=True)
 class Found:
-    """An accepted effect.
+    """An accepted effect."""
 
-    Attributes:
-        order: From 1.
-        effect: Name.
-        place: Where.
-        parameters: Estimates.
-        rivals: Effects at places that explain the log as well.
-        valid_before: Validation error without it (with those before it) by estimates from training
-            rows, RMS of the joints it touches, in `unit`; NaN where none of them has a row there.
-        valid_after: The same with it.
-        unit: Of the compared channel.
-        noise_floor: Of the same joints, in `unit`.
-        excitation: The motion that would distinguish it from its rivals.
-        level: `CONFIRMED`, `APPROXIMATE` or `SUSPECTED`.
-        reason: Why it is not confirmed, or empty.
-        law: Which of its laws, where the effect has several.
-        members: Where several like findings are reported as one, each of them.
-        gap_before: Error on test rows without it, where it shows most; NaN until the written model
-            was held against those rows, and where there is no row.
-        gap_after: The same with it.
-        written: Whether the model file holds it.
-    """
-
-    order: int
-    effect: str
-    place: tuple[str, ...]
-    parameters: tuple[Estimate, ...]
+    order: int  #: From 1.
+    effect: str  #: Name.
+    place: tuple[str, ...]  #: Where.
+    parameters: tuple[Estimate, ...]  #: Estimates.
+    #: Effects at places that explain the log as well.
     rivals: tuple[tuple[str, tuple[str, ...]], ...]
+    #: Validation error without it (with those before it) by estimates from training rows, RMS of
+    #: the joints it touches, in `unit`; NaN where none of them has a row there.
     valid_before: float
-    valid_after: float
-    unit: str
-    noise_floor: float
-    excitation: str
-    level: str = CONFIRMED
-    reason: str = ""
-    law: str = ""
+    valid_after: float  #: The same with it.
+    unit: str  #: Of the compared channel.
+    noise_floor: float  #: Of the same joints, in `unit`.
+    excitation: str  #: The motion that would distinguish it from its rivals.
+    level: str = CONFIRMED  #: `CONFIRMED`, `APPROXIMATE` or `SUSPECTED`.
+    reason: str = ""  #: Why it is not confirmed, or empty.
+    law: str = ""  #: Which of its laws, where the effect has several.
+    #: Where several like findings are reported as one, each of them.
     members: tuple[Member, ...] = ()
+    #: Error on test rows without it, where it shows most; NaN until the written model was held
+    #: against those rows, and where there is no row.
     gap_before: float = float("nan")
-    gap_after: float = float("nan")
-    written: bool = False
+    gap_after: float = float("nan")  #: The same with it.
+    written: bool = False  #: Whether the model file holds it.
 
     @property
     def values(self) -> dict[str, float]:
@@ -172,50 +132,31 @@ class Found:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What a model leaves at one joint on test rows.
+    """What a model leaves at one joint on test rows."""
 
-    Attributes:
-        joint: Name.
-        channel: Channel.
-        error: RMS, in `unit`.
-        noise_floor: In `unit`.
-        unit: Unit.
-        significant: Whether it is more than `UNEXPLAINED` times the noise floor.
-        description: What it depends on, in words; empty where it is noise.
-        rows: Held-out rows that were compared; without any the error is that of fitted rows.
-    """
-
-    joint: str
-    channel: str
-    error: float
-    noise_floor: float
-    unit: str
-    significant: bool
-    description: str
+    joint: str  #: Name.
+    channel: str  #: Channel.
+    error: float  #: RMS, in `unit`.
+    noise_floor: float  #: In `unit`.
+    unit: str  #: Unit.
+    significant: bool  #: Whether it is more than `UNEXPLAINED` times the noise floor.
+    description: str  #: What it depends on, in words; empty where it is noise.
+    #: Held-out rows that were compared; without any the error is that of fitted rows.
     rows: int = 1
 
 
 @dataclass(frozen=True)
 class Naming:
-    """The result of naming.
+    """The result of naming."""
 
-    Attributes:
-        found: Accepted effects in the order of acceptance.
-        candidates: Every candidate once.
-        tolerances: Nuisances with estimate and prior sigma: (kind, place) to (value, sigma).
-        tried: Number of candidates tried.
-        channel: The compared channel.
-        unit: Its unit.
-        notes: Remarks for the report, in words.
-    """
-
-    found: tuple[Found, ...]
-    candidates: tuple[Candidate, ...]
+    found: tuple[Found, ...]  #: Accepted effects in the order of acceptance.
+    candidates: tuple[Candidate, ...]  #: Every candidate once.
+    #: Nuisances with estimate and prior sigma: (kind, place) to (value, sigma).
     tolerances: Mapping[tuple[str, str], tuple[float, float]]
-    tried: int
-    channel: str
-    unit: str
-    notes: tuple[str, ...] = field(default=())
+    tried: int  #: Number of candidates tried.
+    channel: str  #: The compared channel.
+    unit: str  #: Its unit.
+    notes: tuple[str, ...] = field(default=())  #: Remarks for the report, in words.
 
 
 def named(found: Found) -> str:

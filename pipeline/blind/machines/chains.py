@@ -28,27 +28,16 @@ _AXES: Final = {"x": "1 0 0", "y": "0 1 0", "z": "0 0 1"}
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine as its files say.
+    """A machine as its files say."""
 
-    Attributes:
-        name: One of `FIXED`, or ``"walk"`` for the hexapod.
-        urdf: Text of the file; empty where `robot` has files of its own.
-        model: Bodies.
-        joints: Names of the columns.
-        links: Link that each joint carries.
-        ratio: Motor turns per joint turn, shape (J,).
-        lengths: Of the links [m], shape (J,).
-        robot: The walking robot; None for a fixed base.
-    """
-
-    name: str
-    urdf: str
-    model: pin.Model
-    joints: tuple[str, ...]
-    links: tuple[str, ...]
-    ratio: Array
-    lengths: Array
-    robot: Robot | None = None
+    name: str  #: One of `FIXED`, or ``"walk"`` for the hexapod.
+    urdf: str  #: Text of the file; empty where `robot` has files of its own.
+    model: pin.Model  #: Bodies.
+    joints: tuple[str, ...]  #: Names of the columns.
+    links: tuple[str, ...]  #: Link that each joint carries.
+    ratio: Array  #: Motor turns per joint turn, shape (J,).
+    lengths: Array  #: Of the links [m], shape (J,).
+    robot: Robot | None = None  #: The walking robot; None for a fixed base.
 
 
 def draw_chain(rng: np.random.Generator, name: str) -> Machine:

@@ -28,21 +28,13 @@ EVERY: Final = (*FIXED, "walk")
 
 @dataclass(frozen=True)
 class Case:
-    """A machine and the motion that sizes are measured on.
+    """A machine and the motion that sizes are measured on."""
 
-    Attributes:
-        machine: By its files.
-        plant: As it is.
-        course: Of the training log, as planned.
-        torque: Of the true bodies along it, shape (N, J) [N*m].
-        noise: Of the torque, shape (J,) [N*m].
-    """
-
-    machine: Machine
-    plant: Plant
-    course: Course
-    torque: Array
-    noise: Array
+    machine: Machine  #: By its files.
+    plant: Plant  #: As it is.
+    course: Course  #: Of the training log, as planned.
+    torque: Array  #: Of the true bodies along it, shape (N, J) [N*m].
+    noise: Array  #: Of the torque, shape (J,) [N*m].
 
     def size(self, rng: Rng, j: int, per_unit: Array | float) -> float:
         """A size whose torque is drawn over the noise."""
@@ -264,26 +256,17 @@ def _cable(rng: Rng, case: Case, j: int) -> tuple[Values, Plant]:
 
 @dataclass(frozen=True)
 class Effect:
-    """A row of the table.
+    """A row of the table."""
 
-    Attributes:
-        name: As in the catalogue, or of its own.
-        draw: Values and the changed plant.
-        place: ``"joint"``, ``"link"``, ``"column"`` of the torque, ``"pair"`` of joints, or where
-            the effect acts on everything.
-        friction: Whether it is all of its joint's friction.
-        in_catalogue: Whether the workflow has a name for it.
-        sources: That can make it.
-        machines: That can have it.
-    """
-
-    name: str
-    draw: Draw
+    name: str  #: As in the catalogue, or of its own.
+    draw: Draw  #: Values and the changed plant.
+    #: ``"joint"``, ``"link"``, ``"column"`` of the torque, ``"pair"`` of joints, or where the
+    #: effect acts on everything.
     place: str = "joint"
-    friction: bool = False
-    in_catalogue: bool = True
-    sources: tuple[str, ...] = BOTH
-    machines: tuple[str, ...] = EVERY
+    friction: bool = False  #: Whether it is all of its joint's friction.
+    in_catalogue: bool = True  #: Whether the workflow has a name for it.
+    sources: tuple[str, ...] = BOTH  #: That can make it.
+    machines: tuple[str, ...] = EVERY  #: That can have it.
 
     def where(self, machine: Machine, j: int) -> list[str]:
         """Place in the workflow's words."""

@@ -23,28 +23,17 @@ _DEFLECTION = 2e-4
 
 @dataclass(frozen=True)
 class Friction:
-    """Friction at every joint, arrays of shape (J,), referred to the joint.
+    """Friction at every joint, arrays of shape (J,), referred to the joint."""
 
-    Attributes:
-        coulomb: [N*m].
-        excess: Break-away above it [N*m].
-        stribeck: Velocity over which that falls off [rad/s].
-        viscous: [N*m*s/rad].
-        quadratic: [N*m*s^2/rad^2].
-        driving: Share of the load lost while the motor drives it [1].
-        driven: Likewise while the load drives the motor [1].
-        asymmetry: Added to Coulomb friction in positive motion, taken off in negative [N*m].
-        spots: Joint to a further level of dry friction over time [s] and angle [rad], or none.
-    """
-
-    coulomb: Array
-    excess: Array
-    stribeck: Array
-    viscous: Array
-    quadratic: Array
-    driving: Array
-    driven: Array
-    asymmetry: Array
+    coulomb: Array  #: [N*m].
+    excess: Array  #: Break-away above it [N*m].
+    stribeck: Array  #: Velocity over which that falls off [rad/s].
+    viscous: Array  #: [N*m*s/rad].
+    quadratic: Array  #: [N*m*s^2/rad^2].
+    driving: Array  #: Share of the load lost while the motor drives it [1].
+    driven: Array  #: Likewise while the load drives the motor [1].
+    asymmetry: Array  #: Added to Coulomb friction in positive motion, taken off in negative [N*m].
+    #: Joint to a further level of dry friction over time [s] and angle [rad], or none.
     spots: tuple[tuple[int, Callable[[float, float], float]], ...] = ()
 
     @classmethod

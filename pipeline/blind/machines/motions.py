@@ -13,23 +13,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Course:
-    """What the links do, at uniform times.
+    """What the links do, at uniform times."""
 
-    Attributes:
-        time: Shape (N,) [s].
-        q: Shape (N, J) [rad].
-        v: [rad/s].
-        a: [rad/s^2].
-        body: Configuration, velocity and acceleration of the base, (N, 7), (N, 6), (N, 6); None
-            for a fixed base.
-        stances: Legs that stand, for every row; empty for a fixed base.
-    """
-
-    time: Array
-    q: Array
-    v: Array
-    a: Array
+    time: Array  #: Shape (N,) [s].
+    q: Array  #: Shape (N, J) [rad].
+    v: Array  #: [rad/s].
+    a: Array  #: [rad/s^2].
+    #: Configuration, velocity and acceleration of the base, (N, 7), (N, 6), (N, 6); None for a
+    #: fixed base.
     body: tuple[Array, Array, Array] | None = None
+    #: Legs that stand, for every row; empty for a fixed base.
     stances: tuple[tuple[str, ...], ...] = ()
 
     @property

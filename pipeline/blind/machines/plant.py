@@ -19,34 +19,20 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Plant:
-    """A machine as it is; arrays of shape (J,), referred to the joint.
+    """A machine as it is; arrays of shape (J,), referred to the joint."""
 
-    Attributes:
-        model: Bodies and gravity.
-        friction: At every joint, on the motor's side of gears that give.
-        inertia: Of the rotors, as far as the URDF lacks it [kg*m^2].
-        compliance: Of the gears [rad/(N*m)].
-        play: Whole width [rad].
-        coupling: Motor speeds over joint speeds, shape (J, J); friction and rotors feel both.
-        extra: Joint to a law begun for a time step [s].
-        gain: By which torques read too much [1].
-        offset: Added to torques [N*m].
-        zero: Added to positions [rad].
-        delay: Of the torques behind the positions [s].
-        sides: Where positions are measured: ``"joint"``, ``"motor"`` or ``"both"``.
-    """
-
-    model: pin.Model
-    friction: Friction
-    inertia: Array
-    compliance: Array
-    play: Array
-    coupling: Array
-    gain: Array
-    offset: Array
-    zero: Array
-    delay: float = 0.0
-    sides: str = "joint"
+    model: pin.Model  #: Bodies and gravity.
+    friction: Friction  #: At every joint, on the motor's side of gears that give.
+    inertia: Array  #: Of the rotors, as far as the URDF lacks it [kg*m^2].
+    compliance: Array  #: Of the gears [rad/(N*m)].
+    play: Array  #: Whole width [rad].
+    coupling: Array  #: Motor speeds over joint speeds, shape (J, J); friction and rotors feel both.
+    gain: Array  #: By which torques read too much [1].
+    offset: Array  #: Added to torques [N*m].
+    zero: Array  #: Added to positions [rad].
+    delay: float = 0.0  #: Of the torques behind the positions [s].
+    sides: str = "joint"  #: Where positions are measured: ``"joint"``, ``"motor"`` or ``"both"``.
+    #: Joint to a law begun for a time step [s].
     extra: tuple[tuple[int, Callable[[float], Law]], ...] = ()
 
     def at(self, field: str, joint: int, value: float) -> Plant:
@@ -71,18 +57,12 @@ def rigid_plant(machine: Machine, model: pin.Model) -> Plant:
 
 @dataclass(frozen=True)
 class Happened:
-    """What truly happened.
+    """What truly happened."""
 
-    Attributes:
-        course: Of the links.
-        motor: Angle of the motors at the joint's side, shape (N, J) [rad].
-        torque: Of the motors at the joint's side, shape (N, J) [N*m].
-        feet: Normal forces on the feet, shape (N, L) [N]; None for a fixed base.
-    """
-
-    course: Course
-    motor: Array
-    torque: Array
+    course: Course  #: Of the links.
+    motor: Array  #: Angle of the motors at the joint's side, shape (N, J) [rad].
+    torque: Array  #: Of the motors at the joint's side, shape (N, J) [N*m].
+    #: Normal forces on the feet, shape (N, L) [N]; None for a fixed base.
     feet: Array | None = None
 
     def every(self, dt: float) -> Happened:

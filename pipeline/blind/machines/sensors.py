@@ -19,23 +19,14 @@ _FORCE_NOISE: Final = 0.5  # of a foot sensor [N]
 
 @dataclass(frozen=True)
 class Sensors:
-    """How a machine is measured.
+    """How a machine is measured."""
 
-    Attributes:
-        rate: Of the log [Hz].
-        white: Of the torque, standard deviation of a row, shape (J,) [N*m].
-        coloured: Slow part of the torque's noise [N*m].
-        memory: Time over which that part forgets [s].
-        bits: Of the joints' encoders.
-        velocity: Noise of a velocity column [rad/s]; zero for none.
-    """
-
-    rate: float
-    white: Array
-    coloured: Array
-    memory: float
-    bits: int
-    velocity: float
+    rate: float  #: Of the log [Hz].
+    white: Array  #: Of the torque, standard deviation of a row, shape (J,) [N*m].
+    coloured: Array  #: Slow part of the torque's noise [N*m].
+    memory: float  #: Time over which that part forgets [s].
+    bits: int  #: Of the joints' encoders.
+    velocity: float  #: Noise of a velocity column [rad/s]; zero for none.
 
     @property
     def resolution(self) -> float:

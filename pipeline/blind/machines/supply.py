@@ -44,33 +44,19 @@ _RATE: Final = 100.0  # of the joints [Hz]
 
 @dataclass(frozen=True)
 class Supply:
-    """What stands between battery and motors.
+    """What stands between battery and motors."""
 
-    Attributes:
-        hidden: Names of `HIDDEN`.
-        constant: Hotel load and idle of all drives [W].
-        efficiency: Of the drivers [1].
-        returned: Share of returned power that is used again [1].
-        leg: That rubs.
-        friction: Of each of its joints, Coulomb [N*m].
-        resistance: Of the battery [ohm].
-        voltage: Of the battery without current [V].
-        rate: Of the samples [Hz].
-        reading: ``"mean"`` or ``"instant"``.
-        stated: Whether the log lacks the voltage and only a nominal one is known.
-    """
-
-    hidden: tuple[str, ...]
-    constant: float
-    efficiency: float
-    returned: float
-    leg: str
-    friction: float
-    resistance: float
-    voltage: float
-    rate: float
-    reading: str
-    stated: bool
+    hidden: tuple[str, ...]  #: Names of `HIDDEN`.
+    constant: float  #: Hotel load and idle of all drives [W].
+    efficiency: float  #: Of the drivers [1].
+    returned: float  #: Share of returned power that is used again [1].
+    leg: str  #: That rubs.
+    friction: float  #: Of each of its joints, Coulomb [N*m].
+    resistance: float  #: Of the battery [ohm].
+    voltage: float  #: Of the battery without current [V].
+    rate: float  #: Of the samples [Hz].
+    reading: str  #: ``"mean"`` or ``"instant"``.
+    stated: bool  #: Whether the log lacks the voltage and only a nominal one is known.
 
 
 def draw_supply(

@@ -31,33 +31,19 @@ FEWEST_ROWS: Final = 20
 
 @dataclass(frozen=True)
 class Where:
-    """The gap of one joint in one band.
+    """The gap of one joint in one band."""
 
-    Attributes:
-        rank: From 1, by the part of the gap above the noise floor.
-        joint: Name.
-        by: How the rows are sorted; `WHOLE` for all of them.
-        band: Which of them.
-        rows: Compared rows.
-        gap: Root mean square of measured minus predicted, in `unit`.
-        mean: Of measured minus predicted, in `unit`.
-        noise_floor: Standard deviation of the noise in the bandwidth, in `unit`.
-        unit: Of the compared channel.
-        share_of_total: Of the squared gap of all joints [1].
-        share_above_noise: Of this band's squared gap beyond the squared noise floor [1].
-    """
-
-    rank: int
-    joint: str
-    by: str
-    band: str
-    rows: int
-    gap: float
-    mean: float
-    noise_floor: float
-    unit: str
-    share_of_total: float
-    share_above_noise: float
+    rank: int  #: From 1, by the part of the gap above the noise floor.
+    joint: str  #: Name.
+    by: str  #: How the rows are sorted; `WHOLE` for all of them.
+    band: str  #: Which of them.
+    rows: int  #: Compared rows.
+    gap: float  #: Root mean square of measured minus predicted, in `unit`.
+    mean: float  #: Of measured minus predicted, in `unit`.
+    noise_floor: float  #: Standard deviation of the noise in the bandwidth, in `unit`.
+    unit: str  #: Of the compared channel.
+    share_of_total: float  #: Of the squared gap of all joints [1].
+    share_above_noise: float  #: Of this band's squared gap beyond the squared noise floor [1].
 
 
 def gap_of(m: Measurement, prediction: Prediction, channel: int = 0) -> Array:

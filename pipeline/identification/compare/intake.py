@@ -34,20 +34,13 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Intake:
-    """Logs that were accepted.
+    """Logs that were accepted."""
 
-    Attributes:
-        prepared: One per log, in the order given.
-        findings: Rows of `quality.csv`.
-        settings: Common to all.
-        of_logs: Of the findings those that no bandwidth changes.
-        long: The logs chunk by chunk where `prepared` holds but stretches of them, else None.
-    """
-
-    prepared: tuple[Prepared, ...]
-    findings: tuple[Finding, ...]
-    settings: Settings
-    of_logs: tuple[Finding, ...] = ()
+    prepared: tuple[Prepared, ...]  #: One per log, in the order given.
+    findings: tuple[Finding, ...]  #: Rows of `quality.csv`.
+    settings: Settings  #: Common to all.
+    of_logs: tuple[Finding, ...] = ()  #: Of the findings those that no bandwidth changes.
+    #: The logs chunk by chunk where `prepared` holds but stretches of them, else None.
     long: LongLogs | None = None
 
     def at(self, prepared: Sequence[Prepared]) -> Intake:

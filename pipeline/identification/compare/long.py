@@ -40,25 +40,16 @@ _OF_SURVEY: Final = ("cutoff", "period", "contact", "usable_share", "noise_floor
 
 @dataclass(eq=False)
 class LongLogs:
-    """Several logs in chunks.
+    """Several logs in chunks."""
 
-    Attributes:
-        streams: One per log.
-        surveys: What stands for each.
-        prepared: The surveys at the common bandwidth: grid, cut-off and noise for every chunk.
-        parts: Of the surveys.
-        largest: As for `judge`.
-        contact: How to tell which feet stand.
-        rows: Per chunk.
-    """
-
-    streams: tuple[Stream, ...]
-    surveys: tuple[Survey, ...]
+    streams: tuple[Stream, ...]  #: One per log.
+    surveys: tuple[Survey, ...]  #: What stands for each.
+    #: The surveys at the common bandwidth: grid, cut-off and noise for every chunk.
     prepared: tuple[Prepared, ...]
-    parts: Parts
-    largest: Mapping[str, Array]
-    contact: Callable[[Log], Contact | None] | None
-    rows: int = CHUNK_ROWS
+    parts: Parts  #: Of the surveys.
+    largest: Mapping[str, Array]  #: As for `judge`.
+    contact: Callable[[Log], Contact | None] | None  #: How to tell which feet stand.
+    rows: int = CHUNK_ROWS  #: Per chunk.
     _kept: list[tuple[int, Simulator]] = field(default_factory=list)
     _findings: tuple[Finding, ...] = ()
 

@@ -20,20 +20,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """One model along all logs.
+    """One model along all logs."""
 
-    Attributes:
-        label: What it has that the one before has not.
-        predictions: One per log.
-        gaps: Root mean square on test rows by joint and channel, shape (J, C), NaN where no row
-            counts.
-        valid: The same on validation rows, of the compared channel, shape (J,).
-    """
-
-    label: str
-    predictions: tuple[Prediction, ...]
+    label: str  #: What it has that the one before has not.
+    predictions: tuple[Prediction, ...]  #: One per log.
+    #: Root mean square on test rows by joint and channel, shape (J, C), NaN where no row counts.
     gaps: Array
-    valid: Array
+    valid: Array  #: The same on validation rows, of the compared channel, shape (J,).
 
     @property
     def gap(self) -> Array:

@@ -45,23 +45,16 @@ LARGEST_ROWS = 50_000
 
 @dataclass(frozen=True, eq=False)
 class DataSet:
-    """One log made ready for least squares.
+    """One log made ready for least squares."""
 
-    Attributes:
-        simulator: Of its motion.
-        rows: Rows of the measurement that count, ordered by part and block, shape (R,).
-        parts: Part of the data to its range among those rows.
-        edges: First row of each block among those rows, with the end, shape (B + 1,).
-        block_part: Part of each block, shape (B,).
-        weight: Square root of independent samples per row [1].
-    """
-
-    simulator: Simulator
+    simulator: Simulator  #: Of its motion.
+    #: Rows of the measurement that count, ordered by part and block, shape (R,).
     rows: NDArray[np.intp]
-    parts: Mapping[int, slice]
+    parts: Mapping[int, slice]  #: Part of the data to its range among those rows.
+    #: First row of each block among those rows, with the end, shape (B + 1,).
     edges: NDArray[np.intp]
-    block_part: NDArray[np.int8]
-    weight: float
+    block_part: NDArray[np.int8]  #: Part of each block, shape (B,).
+    weight: float  #: Square root of independent samples per row [1].
 
     @property
     def measurement(self) -> Measurement:

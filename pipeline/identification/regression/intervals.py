@@ -38,15 +38,10 @@ _COVERED: Final = (0.025, 0.975)
 
 @dataclass(frozen=True)
 class Sized:
-    """One accepted effect's estimates.
+    """One accepted effect's estimates."""
 
-    Attributes:
-        parameters: With intervals.
-        certain: Whether "nothing of it" lies outside their common 95 % region.
-    """
-
-    parameters: tuple[Estimate, ...]
-    certain: bool
+    parameters: tuple[Estimate, ...]  #: With intervals.
+    certain: bool  #: Whether "nothing of it" lies outside their common 95 % region.
 
 
 def estimates(problem: Problem, channel: str) -> list[Sized]:

@@ -21,25 +21,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class BlockSums:
-    """Normal equations of B blocks and n unknowns.
+    """Normal equations of B blocks and n unknowns."""
 
-    Attributes:
-        H: Shape (B, n, n).
-        h: Shape (B, n).
-        s: Shape (B,).
-        count: Independent samples, shape (B,).
-        part: Part of the data of each block, shape (B,).
-        precision: Prior precision of the unknowns, shape (n,).
-        mean: Where the prior is centred: minus what the model holds already, shape (n,).
-    """
-
-    H: Array
-    h: Array
-    s: Array
-    count: Array
-    part: NDArray[np.int8]
-    precision: Array
-    mean: Array
+    H: Array  #: Shape (B, n, n).
+    h: Array  #: Shape (B, n).
+    s: Array  #: Shape (B,).
+    count: Array  #: Independent samples, shape (B,).
+    part: NDArray[np.int8]  #: Part of the data of each block, shape (B,).
+    precision: Array  #: Prior precision of the unknowns, shape (n,).
+    mean: Array  #: Where the prior is centred: minus what the model holds already, shape (n,).
 
     def blocks(self, *parts: int) -> NDArray[np.intp]:
         """Numbers of the blocks of some parts of the data."""
@@ -109,19 +99,13 @@ def inverse_spd(A: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class DesignMatrix:
-    """Columns of n unknowns and the residual, joint by joint, for one log.
+    """Columns of n unknowns and the residual, joint by joint, for one log."""
 
-    Attributes:
-        data_set: The log.
-        ids: By joint, numbers of the unknowns that touch it, shape (n_j,).
-        X: By joint, their columns, shape (n_j, R, C).
-        r: By joint, the residual, shape (R, C).
-    """
-
-    data_set: DataSet
+    data_set: DataSet  #: The log.
+    #: By joint, numbers of the unknowns that touch it, shape (n_j,).
     ids: Mapping[int, NDArray[np.intp]]
-    X: Mapping[int, Array]
-    r: Mapping[int, Array]
+    X: Mapping[int, Array]  #: By joint, their columns, shape (n_j, R, C).
+    r: Mapping[int, Array]  #: By joint, the residual, shape (R, C).
 
 
 def make_design_matrix(

@@ -73,19 +73,12 @@ class _Everywhere:
 
 @dataclass(frozen=True)
 class Accepted:
-    """An effect in the model.
+    """An effect in the model."""
 
-    Attributes:
-        effect: The effect.
-        place: Where.
-        x: Its coordinates.
-        shape: Its nonlinear parameters.
-    """
-
-    effect: Effect
-    place: Place
-    x: Mapping[str, float]
-    shape: Mapping[str, float]
+    effect: Effect  #: The effect.
+    place: Place  #: Where.
+    x: Mapping[str, float]  #: Its coordinates.
+    shape: Mapping[str, float]  #: Its nonlinear parameters.
 
     @property
     def nonlinear(self) -> dict[str, float]:
@@ -99,29 +92,20 @@ class Accepted:
 
 @dataclass(eq=False)
 class Problem:
-    """Everything linear about the machine at its present estimate.
+    """Everything linear about the machine at its present estimate."""
 
-    Attributes:
-        model: Before any effect.
-        data_sets: One per log.
-        sigma: Standard deviation that residuals are judged against, shape (J, C).
-        accepted: Effects in the model, in order.
-        tolerances: Always free within their priors.
-        held: What the present model holds of each tolerance, in its sigmas.
-        floor: Standard deviation of the noise, shape (J, C).
-        uncertainty: Of the URDF's bodies [1].
-        weights: Of the squared residuals, shape (J, C): one over the variance of what is taken for
-            noise, in floors.
-    """
-
-    model: MachineModel
-    data_sets: tuple[DataSet, ...]
-    sigma: Array
-    accepted: tuple[Accepted, ...] = ()
-    tolerances: tuple[Nuisance, ...] = ()
+    model: MachineModel  #: Before any effect.
+    data_sets: tuple[DataSet, ...]  #: One per log.
+    sigma: Array  #: Standard deviation that residuals are judged against, shape (J, C).
+    accepted: tuple[Accepted, ...] = ()  #: Effects in the model, in order.
+    tolerances: tuple[Nuisance, ...] = ()  #: Always free within their priors.
+    #: What the present model holds of each tolerance, in its sigmas.
     held: Array = field(default_factory=lambda: np.zeros(0))
+    #: Standard deviation of the noise, shape (J, C).
     floor: Array = field(default_factory=lambda: np.zeros(0))
-    uncertainty: float = UNCERTAINTY
+    uncertainty: float = UNCERTAINTY  #: Of the URDF's bodies [1].
+    #: Of the squared residuals, shape (J, C): one over the variance of what is taken for noise, in
+    #: floors.
     weights: Array = field(default_factory=lambda: np.zeros(0))
     _columns: dict[_Key, _Columns] = field(default_factory=dict)
     _files: list[Prediction] = field(default_factory=list)

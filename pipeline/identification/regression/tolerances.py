@@ -48,21 +48,15 @@ OFFSET_SIGMAS: Final = 0.75
 
 @dataclass(frozen=True)
 class Nuisance:
-    """One tolerance of one part of the machine.
+    """One tolerance of one part of the machine."""
 
-    Attributes:
-        kind: One of `STRAINS` (of a link's body), ``"torque_constant"``, ``"resistance"``,
-            ``"friction"`` (of the files), ``"encoder"``, ``"effort_zero"``, ``"compliance"`` or
-            ``"skew"`` (of all effort channels).
-        place: Link or joint.
-        sigma: Standard deviation before the log was seen.
-        unit: Of it.
-    """
-
+    #: One of `STRAINS` (of a link's body), ``"torque_constant"``, ``"resistance"``, ``"friction"``
+    #: (of the files), ``"encoder"``, ``"effort_zero"``, ``"compliance"`` or ``"skew"`` (of all
+    #: effort channels).
     kind: str
-    place: str
-    sigma: float
-    unit: str
+    place: str  #: Link or joint.
+    sigma: float  #: Standard deviation before the log was seen.
+    unit: str  #: Of it.
 
     @property
     def lowest(self) -> float:

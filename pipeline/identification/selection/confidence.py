@@ -23,19 +23,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Rival:
-    """What may stand in the place of a name.
+    """What may stand in the place of a name."""
 
-    Attributes:
-        key: Effect and place; None for nothing, or the URDF's bodies.
-        behind: Logarithm of how much less likely the log is with it.
-        sure: How many standard errors over blocks worse it predicts.
-        richer: Whether it has more coordinates, so that it may predict as well by having the name
-            in it.
-    """
-
-    key: Key | None
-    behind: float
-    sure: float
+    key: Key | None  #: Effect and place; None for nothing, or the URDF's bodies.
+    behind: float  #: Logarithm of how much less likely the log is with it.
+    sure: float  #: How many standard errors over blocks worse it predicts.
+    #: Whether it has more coordinates, so that it may predict as well by having the name in it.
     richer: bool = False
 
     @property

@@ -41,34 +41,21 @@ _SHRINKINGS: Final = 12
 
 @dataclass(frozen=True)
 class Rival:
-    """An effect at a place, at the parameters that explain the log.
+    """An effect at a place, at the parameters that explain the log."""
 
-    Attributes:
-        effect: The effect.
-        place: Where.
-        values: Its parameters; None where only its kind is known.
-    """
-
-    effect: Effect
-    place: Place
-    values: Values | None = None
+    effect: Effect  #: The effect.
+    place: Place  #: Where.
+    values: Values | None = None  #: Its parameters; None where only its kind is known.
 
 
 @dataclass(frozen=True, eq=False)
 class Deciding:
-    """A motion and how well it decides.
+    """A motion and how well it decides."""
 
-    Attributes:
-        name: Of the motion, in words.
-        time: Shape (N,) [s].
-        position: Shape (N, J) [rad].
-        misfit: What the best-fitting rival misses, in noise floors.
-    """
-
-    name: str
-    time: Array
-    position: Array
-    misfit: float
+    name: str  #: Of the motion, in words.
+    time: Array  #: Shape (N,) [s].
+    position: Array  #: Shape (N, J) [rad].
+    misfit: float  #: What the best-fitting rival misses, in noise floors.
 
 
 def deciding_motion(

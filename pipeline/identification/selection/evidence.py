@@ -46,16 +46,12 @@ RIDGE: Final = 1e-10
 
 @dataclass(frozen=True)
 class State:
-    """A set of names.
+    """A set of names."""
 
-    Attributes:
-        terms: Numbers of the pool's terms with the coordinates in use.
-        uncertainty: Of the URDF's bodies [1].
-        evidence: Its logarithm, priors of the names in it; up to a constant of the pool.
-    """
-
+    #: Numbers of the pool's terms with the coordinates in use.
     terms: tuple[tuple[int, tuple[int, ...]], ...]
-    uncertainty: float
+    uncertainty: float  #: Of the URDF's bodies [1].
+    #: Its logarithm, priors of the names in it; up to a constant of the pool.
     evidence: float = -np.inf
 
     @property

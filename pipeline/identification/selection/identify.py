@@ -46,15 +46,10 @@ _RENEWED: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class Identified:
-    """Naming with what it leads to.
+    """Naming with what it leads to."""
 
-    Attributes:
-        naming: Results.
-        settled: The set of names at its estimates.
-    """
-
-    naming: Naming
-    settled: Settled
+    naming: Naming  #: Results.
+    settled: Settled  #: The set of names at its estimates.
 
     @property
     def noise(self) -> Array:

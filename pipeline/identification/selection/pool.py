@@ -34,19 +34,12 @@ Key = tuple[str, Place]
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """An effect at a place with nonlinear parameters of its own.
+    """An effect at a place with nonlinear parameters of its own."""
 
-    Attributes:
-        effect: The effect.
-        place: Where.
-        shape: Its nonlinear parameters.
-        columns: Of the pool, one per coordinate.
-    """
-
-    effect: Effect
-    place: Place
-    shape: Mapping[str, float]
-    columns: Index
+    effect: Effect  #: The effect.
+    place: Place  #: Where.
+    shape: Mapping[str, float]  #: Its nonlinear parameters.
+    columns: Index  #: Of the pool, one per coordinate.
 
     @property
     def key(self) -> Key:
@@ -56,51 +49,31 @@ class Term:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """Normal equations of one effort channel of one joint by block.
+    """Normal equations of one effort channel of one joint by block."""
 
-    Attributes:
-        joint: Its number.
-        ids: Columns of the pool that touch it, (n,).
-        H: X^T X of every block, (B, n, n).
-        h: X^T r, (B, n).
-        s: r^T r, (B,).
-        count: Independent samples, (B,).
-        part: TRAIN or VALIDATION, (B,).
-        number: Of the channel.
-        effort: Mean square of the measured effort, in the noise's variance.
-        noise: Of the highest frequencies in the bandwidth, taken as white there, in standard
-            deviations of the floor; NaN where too few rows follow one another.
-    """
-
-    joint: int
-    ids: Index
-    H: Array
-    h: Array
-    s: Array
-    count: Array
-    part: NDArray[np.int8]
-    number: int
-    effort: float
+    joint: int  #: Its number.
+    ids: Index  #: Columns of the pool that touch it, (n,).
+    H: Array  #: X^T X of every block, (B, n, n).
+    h: Array  #: X^T r, (B, n).
+    s: Array  #: r^T r, (B,).
+    count: Array  #: Independent samples, (B,).
+    part: NDArray[np.int8]  #: TRAIN or VALIDATION, (B,).
+    number: int  #: Of the channel.
+    effort: float  #: Mean square of the measured effort, in the noise's variance.
+    #: Of the highest frequencies in the bandwidth, taken as white there, in standard deviations of
+    #: the floor; NaN where too few rows follow one another.
     noise: float
 
 
 @dataclass(frozen=True, eq=False)
 class Pool:
-    """The regression of everything that competes.
+    """The regression of everything that competes."""
 
-    Attributes:
-        problem: About whose present model the columns are.
-        terms: What competes, accepted effects first.
-        size: Number of columns; tolerances first.
-        channels: Normal equations of what may be learnt from.
-        held: Values of tolerances and of accepted effects' coordinates in the present model.
-    """
-
-    problem: Problem
-    terms: tuple[Term, ...]
-    size: int
-    channels: tuple[Channel, ...]
-    held: Array
+    problem: Problem  #: About whose present model the columns are.
+    terms: tuple[Term, ...]  #: What competes, accepted effects first.
+    size: int  #: Number of columns; tolerances first.
+    channels: tuple[Channel, ...]  #: Normal equations of what may be learnt from.
+    held: Array  #: Values of tolerances and of accepted effects' coordinates in the present model.
 
     @property
     def base(self) -> int:

@@ -35,19 +35,12 @@ _STARTS: Final = 2
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """A set of names at its estimates.
+    """A set of names at its estimates."""
 
-    Attributes:
-        problem: With the names as accepted effects and the uncertainty of the URDF.
-        search: On columns about these estimates.
-        state: The names there.
-        first: The search about the files' model.
-    """
-
-    problem: Problem
-    search: Search
-    state: State
-    first: Search
+    problem: Problem  #: With the names as accepted effects and the uncertainty of the URDF.
+    search: Search  #: On columns about these estimates.
+    state: State  #: The names there.
+    first: Search  #: The search about the files' model.
 
     @property
     def pool(self) -> Pool:

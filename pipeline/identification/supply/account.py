@@ -46,34 +46,20 @@ SMALL = 0.02
 
 @dataclass(frozen=True)
 class Share:
-    """One term's part of the mean power on test samples.
+    """One term's part of the mean power on test samples."""
 
-    Attributes:
-        term: Name.
-        words: What it is.
-        basis: ``"model"``: as log and model say, with a coefficient of one; ``"found"``; empty for
-            sums.
-        coefficient: Of its column; None for sums.
-        low: Lower end of its 95 % interval.
-        high: Upper end.
-        unit: Of the coefficient.
-        watts: Mean [W].
-        watts_low: Lower end of its 95 % interval [W].
-        watts_high: Upper end [W].
-        rivals: Terms that may stand in its place without predicting worse.
-    """
-
-    term: str
-    words: str
+    term: str  #: Name.
+    words: str  #: What it is.
+    #: ``"model"``: as log and model say, with a coefficient of one; ``"found"``; empty for sums.
     basis: str
-    coefficient: float | None
-    low: float | None
-    high: float | None
-    unit: str
-    watts: float
-    watts_low: float
-    watts_high: float
-    rivals: tuple[str, ...] = ()
+    coefficient: float | None  #: Of its column; None for sums.
+    low: float | None  #: Lower end of its 95 % interval.
+    high: float | None  #: Upper end.
+    unit: str  #: Of the coefficient.
+    watts: float  #: Mean [W].
+    watts_low: float  #: Lower end of its 95 % interval [W].
+    watts_high: float  #: Upper end [W].
+    rivals: tuple[str, ...] = ()  #: Terms that may stand in its place without predicting worse.
 
 
 @dataclass(frozen=True)
@@ -91,35 +77,23 @@ class DriveShare:
 
 @dataclass(frozen=True, eq=False)
 class Account:
-    """The answer of `gap power`.
+    """The answer of `gap power`."""
 
-    Attributes:
-        shares: Rows of `power.csv`, what was measured and what stays unexplained last.
-        drives: By joint.
-        rows: Every sample.
-        proves: Which of them are test samples, shape (K,).
-        explained: Power by all terms, shape (K,) [W].
-        rms: Of measured minus predicted on test samples, by the model's sum and with all
-            terms [W].
-        reading: How samples were read: ``"mean"`` or ``"instant"``.
-        wrong_sum: ``"recognised"``, ``"possible"`` or empty: whether motor currents times the
-            supply's voltage were taken for its power; where that is recognised nothing is found.
-        sag: Where voltage and current of the supply were both measured, else None.
-        by_model: Joints whose torque no log tells.
-        logs: Names.
-    """
-
+    #: Rows of `power.csv`, what was measured and what stays unexplained last.
     shares: tuple[Share, ...]
-    drives: tuple[DriveShare, ...]
-    rows: Rows
-    proves: Mask
-    explained: Array
+    drives: tuple[DriveShare, ...]  #: By joint.
+    rows: Rows  #: Every sample.
+    proves: Mask  #: Which of them are test samples, shape (K,).
+    explained: Array  #: Power by all terms, shape (K,) [W].
+    #: Of measured minus predicted on test samples, by the model's sum and with all terms [W].
     rms: tuple[float, float]
-    reading: str
+    reading: str  #: How samples were read: ``"mean"`` or ``"instant"``.
+    #: ``"recognised"``, ``"possible"`` or empty: whether motor currents times the supply's voltage
+    #: were taken for its power; where that is recognised nothing is found.
     wrong_sum: str
-    sag: Sag | None
-    by_model: tuple[str, ...]
-    logs: tuple[str, ...]
+    sag: Sag | None  #: Where voltage and current of the supply were both measured, else None.
+    by_model: tuple[str, ...]  #: Joints whose torque no log tells.
+    logs: tuple[str, ...]  #: Names.
 
     def share(self, term: str) -> Share | None:
         """A term's row, or None where it was not taken in."""

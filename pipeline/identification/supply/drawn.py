@@ -30,35 +30,20 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """Power by drive along one log, positive from supply to motor.
+    """Power by drive along one log, positive from supply to motor."""
 
-    Attributes:
-        time: Shape (N,) [s].
-        joints: Names of the columns.
-        speed: Of the joints, shape (N, J) [rad/s].
-        work: Torque of the bodies times speed, shape (N, J) [W].
-        friction: Of the motor's mechanical power what is no work, shape (N, J) [W].
-        copper: R i^2, shape (N, J) [W].
-        current: Of the motors, shape (N, J) [A].
-        enabled: Whether the drive is on, shape (N, J).
-        usable: Whether all of it is known, shape (N,).
-        step: Between rows without a gap [s].
-        reach: Time within which the low-pass of the motion blurs [s].
-        by_model: Joints whose torque is the model's.
-    """
-
-    time: Array
-    joints: tuple[str, ...]
-    speed: Array
-    work: Array
-    friction: Array
-    copper: Array
-    current: Array
-    enabled: Mask
-    usable: Mask
-    step: float
-    reach: float
-    by_model: tuple[str, ...]
+    time: Array  #: Shape (N,) [s].
+    joints: tuple[str, ...]  #: Names of the columns.
+    speed: Array  #: Of the joints, shape (N, J) [rad/s].
+    work: Array  #: Torque of the bodies times speed, shape (N, J) [W].
+    friction: Array  #: Of the motor's mechanical power what is no work, shape (N, J) [W].
+    copper: Array  #: R i^2, shape (N, J) [W].
+    current: Array  #: Of the motors, shape (N, J) [A].
+    enabled: Mask  #: Whether the drive is on, shape (N, J).
+    usable: Mask  #: Whether all of it is known, shape (N,).
+    step: float  #: Between rows without a gap [s].
+    reach: float  #: Time within which the low-pass of the motion blurs [s].
+    by_model: tuple[str, ...]  #: Joints whose torque is the model's.
 
     @property
     def electrical(self) -> Array:

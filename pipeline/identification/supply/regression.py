@@ -43,17 +43,11 @@ SEED: Final = 1
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Rows that estimate and choose, and terms that may be taken in.
+    """Rows that estimate and choose, and terms that may be taken in."""
 
-    Attributes:
-        rows: Without test rows.
-        block: Of each of them, shape (K,).
-        terms: All of them.
-    """
-
-    rows: Rows
-    block: NDArray[np.intp]
-    terms: tuple[Term, ...]
+    rows: Rows  #: Without test rows.
+    block: NDArray[np.intp]  #: Of each of them, shape (K,).
+    terms: tuple[Term, ...]  #: All of them.
 
     def fit(self, names: Sequence[str], kept: NDArray[np.intp] | slice = slice(None)) -> Array:
         """Coefficients of some terms by some rows, (T,)."""

@@ -19,20 +19,13 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Sag:
-    """A supply's resistance with its 95 % interval, and how it shows.
+    """A supply's resistance with its 95 % interval, and how it shows."""
 
-    Attributes:
-        resistance: [ohm].
-        low: Lower end [ohm].
-        high: Upper end [ohm].
-        voltage: Without current, at the first sample [V].
-        lost: Mean power that the resistance turns into heat before the voltage is measured [W].
-    """
-
-    resistance: float
-    low: float
-    high: float
-    voltage: float
+    resistance: float  #: [ohm].
+    low: float  #: Lower end [ohm].
+    high: float  #: Upper end [ohm].
+    voltage: float  #: Without current, at the first sample [V].
+    #: Mean power that the resistance turns into heat before the voltage is measured [W].
     lost: float
 
 

@@ -23,23 +23,14 @@ _HELD: Final = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """Samples of the supply of one log, each the mean over the time since the one before.
+    """Samples of the supply of one log, each the mean over the time since the one before."""
 
-    Attributes:
-        begin: Shape (K,) [s].
-        end: Shape (K,) [s].
-        power: Shape (K,) [W].
-        voltage: Shape (K,) [V]; NaN where it is not known.
-        current: Out of the supply, shape (K,) [A]; NaN where it is not known.
-        measured: Whether the voltage was measured and not stated.
-    """
-
-    begin: Array
-    end: Array
-    power: Array
-    voltage: Array
-    current: Array
-    measured: bool
+    begin: Array  #: Shape (K,) [s].
+    end: Array  #: Shape (K,) [s].
+    power: Array  #: Shape (K,) [W].
+    voltage: Array  #: Shape (K,) [V]; NaN where it is not known.
+    current: Array  #: Out of the supply, shape (K,) [A]; NaN where it is not known.
+    measured: bool  #: Whether the voltage was measured and not stated.
 
 
 def supply_samples(log: Log, shortest: float) -> Samples:

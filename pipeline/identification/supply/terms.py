@@ -30,43 +30,27 @@ OWN = ("work", "friction", "copper")
 
 @dataclass(frozen=True)
 class Term:
-    """A power that the model's sum may lack.
+    """A power that the model's sum may lack."""
 
-    Attributes:
-        name: Of the column, with its leg where it has one, e.g. ``extra_friction lf``.
-        words: What it is.
-        unit: Of the coefficient.
-        low: Least coefficient.
-        high: Greatest coefficient.
-    """
-
-    name: str
-    words: str
-    unit: str
-    low: float = 0.0
-    high: float = np.inf
+    name: str  #: Of the column, with its leg where it has one, e.g. ``extra_friction lf``.
+    words: str  #: What it is.
+    unit: str  #: Of the coefficient.
+    low: float = 0.0  #: Least coefficient.
+    high: float = np.inf  #: Greatest coefficient.
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Samples of the supply of all logs with what they are held against; shapes (K,).
+    """Samples of the supply of all logs with what they are held against; shapes (K,)."""
 
-    Attributes:
-        log: Number of each sample's log.
-        begin: [s].
-        end: [s].
-        power: Measured [W].
-        own: Of the model's sum, by `OWN` [W].
-        columns: By a term's name; a coefficient of one gives watts or the term's unit.
-        summed: Motor currents summed, times the supply's voltage where it is known, by their sign.
-    """
-
-    log: NDArray[np.intp]
-    begin: Array
-    end: Array
-    power: Array
-    own: Mapping[str, Array]
+    log: NDArray[np.intp]  #: Number of each sample's log.
+    begin: Array  #: [s].
+    end: Array  #: [s].
+    power: Array  #: Measured [W].
+    own: Mapping[str, Array]  #: Of the model's sum, by `OWN` [W].
+    #: By a term's name; a coefficient of one gives watts or the term's unit.
     columns: Mapping[str, Array]
+    #: Motor currents summed, times the supply's voltage where it is known, by their sign.
     summed: Mapping[str, Array]
 
     def __len__(self) -> int:

@@ -18,15 +18,10 @@ from pipeline.progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """What the model lacks.
+    """What the model lacks."""
 
-    Attributes:
-        named: The names and what they rest on.
-        where: Logs with the noise floor that the explanation found.
-    """
-
-    named: Identified
-    where: Whereabouts
+    named: Identified  #: The names and what they rest on.
+    where: Whereabouts  #: Logs with the noise floor that the explanation found.
 
     @property
     def naming(self) -> Naming:

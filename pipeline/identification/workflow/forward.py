@@ -26,17 +26,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """One model along one log.
+    """One model along one log."""
 
-    Attributes:
-        log: What the machine did.
-        model: What the model has that the one before has not.
-        rollout: What the model did.
-    """
-
-    log: Log
-    model: str
-    rollout: Rollout
+    log: Log  #: What the machine did.
+    model: str  #: What the model has that the one before has not.
+    rollout: Rollout  #: What the model did.
 
     @property
     def miss(self) -> Array:

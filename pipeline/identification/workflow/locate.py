@@ -22,23 +22,14 @@ from pipeline.simulation.predict import Prediction, Simulator
 
 @dataclass(frozen=True, eq=False)
 class Whereabouts:
-    """Steps 1 and 2.
+    """Steps 1 and 2."""
 
-    Attributes:
-        intake: The logs.
-        parts: Of the logs.
-        fitted: How many of them may be fitted, the first ones.
-        measurements: One per log.
-        predictions: By the model as it is.
-        rows: Of `where.csv`.
-    """
-
-    intake: Intake
-    parts: Parts
-    fitted: int
-    measurements: tuple[Measurement, ...]
-    predictions: tuple[Prediction, ...]
-    rows: tuple[Where, ...]
+    intake: Intake  #: The logs.
+    parts: Parts  #: Of the logs.
+    fitted: int  #: How many of them may be fitted, the first ones.
+    measurements: tuple[Measurement, ...]  #: One per log.
+    predictions: tuple[Prediction, ...]  #: By the model as it is.
+    rows: tuple[Where, ...]  #: Of `where.csv`.
 
 
 def find_where(

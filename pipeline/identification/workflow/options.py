@@ -22,42 +22,27 @@ DEFAULT_OUT: Final = Path("reports/out/gap")
 
 @dataclass(frozen=True)
 class Options:
-    """Logs, machine and choices of one run; names and defaults are those of the command line.
+    """Logs, machine and choices of one run; names and defaults are those of the command line."""
 
-    Attributes:
-        logs: CSV or Parquet, to learn from.
-        step: One of `STEPS`, or ``all``.
-        robot: Robot file or URDF; the model file's or the hexapod by default.
-        model: Model file with effects found earlier.
-        gait: File with a table ``[gait]`` that was walked instead of the robot file's.
-        holdout: Test logs.
-        base: ``fixed``, ``level`` or ``measured``; as log and robot say by default.
-        gait_start: Time in the log at which a period of the gait begins [s].
-        mapping: Mapping file for foreign columns.
-        alternative: Actuator between joint and supply, by name.
-        actuators: Folder of actuator files of one's own.
-        changes: Numbers that differ from the files', by their keys.
-        effort: Channel to compare; the log's most direct by default.
-        cutoff: Bandwidth of the comparison [Hz]; the data's own by default.
-        prove_last: Last share of every log that is for the test; blocks in between by default.
-        out: Folder for what is written; the model file names its robot relative to it.
-        decimal: Sign of decimals in copies of the tables.
-    """
-
-    logs: tuple[Path, ...]
-    step: str = "all"
-    robot: Path | None = None
-    model: Path | None = None
+    logs: tuple[Path, ...]  #: CSV or Parquet, to learn from.
+    step: str = "all"  #: One of `STEPS`, or ``all``.
+    robot: Path | None = None  #: Robot file or URDF; the model file's or the hexapod by default.
+    model: Path | None = None  #: Model file with effects found earlier.
+    #: File with a table ``[gait]`` that was walked instead of the robot file's.
     gait: Path | None = None
-    holdout: tuple[Path, ...] = ()
+    holdout: tuple[Path, ...] = ()  #: Test logs.
+    #: ``fixed``, ``level`` or ``measured``; as log and robot say by default.
     base: str | None = None
-    gait_start: float | None = None
-    mapping: Path | None = None
-    alternative: str | None = None
-    actuators: Path | None = None
+    gait_start: float | None = None  #: Time in the log at which a period of the gait begins [s].
+    mapping: Path | None = None  #: Mapping file for foreign columns.
+    alternative: str | None = None  #: Actuator between joint and supply, by name.
+    actuators: Path | None = None  #: Folder of actuator files of one's own.
+    #: Numbers that differ from the files', by their keys.
     changes: Mapping[str, object] = field(default_factory=dict)
-    effort: str | None = None
-    cutoff: float | None = None
+    effort: str | None = None  #: Channel to compare; the log's most direct by default.
+    cutoff: float | None = None  #: Bandwidth of the comparison [Hz]; the data's own by default.
+    #: Last share of every log that is for the test; blocks in between by default.
     prove_last: float | None = None
+    #: Folder for what is written; the model file names its robot relative to it.
     out: Path = DEFAULT_OUT
-    decimal: str = "."
+    decimal: str = "."  #: Sign of decimals in copies of the tables.

@@ -57,37 +57,23 @@ BASES = ("fixed", "level", "measured")
 
 @dataclass(frozen=True)
 class Setup:
-    """The machine as its files describe it.
+    """The machine as its files describe it."""
 
-    Attributes:
-        path: Robot file or URDF.
-        sources: Every file that was read, for hashes.
-        robot: None for a bare URDF.
-        model: As the workflow computes it.
-        expected: What a log of it looks like.
-        catalog: Actuator components and alternatives.
-        own: What single joints have of their own.
-        alternative: Name of the actuator chain; empty without one.
-        file: The model file whose edits are in `model`; without edits where none was given.
-        bare: The model before those edits.
-        warnings: What of the files a reader should know, in words.
-        folder: Of the actuator files, the user's or the project's.
-        mimics: Joints of the URDF that mimic another, to the other's name; no log may move them.
-    """
-
-    path: Path
-    sources: tuple[Path, ...]
-    robot: Robot | None
-    model: MachineModel
-    expected: Expected
-    catalog: Catalog
-    own: OwnActuators
-    alternative: str
+    path: Path  #: Robot file or URDF.
+    sources: tuple[Path, ...]  #: Every file that was read, for hashes.
+    robot: Robot | None  #: None for a bare URDF.
+    model: MachineModel  #: As the workflow computes it.
+    expected: Expected  #: What a log of it looks like.
+    catalog: Catalog  #: Actuator components and alternatives.
+    own: OwnActuators  #: What single joints have of their own.
+    alternative: str  #: Name of the actuator chain; empty without one.
+    #: The model file whose edits are in `model`; without edits where none was given.
     file: ModelFile
-    bare: MachineModel
-    warnings: tuple[str, ...] = ()
+    bare: MachineModel  #: The model before those edits.
+    warnings: tuple[str, ...] = ()  #: What of the files a reader should know, in words.
+    #: Joints of the URDF that mimic another, to the other's name; no log may move them.
     mimics: Mapping[str, str] = field(default_factory=dict)
-    folder: Path = CATALOG
+    folder: Path = CATALOG  #: Of the actuator files, the user's or the project's.
 
     @property
     def motors(self) -> Motors | None:

@@ -36,27 +36,18 @@ WORTH_SHOWING = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Story:
-    """Everything a page tells.
+    """Everything a page tells."""
 
-    Attributes:
-        given: Robot and actuators.
-        where: Steps 1 and 2.
-        naming: Step 3; without candidates where a model file was checked.
-        weighed: The model as written against the logs, effect by effect.
-        energy: With and without the effects; None for a robot that does not walk.
-        signatures: File name to caption, one per effect that shows at a joint with rows.
-        decides: What the deciding motion is, in words; empty without one.
-        remarks: What else a reader should know.
-    """
-
-    given: Setup
-    where: Whereabouts
-    naming: Naming
-    weighed: Weighed
+    given: Setup  #: Robot and actuators.
+    where: Whereabouts  #: Steps 1 and 2.
+    naming: Naming  #: Step 3; without candidates where a model file was checked.
+    weighed: Weighed  #: The model as written against the logs, effect by effect.
+    #: With and without the effects; None for a robot that does not walk.
     energy: EnergyChange | None
+    #: File name to caption, one per effect that shows at a joint with rows.
     signatures: dict[str, str]
-    decides: str
-    remarks: tuple[str, ...]
+    decides: str  #: What the deciding motion is, in words; empty without one.
+    remarks: tuple[str, ...]  #: What else a reader should know.
 
     @property
     def suspected(self) -> tuple[str, ...]:
@@ -77,19 +68,13 @@ class Story:
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """What a run writes.
+    """What a run writes."""
 
-    Attributes:
-        story: For the page.
-        deciding: Motion that decides between a found effect and its rivals; None without one.
-        model_file: Text of the model file; empty where there is nothing to add.
-        shown: Columns of the joints that the figure in time shows.
-    """
-
-    story: Story
+    story: Story  #: For the page.
+    #: Motion that decides between a found effect and its rivals; None without one.
     deciding: Deciding | None
-    model_file: str
-    shown: tuple[int, ...]
+    model_file: str  #: Text of the model file; empty where there is nothing to add.
+    shown: tuple[int, ...]  #: Columns of the joints that the figure in time shows.
 
 
 def with_every(model: MachineModel, found: Sequence[Found]) -> MachineModel:

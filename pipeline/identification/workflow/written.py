@@ -32,23 +32,16 @@ AS_IT_WAS = "model as it was"
 
 @dataclass(frozen=True, eq=False)
 class Weighed:
-    """A model file against the logs.
+    """A model file against the logs."""
 
-    Attributes:
-        found: Effects, with what each closes on test rows and whether the file holds it.
-        stages: The model as it was, with one effect of the file after another.
-        pairs: Per effect, the stage without it and the stage with it.
-        joints: Per effect, the column at which it shows.
-        left: What the model as written leaves.
-        text: Of the file; empty where there is none.
-    """
-
+    #: Effects, with what each closes on test rows and whether the file holds it.
     found: tuple[Found, ...]
-    stages: tuple[Stage, ...]
+    stages: tuple[Stage, ...]  #: The model as it was, with one effect of the file after another.
+    #: Per effect, the stage without it and the stage with it.
     pairs: tuple[tuple[Stage, Stage], ...]
-    joints: tuple[int, ...]
-    left: tuple[Remainder, ...]
-    text: str = ""
+    joints: tuple[int, ...]  #: Per effect, the column at which it shows.
+    left: tuple[Remainder, ...]  #: What the model as written leaves.
+    text: str = ""  #: Of the file; empty where there is none.
 
     @property
     def unexplained(self) -> bool:

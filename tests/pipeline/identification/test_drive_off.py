@@ -81,14 +81,17 @@ def driven(seed: int, open_bridge: bool, seconds: float = 8.0) -> Log:
 
 
 @cache
-def measurements(bridge: str | None) -> tuple[Measurement, ...]:
+def measurements(
+    bridge: str | None, train: int = 2, seconds: float = 8.0
+) -> tuple[Measurement, ...]:
+    """Training logs and one for the test."""
     model = stated()
-    logs = [
-        replace(driven(seed, bridge != "shorted"), torque_off_bridge=bridge) for seed in (1, 2, 3)
-    ]
+    seeds = range(1, train + 2)
+    runs = [driven(k, bridge != "shorted", seconds) for k in seeds]
+    logs = [replace(run, torque_off_bridge=bridge) for run in runs]
     expected = expected_of_model(model.rigid, model.name, joints=model.joints)
     intake = prepare_logs(logs, expected, cutoff=12.0)
-    parts = split(intake.prepared[:2], holdout=intake.prepared[2:])
+    parts = split(intake.prepared[:train], holdout=intake.prepared[train:])
     return observe(model, intake.prepared, parts)
 
 
@@ -98,7 +101,7 @@ def named(bridge: str) -> Naming:
 
 
 def test_only_rows_whose_filter_sees_no_drive_count() -> None:
-    told, untold = measurements("open")[0], measurements(None)[0]
+    told, untold = (measurements(bridge, 1, 4.8)[0] for bridge in ("open", None))
     assert told.open_winding is not None
     assert untold.open_winding is None
     more = told.mask & ~untold.mask

@@ -27,7 +27,7 @@ def with_motor(model: MachineModel, **changes: float) -> MachineModel:
 
 @pytest.fixture(scope="module")
 def motion() -> Measurement:
-    return leg.leg_motion()
+    return leg.leg_motion(duration=8.0)
 
 
 def test_the_files_interval_is_the_tolerance(motion: Measurement) -> None:
