@@ -14,15 +14,10 @@ Scalars: TypeAlias = float | Array  # one number for all joints, or one per join
 
 
 def require(condition: object, where: str, remedy: str) -> None:
-    """Raise unless a condition holds for every joint.
-
-    Args:
-        condition: Boolean or boolean array (J,); NaN compares false and so is refused.
-        where: The element.
-        remedy: What must hold.
+    """Raise unless a condition of the element `where` holds for every joint; NaN does not.
 
     Raises:
-        UnphysicalElementError: The condition fails for at least one joint.
+        UnphysicalElementError: Says that the `remedy` must hold.
     """
     if not np.all(np.asarray(condition)):
         raise UnphysicalElementError(f"element '{where}': {remedy}")
@@ -43,5 +38,4 @@ def require_non_negative(where: str, **values: Scalars) -> None:
 
 def least_magnitude(low: Array, high: Array) -> Array:
     """Return the value of least magnitude in each interval [low, high]."""
-    value: Array = np.clip(0.0, low, high)
-    return value
+    return np.asarray(np.clip(0.0, low, high))

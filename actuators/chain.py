@@ -1,5 +1,6 @@
 """A chain of elements from the joint to the supply, and its answers in motion and at rest."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
@@ -58,16 +59,8 @@ class ChainResult:
         return (*self.shafts, SUPPLY_STAGE)
 
     def stage_power(self, stage: str) -> Array:
-        """Return the power towards the joint at a stage, (N, J) [W].
-
-        Raises:
-            ChainError: The chain has no such stage.
-        """
-        if stage == SUPPLY_STAGE:
-            return self.electrical_power
-        if stage not in self.shafts:
-            raise ChainError(f"{self.chain}: no stage '{stage}': {closest(stage, self.stages)}")
-        return self.shafts[stage].power
+        """Return the power towards the joint at one of the stages, (N, J) [W]."""
+        return self.electrical_power if stage == SUPPLY_STAGE else self.shafts[stage].power
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +99,7 @@ class Chain:
     @property
     def ratio(self) -> Scalars:
         """Motor speed over joint speed."""
-        total: Scalars = 1.0
-        for element in self.elements:
-            total = total * element.gearing
-        return total
+        return math.prod((element.gearing for element in self.elements), start=1.0)
 
     def element(self, name: str) -> Element:
         """Return an element by name.
@@ -117,25 +107,21 @@ class Chain:
         Raises:
             ChainError: There is none of that name.
         """
-        return self.elements[self._index(name)]
+        known = {e.name: e for e in self.elements}
+        if name not in known:
+            raise ChainError(f"{self.name}: no element '{name}': {closest(name, [*known])}")
+        return known[name]
 
     def replaced(self, element: Element) -> "Chain":
-        """Return a chain in which the element of the same name is this one.
-
-        Raises:
-            ChainError: There is none of that name.
-        """
-        at = self._index(element.name)
-        return replace(self, elements=(*self.elements[:at], element, *self.elements[at + 1 :]))
+        """Return a chain in which the element of the same name is this one; see `element`."""
+        old = self.element(element.name)
+        return replace(self, elements=tuple(element if e is old else e for e in self.elements))
 
     def inverse(self, joint: ShaftSeries) -> ChainResult:
-        """Return everything the chain needs for a motion of its joints.
+        """Return everything the chain needs for a motion, best split by `split_at_reversals`.
 
         Samples of a joint at rest (`direction` zero) get the holding torque of least magnitude
         at every stage: no power flows through a standing shaft, only R I^2 into the motor.
-
-        Args:
-            joint: Series at the joints, best split by `split_at_reversals`.
         """
         at_rest = joint.direction == 0.0
         standing = bool(at_rest.any())
@@ -164,16 +150,9 @@ class Chain:
         current = self.motor.current(last.torque)
         voltage = self.motor.voltage(current, last.velocity)
         losses[self.motor.name] = self.motor.copper_loss(current)
-        return ChainResult(
-            chain=self.name,
-            shafts=shafts,
-            losses=losses,
-            stored=stored,
-            current=current,
-            voltage=voltage,
-            electrical_power=voltage * current + drawn,
-            motors=(self.motor,) * len(joint.joints),
-        )
+        power = voltage * current + drawn
+        motors = (self.motor,) * len(joint.joints)
+        return ChainResult(self.name, shafts, losses, stored, current, voltage, power, motors)
 
     def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
         """Return what holds joint torques at standstill.
@@ -199,10 +178,7 @@ class Chain:
         return HoldingResult(low, high, motor_torque, current, voltage, voltage * current + drawn)
 
     def forward(self, motor: ShaftSeries) -> ShaftSeries:
-        """Return what reaches the joints from the motor's torque, all motion being known.
-
-        Args:
-            motor: Series at the motor's shaft.
+        """Return what reaches the joints from the series at the motor's shaft.
 
         Raises:
             SelfLockingError: A self-locking gear is asked to move against its pinion's torque.
@@ -211,13 +187,6 @@ class Chain:
         for element in reversed(self.elements):
             side = element.forward(side)
         return side
-
-    def _index(self, name: str) -> int:
-        """Return the place of an element in the list."""
-        names = [e.name for e in self.elements]
-        if name not in names:
-            raise ChainError(f"{self.name}: no element '{name}': {closest(name, names)}")
-        return names.index(name)
 
 
 def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
@@ -229,18 +198,11 @@ def moved(elements: Iterable[Element], joint: ShaftSeries) -> ShaftSeries:
 
 
 def held(
-    elements: Iterable[Element],
-    low: Array,
-    high: Array,
-    position: Array | None = None,
+    elements: Iterable[Element], low: Array, high: Array, position: Array | None = None
 ) -> tuple[Array, Array]:
-    """Return which torques at the motor side of a row of elements hold at standstill.
+    """Return which torques at the motor side of a row of elements hold a load at standstill.
 
-    Args:
-        elements: From the joint to the motor.
-        low: Least torques at the joint side (...) [N*m].
-        high: Greatest ones (...) [N*m].
-        position: Of the joint side (...) [rad]; see `Chain.holding`.
+    Torques (...) [N*m], position of the joint side (...) [rad]; see `Chain.holding`.
     """
     for element, angle in _placed(elements, position):
         low, high = element.holding(low, high, angle)

@@ -56,14 +56,7 @@ def one_line(text: object) -> str:
 
 
 def closest(name: str, known: Sequence[str]) -> str:
-    """Return a hint naming the closest known name, or the known names where none is close.
-
-    A catalogue's names are many: of more than one reads, the first.
-
-    Args:
-        name: What was written.
-        known: What would have been accepted.
-    """
+    """Return a hint: the closest known name, or the first of the known where none is close."""
     match = difflib.get_close_matches(one_line(name), known, n=1)
     if match:
         return f"did you mean '{match[0]}'?"

@@ -82,12 +82,7 @@ class Parameter:
 
 
 class ParameterSet(Mapping[str, float]):
-    """An ordered, unchangeable set of parameters: `set[name]` is the SI value.
-
-    Args:
-        parameters: In the order of their rows.
-        where: File or component the set comes from, for messages.
-    """
+    """An ordered, unchangeable set of parameters, of a file or component: SI values by name."""
 
     def __init__(self, parameters: tuple[Parameter, ...], where: str) -> None:
         self._parameters: Final = {p.name: p for p in parameters}
@@ -97,8 +92,7 @@ class ParameterSet(Mapping[str, float]):
         return self.parameter(name).value
 
     def __contains__(self, name: object) -> bool:
-        # Mapping asks __getitem__ and expects a KeyError, which a message in one line is not.
-        return name in self._parameters
+        return name in self._parameters  # of Mapping's own, a KeyError would be the message
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._parameters)
@@ -124,11 +118,11 @@ class ParameterSet(Mapping[str, float]):
         return tuple(self._parameters.values())
 
     def replaced(self, name: str, value: float, **changes: Any) -> "ParameterSet":
-        """Return a new set in which one parameter has another value.
+        """Return a set in which one parameter has another SI value.
 
         Args:
             name: Which parameter.
-            value: New value in SI units, inside the parameter's bounds.
+            value: Inside the parameter's bounds.
             **changes: New `basis`, `source`, `interval` (SI) and `reason`. Without them the
                 parameter becomes an assumption whose interval spans the old one and the value.
 
@@ -149,8 +143,6 @@ class ParameterSet(Mapping[str, float]):
             replacement = dataclasses.replace(old, **new)
         except ParameterError as error:
             raise ParameterError(f"{self.where}: {error}") from None
-        except TypeError as error:
-            raise ParameterError(f"{self.where}: '{name}': {one_line(error)}") from None
         rows = tuple(replacement if p.name == name else p for p in self.rows())
         return ParameterSet(rows, self.where)
 
@@ -169,8 +161,6 @@ def read_toml(path: str | Path) -> dict[str, Any]:
 
 
 class _Written(Table):
-    """A parameter as it stands in a file."""
-
     expected = "{value, unit, basis, source}"
     value: Number
     unit: str
@@ -182,8 +172,6 @@ class _Written(Table):
 
 
 class _Names(Table):
-    """Parameters by name."""
-
     noun = "parameter"
     expected = "parameters by name"
 
@@ -236,23 +224,3 @@ def parameters_from_table(
     read = checked(names, table, where, ParameterError)
     rows = (getattr(read, name) for name in schema)
     return ParameterSet(tuple(row for row in rows if row is not None), where)
-
-
-def load_parameters(
-    path: str | Path, schema: Mapping[str, str], table: str = "parameters"
-) -> ParameterSet:
-    """Load the parameters of one TOML file.
-
-    Args:
-        path: The file.
-        schema: As for `parameters_from_table`.
-        table: Name of the table that holds them.
-
-    Raises:
-        ParameterError: As for `read_toml` and `parameters_from_table`.
-    """
-    contents = read_toml(path)
-    name = one_line(Path(path).name)
-    if table not in contents:
-        raise ParameterError(f"{name}: no table [{table}]: {closest(table, list(contents))}")
-    return parameters_from_table(contents[table], schema, f"{name} [{table}]")

@@ -26,6 +26,7 @@ from actuators.arrays import Array, Scalars
 from actuators.errors import ShaftError
 
 REST_SPEED: Final = 1e-9  # [rad/s]
+_BY_JOINT: Final = ("position", "velocity", "acceleration", "torque", "direction")
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +51,7 @@ class ShaftSeries:
         acceleration: ArrayLike,
         torque: ArrayLike,
     ) -> "ShaftSeries":
-        """Return a checked series with its directions decided.
-
-        Args:
-            joints: Names of the J joints.
-            time: (N,) [s].
-            position: (N, J) [rad].
-            velocity: (N, J) [rad/s].
-            acceleration: (N, J) [rad/s^2].
-            torque: (N, J) [N*m].
+        """Return a checked series with its directions decided; arguments as its fields.
 
         Raises:
             ShaftError: Shapes differ, a value is not finite, time runs backwards, or a joint is
@@ -71,25 +64,19 @@ class ShaftSeries:
         if t.ndim != 1 or t.size == 0:
             raise ShaftError(f"time has shape {t.shape}: expected (N,) with N >= 1")
         shape = (t.size, len(names))
-        arrays: dict[str, Array] = {}
-        for name, values in (
-            ("position", position),
-            ("velocity", velocity),
-            ("acceleration", acceleration),
-            ("torque", torque),
-        ):
-            array = np.asarray(values, dtype=float)
+        given = {"position": position, "velocity": velocity}
+        given |= {"acceleration": acceleration, "torque": torque}
+        arrays = {name: np.asarray(values, dtype=float) for name, values in given.items()}
+        for name, array in arrays.items():
             if array.shape != shape:
                 raise ShaftError(f"{name} has shape {array.shape}: expected {shape} (time, joint)")
             if not np.isfinite(array).all():
                 row, column = np.argwhere(~np.isfinite(array))[0]
                 raise ShaftError(f"{name} of '{names[column]}' is not finite in sample {row}")
-            arrays[name] = array
         if not np.isfinite(t).all() or (np.diff(t) < 0.0).any():
             raise ShaftError("time must be finite and never decrease: sort the samples")
         direction, rest = directions(t, arrays["velocity"])
-        if rest.any():
-            arrays["velocity"] = np.where(rest, 0.0, arrays["velocity"])
+        arrays["velocity"] = np.where(rest, 0.0, arrays["velocity"])
         return cls(joints=names, time=t, direction=direction, **arrays)
 
     @property
@@ -99,55 +86,38 @@ class ShaftSeries:
 
     def at(self, joint: int) -> "ShaftSeries":
         """Return the series of one joint, by column."""
-        k = slice(joint, joint + 1)
-        return ShaftSeries(
-            joints=self.joints[k],
-            time=self.time,
-            position=self.position[:, k],
-            velocity=self.velocity[:, k],
-            acceleration=self.acceleration[:, k],
-            torque=self.torque[:, k],
-            direction=self.direction[:, k],
-        )
+        return self._columns(slice(joint, joint + 1), self.joints[joint : joint + 1])
+
+    def of(self, joints: Sequence[str]) -> "ShaftSeries":
+        """Return the series of some joints, by name."""
+        return self._columns([self.joints.index(joint) for joint in joints], tuple(joints))
+
+    def _columns(self, which: slice | list[int], joints: tuple[str, ...]) -> "ShaftSeries":
+        arrays = {name: getattr(self, name)[:, which] for name in _BY_JOINT}
+        return ShaftSeries(joints=joints, time=self.time, **arrays)
 
     def with_torque(self, torque: Array) -> "ShaftSeries":
         """Return the same motion with another torque, (N, J) [N*m]; arrays are shared."""
         return replace(self, torque=torque)
 
     def geared(self, ratio: Scalars, torque: Array) -> "ShaftSeries":
-        """Return the motion of a shaft that turns `ratio` times as fast, with its torque.
-
-        Args:
-            ratio: Positive, dimensionless, for all joints or (J,).
-            torque: (N, J) [N*m] at the faster shaft.
-        """
-        return ShaftSeries(
-            joints=self.joints,
-            time=self.time,
+        """Return a shaft that turns `ratio` times as fast, with its torque (N, J) [N*m]."""
+        return replace(
+            self,
             position=self.position * ratio,
             velocity=self.velocity * ratio,
             acceleration=self.acceleration * ratio,
             torque=torque,
-            direction=self.direction,
         )
-
-
-def block_starts(time: Array) -> NDArray[np.intp]:
-    """Return the index of each block's first sample: 0 and every second of a repeated stamp."""
-    return np.concatenate(([0], np.flatnonzero(np.diff(time) == 0.0) + 1))
 
 
 def directions(time: Array, velocity: Array) -> tuple[Array, NDArray[np.bool_]]:
     """Decide sgn(velocity) for every sample by the rules of this module.
 
-    Args:
-        time: (N,) [s].
-        velocity: (N, J) [rad/s].
-
     Returns:
         Directions (N, J) in {-1, 0, +1}, and which samples lie in a block at rest (N, J).
     """
-    starts = block_starts(time)
+    starts = np.concatenate(([0], np.flatnonzero(np.diff(time) == 0.0) + 1))  # of the blocks
     lengths = np.diff(np.append(starts, time.size))
     high = np.maximum.reduceat(velocity, starts, axis=0) >= REST_SPEED  # (blocks, J)
     low = np.minimum.reduceat(velocity, starts, axis=0) <= -REST_SPEED

@@ -19,11 +19,7 @@ class UnreadableTextError(Exception):
 
 
 def read_file(path: Path, largest: int) -> bytes:
-    """The bytes of a regular file.
-
-    Args:
-        path: The file.
-        largest: Size from which it is refused unread [bytes].
+    """The bytes of a regular file of at most so many bytes.
 
     Raises:
         UnreadableTextError: There is none, it is a folder or a device, too large, or not readable.

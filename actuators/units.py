@@ -97,10 +97,6 @@ def si_unit(dimension_name: str) -> str:
 def to_si(value: float, unit: str) -> float:
     """Return a value in SI units.
 
-    Args:
-        value: The number as written.
-        unit: A unit of the table.
-
     Raises:
         UnitError: The unit is not in the table.
     """
@@ -109,20 +105,16 @@ def to_si(value: float, unit: str) -> float:
 
 
 def quantity(written: object, dimension_name: str) -> float:
-    """Return a number written with its unit, such as ``"240 mm"``, in SI units.
-
-    Args:
-        written: Number and unit in one text; a bare number only for a ratio, or 0.
-        dimension_name: Of the table, e.g. ``length``.
-
-    Raises:
-        UnitError: As for `number_and_unit`.
-    """
+    """Return a number written with its unit in SI units; see `number_and_unit`."""
     return to_si(*number_and_unit(written, dimension_name))
 
 
 def number_and_unit(written: object, dimension_name: str) -> tuple[float, str]:
-    """Return a number and its unit as they are written; arguments as for `quantity`.
+    """Return a number and its unit as they are written, such as ``"240 mm"``.
+
+    Args:
+        written: Number and unit in one text; a bare number only for a ratio, or 0.
+        dimension_name: Of the table, e.g. ``length``.
 
     Raises:
         UnitError: No number, no unit, or a unit of another dimension; says what is expected.
@@ -149,10 +141,6 @@ def number_and_unit(written: object, dimension_name: str) -> tuple[float, str]:
 
 
 def from_si(value: float, unit: str) -> float:
-    """Return an SI value in a unit of the table; the inverse of `to_si`.
-
-    Raises:
-        UnitError: The unit is not in the table.
-    """
+    """Return an SI value in a unit of the table; the inverse of `to_si`."""
     dimension(unit)
     return (value - _OFFSET.get(unit, 0.0)) / _FACTOR[unit]

@@ -6,8 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuators.loading.build import CATALOG
-from actuators.parameters import load_parameters
+from actuators.loading.build import load_catalog
 from pipeline.blind.machines.chains import Machine
 from pipeline.blind.machines.motions import sines, strokes
 from pipeline.blind.machines.own import run
@@ -30,15 +29,10 @@ def leg_logs(seed: int, effects: list[str], count: int = 1) -> dict[str, dict[st
     robot = load_robot(load_robot_file(FOLDER / "leg.toml"))
     n, model = len(robot.joints), robot.model.copy()
     machine = Machine("leg", "", model, robot.joints, ("",) * n, np.ones(n), np.full(n, 0.3))
-    rotor = load_parameters(
-        CATALOG / "rotor_re40.toml",
-        {"coulomb": "torque", "viscous": "viscous friction", "inertia": "inertia"},
-    )
-    units = {"torque_constant": "torque constant", "resistance": "resistance", "mass": "mass"}
-    units |= {"max_speed": "angular velocity", "supply_voltage": "voltage"}
-    units |= dict.fromkeys(("continuous_current", "peak_current"), "current")
-    motor = load_parameters(CATALOG / "motor_re40_24v.toml", units)
-    ratio = load_parameters(CATALOG / "requirement.toml", {"ratio": "ratio"})["ratio"]
+    catalog = load_catalog()
+    rotor = catalog.components["rotor_re40"].parameters
+    motor = catalog.components["motor_re40_24v"].parameters
+    ratio = catalog.parameter("requirement.ratio").value
     more = {name: 1.5 if name in effects else 0.0 for name in ("viscous_friction", "rotor_inertia")}
     gain = np.where(np.arange(n) == 1, 1.2 if "torque_constant_error" in effects else 1.0, 1.0)
     plant = rigid_plant(machine, model)

@@ -1,14 +1,13 @@
-"""The alternatives as written in the catalogue: elements, laws and where arguments come from."""
+"""What a catalogue may hold: laws and kinds of components with their numbers; the alternatives."""
 
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Annotated, Final, Self
+from collections.abc import Callable, Collection, Mapping
+from typing import Annotated, Final, NamedTuple, Self
 
 from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
-from actuators.checked import Table, Text, checked
+from actuators.checked import Table, Text
 from actuators.elements.element import Element
 from actuators.elements.friction import Friction
 from actuators.elements.holding_brake import HoldingBrake
@@ -17,54 +16,89 @@ from actuators.elements.inertia import Inertia
 from actuators.elements.position_torque import ParallelSpring
 from actuators.elements.ratio import Ratio
 from actuators.elements.second_motor import SecondMotor
-from actuators.errors import CatalogError, closest, one_line
-from actuators.loading.components import FRICTION
+from actuators.errors import closest, one_line
 
 ALTERNATIVES_FILE: Final = "alternatives.toml"
+MOTOR_KIND: Final = "dc_motor"
 #: Files and columns are called after alternatives.
 NAME: Final = re.compile(r"[A-Za-z0-9_-]+")
 
 
-@dataclass(frozen=True)
-class Law:
-    """What a law's arguments are."""
+class Law(NamedTuple):
+    """An element's class, and its arguments with the dimension of each."""
 
-    element: Callable[..., Element]  #: Its class.
-    #: Arguments it must have, with the dimension of each.
-    needed: Mapping[str, str] = field(default_factory=dict)
-    possible: Mapping[str, str] = field(default_factory=dict)  #: Arguments it may have, likewise.
+    element: Callable[..., Element]
+    needed: Mapping[str, str] = {}
+    possible: Mapping[str, str] = {}
 
     @property
-    def arguments(self) -> Mapping[str, str]:
+    def arguments(self) -> dict[str, str]:
         """Every argument and its dimension."""
         return {**self.needed, **self.possible}
 
 
+_FRICTION: Final = {
+    "coulomb": "torque",
+    "load": "ratio",
+    "viscous": "viscous friction",
+    "skew": "torque",
+    "excess": "torque",
+    "stribeck_speed": "angular velocity",
+    "when_driving": "ratio",
+    "when_driven": "ratio",
+}
+_TEETH: Final = {
+    "pinion_angle": "angle",
+    "wheel_angle": "angle",
+    "wheel_radius": "length",
+    "friction": "ratio",
+}
+_BRAKE_POWER: Final = {"released_power": "power", "engaged_power": "power"}
+_CONVERSION: Final = {"torque_constant": "torque constant", "resistance": "resistance"}
 LAWS: Final[Mapping[str, Law]] = {
     "ratio": Law(Ratio, {"ratio": "ratio"}),
     "inertia": Law(Inertia, {"inertia": "inertia"}),
-    "friction": Law(Friction, possible=FRICTION),
-    "hypoid": Law(
-        Hypoid,
-        {
-            "ratio": "ratio",
-            "pinion_angle": "angle",
-            "wheel_angle": "angle",
-            "wheel_radius": "length",
-            "friction": "ratio",
-        },
-    ),
+    "friction": Law(Friction, possible=_FRICTION),
+    "hypoid": Law(Hypoid, {"ratio": "ratio", **_TEETH}),
     "parallel_spring": Law(ParallelSpring, {"stiffness": "rotational stiffness", "rest": "angle"}),
-    "holding_brake": Law(
-        HoldingBrake,
-        {"static_torque": "torque"},
-        {"released_power": "power", "engaged_power": "power"},
-    ),
-    "second_motor": Law(
-        SecondMotor,
-        {"torque_constant": "torque constant", "resistance": "resistance", "share": "ratio"},
-    ),
+    "holding_brake": Law(HoldingBrake, {"static_torque": "torque"}, _BRAKE_POWER),
+    "second_motor": Law(SecondMotor, {**_CONVERSION, "share": "ratio"}),
 }
+_ROTATING: Final = {**_FRICTION, "inertia": "inertia"}
+_GEAR: Final = {"ratio": "ratio", **_ROTATING}
+#: Kind of a component to its numbers with the dimension of each.
+KINDS: Final[Mapping[str, Mapping[str, str]]] = {
+    "requirement": LAWS["ratio"].arguments,
+    MOTOR_KIND: {
+        **_CONVERSION,
+        "max_speed": "angular velocity",
+        "supply_voltage": "voltage",
+        "continuous_current": "current",
+        "peak_current": "current",
+        "mass": "mass",
+    },
+    "rotating_friction": _ROTATING,
+    "gear": _GEAR,
+    "harmonic_drive": _GEAR,
+    "timing_belt": _GEAR,
+    "planetary": _GEAR,
+    "hypoid": {**_GEAR, **_TEETH},
+    "bearing": _FRICTION,
+    "spring": LAWS["parallel_spring"].arguments,
+    "brake": LAWS["holding_brake"].arguments,
+    "second_motor": LAWS["second_motor"].arguments,
+}
+
+
+def known(noun: str, names: Collection[str]) -> AfterValidator:
+    """Return the check that a word is one of some names."""
+
+    def check(word: str) -> str:
+        if word not in names:
+            raise ValueError(f"unknown {noun} '{one_line(word)}': {closest(word, list(names))}")
+        return word
+
+    return AfterValidator(check)
 
 
 class ElementEntry(Table):
@@ -73,8 +107,8 @@ class ElementEntry(Table):
     model_config = ConfigDict(extra="allow")
     expected = "name, law, arguments, and for the last element stage"
     __pydantic_extra__: dict[str, str] = Field(init=False)
-    name: Text  #: The element's name.
-    law: str  #: Key of the table of laws.
+    name: Text
+    law: Annotated[str, known("law", LAWS)]
     stage: str = ""  #: Name of the shaft on its motor side, or empty.
     shaft: str = ""  #: Where that shaft is, in words, or empty.
 
@@ -85,9 +119,6 @@ class ElementEntry(Table):
 
     @model_validator(mode="after")
     def _of_the_law(self) -> Self:
-        """Arguments are those of the law, and a place in words is that of a stage."""
-        if self.law not in LAWS:
-            raise ValueError(f"unknown law '{one_line(self.law)}': {closest(self.law, list(LAWS))}")
         law = LAWS[self.law]
         for argument in self.arguments:
             if argument not in law.arguments:
@@ -95,41 +126,11 @@ class ElementEntry(Table):
                     f"law '{self.law}' has no argument '{one_line(argument)}': "
                     f"{closest(argument, sorted(law.arguments))}"
                 )
-        lacking = sorted(set(law.needed) - set(self.arguments))
-        if lacking:
-            names = ", ".join(f"'{name}'" for name in lacking)
-            raise ValueError(f"law '{self.law}' lacks its argument {names}")
+        if lacking := ", ".join(f"'{n}'" for n in sorted({*law.needed} - {*self.arguments})):
+            raise ValueError(f"law '{self.law}' lacks its argument {lacking}")
         if self.shaft and not self.stage:
             raise ValueError("'shaft' says where a stage is; name the stage, too")
         return self
-
-
-@dataclass(frozen=True)
-class Alternative:
-    """One alternative as written."""
-
-    name: str  #: Its key, such as `reversible`.
-    title: str  #: In words.
-    motor: str  #: Component of the motor.
-    ratio: str  #: `component.parameter` that the product of all ratios has to equal.
-    elements: tuple[ElementEntry, ...]  #: From the joint to the motor.
-
-    @property
-    def stage_names(self) -> Mapping[str, str]:
-        """Every stage from the joint to the supply in words, by its short name."""
-        *inner, last = [e for e in self.elements if e.stage]
-        names = {e.stage: e.shaft or f"motor side of {e.name}" for e in inner}
-        return {
-            JOINT_STAGE: "joint",
-            **names,
-            last.stage: last.shaft or "motor",
-            SUPPLY_STAGE: "supply",
-        }
-
-    @property
-    def references(self) -> tuple[str, ...]:
-        """Every `component.parameter` it names outside its motor."""
-        return (self.ratio, *(r for e in self.elements for r in e.arguments.values()))
 
 
 def _stages_differ(elements: tuple[ElementEntry, ...]) -> tuple[ElementEntry, ...]:
@@ -146,30 +147,30 @@ def _stages_differ(elements: tuple[ElementEntry, ...]) -> tuple[ElementEntry, ..
     return elements
 
 
-class _Written(Table):
-    """An alternative as it stands in a file."""
+class Alternative(Table):
+    """One alternative as written."""
 
+    model_config = ConfigDict(populate_by_name=False)
     title: Text
-    motor: str
-    ratio: str
-    element: Annotated[tuple[ElementEntry, ...], Strict(False), AfterValidator(_stages_differ)]
+    motor: str  #: Component of the motor.
+    ratio: str  #: `component.parameter` that the product of all ratios has to equal.
+    #: From the joint to the motor.
+    elements: Annotated[
+        tuple[ElementEntry, ...],
+        Strict(False),
+        AfterValidator(_stages_differ),
+        Field(alias="element"),
+    ]
 
+    @property
+    def stage_names(self) -> Mapping[str, str]:
+        """Every stage from the joint to the supply in words, by its short name."""
+        *inner, last = [e for e in self.elements if e.stage]
+        names = {e.stage: e.shaft or f"motor side of {e.name}" for e in inner}
+        names[last.stage] = last.shaft or "motor"
+        return {JOINT_STAGE: "joint", **names, SUPPLY_STAGE: "supply"}
 
-def read_alternative(name: str, entry: object) -> Alternative:
-    """Return one alternative from its table.
-
-    Args:
-        name: Its key.
-        entry: What stands under it.
-
-    Raises:
-        CatalogError: The name cannot be part of a file's, a key, law or argument is unknown or
-            missing, or a stage is named twice.
-    """
-    if not NAME.fullmatch(name):
-        raise CatalogError(
-            f"{ALTERNATIVES_FILE} [{one_line(name)}]: expected a name of letters a to z, digits, "
-            "'_' and '-'; tables and files are called after it"
-        )
-    written = checked(_Written, entry, f"{ALTERNATIVES_FILE} [{one_line(name)}]", CatalogError)
-    return Alternative(name, written.title, written.motor, written.ratio, written.element)
+    @property
+    def references(self) -> tuple[str, ...]:
+        """Every `component.parameter` it names outside its motor."""
+        return (self.ratio, *(r for e in self.elements for r in e.arguments.values()))

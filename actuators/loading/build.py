@@ -6,17 +6,25 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import numpy as np
 
 from actuators.arrays import Scalars
 from actuators.chain import Chain
+from actuators.checked import Table, checked
 from actuators.elements.motor import DCMotor
 from actuators.errors import ActuatorError, CatalogError, closest, one_line
-from actuators.loading.alternatives import ALTERNATIVES_FILE, LAWS, Alternative, read_alternative
-from actuators.loading.components import MOTOR_KIND, Component, load_component
-from actuators.parameters import Parameter, read_toml
+from actuators.loading.alternatives import (
+    ALTERNATIVES_FILE,
+    KINDS,
+    LAWS,
+    MOTOR_KIND,
+    NAME,
+    Alternative,
+    known,
+)
+from actuators.parameters import Parameter, ParameterSet, parameters_from_table, read_toml
 from actuators.units import dimension, si_unit
 
 CATALOG: Final = Path(__file__).parents[1] / "catalog"
@@ -25,12 +33,40 @@ _RATIO_TOLERANCE: Final = 1e-9  # relative
 _logger: Final = logging.getLogger("legwatt")
 
 
+class _Written(Table):
+    kind: Annotated[str, known("kind", KINDS)]
+    title: str
+    note: str = ""
+    parameters: dict[str, object]  # which, the kind says
+
+
+@dataclass(frozen=True)
+class Component:
+    """One component file of the catalogue."""
+
+    name: str  #: The file's stem.
+    kind: str  #: One of `KINDS`.
+    title: str  #: What it is, in words.
+    note: str  #: What its values claim and what they do not; may be empty.
+    parameters: ParameterSet
+
+
+def _component(path: Path) -> Component:
+    file = one_line(path.name)
+    written = checked(_Written, read_toml(path), file, CatalogError)
+    kinds = KINDS[written.kind]
+    # What is needed, alternatives say: they name each number, and one that none names is refused.
+    optional = frozenset({"mass"} if written.kind == MOTOR_KIND else kinds)
+    parameters = parameters_from_table(written.parameters, kinds, file, optional)
+    return Component(path.stem, written.kind, written.title, written.note, parameters)
+
+
 @dataclass(frozen=True)
 class Catalog:
-    """Components and the alternatives built from them; edits return a new catalogue."""
+    """Components and the alternatives built from them, by name; edits return a new catalogue."""
 
-    components: Mapping[str, Component]  #: By name.
-    alternatives: Mapping[str, Alternative]  #: By name, in the file's order.
+    components: Mapping[str, Component]
+    alternatives: Mapping[str, Alternative]  #: In the file's order.
 
     def parameter(self, reference: str) -> Parameter:
         """Return the parameter that `component.parameter` names.
@@ -47,23 +83,15 @@ class Catalog:
         return tuple((c.name, p) for c in self.components.values() for p in c.parameters.rows())
 
     def replaced(self, reference: str, value: float, **changes: Any) -> "Catalog":
-        """Return a catalogue in which one parameter has another SI value.
+        """Return a catalogue in which `component.parameter` has another SI value.
 
-        Args:
-            reference: `component.parameter`.
-            value: In SI units.
-            **changes: As for `ParameterSet.replaced`.
-
-        Raises:
-            CatalogError: No such component.
-            ParameterError: No such parameter, or a value outside its bounds.
+        Changes and errors are those of `ParameterSet.replaced` and `parameter`.
         """
         component, name = self._split(reference)
-        edited = dataclasses.replace(
-            component, parameters=component.parameters.replaced(name, value, **changes)
-        )
-        components = {n: edited if n == component.name else c for n, c in self.components.items()}
-        return dataclasses.replace(self, components=MappingProxyType(components))
+        parameters = component.parameters.replaced(name, value, **changes)
+        edited = dataclasses.replace(component, parameters=parameters)
+        components = MappingProxyType({**self.components, component.name: edited})
+        return dataclasses.replace(self, components=components)
 
     def chain(self, name: str, values: Mapping[str, Scalars] | None = None) -> Chain:
         """Return the chain of an alternative.
@@ -114,11 +142,7 @@ class Catalog:
         return {name: self.chain(name) for name in self.alternatives}
 
     def only(self, names: Iterable[str]) -> "Catalog":
-        """Return a catalogue of some alternatives, in the file's order, and of what they use.
-
-        Args:
-            names: Of alternatives; others than the catalogue's are passed over.
-        """
+        """Return a catalogue of some alternatives, in the file's order, and of what they use."""
         kept = set(names)
         alternatives = {n: a for n, a in self.alternatives.items() if n in kept}
         used = {a.motor for a in alternatives.values()}
@@ -156,15 +180,25 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     if not contents:
         raise CatalogError(f"{ALTERNATIVES_FILE}: no alternative, expected one table [NAME] each")
     files = sorted(p for p in folder.glob("*.toml") if p.name != ALTERNATIVES_FILE)
-    components = {p.stem: load_component(p) for p in files}
-    alternatives = {name: read_alternative(name, entry) for name, entry in contents.items()}
+    components = {p.stem: _component(p) for p in files}
+    alternatives = {name: _alternative(name, entry) for name, entry in contents.items()}
     catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
-    for alternative in alternatives.values():
-        _check_references(alternative, catalog)
-        catalog.chain(alternative.name)
+    for name in alternatives:
+        _check_references(name, catalog)
+        catalog.chain(name)
     catalog = catalog.only(alternatives)
     _refuse_unused(catalog)
     return catalog
+
+
+def _alternative(name: str, entry: object) -> Alternative:
+    where = f"{ALTERNATIVES_FILE} [{one_line(name)}]"
+    if not NAME.fullmatch(name):
+        raise CatalogError(
+            f"{where}: expected a name of letters a to z, digits, '_' and '-'; tables and files "
+            "are called after it"
+        )
+    return checked(Alternative, entry, where, CatalogError)
 
 
 def _refuse_unused(catalog: Catalog) -> None:
@@ -172,13 +206,12 @@ def _refuse_unused(catalog: Catalog) -> None:
 
     Forgotten is one that the law of an element takes which names others of the component.
     """
-    alternatives = catalog.alternatives.values()
-    used = {r for alternative in alternatives for r in alternative.references}
+    used = {r for alternative in catalog.alternatives.values() for r in alternative.references}
     taken = {
-        f"{r.partition('.')[0]}.{argument}"
-        for alternative in alternatives
+        f"{reference.partition('.')[0]}.{argument}"
+        for alternative in catalog.alternatives.values()
         for e in alternative.elements
-        for r in e.arguments.values()
+        for reference in e.arguments.values()
         for argument in LAWS[e.law].arguments
     }
     for component in catalog.components.values():
@@ -192,12 +225,13 @@ def _refuse_unused(catalog: Catalog) -> None:
             _logger.warning("%s", said)
 
 
-def _check_references(alternative: Alternative, catalog: Catalog) -> None:
+def _check_references(name: str, catalog: Catalog) -> None:
     """Raise unless the motor is one and every argument names a parameter of its own dimension."""
+    alternative = catalog.alternatives[name]
     motors = [c.name for c in catalog.components.values() if c.kind == MOTOR_KIND]
     if alternative.motor not in motors:
         raise CatalogError(
-            f"alternative '{alternative.name}': no motor '{one_line(alternative.motor)}': "
+            f"alternative '{name}': no motor '{one_line(alternative.motor)}': "
             f"{closest(alternative.motor, motors)}"
         )
     wanted = [("ratio", alternative.ratio, "ratio")]
@@ -208,9 +242,9 @@ def _check_references(alternative: Alternative, catalog: Catalog) -> None:
         try:
             unit = catalog.parameter(reference).unit
         except ActuatorError as error:
-            raise CatalogError(f"alternative '{alternative.name}': {error}") from None
+            raise CatalogError(f"alternative '{name}': {error}") from None
         if dimension(unit) != expected:
             raise CatalogError(
-                f"{ALTERNATIVES_FILE} [{alternative.name}]: {key} = '{reference}' is in '{unit}', "
+                f"{ALTERNATIVES_FILE} [{name}]: {key} = '{reference}' is in '{unit}', "
                 f"a unit of {dimension(unit)}; expected {expected} such as '{si_unit(expected)}'"
             )

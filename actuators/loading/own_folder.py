@@ -4,14 +4,13 @@ import itertools
 import json
 import math
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 
 from actuators.errors import DataSheetError, one_line
-from actuators.loading.alternatives import ALTERNATIVES_FILE, NAME
+from actuators.loading.alternatives import ALTERNATIVES_FILE, KINDS, NAME
 from actuators.loading.build import load_catalog
-from actuators.loading.components import KINDS
 from actuators.loading.converted import contradictions, converted
 from actuators.loading.data_sheet import option, read_sheet
 from actuators.parameters import Parameter
@@ -20,6 +19,11 @@ from actuators.units import from_si, si_unit
 _IDEAL: Final = "ideal"
 _KINDS: Final = {"motor": "dc_motor", "rotor": "rotating_friction", "gear": "gear"}
 _LAWS: Final = {"friction": ("coulomb", "load", "viscous"), "inertia": ("inertia",)}
+_STAGES: Final = {
+    "gear": {"stage": "g", "shaft": "between rotor and gear"},
+    "rotor": {"stage": "m"},
+}
+Keys = Mapping[str, object]
 
 
 def init_actuator(
@@ -108,58 +112,54 @@ def parameters_of(words: Mapping[str, str], source: str) -> dict[str, Parameter]
     return out
 
 
-def _component(title: str, kind: str, parameters: Sequence[Parameter]) -> str:
-    """The file of one component."""
-    out = f"kind = {_text(kind)}\ntitle = {_text(title)}\n"
-    for p in parameters:
-        out += f"\n[parameters.{p.name}]\nvalue = {_digits(p.value_as_written)}\n"
-        out += "".join(f"{k} = {_text(getattr(p, k))}\n" for k in ("unit", "basis", "source"))
-        if p.interval:
-            out += "interval = [{}, {}]\n".format(
-                *(_digits(from_si(v, p.unit)) for v in p.interval)
-            )
-        if p.reason:
-            out += f"reason = {_text(p.reason)}\n"
-    return out
-
-
 def _texts(name: str, source: str, parameters: Mapping[str, Parameter]) -> dict[str, str]:
     """The files of the folder."""
     texts = {}
     for part, kind in _KINDS.items():
         own = [p for key, p in parameters.items() if key.startswith(f"{part}.")]
-        texts[f"{part}.toml"] = _component(f"{part} of {name}: {source}", kind, own)
-    elements = [_element(name, "transmission", "ratio", ["gear.ratio"])]
-    between = 'stage = "g"\nshaft = "between rotor and gear"\n'
-    for part, stage in (("gear", between), ("rotor", 'stage = "m"\n')):
+        head: Keys = {"kind": kind, "title": f"{part} of {name}: {source}"}
+        each = [(f"[parameters.{p.name}]\n", _number(p)) for p in own]
+        texts[f"{part}.toml"] = _toml([("", head), *each])
+    transmission: Keys = {"name": "transmission", "law": "ratio", "ratio": "gear.ratio"}
+    entries = [dict(transmission)]
+    for part, stage in _STAGES.items():
         for law, arguments in _LAWS.items():
-            given = [key for a in arguments if (key := f"{part}.{a}") in parameters]
+            given = {a: f"{part}.{a}" for a in arguments if f"{part}.{a}" in parameters}
             if given:
-                elements.append(_element(name, f"{part}_{law}", law, given))
-        elements[-1] += stage
-    texts[ALTERNATIVES_FILE] = (
-        f"# {name}, by `python -m pipeline init-actuator` from: {one_line(source)}\n"
-        + _head(_IDEAL, f"Ideal: ratio and motor of {name} alone")
-        + _element(_IDEAL, "transmission", "ratio", ["gear.ratio"])
-        + 'stage = "m"\n'
-        + _head(name, f"{name} by its data sheet")
-        + "".join(elements)
+                entries.append({"name": f"{part}_{law}", "law": law, **given})
+        entries[-1] |= stage
+    built = {"motor": "motor", "ratio": "gear.ratio"}
+    said = f"# {name}, by `python -m pipeline init-actuator` from: {one_line(source)}\n"
+    texts[ALTERNATIVES_FILE] = _toml(
+        [
+            (said, {}),
+            (f"[{_IDEAL}]\n", {"title": f"Ideal: ratio and motor of {name} alone"} | built),
+            (f"[[{_IDEAL}.element]]\n", {**transmission, "stage": "m"}),
+            (f"[{name}]\n", {"title": f"{name} by its data sheet"} | built),
+            *((f"[[{name}.element]]\n", entry) for entry in entries),
+        ]
     )
     return texts
 
 
-def _head(name: str, title: str) -> str:
-    return f'\n[{name}]\ntitle = {_text(title)}\nmotor = "motor"\nratio = "gear.ratio"\n'
+def _number(p: Parameter) -> Keys:
+    """A parameter as its file has it."""
+    out: dict[str, object] = {"value": p.value_as_written}
+    out |= {"unit": p.unit, "basis": p.basis, "source": p.source}
+    if p.interval:
+        out["interval"] = [from_si(end, p.unit) for end in p.interval]
+    return out | ({"reason": p.reason} if p.reason else {})
 
 
-def _element(alternative: str, name: str, law: str, arguments: Sequence[str]) -> str:
-    lines = (f'{key.split(".")[1]} = "{key}"\n' for key in arguments)
-    return f'\n[[{alternative}.element]]\nname = "{name}"\nlaw = "{law}"\n' + "".join(lines)
+def _toml(tables: Iterable[tuple[str, Keys]]) -> str:
+    """Tables, each behind its head, with texts on one line and nine digits of every number."""
 
+    def text(value: object) -> str:
+        if isinstance(value, list):
+            return f"[{', '.join(map(text, value))}]"
+        if isinstance(value, float):
+            return f"{value:.9g}"
+        return json.dumps(one_line(value), ensure_ascii=False)
 
-def _text(text: str) -> str:
-    return json.dumps(one_line(text), ensure_ascii=False)
-
-
-def _digits(value: float) -> str:
-    return f"{value:.9g}"
+    each = (head + "".join(f"{k} = {text(v)}\n" for k, v in t.items()) for head, t in tables)
+    return "\n".join(each)

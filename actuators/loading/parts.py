@@ -92,8 +92,6 @@ KINDS: Final[Mapping[str, Mapping[str, Entry]]] = {
 
 
 class _Written(Table):
-    """A part's file."""
-
     title: str
     part: str = ""
     basis: Literal["datasheet", "identified", "assumed"]
@@ -113,8 +111,7 @@ class Part:
     basis: str  #: Of its numbers.
     source: str  #: Where they were read.
     note: str  #: What is doubtful or filled in from its class.
-    words: Mapping[str, str]  #: As printed.
-    printed: Mapping[str, Number]  #: The same as numbers, SI.
+    printed: Mapping[str, Number]
 
     @property
     def filled(self) -> tuple[str, ...]:
@@ -124,9 +121,6 @@ class Part:
 
 def load_parts(folder: Path = PARTS) -> dict[str, Part]:
     """Load every part of a folder with a folder for each kind; sorted by kind and name.
-
-    Args:
-        folder: The project's own by default.
 
     Raises:
         CatalogError: No such folder, an unknown kind, a wrong key, or two parts of one name.
@@ -156,9 +150,7 @@ def load_part(path: Path) -> Part:
         printed = {n: read_entry(n, text, KINDS[kind]) for n, text in w.printed.items()}
     except DataSheetError as error:
         raise DataSheetError(f"{file}: {error}") from None
-    return Part(
-        path.stem, kind, w.title, w.part, w.basis, w.source, w.note, dict(w.printed), printed
-    )
+    return Part(path.stem, kind, w.title, w.part, w.basis, w.source, w.note, printed)
 
 
 def odd(part: Part) -> Iterator[str]:
@@ -169,7 +161,7 @@ def odd(part: Part) -> Iterator[str]:
     """
     if part.kind != "motor":
         return
-    words = {n: text for n, text in part.words.items() if n in ENTRIES}
+    words = {n: x.words for n, x in part.printed.items() if n in ENTRIES}
     try:
         sheet = read_sheet({"gear_ratio": "1"} | words)
         found = converted({name: number.value for name, number in sheet.items()})

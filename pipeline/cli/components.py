@@ -97,10 +97,14 @@ def _within(part: Part, bounds: Sequence[tuple[str, float, float]]) -> bool:
     )
 
 
+def _words(part: Part, name: str) -> str:
+    return part.printed[name].words if name in part.printed else ""
+
+
 def _list(parts: Sequence[Part]) -> str:
     shown = _SHOWN.get(parts[0].kind, _OF_GEARS)
     rows = [("name", *shown, "what it is")]
-    rows += [(p.name, *(p.words.get(name, "") for name in shown), p.title) for p in parts]
+    rows += [(p.name, *(_words(p, name) for name in shown), p.title) for p in parts]
     widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]) - 1)]
     lines = [
         "  ".join([*(cell.ljust(w) for cell, w in zip(row, widths, strict=False)), row[-1]])
@@ -114,7 +118,7 @@ def _full(parts: Sequence[Part]) -> str:
     for p in parts:
         out.append(f"{p.name} ({p.kind}): {p.title}\n  {p.basis}: {p.source}")
         out += [f"  note: {p.note}"] * bool(p.note)
-        for name, text in p.words.items():
+        for name, number in p.printed.items():
             range_ = "  (range)" if name in p.filled else ""
-            out.append(f"  {name} = {text}{range_}  {KINDS[p.kind][name].words}")
+            out.append(f"  {name} = {number.words}{range_}  {KINDS[p.kind][name].words}")
     return "\n".join(out) + "\n"

@@ -36,7 +36,6 @@ from pydantic import Field, Strict
 from actuators.chain import Chain
 from actuators.checked import Names, Table, Text, checked
 from actuators.errors import ActuatorError, closest, one_line
-from actuators.loading.alternatives import Alternative
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table
 from actuators.units import dimension
@@ -115,7 +114,7 @@ class OwnActuators:
             for e in parts[0].elements
         )
         title = "As built: " + ", ".join(f"{name} at {count[name]} joints" for name in names)
-        mixed = Alternative(AS_BUILT, title, parts[0].motor, parts[0].ratio, elements)
+        mixed = parts[0].model_copy(update={"title": title, "elements": elements})
         return replace(
             catalog, alternatives=MappingProxyType({**catalog.alternatives, AS_BUILT: mixed})
         )

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from actuators.errors import ParameterError
-from actuators.parameters import load_parameters, parameters_from_table
+from actuators.parameters import parameters_from_table, read_toml
 
 SCHEMA = {"mass": "mass", "torque": "torque"}
 
@@ -88,7 +88,7 @@ def test_any_bytes_give_parameters_or_a_parameter_error(tmp_path_factory, conten
     path = tmp_path_factory.getbasetemp() / "bytes.toml"
     path.write_bytes(content)
     with pytest.raises(ParameterError) as caught:
-        load_parameters(path, SCHEMA)
+        parameters_from_table(read_toml(path), SCHEMA, "bytes.toml")
     assert "\n" not in str(caught.value)
 
 

@@ -334,7 +334,7 @@ def _motor_torque(x: Sheet) -> float:
 
 def _sheet(part: Part) -> dict[str, Number]:
     """A motor's entries with what follows without being said."""
-    words = {name: text for name, text in part.words.items() if name in ENTRIES}
+    words = {name: x.words for name, x in part.printed.items() if name in ENTRIES}
     others = {name: x for name, x in part.printed.items() if name not in ENTRIES}
     try:
         return dict(read_sheet({"gear_ratio": "1"} | words)) | others
