@@ -63,11 +63,6 @@ class Nuisance:
         """Least value that makes sense: what scales a mass or a constant leaves a tenth of it."""
         return -0.9 if self.unit == "1" else -np.inf
 
-    @property
-    def of_body(self) -> bool:
-        """Whether inverse dynamics has to be run again."""
-        return self.kind in STRAINS or self.kind == "encoder"
-
     def edit(self, model: MachineModel, value: float) -> MachineModel:
         """The machine with this tolerance at a value."""
         if self.kind in STRAINS:
