@@ -50,14 +50,10 @@ _HELD: dict[str, int] = {}
 
 @dataclass(frozen=True)
 class Manifest:
-    """What a run wrote.
+    """What a run wrote."""
 
-    Attributes:
-        verb: The command, e.g. ``"walk"`` or ``"gap add"``; empty where there was no run.
-        files: Name relative to the folder, with slashes, to the SHA-256 of its bytes.
-    """
-
-    verb: str = ""
+    verb: str = ""  #: The command, e.g. ``"walk"`` or ``"gap add"``; empty where there was no run.
+    #: Name relative to the folder, with slashes, to the SHA-256 of its bytes.
     files: Mapping[str, str] = field(default_factory=dict)
 
 

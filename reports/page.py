@@ -33,29 +33,20 @@ class Points:
 
 @dataclass(frozen=True)
 class TableBlock:
-    """A table to read.
+    """A table to read."""
 
-    Attributes:
-        headers: Column titles with their units.
-        rows: Cells; numbers are aligned to the right, None and NaN shown as a dash.
-        caption: One sentence.
-        file: CSV with the full numbers, relative to the page; linked from the caption.
-        tones: Text of a cell to ``good``, ``bad`` or ``quiet``, for verdicts.
-        digits: Significant digits of numbers.
-        hints: What each column means, for a reader who points at its heading; empty for none.
-        sortable: Whether a reader may sort it by a column and filter its rows.
-        anchor: Before a row's first cell, makes what links lead to; empty for none.
-    """
-
-    headers: tuple[str, ...]
+    headers: tuple[str, ...]  #: Column titles with their units.
+    #: Cells; numbers are aligned to the right, None and NaN shown as a dash.
     rows: tuple[tuple[Any, ...], ...]
-    caption: str = ""
-    file: str = ""
+    caption: str = ""  #: One sentence.
+    file: str = ""  #: CSV with the full numbers, relative to the page; linked from the caption.
+    #: Text of a cell to ``good``, ``bad`` or ``quiet``, for verdicts.
     tones: Mapping[str, str] = field(default_factory=dict)
-    digits: int = 4
+    digits: int = 4  #: Significant digits of numbers.
+    #: What each column means, for a reader who points at its heading; empty for none.
     hints: tuple[str, ...] = ()
-    sortable: bool = False
-    anchor: str = ""
+    sortable: bool = False  #: Whether a reader may sort it by a column and filter its rows.
+    anchor: str = ""  #: Before a row's first cell, makes what links lead to; empty for none.
 
     def __post_init__(self) -> None:
         """Refuse ragged rows.
@@ -82,18 +73,12 @@ class TableBlock:
 
 @dataclass(frozen=True)
 class FigureBlock:
-    """A picture that has been written before the page.
+    """A picture that has been written before the page."""
 
-    Attributes:
-        file: SVG or PNG; it must lie in the page's folder or below it.
-        caption: What to see in it; none where its title says so.
-        alt: For those who cannot see it; the caption by default.
-        half: Whether two stand side by side where the page is wide: for narrow pictures.
-    """
-
-    file: Path
-    caption: str = ""
-    alt: str = ""
+    file: Path  #: SVG or PNG; it must lie in the page's folder or below it.
+    caption: str = ""  #: What to see in it; none where its title says so.
+    alt: str = ""  #: For those who cannot see it; the caption by default.
+    #: Whether two stand side by side where the page is wide: for narrow pictures.
     half: bool = False
 
 
@@ -110,41 +95,26 @@ class Section:
 
 @dataclass(frozen=True)
 class Number:
-    """A number to see before anything is read.
+    """A number to see before anything is read."""
 
-    Attributes:
-        value: With its unit.
-        label: What it is, in a few words.
-        tone: ``good``, ``bad`` or ``quiet``.
-    """
-
-    value: str
-    label: str
-    tone: str = "quiet"
+    value: str  #: With its unit.
+    label: str  #: What it is, in a few words.
+    tone: str = "quiet"  #: ``good``, ``bad`` or ``quiet``.
 
 
 @dataclass(frozen=True)
 class Page:
-    """A report that gives its answer at first sight.
+    """A report that gives its answer at first sight."""
 
-    Attributes:
-        title: Of the page.
-        answer: A few sentences that a reader in a hurry reads and then stops.
-        sections: The rest, the answer in full words first.
-        files: File name (relative) to what it holds, listed at the end.
-        footer: A last line, such as versions.
-        notices: What a reader must not overlook, above everything else.
-        numbers: Four at most.
-        picture: Beside the answer; one whose text can be read on a telephone.
-    """
-
-    title: str
-    answer: tuple[str, ...]
-    sections: tuple[Section, ...] = ()
+    title: str  #: Of the page.
+    answer: tuple[str, ...]  #: A few sentences that a reader in a hurry reads and then stops.
+    sections: tuple[Section, ...] = ()  #: The rest, the answer in full words first.
+    #: File name (relative) to what it holds, listed at the end.
     files: Mapping[str, str] = field(default_factory=dict)
-    footer: str = ""
-    notices: tuple[str, ...] = ()
-    numbers: tuple[Number, ...] = ()
+    footer: str = ""  #: A last line, such as versions.
+    notices: tuple[str, ...] = ()  #: What a reader must not overlook, above everything else.
+    numbers: tuple[Number, ...] = ()  #: Four at most.
+    #: Beside the answer; one whose text can be read on a telephone.
     picture: FigureBlock | None = None
 
 

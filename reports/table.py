@@ -30,23 +30,18 @@ _HEADER = re.compile(r"""(?:[^/\\,;"\x00-\x1f\x7f]+__)?[A-Za-z0-9_]+""")
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of equal length, ready to be written.
+    """Columns of equal length, ready to be written."""
 
-    Attributes:
-        name: File name without ending, e.g. ``"standing"``.
-        columns: Header to values, in the order of the file. NaN and None are empty cells.
-        meanings: Header to (meaning, unit) or (meaning, unit, title); see `reports.column`.
-        description: One sentence on what the table holds and its sign conventions.
-        exact: Whether the numbers were given and not computed, so that none is round-off.
-        zero_below: Header to the magnitude up to which numbers were set to zero, by unit where
-            rows have units of their own; filled in by `reports.roundoff`.
-    """
-
-    name: str
+    name: str  #: File name without ending, e.g. ``"standing"``.
+    #: Header to values, in the order of the file. NaN and None are empty cells.
     columns: Mapping[str, Column]
+    #: Header to (meaning, unit) or (meaning, unit, title); see `reports.column`.
     meanings: Mapping[str, Meaning]
-    description: str = ""
+    description: str = ""  #: One sentence on what the table holds and its sign conventions.
+    #: Whether the numbers were given and not computed, so that none is round-off.
     exact: bool = False
+    #: Header to the magnitude up to which numbers were set to zero, by unit where rows have units
+    #: of their own; filled in by `reports.roundoff`.
     zero_below: Mapping[str, float | Mapping[str, float]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -138,20 +133,14 @@ def table_of(
 
 @dataclass(frozen=True)
 class Quantity:
-    """One quantity at every joint (or foot).
+    """One quantity at every joint (or foot)."""
 
-    Attributes:
-        name: As it stands in the header, e.g. ``"torque"``.
-        unit: As people write it, e.g. ``"N*m"``; ``"1"`` leaves the header without a unit. One for
-            each owner, in a tuple, where they differ.
-        meaning: One clause with the sign, e.g. ``"torque the actuator applies to the joint"``.
-        values: Shape (N, J).
-    """
-
-    name: str
+    name: str  #: As it stands in the header, e.g. ``"torque"``.
+    #: As people write it, e.g. ``"N*m"``; ``"1"`` leaves the header without a unit. One for each
+    #: owner, in a tuple, where they differ.
     unit: str | tuple[str, ...]
-    meaning: str
-    values: Array
+    meaning: str  #: One clause with the sign, e.g. ``"torque the actuator applies to the joint"``.
+    values: Array  #: Shape (N, J).
 
 
 def wide_series(

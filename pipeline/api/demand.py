@@ -29,16 +29,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Demand:
-    """What a motion demands of the joints.
+    """What a motion demands of the joints."""
 
-    Attributes:
-        motion: Base and joints over time.
-        joints: Position, velocity, acceleration and torque by segment.
-        sliding: Names of the prismatic joints: metres and newtons, not radians.
-    """
-
-    motion: Motion = field(repr=False)
+    motion: Motion = field(repr=False)  #: Base and joints over time.
+    #: Position, velocity, acceleration and torque by segment.
     joints: MotionDemand = field(repr=False)
+    #: Names of the prismatic joints: metres and newtons, not radians.
     sliding: tuple[str, ...] = ()
 
     @cached_property

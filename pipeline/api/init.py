@@ -34,20 +34,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Init:
-    """A robot file that was written.
+    """A robot file that was written."""
 
-    Attributes:
-        path: The file.
-        picture: Of the stance; its SVG lies beside it.
-        guess: What was found, with reasons.
-        findings: What `check` says of it.
-        motors: Which drive its joints: the robot's own where they are known, else assumed ones.
-    """
-
-    path: Path
-    picture: Path
-    guess: Guess
-    findings: tuple[Finding, ...]
+    path: Path  #: The file.
+    picture: Path  #: Of the stance; its SVG lies beside it.
+    guess: Guess  #: What was found, with reasons.
+    findings: tuple[Finding, ...]  #: What `check` says of it.
+    #: Which drive its joints: the robot's own where they are known, else assumed ones.
     motors: Motors
 
 

@@ -46,15 +46,10 @@ Common = tuple[
 
 @dataclass(frozen=True, eq=False)
 class LogResult(Result):
-    """What one step finds in logs.
+    """What one step finds in logs."""
 
-    Attributes:
-        given: The machine as the step computed it.
-        findings: What the logs are worth.
-    """
-
-    given: Setup
-    findings: Sequence[Finding]
+    given: Setup  #: The machine as the step computed it.
+    findings: Sequence[Finding]  #: What the logs are worth.
 
     @property
     def quality(self) -> Table:
@@ -64,26 +59,17 @@ class LogResult(Result):
 
 @dataclass(frozen=True, eq=False)
 class MeasuredLog(LogResult):
-    """A log that was read and judged.
+    """A log that was read and judged."""
 
-    Attributes:
-        path: CSV or Parquet.
-        mapping: Mapping file for foreign columns; None without.
-    """
-
-    path: Path
-    mapping: Path | None
+    path: Path  #: CSV or Parquet.
+    mapping: Path | None  #: Mapping file for foreign columns; None without.
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison(LogResult):
-    """Where model and machine disagree.
+    """Where model and machine disagree."""
 
-    Attributes:
-        residuals: By joint and circumstance, with the predictions they rest on.
-    """
-
-    residuals: Whereabouts
+    residuals: Whereabouts  #: By joint and circumstance, with the predictions they rest on.
 
     @property
     def where(self) -> Table:
@@ -100,18 +86,13 @@ class Comparison(LogResult):
 
 @dataclass(frozen=True, eq=False)
 class Identified(LogResult):
-    """What the model lacks, and what it leaves once that is written into it.
+    """What the model lacks, and what it leaves once that is written into it."""
 
-    Attributes:
-        told: Everything that the files say.
-        bodies: Those found to be others, and the corrected URDF.
-        step: ``name`` saves tables, ``add`` the model file with them, others pictures and a page.
-        machine: That was compared; None for the command line.
-    """
-
-    told: Told
-    bodies: FoundBodies
+    told: Told  #: Everything that the files say.
+    bodies: FoundBodies  #: Those found to be others, and the corrected URDF.
+    #: ``name`` saves tables, ``add`` the model file with them, others pictures and a page.
     step: str
+    #: That was compared; None for the command line.
     machine: Machine | None = field(default=None, repr=False)
 
     @property
@@ -161,13 +142,9 @@ class Identified(LogResult):
 
 @dataclass(frozen=True, eq=False)
 class Driven(LogResult):
-    """A model that drove itself under its servos' law.
+    """A model that drove itself under its servos' law."""
 
-    Attributes:
-        drives: One for each log and model.
-    """
-
-    drives: Sequence[Drive]
+    drives: Sequence[Drive]  #: One for each log and model.
 
     @property
     def position_rms(self) -> float:

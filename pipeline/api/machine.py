@@ -23,17 +23,13 @@ from reports.atomic import write_text
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """What `load` returns and every other function takes; changes give a new one.
+    """What `load` returns and every other function takes; changes give a new one."""
 
-    Attributes:
-        files: What the files say.
-        changes: Numbers that differ from the files', by name.
-        loaded: Robot and actuators with the changes; None for the URDF of a robot on a fixed base,
-            with which logs are compared and nothing else done.
-    """
-
-    files: Files
+    files: Files  #: What the files say.
+    #: Numbers that differ from the files', by name.
     changes: Mapping[str, object] = field(default_factory=dict)
+    #: Robot and actuators with the changes; None for the URDF of a robot on a fixed base, with
+    #: which logs are compared and nothing else done.
     loaded: Settings | None = field(default=None, repr=False)
 
     @property

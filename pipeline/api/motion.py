@@ -24,13 +24,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Stand(Result):
-    """The robot standing still.
+    """The robot standing still."""
 
-    Attributes:
-        result: Arrays: posture, demand, contacts, what holds, by alternative.
-    """
-
-    result: walk_stand.Standing
+    result: walk_stand.Standing  #: Arrays: posture, demand, contacts, what holds, by alternative.
 
     @property
     def holding(self) -> Table:
@@ -50,12 +46,9 @@ class Stand(Result):
 
 @dataclass(frozen=True, eq=False)
 class Walk(Result):
-    """The robot over one gait cycle.
+    """The robot over one gait cycle."""
 
-    Attributes:
-        result: Arrays: motion, demand, margins, stages and supplies, by alternative.
-    """
-
+    #: Arrays: motion, demand, margins, stages and supplies, by alternative.
     result: walk_stand.Walking
 
     @property

@@ -20,16 +20,12 @@ Computed = dict[str, Callable[[], Table]]
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """Tables by name; some are attributes, too. A table has `.frame()`.
+    """Tables by name; some are attributes, too. A table has `.frame()`."""
 
-    Attributes:
-        verb: Of the command line that writes the same.
-        inputs: Files that were read; they stay where they lie in a folder that is written.
-    """
-
-    verb: str
+    verb: str  #: Of the command line that writes the same.
     _tables: Mapping[str, Table | Callable[[], Table]] = field(repr=False)
     _meta: Callable[[], dict[str, Any]] = field(repr=False)
+    #: Files that were read; they stay where they lie in a folder that is written.
     inputs: tuple[Path, ...] = field(repr=False)
 
     def table(self, name: str) -> Table:

@@ -40,37 +40,23 @@ SIGNATURES: Final = (
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of an effect.
+    """One parameter of an effect."""
 
-    Attributes:
-        name: In the model file.
-        unit: ``"channel"`` stands for the unit of the compared channel.
-        low: Below this the effect makes no sense.
-        high: Above this likewise.
-        optional: Whether it may be left out and is zero then.
-    """
-
-    name: str
-    unit: str
-    low: float
-    high: float
-    optional: bool = False
+    name: str  #: In the model file.
+    unit: str  #: ``"channel"`` stands for the unit of the compared channel.
+    low: float  #: Below this the effect makes no sense.
+    high: float  #: Above this likewise.
+    optional: bool = False  #: Whether it may be left out and is zero then.
 
 
 @dataclass(frozen=True)
 class Coordinate:
-    """A number in which an effect is fitted; at zero the effect is not there.
+    """A number in which an effect is fitted; at zero the effect is not there."""
 
-    Attributes:
-        name: Of the coordinate.
-        step: For finite differences; small against what matters.
-        signed: Whether negative values make sense.
-        required: Whether the effect is this effect only while this coordinate is not zero.
-    """
-
-    name: str
-    step: float
-    signed: bool = False
+    name: str  #: Of the coordinate.
+    step: float  #: For finite differences; small against what matters.
+    signed: bool = False  #: Whether negative values make sense.
+    #: Whether the effect is this effect only while this coordinate is not zero.
     required: bool = True
 
 
@@ -84,37 +70,30 @@ class Effect(ABC):
 
     An effect is fitted in `coordinates`, in which the prediction is linear or nearly so, at given
     `shapes` (Stribeck speed, order of a ripple), and reported in `parameters`.
-
-    Attributes:
-        name: In the field's terms; key of the registry.
-        place_kind: What it acts on: joint, joint pair, link, ground, effort channels or column.
-        parameters: As written to results and model files.
-        coordinates: As fitted.
-        signature: Variable against which its residual shows, one of `SIGNATURES`.
-        excitation: The motion that shows it, in words.
-        reaches: Multiples of the coordinates' steps to look across, where the prediction bends.
-        contains: Effects that are special cases of this one at the same place.
-        rescales: Whether what bodies do to a channel is multiplied by it.
-        competes: Whether it is tried by itself; others are fitted together for a whole machine.
-        kinds_absorbed: Kinds of tolerances at its place that are this effect in small.
-        additive: Whether what it adds does not depend on what else acts at the joint.
-        has_law: Whether it is a law; curves without one are drawn and never more than approximate.
-        fixed: Nonlinear parameters that are not estimated: the knots of curves.
     """
 
-    name: ClassVar[str]
+    name: ClassVar[str]  #: In the field's terms; key of the registry.
+    #: What it acts on: joint, joint pair, link, ground, effort channels or column.
     place_kind: ClassVar[str] = "joint"
-    parameters: ClassVar[tuple[Parameter, ...]]
-    coordinates: ClassVar[tuple[Coordinate, ...]]
+    parameters: ClassVar[tuple[Parameter, ...]]  #: As written to results and model files.
+    coordinates: ClassVar[tuple[Coordinate, ...]]  #: As fitted.
+    #: Variable against which its residual shows, one of `SIGNATURES`.
     signature: ClassVar[str] = "velocity"
-    excitation: ClassVar[str]
+    excitation: ClassVar[str]  #: The motion that shows it, in words.
+    #: Multiples of the coordinates' steps to look across, where the prediction bends.
     reaches: ClassVar[tuple[float, ...]] = (1.0,)
+    #: Effects that are special cases of this one at the same place.
     contains: ClassVar[tuple[str, ...]] = ()
-    rescales: ClassVar[bool] = False
+    rescales: ClassVar[bool] = False  #: Whether what bodies do to a channel is multiplied by it.
+    #: Whether it is tried by itself; others are fitted together for a whole machine.
     competes: ClassVar[bool] = True
+    #: Kinds of tolerances at its place that are this effect in small.
     kinds_absorbed: ClassVar[tuple[str, ...]] = ()
+    #: Whether what it adds does not depend on what else acts at the joint.
     additive: ClassVar[bool] = False
+    #: Whether it is a law; curves without one are drawn and never more than approximate.
     has_law: ClassVar[bool] = True
+    #: Nonlinear parameters that are not estimated: the knots of curves.
     fixed: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:

@@ -57,40 +57,25 @@ _HASH: Final = re.compile(r"[0-9a-f]{64}")
 
 @dataclass(frozen=True)
 class EditParameter:
-    """One parameter of an edit.
+    """One parameter of an edit."""
 
-    Attributes:
-        name: Of the effect's parameter.
-        value: In `unit`.
-        unit: SI.
-        interval: 95 % interval in `unit`.
-    """
-
-    name: str
-    value: float
-    unit: str
-    interval: tuple[float, float]
+    name: str  #: Of the effect's parameter.
+    value: float  #: In `unit`.
+    unit: str  #: SI.
+    interval: tuple[float, float]  #: 95 % interval in `unit`.
 
 
 @dataclass(frozen=True)
 class Edit:
-    """One effect at one place.
+    """One effect at one place."""
 
-    Attributes:
-        effect: Name in the catalogue of effects.
-        place: Joints, link, ground or effort channels.
-        parameters: In the effect's order.
-        basis: ``"identified"`` or ``"assumed"``.
-        source: The log and its hash.
-        level: ``"confirmed"``, or ``"approximate"``: it closes a large part of the gap, though its
-            law is not exactly the machine's or its size scatters.
-    """
-
-    effect: str
-    place: tuple[str, ...]
-    parameters: tuple[EditParameter, ...]
-    basis: str = "identified"
-    source: str = ""
+    effect: str  #: Name in the catalogue of effects.
+    place: tuple[str, ...]  #: Joints, link, ground or effort channels.
+    parameters: tuple[EditParameter, ...]  #: In the effect's order.
+    basis: str = "identified"  #: ``"identified"`` or ``"assumed"``.
+    source: str = ""  #: The log and its hash.
+    #: ``"confirmed"``, or ``"approximate"``: it closes a large part of the gap, though its law is
+    #: not exactly the machine's or its size scatters.
     level: str = "confirmed"
 
     @property
@@ -101,25 +86,18 @@ class Edit:
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model file after loading.
+    """A model file after loading."""
 
-    Attributes:
-        robot: Path of the robot file or URDF.
-        robot_sha256: Its hash as written.
-        alternative: Actuator of the catalogue; empty for none.
-        actuators_sha256: Catalogue file to its hash as written.
-        edits: In order.
-        noise: Channel to joint to standard deviation of what no effect explains, in the channel's
-            unit; empty where no log was compared.
-        changed: Files whose contents are no longer those of the hashes, in words.
-    """
-
-    robot: Path
-    robot_sha256: str
-    alternative: str
+    robot: Path  #: Path of the robot file or URDF.
+    robot_sha256: str  #: Its hash as written.
+    alternative: str  #: Actuator of the catalogue; empty for none.
+    #: Catalogue file to its hash as written.
     actuators_sha256: Mapping[str, str] = field(default_factory=dict)
-    edits: tuple[Edit, ...] = ()
+    edits: tuple[Edit, ...] = ()  #: In order.
+    #: Channel to joint to standard deviation of what no effect explains, in the channel's unit;
+    #: empty where no log was compared.
     noise: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    #: Files whose contents are no longer those of the hashes, in words.
     changed: tuple[str, ...] = ()
 
     def with_edits(self, edits: Sequence[Edit]) -> ModelFile:

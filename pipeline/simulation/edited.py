@@ -40,25 +40,16 @@ LEFT_OUT = {
 
 @dataclass(frozen=True)
 class Effects:
-    """A model file's effects, ready for standing and walking.
+    """A model file's effects, ready for standing and walking."""
 
-    Attributes:
-        robot: With the bodies and the ground that the effects change.
-        file: The model file's name.
-        names: Of the effects in order.
-        found_with: Alternative against which they were found; empty for none.
-        apply: Puts them into a machine.
-        warnings: What of the model file a reader should know.
-    """
-
-    robot: Robot
-    file: str
-    names: tuple[str, ...]
-    found_with: str
-    apply: Callable[[MachineModel], MachineModel]
+    robot: Robot  #: With the bodies and the ground that the effects change.
+    file: str  #: The model file's name.
+    names: tuple[str, ...]  #: Of the effects in order.
+    found_with: str  #: Alternative against which they were found; empty for none.
+    apply: Callable[[MachineModel], MachineModel]  #: Puts them into a machine.
     _bare: MachineModel
     _machine: MachineModel
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  #: What of the model file a reader should know.
 
     @property
     def of_drivetrain(self) -> tuple[str, ...]:

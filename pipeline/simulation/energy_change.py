@@ -19,37 +19,24 @@ PAIR = ("reversible", "irreversible")
 
 @dataclass(frozen=True)
 class Cost:
-    """Energies with one alternative.
+    """Energies with one alternative."""
 
-    Attributes:
-        cycle: Electrical energy of one gait cycle, whole robot [J].
-        standing: Electrical power, standing as the robot file says, whole robot [W].
-        middle_cycle: Of the middle legs alone, on which the paper's break-even rests [J].
-        middle_standing: Likewise [W].
-    """
-
-    cycle: float
-    standing: float
-    middle_cycle: float
-    middle_standing: float
+    cycle: float  #: Electrical energy of one gait cycle, whole robot [J].
+    standing: float  #: Electrical power, standing as the robot file says, whole robot [W].
+    middle_cycle: float  #: Of the middle legs alone, on which the paper's break-even rests [J].
+    middle_standing: float  #: Likewise [W].
 
 
 @dataclass(frozen=True)
 class EnergyChange:
-    """Before and after effects.
+    """Before and after effects."""
 
-    Attributes:
-        before: By alternative.
-        after: By alternative; of those alone in which all the effects count.
-        break_even_before: Fraction of time standing above which the irreversible actuator uses
-            less in the middle legs (Fig. 21 of the paper); NaN where there is none.
-        break_even_after: The same with the effects.
-    """
-
-    before: Mapping[str, Cost]
-    after: Mapping[str, Cost]
+    before: Mapping[str, Cost]  #: By alternative.
+    after: Mapping[str, Cost]  #: By alternative; of those alone in which all the effects count.
+    #: Fraction of time standing above which the irreversible actuator uses less in the middle legs
+    #: (Fig. 21 of the paper); NaN where there is none.
     break_even_before: float
-    break_even_after: float
+    break_even_after: float  #: The same with the effects.
 
 
 def energy_change(

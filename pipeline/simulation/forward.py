@@ -39,50 +39,29 @@ _EXACT: Final = 1e-9  # residual over the scale of torques
 
 @dataclass(frozen=True, eq=False)
 class ServoInput:
-    """What the servos of a machine are commanded, and the first instant.
+    """What the servos of a machine are commanded, and the first instant."""
 
-    Attributes:
-        name: Of the log.
-        time: Shape (N,) [s].
-        goal: Position asked for, shape (N, J) [rad].
-        supply: Shape (N,) [V].
-        gain: Duty per position error [1/rad].
-        off: Where a drive is switched off, shape (N, J).
-        open_bridge: Whether a drive that is off leaves its winding open; else it is shorted.
-        position: At the first instant, as its sensor reads, shape (J,) [rad].
-        velocity: Likewise [rad/s].
-        temperature: Of the motors' sensors, shape (N, J) [degC], or None.
-    """
-
-    name: str
-    time: Array
-    goal: Array
-    supply: Array
-    gain: float
-    off: Mask
-    open_bridge: bool
-    position: Array
-    velocity: Array
-    temperature: Array | None = None
+    name: str  #: Of the log.
+    time: Array  #: Shape (N,) [s].
+    goal: Array  #: Position asked for, shape (N, J) [rad].
+    supply: Array  #: Shape (N,) [V].
+    gain: float  #: Duty per position error [1/rad].
+    off: Mask  #: Where a drive is switched off, shape (N, J).
+    open_bridge: bool  #: Whether a drive that is off leaves its winding open; else it is shorted.
+    position: Array  #: At the first instant, as its sensor reads, shape (J,) [rad].
+    velocity: Array  #: Likewise [rad/s].
+    temperature: Array | None = None  #: Of the motors' sensors, shape (N, J) [degC], or None.
 
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """What a simulated machine did.
+    """What a simulated machine did."""
 
-    Attributes:
-        time: Of the input, shape (N,) [s].
-        position: As its sensors read, shape (N, J) [rad].
-        velocity: Shape (N, J) [rad/s].
-        voltage: Applied to the motors, shape (N, J) [V]; NaN where the winding is open.
-        current: Shape (N, J) [A].
-    """
-
-    time: Array
-    position: Array
-    velocity: Array
-    voltage: Array
-    current: Array
+    time: Array  #: Of the input, shape (N,) [s].
+    position: Array  #: As its sensors read, shape (N, J) [rad].
+    velocity: Array  #: Shape (N, J) [rad/s].
+    voltage: Array  #: Applied to the motors, shape (N, J) [V]; NaN where the winding is open.
+    current: Array  #: Shape (N, J) [A].
 
 
 def servo_input(log: Log) -> ServoInput:

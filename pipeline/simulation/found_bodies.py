@@ -37,21 +37,13 @@ FOUND: Final = "as found in a log, see model.toml"
 
 @dataclass(frozen=True, eq=False)
 class FoundBody:
-    """A link, with all that is fixed to it, by the URDF and as found.
+    """A link, with all that is fixed to it, by the URDF and as found."""
 
-    Attributes:
-        link: That its joint carries.
-        urdf: Mass [kg] and centre of mass in the link's frame [m], (4,).
-        found: The same with the edits.
-        low: Lower ends of the 95 % intervals, (4,); minus infinity where there is none.
-        high: Upper ends likewise.
-    """
-
-    link: str
-    urdf: Array
-    found: Array
-    low: Array
-    high: Array
+    link: str  #: That its joint carries.
+    urdf: Array  #: Mass [kg] and centre of mass in the link's frame [m], (4,).
+    found: Array  #: The same with the edits.
+    low: Array  #: Lower ends of the 95 % intervals, (4,); minus infinity where there is none.
+    high: Array  #: Upper ends likewise.
 
     @property
     def change(self) -> Array:
@@ -73,17 +65,12 @@ class FoundBody:
 
 @dataclass(frozen=True, eq=False)
 class FoundBodies:
-    """What a model file says of bodies.
+    """What a model file says of bodies."""
 
-    Attributes:
-        bodies: That it changes, the largest change first.
-        elsewhere: Its effects that a URDF's inertial elements cannot carry, with their places.
-        urdf: Text of the corrected URDF; empty where none is to be written.
-    """
-
-    bodies: tuple[FoundBody, ...] = ()
+    bodies: tuple[FoundBody, ...] = ()  #: That it changes, the largest change first.
+    #: Its effects that a URDF's inertial elements cannot carry, with their places.
     elsewhere: tuple[str, ...] = ()
-    urdf: str = ""
+    urdf: str = ""  #: Text of the corrected URDF; empty where none is to be written.
 
 
 def of_bodies(edits: Sequence[Edit]) -> list[Edit]:

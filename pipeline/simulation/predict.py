@@ -23,36 +23,22 @@ from pipeline.simulation.rigid_bodies import RigidBodies
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """What a model says the sensors show, before the low-pass.
+    """What a model says the sensors show, before the low-pass."""
 
-    Attributes:
-        model: The model.
-        q: Joint positions, link side, shape (N, J) [rad].
-        torque: Demanded of the actuators by the rigid bodies, shape (N, J) [N*m].
-        motor_torque: Of the motors brought to the joint side, shape (N, J) [N*m].
-        effort: Shape (N, J, C) in the measurement's channels.
-        computed: Joints computed for it; the others were taken over.
-    """
-
-    model: MachineModel
-    q: Array
-    torque: Array
-    motor_torque: Array
-    effort: Array
-    computed: tuple[int, ...] = ()
+    model: MachineModel  #: The model.
+    q: Array  #: Joint positions, link side, shape (N, J) [rad].
+    torque: Array  #: Demanded of the actuators by the rigid bodies, shape (N, J) [N*m].
+    motor_torque: Array  #: Of the motors brought to the joint side, shape (N, J) [N*m].
+    effort: Array  #: Shape (N, J, C) in the measurement's channels.
+    computed: tuple[int, ...] = ()  #: Joints computed for it; the others were taken over.
 
 
 @dataclass(frozen=True, eq=False)
 class Difference:
-    """Change of a prediction where it changed at all.
+    """Change of a prediction where it changed at all."""
 
-    Attributes:
-        joints: Columns that changed.
-        effort: Shape (N, len(joints), C).
-    """
-
-    joints: tuple[int, ...]
-    effort: Array
+    joints: tuple[int, ...]  #: Columns that changed.
+    effort: Array  #: Shape (N, len(joints), C).
 
 
 class Simulator:

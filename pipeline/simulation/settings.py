@@ -46,25 +46,16 @@ PAPER_FORCES = ForceChoice()
 
 @dataclass(frozen=True)
 class Files:
-    """What a machine's files say, before numbers are changed.
+    """What a machine's files say, before numbers are changed."""
 
-    Attributes:
-        robot: Robot file, or the URDF of a robot on a fixed base.
-        spec: The robot file's contents; None for a URDF.
-        catalog: Actuator components and alternatives.
-        actuators: Folder of the user's own actuator files; None for the project's catalogue.
-        gait: The gait file; None without one.
-        model: Effects of the model file; None without one.
-        model_path: The model file; None without one.
-    """
-
-    robot: Path
-    spec: RobotSpec | None = field(repr=False)
-    catalog: Catalog = field(repr=False)
+    robot: Path  #: Robot file, or the URDF of a robot on a fixed base.
+    spec: RobotSpec | None = field(repr=False)  #: The robot file's contents; None for a URDF.
+    catalog: Catalog = field(repr=False)  #: Actuator components and alternatives.
+    #: Folder of the user's own actuator files; None for the project's catalogue.
     actuators: Path | None = None
-    gait: Path | None = None
-    model: ModelFile | None = None
-    model_path: Path | None = None
+    gait: Path | None = None  #: The gait file; None without one.
+    model: ModelFile | None = None  #: Effects of the model file; None without one.
+    model_path: Path | None = None  #: The model file; None without one.
 
 
 def read_files(
@@ -102,43 +93,25 @@ def read_files(
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """A loaded machine, and how it stands and walks.
+    """A loaded machine, and how it stands and walks."""
 
-    Attributes:
-        files: What the files say.
-        changes: Numbers that differ from the files', by the keys of ``--set``.
-        bare: The robot without the payload of its gait.
-        robot: Loaded and checked, with the payload.
-        catalog: Actuator components and alternatives.
-        own: What single joints have of their own.
-        effects: Of the model file; None without one.
-        notes: What a reader of the numbers should know of the changes.
-        warnings: The same of the robot's bodies.
-        samples: Per half period of the gait.
-        quasi_static: Whether the links' inertial terms are left out.
-        regeneration: What becomes of returned energy.
-        forces: How the ground's forces are chosen.
-        compare_forces: Whether the rules for them are to be compared.
-        motion: In place of the gait; None to walk.
-        motion_file: Where it was read; None without a file.
-    """
-
-    files: Files
-    changes: Mapping[str, object]
-    bare: Robot
-    robot: Robot
-    catalog: Catalog
-    own: OwnActuators
-    effects: Effects | None = None
-    notes: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
-    samples: int = SAMPLES
-    quasi_static: bool = False
+    files: Files  #: What the files say.
+    changes: Mapping[str, object]  #: Numbers that differ from the files', by the keys of ``--set``.
+    bare: Robot  #: The robot without the payload of its gait.
+    robot: Robot  #: Loaded and checked, with the payload.
+    catalog: Catalog  #: Actuator components and alternatives.
+    own: OwnActuators  #: What single joints have of their own.
+    effects: Effects | None = None  #: Of the model file; None without one.
+    notes: tuple[str, ...] = ()  #: What a reader of the numbers should know of the changes.
+    warnings: tuple[str, ...] = ()  #: The same of the robot's bodies.
+    samples: int = SAMPLES  #: Per half period of the gait.
+    quasi_static: bool = False  #: Whether the links' inertial terms are left out.
+    #: What becomes of returned energy.
     regeneration: Regeneration = field(default_factory=Regeneration)
-    forces: ForceChoice = PAPER_FORCES
-    compare_forces: bool = False
-    motion: Motion | None = None
-    motion_file: Path | None = None
+    forces: ForceChoice = PAPER_FORCES  #: How the ground's forces are chosen.
+    compare_forces: bool = False  #: Whether the rules for them are to be compared.
+    motion: Motion | None = None  #: In place of the gait; None to walk.
+    motion_file: Path | None = None  #: Where it was read; None without a file.
 
     def walking(
         self,

@@ -28,15 +28,10 @@ from pipeline.simulation.ground_forces.least_power import Adjust
 
 @dataclass(frozen=True)
 class Regeneration:
-    """What becomes of electrical energy that flows back from a motor.
+    """What becomes of electrical energy that flows back from a motor."""
 
-    Attributes:
-        policy: ``none``, ``fraction`` or ``bus``.
-        fraction: Share that is used again, for ``fraction``.
-    """
-
-    policy: str = "none"
-    fraction: float = 0.0
+    policy: str = "none"  #: ``none``, ``fraction`` or ``bus``.
+    fraction: float = 0.0  #: Share that is used again, for ``fraction``.
 
     @property
     def recovered(self) -> float:
@@ -49,57 +44,34 @@ NOTHING_RETURNS = Regeneration()
 
 @dataclass(frozen=True)
 class Standing:
-    """The robot standing still.
+    """The robot standing still."""
 
-    Attributes:
-        segment: The posture.
-        demand: Torques to hold, one sample.
-        contacts: Ground forces, one sample.
-        holding: By alternative; arrays of shape (J,).
-    """
-
-    segment: Segment
-    demand: JointDemand
-    contacts: ContactForces
-    holding: Mapping[str, HoldingResult]
+    segment: Segment  #: The posture.
+    demand: JointDemand  #: Torques to hold, one sample.
+    contacts: ContactForces  #: Ground forces, one sample.
+    holding: Mapping[str, HoldingResult]  #: By alternative; arrays of shape (J,).
 
 
 @dataclass(frozen=True)
 class Walking:
-    """The robot over one gait cycle, or another motion.
+    """The robot over one gait cycle, or another motion."""
 
-    Attributes:
-        motion: The gait's, or the user's own.
-        demand: At the joints.
-        margins: Static stability by segment [m]; none on a fixed base.
-        results: By alternative.
-        supplies: What each alternative takes from the supply.
-    """
-
-    motion: Motion
-    demand: MotionDemand
-    margins: tuple[Array, ...]
-    results: Mapping[str, ChainResult]
-    supplies: Mapping[str, Supply]
+    motion: Motion  #: The gait's, or the user's own.
+    demand: MotionDemand  #: At the joints.
+    margins: tuple[Array, ...]  #: Static stability by segment [m]; none on a fixed base.
+    results: Mapping[str, ChainResult]  #: By alternative.
+    supplies: Mapping[str, Supply]  #: What each alternative takes from the supply.
 
 
 @dataclass(frozen=True)
 class RuleCost:
-    """What one rule of the ground's forces costs with one alternative over a cycle.
+    """What one rule of the ground's forces costs with one alternative over a cycle."""
 
-    Attributes:
-        alternative: Name.
-        rule: One of `RULES`.
-        energy: Out of the supply [J].
-        root_mean_square_torque: Over joints and samples [N*m].
-        friction_needed: Greatest tangential over normal force [1].
-    """
-
-    alternative: str
-    rule: str
-    energy: float
-    root_mean_square_torque: float
-    friction_needed: float
+    alternative: str  #: Name.
+    rule: str  #: One of `RULES`.
+    energy: float  #: Out of the supply [J].
+    root_mean_square_torque: float  #: Over joints and samples [N*m].
+    friction_needed: float  #: Greatest tangential over normal force [1].
 
     def relative_difference(self, costs: Sequence[RuleCost]) -> float | None:
         """Energy over that of the paper's rule, less one; None where that is zero."""

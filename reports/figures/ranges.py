@@ -14,17 +14,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Range:
-    """One row of the figure.
+    """One row of the figure."""
 
-    Attributes:
-        label: What it is, a few words a line.
-        predicted: Least, nominal and greatest.
-        measured: As measured; none, one, or the ends of a range.
-    """
-
-    label: str
-    predicted: tuple[float, float, float]
-    measured: Sequence[float] = ()
+    label: str  #: What it is, a few words a line.
+    predicted: tuple[float, float, float]  #: Least, nominal and greatest.
+    measured: Sequence[float] = ()  #: As measured; none, one, or the ends of a range.
 
 
 @house_style()

@@ -51,19 +51,12 @@ _LEFT: Final = {
 
 @dataclass(frozen=True)
 class PartSource:
-    """Where the numbers of a part come from.
+    """Where the numbers of a part come from."""
 
-    Attributes:
-        title: What it is.
-        basis: Of its numbers.
-        source: Where they were read.
-        note: What is doubtful or filled in.
-    """
-
-    title: str
-    basis: str
-    source: str
-    note: str = ""
+    title: str  #: What it is.
+    basis: str  #: Of its numbers.
+    source: str  #: Where they were read.
+    note: str = ""  #: What is doubtful or filled in.
 
 
 def write_choice_page(

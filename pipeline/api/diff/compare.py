@@ -22,25 +22,15 @@ Key = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Pair:
-    """One number of two runs.
+    """One number of two runs."""
 
-    Attributes:
-        table: Name.
-        row: What names its row, in words.
-        quantity: Header of its column.
-        unit: Of both.
-        a: Of run A; NaN where it has none.
-        b: Of run B.
-        weight: |b - a| over the largest magnitude in the same column and unit.
-    """
-
-    table: str
-    row: str
-    quantity: str
-    unit: str
-    a: float
-    b: float
-    weight: float
+    table: str  #: Name.
+    row: str  #: What names its row, in words.
+    quantity: str  #: Header of its column.
+    unit: str  #: Of both.
+    a: float  #: Of run A; NaN where it has none.
+    b: float  #: Of run B.
+    weight: float  #: |b - a| over the largest magnitude in the same column and unit.
 
     @property
     def both(self) -> bool:
@@ -60,23 +50,16 @@ class Pair:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """Two runs side by side.
+    """Two runs side by side."""
 
-    Attributes:
-        a: Run.
-        b: Run.
-        pairs: Every number of every table that both have, in the order of A's tables.
-        inputs: What went in and differs: what, in A, in B.
-        alone: Tables and figures that one of them has alone: name to ``"A"`` or ``"B"``.
-        figures: Figures that both have and that are not the same.
-    """
-
-    a: Run
-    b: Run
+    a: Run  #: Run.
+    b: Run  #: Run.
+    #: Every number of every table that both have, in the order of A's tables.
     pairs: tuple[Pair, ...]
-    inputs: tuple[tuple[str, str, str], ...]
+    inputs: tuple[tuple[str, str, str], ...]  #: What went in and differs: what, in A, in B.
+    #: Tables and figures that one of them has alone: name to ``"A"`` or ``"B"``.
     alone: Mapping[str, str]
-    figures: tuple[str, ...]
+    figures: tuple[str, ...]  #: Figures that both have and that are not the same.
 
     def table(self, name: str) -> list[Pair]:
         """Numbers of one table."""

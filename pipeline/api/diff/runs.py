@@ -23,40 +23,25 @@ TIME: Final = "time_s"
 
 @dataclass(frozen=True, eq=False)
 class RunTable:
-    """A table of a run.
+    """A table of a run."""
 
-    Attributes:
-        frame: Cells; those of names as text, the rest as numbers.
-        meanings: Header to meaning.
-        units: Header to unit; empty for names and flags, ``"see COLUMN"`` where another holds it.
-    """
-
-    frame: pandas.DataFrame
-    meanings: Mapping[str, str]
+    frame: pandas.DataFrame  #: Cells; those of names as text, the rest as numbers.
+    meanings: Mapping[str, str]  #: Header to meaning.
+    #: Header to unit; empty for names and flags, ``"see COLUMN"`` where another holds it.
     units: Mapping[str, str]
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a run left in its folder.
+    """What a run left in its folder."""
 
-    Attributes:
-        folder: As given.
-        verb: That wrote it.
-        tables: By name; those over time left out.
-        series: Names of the tables over time.
-        meta: What every sidecar says of the run.
-        figures: Names of the SVG files to their SHA-256.
-        changed: Tables that are no longer as the run wrote them.
-    """
-
-    folder: Path
-    verb: str
-    tables: Mapping[str, RunTable]
-    series: tuple[str, ...]
-    meta: Mapping[str, Any]
-    figures: Mapping[str, str]
-    changed: tuple[str, ...]
+    folder: Path  #: As given.
+    verb: str  #: That wrote it.
+    tables: Mapping[str, RunTable]  #: By name; those over time left out.
+    series: tuple[str, ...]  #: Names of the tables over time.
+    meta: Mapping[str, Any]  #: What every sidecar says of the run.
+    figures: Mapping[str, str]  #: Names of the SVG files to their SHA-256.
+    changed: tuple[str, ...]  #: Tables that are no longer as the run wrote them.
 
     @property
     def kind(self) -> str:

@@ -21,13 +21,9 @@ _LOAD = (0.94, 0.89, 0.26)  # yellow, as no link of ours
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What there is to see of a robot.
+    """What there is to see of a robot."""
 
-    Attributes:
-        robot: The robot.
-    """
-
-    robot: Robot
+    robot: Robot  #: The robot.
 
     @cached_property
     def visuals(self) -> Visuals:

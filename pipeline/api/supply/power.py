@@ -27,13 +27,9 @@ from reports.tables.power import power_tables
 
 @dataclass(frozen=True, eq=False)
 class Powered(LogResult):
-    """The supply's power, term by term.
+    """The supply's power, term by term."""
 
-    Attributes:
-        account: With every sample.
-    """
-
-    account: Account
+    account: Account  #: With every sample.
 
     @property
     def power(self) -> Table:

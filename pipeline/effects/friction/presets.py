@@ -18,13 +18,9 @@ _LARGEST_EXCESS = 3.0  # of break-away over Coulomb friction, in Coulomb frictio
 
 
 class FrictionPreset(Effect):
-    """Friction inserted at the joint's shaft.
+    """Friction inserted at the joint's shaft."""
 
-    Attributes:
-        terms: Each parameter's term of the law.
-    """
-
-    terms: ClassVar[Mapping[str, str]]
+    terms: ClassVar[Mapping[str, str]]  #: Each parameter's term of the law.
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert friction at the joint's shaft."""

@@ -42,51 +42,33 @@ _TINY: Final = 1e-300
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """What a model says along a motion.
+    """What a model says along a motion."""
 
-    Attributes:
-        base: Effort by the model as given, shape (N, J).
-        columns: Its change per unit of each open parameter, shape (P, N, J).
-        spread: Of these parameters, one standard deviation, shape (P,).
-        least: Their lower bounds, shape (P,).
-        relative: Which are changes over a value that is known by its order: their spread is that of
-            the logarithm, shape (P,).
-        v: Velocity, shape (N, J) [rad/s].
-        a: Acceleration, shape (N, J) [rad/s^2].
-        rest: Speed within which friction changes its sign, shape (J,) [rad/s].
-        ends: Which parameters are masses that ends carry; their three moments follow, shape (E,).
-        floor: Share of an effort, root mean square, that honest models of this kind leave.
-    """
-
-    base: Array
-    columns: Array
-    spread: Array
-    least: Array
+    base: Array  #: Effort by the model as given, shape (N, J).
+    columns: Array  #: Its change per unit of each open parameter, shape (P, N, J).
+    spread: Array  #: Of these parameters, one standard deviation, shape (P,).
+    least: Array  #: Their lower bounds, shape (P,).
+    #: Which are changes over a value that is known by its order: their spread is that of the
+    #: logarithm, shape (P,).
     relative: Mask
-    v: Array
-    a: Array
-    rest: Array
+    v: Array  #: Velocity, shape (N, J) [rad/s].
+    a: Array  #: Acceleration, shape (N, J) [rad/s^2].
+    rest: Array  #: Speed within which friction changes its sign, shape (J,) [rad/s].
+    #: Which parameters are masses that ends carry; their three moments follow, shape (E,).
     ends: NDArray[np.intp]
+    #: Share of an effort, root mean square, that honest models of this kind leave.
     floor: float = FLOOR
 
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """How well one hypothesis explains the efforts.
+    """How well one hypothesis explains the efforts."""
 
-    Attributes:
-        share: Left of each joint's effort, root mean square, shape (J,); NaN without rows.
-        floor: What honest models leave of it, shape (J,).
-        penalty: Of the bodies.
-        x: Bodies' parameters, then those of each joint's own columns.
-        held: Which of them are at their bounds.
-    """
-
-    share: Array
-    floor: Array
-    penalty: float
-    x: Array
-    held: Mask
+    share: Array  #: Left of each joint's effort, root mean square, shape (J,); NaN without rows.
+    floor: Array  #: What honest models leave of it, shape (J,).
+    penalty: float  #: Of the bodies.
+    x: Array  #: Bodies' parameters, then those of each joint's own columns.
+    held: Mask  #: Which of them are at their bounds.
 
     def gain(self, other: Score, independent: Array, *, sharp: bool = False) -> float:
         """By how much S falls with another hypothesis: both are judged above the higher floor.

@@ -28,23 +28,14 @@ ZEROS: Final = tuple(k * np.pi / 6 for k in range(-5, 7) if k)
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """What each joint's effort and position are read from.
+    """What each joint's effort and position are read from."""
 
-    Attributes:
-        effort_of: Column of the effort, shape (J,).
-        effort_factor: On it, shape (J,).
-        late: By which it comes late, shape (J,) [s].
-        position_of: Column of the position, shape (J,).
-        position_factor: On it, shape (J,).
-        zero: Added to it, shape (J,) [rad].
-    """
-
-    effort_of: Index
-    effort_factor: Array
-    late: Array
-    position_of: Index
-    position_factor: Array
-    zero: Array
+    effort_of: Index  #: Column of the effort, shape (J,).
+    effort_factor: Array  #: On it, shape (J,).
+    late: Array  #: By which it comes late, shape (J,) [s].
+    position_of: Index  #: Column of the position, shape (J,).
+    position_factor: Array  #: On it, shape (J,).
+    zero: Array  #: Added to it, shape (J,) [rad].
 
     def at(self, which: Sequence[int], **values: object) -> Reading:
         """The same with other values at some joints."""
@@ -68,19 +59,12 @@ def as_named(joints: int) -> Reading:
 
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
-    """One way in which columns may be wrong.
+    """One way in which columns may be wrong."""
 
-    Attributes:
-        cause: Key of `CAUSES`.
-        joints: Whose columns.
-        reading: That mends it.
-        size: Factor, delay or zero; one where there is none to choose.
-    """
-
-    cause: str
-    joints: tuple[int, ...]
-    reading: Reading
-    size: float = 1.0
+    cause: str  #: Key of `CAUSES`.
+    joints: tuple[int, ...]  #: Whose columns.
+    reading: Reading  #: That mends it.
+    size: float = 1.0  #: Factor, delay or zero; one where there is none to choose.
 
     def resized(self, size: float, start: Reading) -> Hypothesis:
         """The same with another size, from the reading that is mended."""

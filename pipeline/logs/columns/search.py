@@ -63,19 +63,14 @@ class Along(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Mended:
-    """What the search found.
+    """What the search found."""
 
-    Attributes:
-        steps: Hypotheses, one after the other, and by how much each lowers the score.
-        before: Share of each joint's effort that is left as logged, shape (J,).
-        after: ... and with all steps.
-        pushed: By how much it falls where the ends of the machine are pushed up from outside, if
-            that explains more than any reading; else zero.
-    """
-
+    #: Hypotheses, one after the other, and by how much each lowers the score.
     steps: tuple[tuple[Hypothesis, float], ...]
-    before: Array
-    after: Array
+    before: Array  #: Share of each joint's effort that is left as logged, shape (J,).
+    after: Array  #: ... and with all steps.
+    #: By how much it falls where the ends of the machine are pushed up from outside, if that
+    #: explains more than any reading; else zero.
     pushed: float = 0.0
 
 

@@ -34,26 +34,16 @@ _TORQUES: Final = 30.0
 
 @dataclass(frozen=True)
 class Guess:
-    """What a column may be.
+    """What a column may be."""
 
-    Attributes:
-        column: Its name in the file.
-        quantity: Of the log format; empty where it is not known.
-        joint: The robot's name of it, or the log's own without a robot.
-        unit: Of the file; empty for the log format's own.
-        scale: Factor.
-        why: By what this was guessed.
-        sure: Whether the line counts; else it is written as a remark.
-        others: What it may be instead: quantity, unit, and when.
-    """
-
-    column: str
-    quantity: str
-    joint: str
-    unit: str
-    why: str
-    scale: float = 1.0
-    sure: bool = True
+    column: str  #: Its name in the file.
+    quantity: str  #: Of the log format; empty where it is not known.
+    joint: str  #: The robot's name of it, or the log's own without a robot.
+    unit: str  #: Of the file; empty for the log format's own.
+    why: str  #: By what this was guessed.
+    scale: float = 1.0  #: Factor.
+    sure: bool = True  #: Whether the line counts; else it is written as a remark.
+    #: What it may be instead: quantity, unit, and when.
     others: tuple[tuple[str, str, str], ...] = ()
 
 

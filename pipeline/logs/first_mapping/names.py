@@ -48,22 +48,14 @@ _KEYWORD: Final = {word: quantity for quantity, words in _WORDS.items() for word
 
 @dataclass(frozen=True)
 class Named:
-    """What a column's name says.
+    """What a column's name says."""
 
-    Attributes:
-        column: The name.
-        quantity: Of the log format, those of the supply as in `SUPPLY_COLUMNS`; empty where
-            unknown.
-        joint: What is left of the name; empty where nothing is.
-        unit: Stated by the name or a row of units; empty where none is.
-        motor: Whether the name speaks of a motor.
-    """
-
-    column: str
+    column: str  #: The name.
+    #: Of the log format, those of the supply as in `SUPPLY_COLUMNS`; empty where unknown.
     quantity: str
-    joint: str
-    unit: str
-    motor: bool
+    joint: str  #: What is left of the name; empty where nothing is.
+    unit: str  #: Stated by the name or a row of units; empty where none is.
+    motor: bool  #: Whether the name speaks of a motor.
 
 
 def words_of(name: str) -> list[str]:

@@ -69,17 +69,11 @@ def angle_units(x: Array, lower: float, upper: float) -> list[str]:
 
 @dataclass(frozen=True)
 class Follows:
-    """How a column follows the derivative of another.
+    """How a column follows the derivative of another."""
 
-    Attributes:
-        position: The other.
-        correlation: Between the derivative and the column.
-        factor: Derivative over column.
-    """
-
-    position: str
-    correlation: float
-    factor: float
+    position: str  #: The other.
+    correlation: float  #: Between the derivative and the column.
+    factor: float  #: Derivative over column.
 
     def units(self, angle: str, stated: str) -> list[str]:
         """Units of the velocity that make the position one in this unit; none where none does.

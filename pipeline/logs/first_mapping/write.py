@@ -42,20 +42,13 @@ _ROWS: Final = 100_000  # that are looked at
 
 @dataclass(frozen=True)
 class FirstMapping:
-    """A mapping file, and what became of the columns.
+    """A mapping file, and what became of the columns."""
 
-    Attributes:
-        text: TOML.
-        mapped: Columns that count.
-        open: Columns that are remarks until somebody decides.
-        unused: Columns that say nothing.
-        asks_gains: Whether there are targets and no effort: the servos' gains are to be put in.
-    """
-
-    text: str
-    mapped: tuple[str, ...]
-    open: tuple[str, ...]
-    unused: tuple[str, ...]
+    text: str  #: TOML.
+    mapped: tuple[str, ...]  #: Columns that count.
+    open: tuple[str, ...]  #: Columns that are remarks until somebody decides.
+    unused: tuple[str, ...]  #: Columns that say nothing.
+    #: Whether there are targets and no effort: the servos' gains are to be put in.
     asks_gains: bool
 
 

@@ -38,17 +38,12 @@ NEEDS: Final = (
 
 
 class Message(NamedTuple):
-    """One message's numbers.
+    """One message's numbers."""
 
-    Attributes:
-        stamp: Of the header [ns].
-        columns: Joint and quantity of every number, in the message's order.
-        values: The numbers.
-    """
-
-    stamp: int
+    stamp: int  #: Of the header [ns].
+    #: Joint and quantity of every number, in the message's order.
     columns: tuple[tuple[str, str], ...]
-    values: NDArray[np.float64]
+    values: NDArray[np.float64]  #: The numbers.
 
 
 class _Layout(NamedTuple):

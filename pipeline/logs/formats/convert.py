@@ -36,15 +36,10 @@ _MADE: Final[dict[tuple[object, ...], Plain]] = {}
 
 @dataclass(frozen=True)
 class Plain:
-    """A table in a file that the readers know.
+    """A table in a file that the readers know."""
 
-    Attributes:
-        path: CSV or Parquet.
-        remarks: What a reader should know of the file that it comes from.
-    """
-
-    path: Path
-    remarks: tuple[str, ...] = ()
+    path: Path  #: CSV or Parquet.
+    remarks: tuple[str, ...] = ()  #: What a reader should know of the file that it comes from.
 
 
 def is_log(path: Path) -> bool:

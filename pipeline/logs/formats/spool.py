@@ -29,17 +29,11 @@ _SUFFIX: Final = {quantity: suffix for suffix, (quantity, _) in JOINT_COLUMNS.it
 
 
 class Column(NamedTuple):
-    """Whose numbers these are.
+    """Whose numbers these are."""
 
-    Attributes:
-        topic: Of the bag.
-        joint: By its name there.
-        quantity: ``"position"``, ``"velocity"``, ``"effort"``, or another interface's name.
-    """
-
-    topic: str
-    joint: str
-    quantity: str
+    topic: str  #: Of the bag.
+    joint: str  #: By its name there.
+    quantity: str  #: ``"position"``, ``"velocity"``, ``"effort"``, or another interface's name.
 
 
 class _Block(NamedTuple):
@@ -50,19 +44,12 @@ class _Block(NamedTuple):
 
 
 class _Sender(NamedTuple):
-    """Blocks that share columns: what one publisher sends.
+    """Blocks that share columns: what one publisher sends."""
 
-    Attributes:
-        columns: Of all of them.
-        blocks: The blocks.
-        rows: The row of every message, by block.
-        times: Of the rows [ns].
-    """
-
-    columns: tuple[Column, ...]
-    blocks: list[_Block]
-    rows: list[Stamps]
-    times: Stamps
+    columns: tuple[Column, ...]  #: Of all of them.
+    blocks: list[_Block]  #: The blocks.
+    rows: list[Stamps]  #: The row of every message, by block.
+    times: Stamps  #: Of the rows [ns].
 
 
 class Spool:

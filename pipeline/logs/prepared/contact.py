@@ -27,17 +27,11 @@ LOWEST: Final = 0.005
 
 @dataclass(frozen=True)
 class Contact:
-    """Which feet stand.
+    """Which feet stand."""
 
-    Attributes:
-        feet: Names of legs.
-        standing: Shape (N, F).
-        source: ``"forces"``, ``"columns"``, ``"schedule"`` or ``"lowest feet"``.
-    """
-
-    feet: tuple[str, ...]
-    standing: Mask
-    source: str
+    feet: tuple[str, ...]  #: Names of legs.
+    standing: Mask  #: Shape (N, F).
+    source: str  #: ``"forces"``, ``"columns"``, ``"schedule"`` or ``"lowest feet"``.
 
     def rows(self, index: NDArray[np.intp]) -> Contact:
         """At other rows."""

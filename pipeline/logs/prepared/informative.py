@@ -32,21 +32,14 @@ START: Final = 0.02
 
 @dataclass(frozen=True, eq=False)
 class Scan:
-    """Stretches of a log and what they tell.
+    """Stretches of a log and what they tell."""
 
-    Attributes:
-        first: First row of each stretch, shape (B,).
-        information: Shape (B, D), at least zero; zero where nothing of a stretch can be compared.
-        rows: Of the log.
-        begin: Its first time [s].
-        end: Its last time [s].
-    """
-
-    first: NDArray[np.intp]
+    first: NDArray[np.intp]  #: First row of each stretch, shape (B,).
+    #: Shape (B, D), at least zero; zero where nothing of a stretch can be compared.
     information: Array
-    rows: int
-    begin: float
-    end: float
+    rows: int  #: Of the log.
+    begin: float  #: Its first time [s].
+    end: float  #: Its last time [s].
 
 
 def scan(pieces: Iterable[Log]) -> Scan:

@@ -63,70 +63,47 @@ def unfiltered(x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """Samples of the machine's motion and of what it cost, at one bandwidth.
+    """Samples of the machine's motion and of what it cost, at one bandwidth."""
 
-    Attributes:
-        name: Of the log.
-        time: Shape (N,) [s].
-        joints: Names of the columns.
-        q: Position as measured, shape (N, J) [rad].
-        v: Velocity, shape (N, J) [rad/s].
-        a: Acceleration, shape (N, J) [rad/s^2].
-        channels: Compared channels, the log's own effort first, e.g. ``("current", "voltage")``.
-            With a measured current, voltage is predicted from that current and the speed.
-        effort: Shape (N, J, C) in the channels' units.
-        noise: Standard deviation of the noise in the bandwidth, shape (J, C).
-        mask: Samples that count, shape (N, J).
-        part: TRAIN, VALIDATION, TEST or UNUSED, shape (N,).
-        block: Number of the block, shape (N,); blocks are what is resampled.
-        pieces: Stretches without a gap.
-        lowpass: Brings a series (N, ...) of this grid to the bandwidth.
-        kernel: The same as weights of neighbouring samples, shape (odd,), or None.
-        bandwidth: Cut-off of that low-pass [Hz].
-        at_motor: Whether the encoder sits on the motor's side of the gear.
-        rest_speed: Speed within which friction passes from one sign to the other, (J,) [rad/s].
-        base_roll: Shape (N,) [rad], or None for level.
-        base_pitch: Likewise.
-        standing: Which feet stand, shape (N, F), or None.
-        foot_force: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None
-            where the ground's forces are computed.
-        open_winding: Rows in which a drive is off and its winding open, (N, J), or None: no current
-            flows, and a voltage that is compared has no part from the speed.
-        temperature: Of the motors' sensors, shape (N, J) [degC], or None.
-        unsure: How unsure the sign of friction is, 0 to 1, shape (N, J); see
-            `pipeline.logs.signals.noise`.
-        removed: What took rows from the comparison, and the share of all joints' rows it took; a
-            row counts with the first that took it.
-        sha256: Of the log.
-    """
-
-    name: str
-    time: Array
-    joints: tuple[str, ...]
-    q: Array
-    v: Array
-    a: Array
+    name: str  #: Of the log.
+    time: Array  #: Shape (N,) [s].
+    joints: tuple[str, ...]  #: Names of the columns.
+    q: Array  #: Position as measured, shape (N, J) [rad].
+    v: Array  #: Velocity, shape (N, J) [rad/s].
+    a: Array  #: Acceleration, shape (N, J) [rad/s^2].
+    #: Compared channels, the log's own effort first, e.g. ``("current", "voltage")``. With a
+    #: measured current, voltage is predicted from that current and the speed.
     channels: tuple[str, ...]
-    effort: Array
-    noise: Array
-    mask: Mask
-    part: NDArray[np.int8]
-    block: NDArray[np.intp]
-    pieces: tuple[slice, ...]
+    effort: Array  #: Shape (N, J, C) in the channels' units.
+    noise: Array  #: Standard deviation of the noise in the bandwidth, shape (J, C).
+    mask: Mask  #: Samples that count, shape (N, J).
+    part: NDArray[np.int8]  #: TRAIN, VALIDATION, TEST or UNUSED, shape (N,).
+    block: NDArray[np.intp]  #: Number of the block, shape (N,); blocks are what is resampled.
+    pieces: tuple[slice, ...]  #: Stretches without a gap.
+    #: Brings a series (N, ...) of this grid to the bandwidth.
     lowpass: Callable[[Array], Array] = unfiltered
+    #: The same as weights of neighbouring samples, shape (odd,), or None.
     kernel: Array | None = None
-    bandwidth: float = float("inf")
-    at_motor: bool = False
+    bandwidth: float = float("inf")  #: Cut-off of that low-pass [Hz].
+    at_motor: bool = False  #: Whether the encoder sits on the motor's side of the gear.
+    #: Speed within which friction passes from one sign to the other, (J,) [rad/s].
     rest_speed: Array = field(default_factory=lambda: np.zeros(0))
-    base_roll: Array | None = None
-    base_pitch: Array | None = None
-    standing: Mask | None = None
+    base_roll: Array | None = None  #: Shape (N,) [rad], or None for level.
+    base_pitch: Array | None = None  #: Likewise.
+    standing: Mask | None = None  #: Which feet stand, shape (N, F), or None.
+    #: World on robot, shape (N, F, 3) [N]; NaN components were not measured; None where the
+    #: ground's forces are computed.
     foot_force: Array | None = None
+    #: Rows in which a drive is off and its winding open, (N, J), or None: no current flows, and a
+    #: voltage that is compared has no part from the speed.
     open_winding: Mask | None = None
-    temperature: Array | None = None
+    temperature: Array | None = None  #: Of the motors' sensors, shape (N, J) [degC], or None.
+    #: How unsure the sign of friction is, 0 to 1, shape (N, J); see `pipeline.logs.signals.noise`.
     unsure: Array | None = None
+    #: What took rows from the comparison, and the share of all joints' rows it took; a row counts
+    #: with the first that took it.
     removed: tuple[tuple[str, float], ...] = ()
-    sha256: str = ""
+    sha256: str = ""  #: Of the log.
 
     def __len__(self) -> int:
         return self.time.size

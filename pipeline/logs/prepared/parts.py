@@ -34,21 +34,15 @@ PATTERN_WITHOUT_TEST: Final = (TRAIN, VALIDATION, TRAIN)
 
 @dataclass(frozen=True)
 class Parts:
-    """Which rows of which log belong to which part.
+    """Which rows of which log belong to which part."""
 
-    Attributes:
-        part: Per log, shape (N,): `TRAIN`, `VALIDATION`, `TEST` or `UNUSED` (guards).
-        block: Per log, shape (N,): number of the block, unique over all logs; -1 in guards.
-        guard: Between blocks [s].
-        rule: How the parts were cut, in words.
-        warning: What the test cannot show, or empty.
-    """
-
+    #: Per log, shape (N,): `TRAIN`, `VALIDATION`, `TEST` or `UNUSED` (guards).
     part: tuple[NDArray[np.int8], ...]
+    #: Per log, shape (N,): number of the block, unique over all logs; -1 in guards.
     block: tuple[NDArray[np.int32], ...]
-    guard: float
-    rule: str
-    warning: str
+    guard: float  #: Between blocks [s].
+    rule: str  #: How the parts were cut, in words.
+    warning: str  #: What the test cannot show, or empty.
 
 
 def split(

@@ -33,55 +33,34 @@ class Prepared:
     All series are filtered by the same zero-phase low-pass, the effort too; a prediction made from
     `q`, `v`, `a` may have content above the cut-off (friction at a reversal) and is brought to the
     same bandwidth with `lowpass`.
-
-    Attributes:
-        log: What was read.
-        q: Position, shape (N, J) [rad].
-        v: Velocity, shape (N, J) [rad/s].
-        a: Acceleration, shape (N, J) [rad/s^2].
-        effort: Shape (N, J), NaN where it was not measured.
-        mask: Where the effort of a joint and the motion of all joints are good, shape (N, J).
-        motion_ok: Where the motion of a joint is good, shape (N, J).
-        noise: Standard deviation of the effort's noise within the bandwidth, shape (J,).
-        noise_basis: ``"repeats"`` or ``"smoother"``.
-        settings: Grid and cut-off.
-        contact: Which feet stand, or None.
-        foot_force: Filtered, shape (N, F, 3) [N], or None.
-        base_roll: Filtered, shape (N,) [rad], or None.
-        base_pitch: Filtered, shape (N,) [rad], or None.
-        other: Further series interpolated on the grid and not filtered: ``velocity``,
-            ``motor_position``,
-            ``goal_position``, ``temperature`` and the efforts that are not compared, each (N, J);
-            ``supply``, (N,).
-        fusion: How velocity columns entered `v` and `a`, and the noise of both in the bandwidth.
-        stamp_error: Standard deviation of the time stamps' errors [s].
-        grid: How the log's rows lie on this grid.
-        usable: Positions and efforts of the log that are good, each (rows of the log, J).
-        log_contact: Which feet stand, at the log's rows; or None.
-        core: Rows that count; less than all only for a chunk of a longer log.
     """
 
-    log: Log
-    q: Array
-    v: Array
-    a: Array
-    effort: Array
-    mask: Mask
-    motion_ok: Mask
-    noise: Array
-    noise_basis: str
-    settings: Settings
-    contact: Contact | None
-    foot_force: Array | None
-    base_roll: Array | None
-    base_pitch: Array | None
+    log: Log  #: What was read.
+    q: Array  #: Position, shape (N, J) [rad].
+    v: Array  #: Velocity, shape (N, J) [rad/s].
+    a: Array  #: Acceleration, shape (N, J) [rad/s^2].
+    effort: Array  #: Shape (N, J), NaN where it was not measured.
+    mask: Mask  #: Where the effort of a joint and the motion of all joints are good, shape (N, J).
+    motion_ok: Mask  #: Where the motion of a joint is good, shape (N, J).
+    noise: Array  #: Standard deviation of the effort's noise within the bandwidth, shape (J,).
+    noise_basis: str  #: ``"repeats"`` or ``"smoother"``.
+    settings: Settings  #: Grid and cut-off.
+    contact: Contact | None  #: Which feet stand, or None.
+    foot_force: Array | None  #: Filtered, shape (N, F, 3) [N], or None.
+    base_roll: Array | None  #: Filtered, shape (N,) [rad], or None.
+    base_pitch: Array | None  #: Filtered, shape (N,) [rad], or None.
+    #: Further series interpolated on the grid and not filtered: ``velocity``, ``motor_position``,
+    #: ``goal_position``, ``temperature`` and the efforts that are not compared, each (N, J);
+    #: ``supply``, (N,).
     other: dict[str, Array]
+    #: How velocity columns entered `v` and `a`, and the noise of both in the bandwidth.
     fusion: Fusion
-    stamp_error: float
-    grid: Grid
+    stamp_error: float  #: Standard deviation of the time stamps' errors [s].
+    grid: Grid  #: How the log's rows lie on this grid.
+    #: Positions and efforts of the log that are good, each (rows of the log, J).
     usable: tuple[Mask, Mask]
-    log_contact: Contact | None
-    core: slice
+    log_contact: Contact | None  #: Which feet stand, at the log's rows; or None.
+    core: slice  #: Rows that count; less than all only for a chunk of a longer log.
 
     def __len__(self) -> int:
         return self.time.size

@@ -23,18 +23,12 @@ OWN_SHARE: Final = 0.125
 
 @dataclass(frozen=True)
 class Settings:
-    """How logs are brought to one grid and bandwidth; the same for all logs that are compared.
+    """How logs are brought to one grid and bandwidth; the same for all logs that are compared."""
 
-    Attributes:
-        dt: Step of the uniform grid [s].
-        cutoff: Of the low-pass [Hz].
-        reason: How the cut-off was chosen, in words.
-        per_joint: Cut-off each joint alone would have asked for, shape (J,) [Hz].
-    """
-
-    dt: float
-    cutoff: float
-    reason: str
+    dt: float  #: Step of the uniform grid [s].
+    cutoff: float  #: Of the low-pass [Hz].
+    reason: str  #: How the cut-off was chosen, in words.
+    #: Cut-off each joint alone would have asked for, shape (J,) [Hz].
     per_joint: Array = field(default_factory=lambda: np.empty(0))
 
     @property

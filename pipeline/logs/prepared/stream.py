@@ -34,19 +34,12 @@ CHUNK_ROWS: Final = 50_000
 
 @dataclass(frozen=True)
 class Stream:
-    """A log that is read piece by piece, as often as needed; a CSV is read once and kept.
+    """A log that is read piece by piece, as often as needed; a CSV is read once and kept."""
 
-    Attributes:
-        path: CSV or Parquet.
-        expected: The robot's names and limits.
-        mapping: For foreign columns.
-        adjust: What is changed in every piece after reading.
-    """
-
-    path: Path
-    expected: Expected
-    mapping: MappingFile | None = None
-    adjust: Callable[[Log], Log] = lambda log: log
+    path: Path  #: CSV or Parquet.
+    expected: Expected  #: The robot's names and limits.
+    mapping: MappingFile | None = None  #: For foreign columns.
+    adjust: Callable[[Log], Log] = lambda log: log  #: What is changed in every piece after reading.
 
     @cached_property
     def _table(self) -> TableFile:
@@ -88,17 +81,11 @@ class Stream:
 
 @dataclass(frozen=True, eq=False)
 class Survey:
-    """What stands for a long log where not every row is needed.
+    """What stands for a long log where not every row is needed."""
 
-    Attributes:
-        log: The stretches that tell most; what lies between them is a gap.
-        found: All stretches.
-        proves_from: Time from which rows are for the test only [s]; infinite where none are.
-    """
-
-    log: Log
-    found: Scan
-    proves_from: float
+    log: Log  #: The stretches that tell most; what lies between them is a gap.
+    found: Scan  #: All stretches.
+    proves_from: float  #: Time from which rows are for the test only [s]; infinite where none are.
 
 
 def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:

@@ -28,38 +28,23 @@ _WARMING: Final = 60.0
 
 @dataclass(frozen=True)
 class Course:
-    """One joint along one log, rows that count only.
+    """One joint along one log, rows that count only."""
 
-    Attributes:
-        time: Shape (N,) [s].
-        rest: Measured minus simulated effort, shape (N,).
-        simulated: Effort, shape (N,).
-        q: Position [rad].
-        v: Velocity [rad/s].
-        a: Acceleration [rad/s^2].
-    """
-
-    time: Array
-    rest: Array
-    simulated: Array
-    q: Array
-    v: Array
-    a: Array
+    time: Array  #: Shape (N,) [s].
+    rest: Array  #: Measured minus simulated effort, shape (N,).
+    simulated: Array  #: Effort, shape (N,).
+    q: Array  #: Position [rad].
+    v: Array  #: Velocity [rad/s].
+    a: Array  #: Acceleration [rad/s^2].
 
 
 @dataclass(frozen=True)
 class Drift:
-    """How a joint's friction changes.
+    """How a joint's friction changes."""
 
-    Attributes:
-        first: Level at the beginning of the first log, in the effort's unit.
-        last: Level at the end of the last.
-        error: Standard error of their difference.
-    """
-
-    first: float
-    last: float
-    error: float
+    first: float  #: Level at the beginning of the first log, in the effort's unit.
+    last: float  #: Level at the end of the last.
+    error: float  #: Standard error of their difference.
 
     @property
     def seen(self) -> bool:

@@ -15,38 +15,23 @@ VERDICTS: Final = ("ok", "masked", "warning", "refused")
 
 @dataclass(frozen=True)
 class Finding:
-    """One check of one column.
+    """One check of one column."""
 
-    Attributes:
-        log: Name of the log.
-        column: Header in the log format, or the joint, or empty for the log as a whole.
-        check: What was looked at.
-        value: The number found.
-        unit: Of `value`.
-        verdict: One of `VERDICTS`.
-        detail: In words, with the remedy where there is one.
-    """
-
-    log: str
-    column: str
-    check: str
-    value: float
-    unit: str
-    verdict: str
-    detail: str
+    log: str  #: Name of the log.
+    column: str  #: Header in the log format, or the joint, or empty for the log as a whole.
+    check: str  #: What was looked at.
+    value: float  #: The number found.
+    unit: str  #: Of `value`.
+    verdict: str  #: One of `VERDICTS`.
+    detail: str  #: In words, with the remedy where there is one.
 
 
 @dataclass(frozen=True)
 class Quality:
-    """The judgement on one log.
+    """The judgement on one log."""
 
-    Attributes:
-        findings: In the order of the checks.
-        usable: Positions and efforts that may be used, each shape (N, J).
-    """
-
-    findings: tuple[Finding, ...]
-    usable: tuple[Mask, Mask]
+    findings: tuple[Finding, ...]  #: In the order of the checks.
+    usable: tuple[Mask, Mask]  #: Positions and efforts that may be used, each shape (N, J).
 
     def refuse(self, *, overlooked: Collection[str] = ()) -> None:
         """Refuse the log where a finding says so.

@@ -12,19 +12,12 @@ from actuators.arrays import Array
 
 @dataclass(frozen=True)
 class Skew:
-    """How one series lies against another: x(t) = factor * y(t - lag) + offset.
+    """How one series lies against another: x(t) = factor * y(t - lag) + offset."""
 
-    Attributes:
-        lag: Positive where x comes later [s].
-        lag_error: Standard error from the residual's spread, taken as white [s].
-        factor: Slope at that lag.
-        correlation: At that lag, -1 to 1.
-    """
-
-    lag: float
-    lag_error: float
-    factor: float
-    correlation: float
+    lag: float  #: Positive where x comes later [s].
+    lag_error: float  #: Standard error from the residual's spread, taken as white [s].
+    factor: float  #: Slope at that lag.
+    correlation: float  #: At that lag, -1 to 1.
 
 
 def skew(x: Array, y: Array, dt: float, *, longest: float) -> Skew | None:

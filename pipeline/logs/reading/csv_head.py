@@ -42,18 +42,13 @@ _SPELT: Final = {
 
 @dataclass(frozen=True)
 class CsvHead:
-    """What the first lines of a CSV file say.
+    """What the first lines of a CSV file say."""
 
-    Attributes:
-        names: Columns, as written.
-        skip: Lines above the first row of numbers.
-        units: Column to the unit of a row of units, where it states one.
-        stamps: Columns of dates and times to the first of them, as written.
-    """
-
-    names: tuple[str, ...]
-    skip: int = 1
+    names: tuple[str, ...]  #: Columns, as written.
+    skip: int = 1  #: Lines above the first row of numbers.
+    #: Column to the unit of a row of units, where it states one.
     units: Mapping[str, str] = field(default_factory=dict)
+    #: Columns of dates and times to the first of them, as written.
     stamps: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -16,30 +16,20 @@ from pipeline.robot.robot import Robot
 
 @dataclass(frozen=True)
 class Expected:
-    """Names and limits against which a log is read.
+    """Names and limits against which a log is read."""
 
-    Attributes:
-        robot: The robot's name, for messages.
-        joints: In the order of the columns.
-        lower: Position limits, -inf where there is none, shape (J,) [rad].
-        upper: Position limits, inf where there is none, shape (J,) [rad].
-        velocity_limit: inf where there is none, shape (J,) [rad/s].
-        effort_limit: Joint torque, inf where there is none, shape (J,) [N*m].
-        feet: Names of legs in order.
-        foot_alias: Other names of the same feet (their frames) to the leg's name.
-        ratio: Motor angle per joint angle, signed, shape (J,); None where it is not known.
-        weight: What the feet carry [N]; None for a robot that does not stand on its feet.
-    """
-
-    robot: str
-    joints: tuple[str, ...]
-    lower: Array
-    upper: Array
-    velocity_limit: Array
-    effort_limit: Array
-    feet: tuple[str, ...] = ()
+    robot: str  #: The robot's name, for messages.
+    joints: tuple[str, ...]  #: In the order of the columns.
+    lower: Array  #: Position limits, -inf where there is none, shape (J,) [rad].
+    upper: Array  #: Position limits, inf where there is none, shape (J,) [rad].
+    velocity_limit: Array  #: inf where there is none, shape (J,) [rad/s].
+    effort_limit: Array  #: Joint torque, inf where there is none, shape (J,) [N*m].
+    feet: tuple[str, ...] = ()  #: Names of legs in order.
+    #: Other names of the same feet (their frames) to the leg's name.
     foot_alias: Mapping[str, str] = field(default_factory=dict)
+    #: Motor angle per joint angle, signed, shape (J,); None where it is not known.
     ratio: Array | None = None
+    #: What the feet carry [N]; None for a robot that does not stand on its feet.
     weight: float | None = None
 
 

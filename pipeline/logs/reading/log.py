@@ -30,17 +30,11 @@ BY_MODEL: Final = "none logged: the model's stands in"
 
 @dataclass(frozen=True)
 class Effort:
-    """The channel that is compared.
+    """The channel that is compared."""
 
-    Attributes:
-        channel: Key of `EFFORTS`.
-        unit: Its unit.
-        values: Shape (N, J).
-    """
-
-    channel: str
-    unit: str
-    values: Array
+    channel: str  #: Key of `EFFORTS`.
+    unit: str  #: Its unit.
+    values: Array  #: Shape (N, J).
 
 
 @dataclass(frozen=True)
@@ -49,95 +43,63 @@ class Log:
 
     The sign of torque, current, voltage and velocity is the joint's; power is positive from supply
     to motor. What a channel did not measure is NaN there.
-
-    Attributes:
-        name: Short name, the file's stem.
-        time: Strictly increasing, shape (N,) [s].
-        joints: Names of the columns.
-        position: Joint side, shape (N, J) [rad].
-        position_source: ``"joint"`` or ``"motor"``: which side of the gear the encoder sits on;
-            motor angles are divided by the ratio.
-        motor_position: Of the motor over the ratio where both sides were measured, (N, J) [rad].
-        velocity: As measured, shape (N, J) [rad/s].
-        torque: At the joint side, shape (N, J) [N*m].
-        current: Of the motor, shape (N, J) [A].
-        voltage: Of the motor, shape (N, J) [V].
-        power: Electrical, shape (N, J) [W].
-        goal_position: Shape (N, J) [rad].
-        goal_velocity: Shape (N, J) [rad/s].
-        goal_torque: What the servos add to their law, at the joint side, shape (N, J) [N*m].
-        temperature: Shape (N, J) [degC].
-        feet: Names of the legs whose feet were measured.
-        foot_force: Of the world on the robot, shape (N, F, 3) [N].
-        contact: Shape (N, F).
-        base_roll: Shape (N,) [rad].
-        base_pitch: Shape (N,) [rad].
-        valid: False where position or effort is unusable, shape (N, J).
-        torque_off: True where the drive was switched off, shape (N, J).
-        supply: Voltage of the supply of all drives, shape (N,) [V].
-        supply_current: Out of it, shape (N,) [A].
-        supply_power: Out of it, shape (N,) [W].
-        gain: Of the controller, duty per position error [1/rad].
-        torque_off_bridge: ``"open"`` (no current flows) or ``"shorted"`` where the drive is off.
-        locked: Joints that stood still on purpose.
-        constants: Further numbers the mapping names, SI.
-        condition: What distinguishes this log from others, e.g. ``{"payload": 0.5}``.
-        extra: Numeric columns the mapping keeps under their own names, each shape (N,).
-        ignored: Columns of the file that were not used.
-        misspelt: Columns that were not used though they are nearly ones of the log format, and
-            those.
-        chosen_effort: Channel to compare, overriding the order of `EFFORTS`.
-        left_out: Joints that cannot be compared, and why.
-        remarks: Columns about which a reader should know something, and that.
-        repeated_times: Rows that were dropped because their time stood in the row before.
-        notes: What a reader should know of the file as a whole.
-        derived: Channels that were computed from others by the mapping, with the formula.
-        sha256: Of the file.
-        source: The file's name.
-        rules: Owner and quantity to the file's column and the mapping's rule for it.
     """
 
-    name: str
-    time: Array
-    joints: tuple[str, ...]
-    position: Array
+    name: str  #: Short name, the file's stem.
+    time: Array  #: Strictly increasing, shape (N,) [s].
+    joints: tuple[str, ...]  #: Names of the columns.
+    position: Array  #: Joint side, shape (N, J) [rad].
+    #: ``"joint"`` or ``"motor"``: which side of the gear the encoder sits on; motor angles are
+    #: divided by the ratio.
     position_source: str
+    #: Of the motor over the ratio where both sides were measured, (N, J) [rad].
     motor_position: Array | None = None
-    velocity: Array | None = None
-    torque: Array | None = None
-    current: Array | None = None
-    voltage: Array | None = None
-    power: Array | None = None
-    goal_position: Array | None = None
-    goal_velocity: Array | None = None
+    velocity: Array | None = None  #: As measured, shape (N, J) [rad/s].
+    torque: Array | None = None  #: At the joint side, shape (N, J) [N*m].
+    current: Array | None = None  #: Of the motor, shape (N, J) [A].
+    voltage: Array | None = None  #: Of the motor, shape (N, J) [V].
+    power: Array | None = None  #: Electrical, shape (N, J) [W].
+    goal_position: Array | None = None  #: Shape (N, J) [rad].
+    goal_velocity: Array | None = None  #: Shape (N, J) [rad/s].
+    #: What the servos add to their law, at the joint side, shape (N, J) [N*m].
     goal_torque: Array | None = None
-    temperature: Array | None = None
-    feet: tuple[str, ...] = ()
-    foot_force: Array | None = None
-    contact: Mask | None = None
-    base_roll: Array | None = None
-    base_pitch: Array | None = None
+    temperature: Array | None = None  #: Shape (N, J) [degC].
+    feet: tuple[str, ...] = ()  #: Names of the legs whose feet were measured.
+    foot_force: Array | None = None  #: Of the world on the robot, shape (N, F, 3) [N].
+    contact: Mask | None = None  #: Shape (N, F).
+    base_roll: Array | None = None  #: Shape (N,) [rad].
+    base_pitch: Array | None = None  #: Shape (N,) [rad].
+    #: False where position or effort is unusable, shape (N, J).
     valid: Mask = field(default_factory=lambda: np.ones((0, 0), dtype=np.bool_))
-    torque_off: Mask | None = None
-    supply: Array | None = None
-    supply_current: Array | None = None
-    supply_power: Array | None = None
-    gain: float | None = None
+    torque_off: Mask | None = None  #: True where the drive was switched off, shape (N, J).
+    supply: Array | None = None  #: Voltage of the supply of all drives, shape (N,) [V].
+    supply_current: Array | None = None  #: Out of it, shape (N,) [A].
+    supply_power: Array | None = None  #: Out of it, shape (N,) [W].
+    gain: float | None = None  #: Of the controller, duty per position error [1/rad].
+    #: ``"open"`` (no current flows) or ``"shorted"`` where the drive is off.
     torque_off_bridge: str | None = None
-    locked: tuple[str, ...] = ()
+    locked: tuple[str, ...] = ()  #: Joints that stood still on purpose.
+    #: Further numbers the mapping names, SI.
     constants: Mapping[str, float] = field(default_factory=dict)
+    #: What distinguishes this log from others, e.g. ``{"payload": 0.5}``.
     condition: Mapping[str, float | str] = field(default_factory=dict)
+    #: Numeric columns the mapping keeps under their own names, each shape (N,).
     extra: Mapping[str, Array] = field(default_factory=dict)
-    ignored: tuple[str, ...] = ()
+    ignored: tuple[str, ...] = ()  #: Columns of the file that were not used.
+    #: Columns that were not used though they are nearly ones of the log format, and those.
     misspelt: Mapping[str, str] = field(default_factory=dict)
-    chosen_effort: str | None = None
+    chosen_effort: str | None = None  #: Channel to compare, overriding the order of `EFFORTS`.
+    #: Joints that cannot be compared, and why.
     left_out: Mapping[str, str] = field(default_factory=dict)
+    #: Columns about which a reader should know something, and that.
     remarks: Mapping[str, str] = field(default_factory=dict)
-    repeated_times: int = 0
-    notes: tuple[str, ...] = ()
+    repeated_times: int = 0  #: Rows that were dropped because their time stood in the row before.
+    notes: tuple[str, ...] = ()  #: What a reader should know of the file as a whole.
+    #: Channels that were computed from others by the mapping, with the formula.
     derived: Mapping[str, str] = field(default_factory=dict)
-    sha256: str = ""
-    source: Path = Path()
+    sha256: str = ""  #: Of the file.
+    source: Path = Path()  #: The file's name.
+    #: Owner and quantity to the file's column and the mapping's rule for it.
     rules: Mapping[tuple[str, str], tuple[str, ColumnTable]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -59,19 +59,12 @@ _PLOTTED: Final = re.compile(r"/?(?:.*/)?joint_states/(.+)/(position|velocity|ef
 
 @dataclass(frozen=True)
 class Target:
-    """Where a column's numbers go.
+    """Where a column's numbers go."""
 
-    Attributes:
-        kind: ``"time"``, ``"joint"``, ``"foot"``, ``"base"`` or ``"supply"``.
-        owner: Joint or leg; empty for the others.
-        quantity: Attribute of the log, or part of one.
-        unit: In which the log keeps it.
-    """
-
-    kind: str
-    owner: str
-    quantity: str
-    unit: str
+    kind: str  #: ``"time"``, ``"joint"``, ``"foot"``, ``"base"`` or ``"supply"``.
+    owner: str  #: Joint or leg; empty for the others.
+    quantity: str  #: Attribute of the log, or part of one.
+    unit: str  #: In which the log keeps it.
 
 
 def column_name(owner: str, quantity: str) -> str:

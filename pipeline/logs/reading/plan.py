@@ -31,25 +31,16 @@ AS_NAMED: Final = ColumnTable()
 
 @dataclass(frozen=True)
 class ReadingPlan:
-    """Which column of a file goes where; made from its header alone.
+    """Which column of a file goes where; made from its header alone."""
 
-    Attributes:
-        table: The open file.
-        expected: The robot's names and limits.
-        mapping: The mapping.
-        rule: What holds for this log.
-        sources: Target to column of the file and the mapping's rule for it.
-        ignored: Columns that mean nothing to the log format.
-        misspelt: Those among them that are nearly one of it, and that one.
-    """
-
-    table: TableFile
-    expected: Expected
-    mapping: Mapping
-    rule: LogTable
+    table: TableFile  #: The open file.
+    expected: Expected  #: The robot's names and limits.
+    mapping: Mapping  #: The mapping.
+    rule: LogTable  #: What holds for this log.
+    #: Target to column of the file and the mapping's rule for it.
     sources: dict[Target, tuple[str, ColumnTable]]
-    ignored: tuple[str, ...]
-    misspelt: dict[str, str]
+    ignored: tuple[str, ...]  #: Columns that mean nothing to the log format.
+    misspelt: dict[str, str]  #: Those among them that are nearly one of it, and that one.
 
     @property
     def channel(self) -> str:

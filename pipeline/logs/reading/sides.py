@@ -26,19 +26,15 @@ _ALONE: Final = (
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Positions brought to the joint's side.
+    """Positions brought to the joint's side."""
 
-    Attributes:
-        position: Of the joint where that was measured, else of the motor over the ratio, (N, J).
-        motor: Of the motor over the ratio where both were measured, shape (N, J), NaN for joints
-            with one position; None where the log has one kind of position.
-        source: ``"motor"`` where every position is the motor's, else ``"joint"``.
-        remarks: Joint to what a reader should know about its positions.
-    """
-
+    #: Of the joint where that was measured, else of the motor over the ratio, (N, J).
     position: Array
+    #: Of the motor over the ratio where both were measured, shape (N, J), NaN for joints with one
+    #: position; None where the log has one kind of position.
     motor: Array | None
-    source: str
+    source: str  #: ``"motor"`` where every position is the motor's, else ``"joint"``.
+    #: Joint to what a reader should know about its positions.
     remarks: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -24,25 +24,16 @@ _DECIMAL_COMMA: Final = re.compile(r"^\s*[-+]?\d+,\d+([eE][-+]?\d+)?\s*$")
 
 @dataclass(frozen=True)
 class TableFile:
-    """A file of columns whose header has been read.
+    """A file of columns whose header has been read."""
 
-    Attributes:
-        path: The file, or the folder of a bag.
-        header: Column names, unique.
-        head: What else stands above the numbers of a CSV file.
-        parquet: Whether its data are Parquet; else CSV.
-        dialect: Of a CSV file.
-        data: What is read: the file, or what was made of it where it is neither CSV nor Parquet.
-        remarks: What a reader should know of how that was made.
-    """
-
-    path: Path
-    header: tuple[str, ...]
-    head: CsvHead
-    parquet: bool
-    dialect: CsvTable
+    path: Path  #: The file, or the folder of a bag.
+    header: tuple[str, ...]  #: Column names, unique.
+    head: CsvHead  #: What else stands above the numbers of a CSV file.
+    parquet: bool  #: Whether its data are Parquet; else CSV.
+    dialect: CsvTable  #: Of a CSV file.
+    #: What is read: the file, or what was made of it where it is neither CSV nor Parquet.
     data: Path
-    remarks: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()  #: What a reader should know of how that was made.
 
     @property
     def where(self) -> str:

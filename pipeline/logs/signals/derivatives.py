@@ -36,16 +36,12 @@ WHOLE: Final = (slice(None),)
 class LowPass:
     """The filter at one sampling rate.
 
-    Attributes:
-        rate: Samples per second [Hz].
-        cutoff: Frequency at which the amplitude is halved [Hz].
-
     Raises:
         PreparationError: The cut-off is not between zero and a quarter of the rate.
     """
 
-    rate: float
-    cutoff: float
+    rate: float  #: Samples per second [Hz].
+    cutoff: float  #: Frequency at which the amplitude is halved [Hz].
 
     def __post_init__(self) -> None:
         if not 0 < self.cutoff <= LARGEST_SHARE * self.rate * (1 + 1e-9):

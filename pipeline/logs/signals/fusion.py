@@ -32,21 +32,13 @@ _LONGEST_LAG: Final = 0.1
 
 @dataclass(frozen=True)
 class Fusion:
-    """How a log's velocity columns enter its speeds.
+    """How a log's velocity columns enter its speeds."""
 
-    Attributes:
-        factor: Of the column to the position's rate, shape (J,); NaN where it is not used.
-        offset: Of the column, shape (J,) [rad/s].
-        lag: Positive where the column is late, shape (J,) [s].
-        weight: Of the column in speed and in acceleration, shape (2, J), 0 to 1.
-        noise: Of speed [rad/s] and acceleration [rad/s^2] within the bandwidth, shape (2, J).
-    """
-
-    factor: Array
-    offset: Array
-    lag: Array
-    weight: Array
-    noise: Array
+    factor: Array  #: Of the column to the position's rate, shape (J,); NaN where it is not used.
+    offset: Array  #: Of the column, shape (J,) [rad/s].
+    lag: Array  #: Positive where the column is late, shape (J,) [s].
+    weight: Array  #: Of the column in speed and in acceleration, shape (2, J), 0 to 1.
+    noise: Array  #: Of speed [rad/s] and acceleration [rad/s^2] within the bandwidth, shape (2, J).
 
     def aligned(self, time: Array, column: Array, j: int) -> Array:
         """A joint's column (N,) at the position's factor, zero and time."""

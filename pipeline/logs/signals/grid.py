@@ -23,22 +23,15 @@ STRETCH_ROWS: Final = 16_384
 
 @dataclass(frozen=True)
 class Grid:
-    """A uniform grid.
+    """A uniform grid."""
 
-    Attributes:
-        time: Shape (M,) [s].
-        pieces: Stretches without a gap, slices of the grid's rows.
-        nearest: Nearest row of the log, shape (M,).
-        left: Row of the log to the left of each grid time, shape (M,); None where the log's own
-            rows lie on the grid.
-        share: Weight of the row to the right, shape (M,).
-    """
-
-    time: Array
-    pieces: tuple[slice, ...]
-    nearest: NDArray[np.intp]
+    time: Array  #: Shape (M,) [s].
+    pieces: tuple[slice, ...]  #: Stretches without a gap, slices of the grid's rows.
+    nearest: NDArray[np.intp]  #: Nearest row of the log, shape (M,).
+    #: Row of the log to the left of each grid time, shape (M,); None where the log's own rows lie
+    #: on the grid.
     left: NDArray[np.intp] | None = None
-    share: Array | None = None
+    share: Array | None = None  #: Weight of the row to the right, shape (M,).
 
     def resample(self, values: Array) -> Array:
         """Values on the grid by linear interpolation, shape (M, C); NaN stays NaN."""

@@ -26,19 +26,12 @@ _LEAST_ROWS: Final = 500
 
 @dataclass(frozen=True)
 class Ripple:
-    """A torque periodic in the joint's angle.
+    """A torque periodic in the joint's angle."""
 
-    Attributes:
-        order: Periods per turn [1].
-        amplitude: In the effort's unit.
-        phase: Of amplitude * sin(order * q + phase) [rad].
-        chance: That noise makes as strong a one at any order.
-    """
-
-    order: float
-    amplitude: float
-    phase: float
-    chance: float
+    order: float  #: Periods per turn [1].
+    amplitude: float  #: In the effort's unit.
+    phase: float  #: Of amplitude * sin(order * q + phase) [rad].
+    chance: float  #: That noise makes as strong a one at any order.
 
 
 def strongest_order(rest: Array, angle: Array, velocity: Array, rate: float) -> Ripple | None:

@@ -31,21 +31,14 @@ _LEAST_ROWS: Final = 60
 
 @dataclass(frozen=True)
 class TwoSides:
-    """What two positions of a joint tell.
+    """What two positions of a joint tell."""
 
-    Attributes:
-        compliance: 1 / k [rad/(N*m)], and its standard error.
-        width: Of the play [rad], and its standard error; NaN where the torque has one sign only.
-        loop: h, and its standard error [rad].
-        scatter: What is left, root mean square [rad].
-        rows: That were used.
-    """
-
-    compliance: tuple[float, float]
+    compliance: tuple[float, float]  #: 1 / k [rad/(N*m)], and its standard error.
+    #: Of the play [rad], and its standard error; NaN where the torque has one sign only.
     width: tuple[float, float]
-    loop: tuple[float, float]
-    scatter: float
-    rows: int
+    loop: tuple[float, float]  #: h, and its standard error [rad].
+    scatter: float  #: What is left, root mean square [rad].
+    rows: int  #: That were used.
 
     @property
     def elastic(self) -> bool:

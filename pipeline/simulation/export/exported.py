@@ -20,19 +20,12 @@ KINDS = ("mjcf", "urdf", "ros2_control")
 
 @dataclass(frozen=True)
 class Exported:
-    """A file for another tool.
+    """A file for another tool."""
 
-    Attributes:
-        text: Its contents.
-        left: What it cannot hold, in words.
-        joints: How many joints it has.
-        remarks: What of the files the machine comes from is odd.
-    """
-
-    text: str
-    left: tuple[str, ...]
-    joints: int
-    remarks: tuple[str, ...]
+    text: str  #: Its contents.
+    left: tuple[str, ...]  #: What it cannot hold, in words.
+    joints: int  #: How many joints it has.
+    remarks: tuple[str, ...]  #: What of the files the machine comes from is odd.
 
 
 def exported(

@@ -37,27 +37,16 @@ _ROUNDING: Final = 1e-6
 
 @dataclass(frozen=True)
 class JointNumbers:
-    """What a joint's drivetrain comes to at the joint's side.
+    """What a joint's drivetrain comes to at the joint's side."""
 
-    Attributes:
-        joint: Its name.
-        friction: Dry friction [N*m].
-        damping: Viscous friction [N*m*s/rad].
-        armature: Inertia of rotor and gears [kg*m^2].
-        stiffness: Of a spring beside the drive [N*m/rad].
-        rest: Where that spring gives no torque [rad].
-        effort: The joint's limit [N*m]; infinite for none.
-        left: What these numbers leave out, in words.
-    """
-
-    joint: str
-    friction: float
-    damping: float
-    armature: float
-    stiffness: float
-    rest: float
-    effort: float
-    left: tuple[str, ...]
+    joint: str  #: Its name.
+    friction: float  #: Dry friction [N*m].
+    damping: float  #: Viscous friction [N*m*s/rad].
+    armature: float  #: Inertia of rotor and gears [kg*m^2].
+    stiffness: float  #: Of a spring beside the drive [N*m/rad].
+    rest: float  #: Where that spring gives no torque [rad].
+    effort: float  #: The joint's limit [N*m]; infinite for none.
+    left: tuple[str, ...]  #: What these numbers leave out, in words.
 
 
 def joint_numbers(machine: MachineModel) -> tuple[JointNumbers, ...]:

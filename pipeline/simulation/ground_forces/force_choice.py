@@ -17,16 +17,11 @@ RULES = (LEAST_TANGENTIAL, LEAST_TORQUE, LEAST_POWER)
 
 @dataclass(frozen=True)
 class ForceChoice:
-    """What options say of the ground's forces.
+    """What options say of the ground's forces."""
 
-    Attributes:
-        rule: One of `RULES`.
-        power_of: Alternative whose power is the least; of ``least_power`` only.
-        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
-    """
-
-    rule: str = LEAST_TANGENTIAL
-    power_of: str | None = None
+    rule: str = LEAST_TANGENTIAL  #: One of `RULES`.
+    power_of: str | None = None  #: Alternative whose power is the least; of ``least_power`` only.
+    #: Greatest tangential over normal force [1]; None for no limit.
     friction_coefficient: float | None = None
 
     def on(self, ground: float | None) -> ForceChoice:

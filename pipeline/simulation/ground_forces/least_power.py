@@ -46,21 +46,16 @@ _GAIN = 1e-6  # of the power: less is no progress
 class LeastPower:
     """The least electrical power that one actuator draws from its supply.
 
-    Attributes:
-        chain: The actuator of every joint.
-        recovered: Share of returned power that is used again.
-        adjust: Changes the demand on the actuators; see `pipeline.simulation.edited`.
-        name: Of the rule.
-
     Note:
         Joints whose motors are coupled count as if each drew power for its own torque alone; what
         is found is then lower than the start, not the least.
     """
 
-    chain: Actuators
-    recovered: float = 0.0
+    chain: Actuators  #: The actuator of every joint.
+    recovered: float = 0.0  #: Share of returned power that is used again.
+    #: Changes the demand on the actuators; see `pipeline.simulation.edited`.
     adjust: Adjust | None = None
-    name: str = "least_power"
+    name: str = "least_power"  #: Of the rule.
 
     def forces(self, stance: Stance) -> Array:
         """Forces on the standing feet in the ground's frame [N], shape (N, K, 3)."""

@@ -29,25 +29,15 @@ _SAME_SLOPE = 1e-6  # share of the steepest
 
 @dataclass(frozen=True)
 class PowerLaw:
-    """Power of many joints and instants, each with its own numbers, shape (n, Q).
+    """Power of many joints and instants, each with its own numbers, shape (n, Q)."""
 
-    Attributes:
-        start: m_0 [N*m].
-        slope: s, left of all kinks [1].
-        kink: b_i [N*m], shape (n, Q, I).
-        bend: d_i [1], shape (n, Q, I).
-        quadratic: a [W/(N*m)^2].
-        linear: b [W/(N*m)].
-        recovered: Share of returned power that is used again.
-    """
-
-    start: Array
-    slope: Array
-    kink: Array
-    bend: Array
-    quadratic: Array
-    linear: Array
-    recovered: float
+    start: Array  #: m_0 [N*m].
+    slope: Array  #: s, left of all kinks [1].
+    kink: Array  #: b_i [N*m], shape (n, Q, I).
+    bend: Array  #: d_i [1], shape (n, Q, I).
+    quadratic: Array  #: a [W/(N*m)^2].
+    linear: Array  #: b [W/(N*m)].
+    recovered: float  #: Share of returned power that is used again.
 
     def of(self, rows: NDArray[np.intp]) -> PowerLaw:
         """Some of the instants."""

@@ -61,36 +61,22 @@ _LEGEND_CHARS = 66
 
 @dataclass(frozen=True)
 class Part:
-    """One element of an actuator, or its motor.
+    """One element of an actuator, or its motor."""
 
-    Attributes:
-        name: In words.
-        law: Key of `LAWS`, or another law's name.
-        numbers: Symbol with value and unit, in the order of the file.
-        dissipates: Whether it turns energy into heat.
-        stores: Whether it holds energy, kinetic or of a spring.
-    """
-
-    name: str
-    law: str
-    numbers: tuple[str, ...]
-    dissipates: bool
-    stores: bool
+    name: str  #: In words.
+    law: str  #: Key of `LAWS`, or another law's name.
+    numbers: tuple[str, ...]  #: Symbol with value and unit, in the order of the file.
+    dissipates: bool  #: Whether it turns energy into heat.
+    stores: bool  #: Whether it holds energy, kinetic or of a spring.
 
 
 @dataclass(frozen=True)
 class Section:
-    """A named stage and the elements between it and the next one towards the joint.
+    """A named stage and the elements between it and the next one towards the joint."""
 
-    Attributes:
-        stage: Short name.
-        where: In words.
-        parts: None after the joint, nor between two names of one shaft.
-    """
-
-    stage: str
-    where: str
-    parts: tuple[Part, ...] = ()
+    stage: str  #: Short name.
+    where: str  #: In words.
+    parts: tuple[Part, ...] = ()  #: None after the joint, nor between two names of one shaft.
 
     @property
     def height(self) -> float:

@@ -31,17 +31,11 @@ _REACH = 4.0  # to either side of the crossing [%]
 
 @dataclass(frozen=True)
 class BreakEven:
-    """Share of standing above which one alternative uses less energy than another.
+    """Share of standing above which one alternative uses less energy than another."""
 
-    Attributes:
-        share: From 0 to 1.
-        energy: There [J].
-        prior: Ends of what is known without any fit, or None.
-    """
-
-    share: float
-    energy: float
-    prior: tuple[float, float] | None = None
+    share: float  #: From 0 to 1.
+    energy: float  #: There [J].
+    prior: tuple[float, float] | None = None  #: Ends of what is known without any fit, or None.
 
 
 @house_style()

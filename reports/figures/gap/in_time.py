@@ -34,29 +34,17 @@ _MOST_POINTS = 2500
 
 @dataclass(frozen=True)
 class GapTrace:
-    """One joint over a stretch of time; all series at the same bandwidth.
+    """One joint over a stretch of time; all series at the same bandwidth."""
 
-    Attributes:
-        joint: Name.
-        time: Shape (N,) [s].
-        measured: Shape (N,).
-        compared: Rows that count for the gap, shape (N,).
-        before: Predicted by the model as it was, shape (N,).
-        after: Predicted with everything found, shape (N,).
-        noise_floor: Standard deviation of the noise.
-        unit: Of the channel.
-        held_out: Held-out rows, shape (N,), shaded; None for all of them.
-    """
-
-    joint: str
-    time: Array
-    measured: Array
-    compared: Mask
-    before: Array
-    after: Array
-    noise_floor: float
-    unit: str
-    held_out: Mask | None = None
+    joint: str  #: Name.
+    time: Array  #: Shape (N,) [s].
+    measured: Array  #: Shape (N,).
+    compared: Mask  #: Rows that count for the gap, shape (N,).
+    before: Array  #: Predicted by the model as it was, shape (N,).
+    after: Array  #: Predicted with everything found, shape (N,).
+    noise_floor: float  #: Standard deviation of the noise.
+    unit: str  #: Of the channel.
+    held_out: Mask | None = None  #: Held-out rows, shape (N,), shaded; None for all of them.
 
 
 @house_style()

@@ -30,17 +30,11 @@ _MAP = "YlOrBr"
 
 @dataclass(frozen=True)
 class WhereGroup:
-    """One way of sorting the rows.
+    """One way of sorting the rows."""
 
-    Attributes:
-        title: What they are sorted by.
-        bands: Names of the bands.
-        ratio: Gap over noise floor, shape (J, len(bands)); NaN where there are no rows.
-    """
-
-    title: str
-    bands: tuple[str, ...]
-    ratio: Array
+    title: str  #: What they are sorted by.
+    bands: tuple[str, ...]  #: Names of the bands.
+    ratio: Array  #: Gap over noise floor, shape (J, len(bands)); NaN where there are no rows.
 
 
 @house_style()

@@ -28,15 +28,11 @@ _TOUCHING = 1e-6  # [m]
 
 @dataclass(frozen=True)
 class View:
-    """A camera at infinity.
+    """A camera at infinity."""
 
-    Attributes:
-        name: E.g. ``"front"``.
-        axes: Rows are the image's right, its up, and the direction towards the viewer, in the
-            world, shape (3, 3); right-handed.
-    """
-
-    name: str
+    name: str  #: E.g. ``"front"``.
+    #: Rows are the image's right, its up, and the direction towards the viewer, in the world, shape
+    #: (3, 3); right-handed.
     axes: Array
 
     def project(self, points: Array) -> Array:

@@ -22,27 +22,18 @@ _SLENDER = 0.03  # thickness of a stick over the leg's length
 
 @dataclass(frozen=True)
 class Solid:
-    """A surface of triangles.
+    """A surface of triangles."""
 
-    Attributes:
-        kind: ``"box"``, ``"sphere"`` or ``"mesh"``.
-        points: Vertices, shape (V, 3) [m].
-        faces: Rows of `points`, shape (F, 3).
-        colors: Of each face, red, green, blue from 0 to 1, shape (F, 3).
-        sides: Number of the side to which each face belongs; a line is drawn around each, shape
-            (F,).
-        corners: Points within which it lies: of a box or sphere those of the box around it (x
-            counts slowest), of a mesh its vertices, shape (P, 3) [m].
-        body: Number of the rigid body that carries it.
-    """
-
-    kind: str
-    points: Array
-    faces: NDArray[np.intp]
-    colors: Array
+    kind: str  #: ``"box"``, ``"sphere"`` or ``"mesh"``.
+    points: Array  #: Vertices, shape (V, 3) [m].
+    faces: NDArray[np.intp]  #: Rows of `points`, shape (F, 3).
+    colors: Array  #: Of each face, red, green, blue from 0 to 1, shape (F, 3).
+    #: Number of the side to which each face belongs; a line is drawn around each, shape (F,).
     sides: NDArray[np.intp]
+    #: Points within which it lies: of a box or sphere those of the box around it (x counts
+    #: slowest), of a mesh its vertices, shape (P, 3) [m].
     corners: Array
-    body: int = 0
+    body: int = 0  #: Number of the rigid body that carries it.
 
     def moved(self, placement: Array) -> Solid:
         """The same elsewhere.
@@ -100,35 +91,23 @@ def _turned(
 
 @dataclass(frozen=True)
 class JointMark:
-    """Where a joint is and which way it moves.
+    """Where a joint is and which way it moves."""
 
-    Attributes:
-        name: Of the joint.
-        position: Origin in the world, shape (3,) [m].
-        axis: Unit vector in the world, shape (3,); positive rotation is right-handed about it,
-            positive sliding along it.
-        slides: Whether it is prismatic.
-    """
-
-    name: str
-    position: Array
+    name: str  #: Of the joint.
+    position: Array  #: Origin in the world, shape (3,) [m].
+    #: Unit vector in the world, shape (3,); positive rotation is right-handed about it, positive
+    #: sliding along it.
     axis: Array
-    slides: bool = False
+    slides: bool = False  #: Whether it is prismatic.
 
 
 @dataclass(frozen=True)
 class Leg:
-    """One leg in one posture.
+    """One leg in one posture."""
 
-    Attributes:
-        name: Shown at the foot.
-        joints: From the base outward.
-        foot: Contact point in the world, shape (3,) [m].
-    """
-
-    name: str
-    joints: tuple[JointMark, ...]
-    foot: Array
+    name: str  #: Shown at the foot.
+    joints: tuple[JointMark, ...]  #: From the base outward.
+    foot: Array  #: Contact point in the world, shape (3,) [m].
 
     @property
     def links(self) -> list[tuple[Array, Array]]:

@@ -18,14 +18,11 @@ from reports.figures.robot.solids import GREY, Color, Solid, box, cylinder, mesh
 
 @dataclass(frozen=True)
 class Visuals:
-    """What a URDF shows of its robot.
+    """What a URDF shows of its robot."""
 
-    Attributes:
-        solids: Link and surface in the link's frame, in the URDF's order.
-        missing: Meshes that were not found or not read, as the URDF names them.
-    """
-
+    #: Link and surface in the link's frame, in the URDF's order.
     solids: tuple[tuple[str, Solid], ...]
+    #: Meshes that were not found or not read, as the URDF names them.
     missing: tuple[str, ...] = ()
 
     @property
