@@ -33,24 +33,15 @@ _UNLOADED = 1e-9  # share of the largest load below which a foot bears none
 
 @dataclass(frozen=True)
 class ContactForces:
-    """Forces of the ground on the feet during one segment.
+    """Forces of the ground on the feet during one segment."""
 
-    Attributes:
-        legs: All legs, in the robot file's order.
-        stance: Those whose feet carry load.
-        time: Shape (N,) [s].
-        position: Foot points in the base frame [m], shape (N, L, 3).
-        force: In the base frame, acting on the robot [N], shape (N, L, 3); zero in the air.
-        force_world: The same in the world frame [N], shape (N, L, 3).
-        normal: Unit normal of the ground in the world frame, shape (3,).
-    """
-
-    legs: tuple[str, ...]
-    stance: tuple[str, ...]
-    time: Array
-    position: Array
-    force: Array
-    force_world: Array
+    legs: tuple[str, ...]  #: All legs, in the robot file's order.
+    stance: tuple[str, ...]  #: Those whose feet carry load.
+    time: Array  #: Shape (N,) [s].
+    position: Array  #: Foot points in the base frame [m], shape (N, L, 3).
+    force: Array  #: In the base frame, acting on the robot [N], shape (N, L, 3); zero in the air.
+    force_world: Array  #: The same in the world frame [N], shape (N, L, 3).
+    #: Unit normal of the ground in the world frame, shape (3,).
     normal: Array = field(default_factory=level_ground)
 
     @property

@@ -30,27 +30,18 @@ _TIE = 1e-9
 
 @dataclass(frozen=True)
 class Stance:
-    """Standing legs over one segment, as a rule sees them: K feet, Q joints that they load.
+    """Standing legs over one segment, as a rule sees them: K feet, Q joints that they load."""
 
-    Attributes:
-        segment: The motion.
-        demand: Of all joints, without the ground's forces.
-        loaded: Columns of the standing legs' joints among all, shape (Q,).
-        foot: Which of the K feet loads each of them, shape (Q,).
-        unit_torque: Torque that a force of 1 N on that foot along each axis of the ground's frame
-            puts into the joint, shape (N, Q, 3) [N*m/N].
-        feet: In a frame whose z axis is the ground's normal [m], shape (N, K, 3).
-        force: The least tangential forces in the same frame [N], shape (N, K, 3).
-        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
-    """
-
-    segment: Segment
-    demand: JointDemand
-    loaded: NDArray[np.intp]
-    foot: NDArray[np.intp]
+    segment: Segment  #: The motion.
+    demand: JointDemand  #: Of all joints, without the ground's forces.
+    loaded: NDArray[np.intp]  #: Columns of the standing legs' joints among all, shape (Q,).
+    foot: NDArray[np.intp]  #: Which of the K feet loads each of them, shape (Q,).
+    #: Torque that a force of 1 N on that foot along each axis of the ground's frame puts into the
+    #: joint, shape (N, Q, 3) [N*m/N].
     unit_torque: Array
-    feet: Array
-    force: Array
+    feet: Array  #: In a frame whose z axis is the ground's normal [m], shape (N, K, 3).
+    force: Array  #: The least tangential forces in the same frame [N], shape (N, K, 3).
+    #: Greatest tangential over normal force [1]; None for no limit.
     friction_coefficient: float | None
 
     def loaded_torque(self, force: Array, rows: Rows = ALL) -> Array:
@@ -142,15 +133,13 @@ class Descent:
 class GroundForces:
     """How the ground's forces are chosen.
 
-    Attributes:
-        rule: None for the paper's, the least sum of squared tangential forces.
-        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
-
     Raises:
         GaitError: A friction coefficient that no ground has.
     """
 
+    #: None for the paper's, the least sum of squared tangential forces.
     rule: ForceRule | None = None
+    #: Greatest tangential over normal force [1]; None for no limit.
     friction_coefficient: float | None = None
 
     def __post_init__(self) -> None:

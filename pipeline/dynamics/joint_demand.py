@@ -122,19 +122,12 @@ def _ground_forces(
 
 @dataclass(frozen=True)
 class MotionDemand:
-    """Demand and contact forces of a whole motion, segment by segment.
+    """Demand and contact forces of a whole motion, segment by segment."""
 
-    Attributes:
-        segments: Demand at the joints.
-        contacts: Forces of the ground; None for a fixed base.
-        period: Of the motion [s]; None where it does not repeat.
-        forces: How the ground's forces were chosen.
-    """
-
-    segments: tuple[JointDemand, ...]
-    contacts: tuple[ContactForces | None, ...]
-    period: float | None
-    forces: GroundForces = PAPER
+    segments: tuple[JointDemand, ...]  #: Demand at the joints.
+    contacts: tuple[ContactForces | None, ...]  #: Forces of the ground; None for a fixed base.
+    period: float | None  #: Of the motion [s]; None where it does not repeat.
+    forces: GroundForces = PAPER  #: How the ground's forces were chosen.
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -23,15 +23,10 @@ from pipeline.machine.joint import JointModel, joints_of
 
 @dataclass(frozen=True, eq=False)
 class Drivetrains:
-    """One drivetrain per joint; it answers `inverse` and `holding` as a chain for all joints does.
+    """One drivetrain per joint; `inverse` and `holding` answer as a chain for all joints does."""
 
-    Attributes:
-        name: Of the alternative.
-        joints: In the order of the columns.
-    """
-
-    name: str
-    joints: tuple[JointModel, ...]
+    name: str  #: Of the alternative.
+    joints: tuple[JointModel, ...]  #: In the order of the columns.
 
     @cached_property
     def coupled(self) -> dict[int, tuple[int, float]]:

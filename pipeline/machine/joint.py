@@ -34,46 +34,34 @@ _MOTOR_STAGE = "m"
 
 @dataclass(frozen=True, eq=False)
 class JointModel:
-    """One joint's actuator and sensors.
+    """One joint's actuator and sensors."""
 
-    Attributes:
-        name: Of the joint.
-        elements: From the joint to the motor; those that effects add stand first.
-        motor: The converter; None where the log's torque is the actuator's, as of a bare URDF.
-        position_torques: Torques that depend on the joint's position alone.
-        compliance: Of the transmission [rad/(N*m)].
-        backlash: Whole width [rad].
-        crossing: Torque over which the joint passes from one flank to the other [N*m].
-        coupled_to: Joint with which this one's motor also turns; empty without.
-        coupling: Turns of the motor, at the joint side, per turn of that other joint [1].
-        heating: Thermal node of the motor; None for a motor that stays cold.
-        warming: How its friction falls with its temperature; None where it does not.
-        encoder_offset: The position sensor reads high by this [rad].
-        effort_offset: The effort sensor reads high by this, in the unit of its channel.
-        delay: The effort channels lag behind the position by this [s].
-        gains: Channel to how many times what it should its column reads; once where absent.
-        stages: Names of shafts to the elements they follow, as a chain has them; the last one is
-            the motor's.
-        output: Elements of the joint's own bearings and seals, nearest to it: they turn with the
-            joint alone, also where its motor turns with another joint, too.
-    """
-
-    name: str
+    name: str  #: Of the joint.
+    #: From the joint to the motor; those that effects add stand first.
     elements: tuple[Element, ...] = ()
+    #: The converter; None where the log's torque is the actuator's, as of a bare URDF.
     motor: DCMotor | None = None
+    #: Torques that depend on the joint's position alone.
     position_torques: tuple[PositionTorque, ...] = ()
-    compliance: float = 0.0
-    backlash: float = 0.0
-    crossing: float = 0.0
-    coupled_to: str = ""
+    compliance: float = 0.0  #: Of the transmission [rad/(N*m)].
+    backlash: float = 0.0  #: Whole width [rad].
+    crossing: float = 0.0  #: Torque over which the joint passes from one flank to the other [N*m].
+    coupled_to: str = ""  #: Joint with which this one's motor also turns; empty without.
+    #: Turns of the motor, at the joint side, per turn of that other joint [1].
     coupling: float = 0.0
-    heating: Heating | None = None
+    heating: Heating | None = None  #: Thermal node of the motor; None for a motor that stays cold.
+    #: How its friction falls with its temperature; None where it does not.
     warming: Warming | None = None
-    encoder_offset: float = 0.0
-    effort_offset: float = 0.0
-    delay: float = 0.0
+    encoder_offset: float = 0.0  #: The position sensor reads high by this [rad].
+    effort_offset: float = 0.0  #: The effort sensor reads high by this, in the unit of its channel.
+    delay: float = 0.0  #: The effort channels lag behind the position by this [s].
+    #: Channel to how many times what it should its column reads; once where absent.
     gains: Mapping[str, float] = field(default_factory=dict)
+    #: Names of shafts to the elements they follow, as a chain has them; the last one is the
+    #: motor's.
     stages: Mapping[str, str] = field(default_factory=dict)
+    #: Elements of the joint's own bearings and seals, nearest to it: they turn with the joint
+    #: alone, also where its motor turns with another joint, too.
     output: tuple[Element, ...] = ()
 
     @property

@@ -28,40 +28,30 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class BodyChange:
-    """How one body differs from the robot file.
+    """How one body differs from the robot file."""
 
-    Attributes:
-        payload: Point mass added at the centre of mass [kg].
-        shift: Displacement of the centre of mass in the frame of the body's joint [m].
-        scale: Factor on mass and rotational inertia [1].
-        inertia_scale: Further factor on the rotational inertia about the centre of mass [1].
-        carried: Ten inertial parameters of what is carried besides, in Pinocchio's order, about the
-            frame of the body's joint.
-        strain: By how much it was stretched, moved and made heavier, ten entries in the order of
-            `STRAINS`: whatever they are, some body has them (`rigid_bodies.strained`).
-    """
-
-    payload: float = 0.0
+    payload: float = 0.0  #: Point mass added at the centre of mass [kg].
+    #: Displacement of the centre of mass in the frame of the body's joint [m].
     shift: Vector = (0.0, 0.0, 0.0)
-    scale: float = 1.0
+    scale: float = 1.0  #: Factor on mass and rotational inertia [1].
+    #: Further factor on the rotational inertia about the centre of mass [1].
     inertia_scale: float = 1.0
+    #: Ten inertial parameters of what is carried besides, in Pinocchio's order, about the frame of
+    #: the body's joint.
     carried: tuple[float, ...] = ()
+    #: By how much it was stretched, moved and made heavier, ten entries in the order of `STRAINS`:
+    #: whatever they are, some body has them (`rigid_bodies.strained`).
     strain: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
 class Bodies:
-    """What the rigid-body torque depends on in addition to the motion.
+    """What the rigid-body torque depends on in addition to the motion."""
 
-    Attributes:
-        changes: Joint that carries the body to its change.
-        tilt: Roll and pitch of the ground or stand [rad].
-        squeeze: Lateral force with which the ground pushes the standing feet outward, of all feet
-            on one side together [N].
-    """
-
-    changes: tuple[tuple[str, BodyChange], ...] = ()
-    tilt: tuple[float, float] = (0.0, 0.0)
+    changes: tuple[tuple[str, BodyChange], ...] = ()  #: Joint that carries the body to its change.
+    tilt: tuple[float, float] = (0.0, 0.0)  #: Roll and pitch of the ground or stand [rad].
+    #: Lateral force with which the ground pushes the standing feet outward, of all feet on one side
+    #: together [N].
     squeeze: float = 0.0
 
     def body(self, joint: str) -> BodyChange:
@@ -76,32 +66,20 @@ class Bodies:
 
 @dataclass(frozen=True, eq=False)
 class MachineModel:
-    """Robot, actuators and sensors.
+    """Robot, actuators and sensors."""
 
-    Attributes:
-        name: Of the robot.
-        rigid: Pinocchio model as the robot file states it; armature zero.
-        joints: In the order of every column.
-        legs: Geometry of the legs; None for a robot without.
-        layout: The legs' joints among `joints`; None for a robot without legs.
-        left: Which legs are on the left side.
-        floating: Whether the base floats.
-        bodies: Changes of bodies, ground and contact.
-        actuators: One per joint.
-        links: Moving link's name to the joint that carries it.
-        identified: Links whose inertial parameters a log has shown: they have no tolerance.
-    """
-
-    name: str
-    rigid: pin.Model
-    joints: tuple[str, ...]
-    legs: LegChains | None
-    layout: LegColumns | None
-    left: tuple[bool, ...]
-    floating: bool
-    bodies: Bodies = field(default_factory=Bodies)
-    actuators: tuple[JointModel, ...] = ()
+    name: str  #: Of the robot.
+    rigid: pin.Model  #: Pinocchio model as the robot file states it; armature zero.
+    joints: tuple[str, ...]  #: In the order of every column.
+    legs: LegChains | None  #: Geometry of the legs; None for a robot without.
+    layout: LegColumns | None  #: The legs' joints among `joints`; None for a robot without legs.
+    left: tuple[bool, ...]  #: Which legs are on the left side.
+    floating: bool  #: Whether the base floats.
+    bodies: Bodies = field(default_factory=Bodies)  #: Changes of bodies, ground and contact.
+    actuators: tuple[JointModel, ...] = ()  #: One per joint.
+    #: Moving link's name to the joint that carries it.
     links: Mapping[str, str] = field(default_factory=dict)
+    #: Links whose inertial parameters a log has shown: they have no tolerance.
     identified: tuple[str, ...] = ()
 
     @cached_property

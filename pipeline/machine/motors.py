@@ -14,24 +14,16 @@ from pipeline.machine.own_actuators import AS_BUILT, OwnActuators
 
 @dataclass(frozen=True)
 class Motors:
-    """The motors of all joints, of all alternatives that count.
+    """The motors of all joints, of all alternatives that count."""
 
-    Attributes:
-        titles: Of the motors' files, each once.
-        joints: How many joints have one.
-        ratio: Least and greatest motor speed over joint speed [1].
-        mass: Least and greatest mass of one motor [kg]; 0 where a file does not state it.
-        total: Greatest mass of all joints' motors [kg]; 0 where one is not stated.
-        robot: Mass of the robot [kg].
-        stated: Whether robot file or command line say which motors these are; assumed otherwise.
-    """
-
-    titles: tuple[str, ...]
-    joints: int
-    ratio: tuple[float, float]
+    titles: tuple[str, ...]  #: Of the motors' files, each once.
+    joints: int  #: How many joints have one.
+    ratio: tuple[float, float]  #: Least and greatest motor speed over joint speed [1].
+    #: Least and greatest mass of one motor [kg]; 0 where a file does not state it.
     mass: tuple[float, float]
-    total: float
-    robot: float
+    total: float  #: Greatest mass of all joints' motors [kg]; 0 where one is not stated.
+    robot: float  #: Mass of the robot [kg].
+    #: Whether robot file or command line say which motors these are; assumed otherwise.
     stated: bool
 
     @property

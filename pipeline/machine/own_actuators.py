@@ -70,25 +70,18 @@ class _Written(Table):
 
 @dataclass(frozen=True)
 class OwnActuators:
-    """What a robot file says of its joints' actuators.
+    """What a robot file says of its joints' actuators."""
 
-    Attributes:
-        where: Robot file and table, for messages.
-        joints: Of the robot.
-        alternative: As which the machine is built; empty where the file does not say.
-        built: Joint to the alternative as which it alone is built.
-        numbers: Joint to the numbers that it alone has.
-        groups: The file's entries, in words, with their numbers.
-        source: Who says that these are its motors; empty where nobody does.
-    """
-
-    where: str = ""
-    joints: tuple[str, ...] = ()
-    alternative: str = ""
+    where: str = ""  #: Robot file and table, for messages.
+    joints: tuple[str, ...] = ()  #: Of the robot.
+    alternative: str = ""  #: As which the machine is built; empty where the file does not say.
+    #: Joint to the alternative as which it alone is built.
     built: Mapping[str, str] = field(default_factory=dict)
+    #: Joint to the numbers that it alone has.
     numbers: Mapping[str, Mapping[str, Parameter]] = field(default_factory=dict)
+    #: The file's entries, in words, with their numbers.
     groups: tuple[tuple[str, tuple[Parameter, ...]], ...] = ()
-    source: str = ""
+    source: str = ""  #: Who says that these are its motors; empty where nobody does.
 
     @property
     def usual(self) -> str:

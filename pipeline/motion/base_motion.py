@@ -16,19 +16,12 @@ from pipeline.motion.motion import Segment
 
 @dataclass(frozen=True)
 class BaseMotion:
-    """The base as Pinocchio's free flyer wants it.
+    """The base as Pinocchio's free flyer wants it."""
 
-    Attributes:
-        position: In the world [m], shape (N, 3).
-        quaternion: From the base to the world, x y z w, shape (N, 4).
-        velocity: Linear and angular in the base's axes [m/s, rad/s], shape (N, 6).
-        acceleration: Time derivative of those components, shape (N, 6).
-    """
-
-    position: Array
-    quaternion: Array
-    velocity: Array
-    acceleration: Array
+    position: Array  #: In the world [m], shape (N, 3).
+    quaternion: Array  #: From the base to the world, x y z w, shape (N, 4).
+    velocity: Array  #: Linear and angular in the base's axes [m/s, rad/s], shape (N, 6).
+    acceleration: Array  #: Time derivative of those components, shape (N, 6).
 
 
 def surge(gait: Gait, share: Array) -> Course:
@@ -107,22 +100,15 @@ def one_sign(quaternion: Array) -> Array:
 
 @dataclass(frozen=True)
 class BaseSeries:
-    """The base's origin and attitude in the world over a segment.
+    """The base's origin and attitude in the world over a segment."""
 
-    Attributes:
-        position: Shape (N, 3) [m].
-        angles: Roll, pitch, yaw [rad], shape (N, 3): the rotation is Rz(yaw) Ry(pitch) Rx(roll);
-            yaw runs on beyond a half turn.
-        velocity: Of the origin, shape (N, 3) [m/s].
-        acceleration: Of the origin, shape (N, 3) [m/s^2].
-        angular_velocity: Shape (N, 3) [rad/s].
-    """
-
-    position: Array
+    position: Array  #: Shape (N, 3) [m].
+    #: Roll, pitch, yaw [rad], shape (N, 3): the rotation is Rz(yaw) Ry(pitch) Rx(roll); yaw runs on
+    #: beyond a half turn.
     angles: Array
-    velocity: Array
-    acceleration: Array
-    angular_velocity: Array
+    velocity: Array  #: Of the origin, shape (N, 3) [m/s].
+    acceleration: Array  #: Of the origin, shape (N, 3) [m/s^2].
+    angular_velocity: Array  #: Shape (N, 3) [rad/s].
 
 
 def base_in_world(segment: Segment) -> BaseSeries:

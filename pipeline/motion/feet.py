@@ -26,17 +26,11 @@ Plane = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Course:
-    """Points with velocity and acceleration.
+    """Points with velocity and acceleration."""
 
-    Attributes:
-        position: Shape (N, ..., 3) [m].
-        velocity: Likewise [m/s].
-        acceleration: Likewise [m/s^2].
-    """
-
-    position: Array
-    velocity: Array
-    acceleration: Array
+    position: Array  #: Shape (N, ..., 3) [m].
+    velocity: Array  #: Likewise [m/s].
+    acceleration: Array  #: Likewise [m/s^2].
 
     def __add__(self, other: Course) -> Course:
         """Both courses together."""

@@ -28,19 +28,15 @@ _SAME = 1e-9
 
 @dataclass(frozen=True)
 class Footfall:
-    """Phases and duty factors of all legs.
+    """Phases and duty factors of all legs."""
 
-    Attributes:
-        name: Of the gait.
-        phase: Leg to its touch-down as a share of the period, in [0, 1); legs that stand together
-            are reported in this order.
-        duty: Leg to the share of the period for which it stands, between 0 and 1.
-        least: Feet that stand at any time, at least: three, or two where the body may rock.
-    """
-
-    name: str
+    name: str  #: Of the gait.
+    #: Leg to its touch-down as a share of the period, in [0, 1); legs that stand together are
+    #: reported in this order.
     phase: Mapping[str, float]
+    #: Leg to the share of the period for which it stands, between 0 and 1.
     duty: Mapping[str, float]
+    #: Feet that stand at any time, at least: three, or two where the body may rock.
     least: int = LEAST_FEET
 
     def since(self, leg: str, share: float, *, stood: bool) -> float:
@@ -121,21 +117,14 @@ def _tetrapod(legs: Sequence[LegSpec], duty: float) -> dict[str, float]:
 
 @dataclass(frozen=True)
 class NamedGait:
-    """A gait known by name.
+    """A gait known by name."""
 
-    Attributes:
-        name: How robot file and command line call it.
-        legs: Number of legs it is defined for; None for any.
-        duty: Duty factor where none is stated, from the number of legs.
-        phase: Phases from the legs and the duty factor.
-        meaning: In words.
-    """
-
-    name: str
-    legs: int | None
-    duty: Callable[[int], float]
+    name: str  #: How robot file and command line call it.
+    legs: int | None  #: Number of legs it is defined for; None for any.
+    duty: Callable[[int], float]  #: Duty factor where none is stated, from the number of legs.
+    #: Phases from the legs and the duty factor.
     phase: Callable[[Sequence[LegSpec], float], dict[str, float]]
-    meaning: str
+    meaning: str  #: In words.
 
 
 GAITS: dict[str, NamedGait] = {

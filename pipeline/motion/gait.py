@@ -29,42 +29,28 @@ _USUAL = {4: "crawl", 6: "tripod"}
 
 @dataclass(frozen=True)
 class Gait:
-    """Everything a motion over one period is made of.
+    """Everything a motion over one period is made of."""
 
-    Attributes:
-        legs: In the robot file's order.
-        footfall: Which legs stand when.
-        period: Of the gait [s].
-        twist: Velocity of the unswayed body in its own axes: x and y [m/s], yaw rate [rad/s],
-            shape (3,).
-        stride: What that adds up to over a period if the axes stood still [m, m, rad], shape (3,).
-        lift: By leg [m], shape (L,).
-        neutral: Feet at mid-support from the unswayed base, axes along the ground [m], shape
-            (L, 3).
-        ground: The plane it walks on.
-        body: Rotation from the base to the ground's axes at zero heading, shape (3, 3).
-        path: Name of the foot's path through the air.
-        margin: Distance from every edge of the support that the body's sway keeps [m]; None where
-            the body does not sway.
-        margin_stated: Whether it must be that one; else it may be half of what there is to have.
-        source: File, for messages.
-        surge: Path of the body ahead of its even course and back, twice a period [m].
-    """
-
-    legs: tuple[str, ...]
-    footfall: Footfall
-    period: float
+    legs: tuple[str, ...]  #: In the robot file's order.
+    footfall: Footfall  #: Which legs stand when.
+    period: float  #: Of the gait [s].
+    #: Velocity of the unswayed body in its own axes: x and y [m/s], yaw rate [rad/s], shape (3,).
     twist: Array
+    #: What that adds up to over a period if the axes stood still [m, m, rad], shape (3,).
     stride: Array
-    lift: Array
+    lift: Array  #: By leg [m], shape (L,).
+    #: Feet at mid-support from the unswayed base, axes along the ground [m], shape (L, 3).
     neutral: Array
-    ground: Ground
-    body: Array
-    path: str
+    ground: Ground  #: The plane it walks on.
+    body: Array  #: Rotation from the base to the ground's axes at zero heading, shape (3, 3).
+    path: str  #: Name of the foot's path through the air.
+    #: Distance from every edge of the support that the body's sway keeps [m]; None where the body
+    #: does not sway.
     margin: float | None
+    #: Whether it must be that one; else it may be half of what there is to have.
     margin_stated: bool
-    source: str
-    surge: float = 0.0
+    source: str  #: File, for messages.
+    surge: float = 0.0  #: Path of the body ahead of its even course and back, twice a period [m].
 
     @property
     def speed(self) -> float:

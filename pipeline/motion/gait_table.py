@@ -142,71 +142,47 @@ Legs = list[list[str]]
 
 
 class GaitTable(BaseModel):
-    """What a table ``[gait]`` may state; everything has a default or follows from the rest.
-
-    Attributes:
-        name: Of a known gait: `pipeline.motion.footfall.GAITS`.
-        sets: Sets of legs that swing in turn.
-        tripods: The same with two sets, half a period each.
-        phase: Touch-down of each leg as a share of the period.
-        least_feet: Feet that stand at any time, at least: 3, or 2, when the moment about the line
-            of two feet is left out and the body would rock.
-        duty_factor: Share of the period for which a foot stands, of all or by leg.
-        transfer_path: Of the foot through the air.
-        period: Of the gait [s].
-        speed: Of the body along `heading` [m/s].
-        heading: Where to, from the x axis to the left [rad].
-        yaw_rate: Of the body, to the left [rad/s].
-        stroke: Path of a foot relative to the body while it stands, of the longest or by leg [m].
-        lift: Height of a foot at the middle of its transfer, of all or by leg [m].
-        body_height: Of the base's origin over the ground [m].
-        body_x: Shift of the base over its feet, forward [m].
-        body_y: To the left [m].
-        body_roll: Of the base against the ground, right side down [rad].
-        body_pitch: Nose down [rad].
-        slope_forward: Angle by which the ground rises ahead [rad].
-        slope_left: By which it rises to the left [rad].
-        friction_coefficient: Of the ground: greatest tangential over normal force of a foot [1]; no
-            limit by default.
-        payload_mass: Of a load on the body [kg].
-        payload_x: Place of its centre of mass in the base's axes [m].
-        payload_y: Likewise.
-        payload_z: Likewise.
-        surge: Share of slowing and speeding up with every step with which the ground's forces point
-            from the feet to the hips; 0, the default, for constant speed.
-        sway: Path of the body over its feet: ``none``, or the ``least`` that keeps the margin.
-        stability_margin: Distance that the sway keeps from every edge of the support [m].
-    """
+    """What a table ``[gait]`` may state; everything has a default or follows from the rest."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    name: Name | None = None
-    sets: Legs | None = None
-    tripods: Legs | None = None
-    phase: Phases | None = None
+    name: Name | None = None  #: Of a known gait: `pipeline.motion.footfall.GAITS`.
+    sets: Legs | None = None  #: Sets of legs that swing in turn.
+    tripods: Legs | None = None  #: The same with two sets, half a period each.
+    phase: Phases | None = None  #: Touch-down of each leg as a share of the period.
+    #: Feet that stand at any time, at least: 3, or 2, when the moment about the line of two feet is
+    #: left out and the body would rock.
     least_feet: Literal[2, 3] = 3
+    #: Share of the period for which a foot stands, of all or by leg.
     duty_factor: Shares | None = None
-    transfer_path: Path = "harmonic"
-    period: Time | None = None
-    speed: Speed | None = None
-    heading: Direction = 0.0
-    yaw_rate: Rate | None = None
+    transfer_path: Path = "harmonic"  #: Of the foot through the air.
+    period: Time | None = None  #: Of the gait [s].
+    speed: Speed | None = None  #: Of the body along `heading` [m/s].
+    heading: Direction = 0.0  #: Where to, from the x axis to the left [rad].
+    yaw_rate: Rate | None = None  #: Of the body, to the left [rad/s].
+    #: Path of a foot relative to the body while it stands, of the longest or by leg [m].
     stroke: Lengths | None = None
+    #: Height of a foot at the middle of its transfer, of all or by leg [m].
     lift: Heights | None = None
-    body_height: Length | None = None
-    body_x: Offset = 0.0
-    body_y: Offset = 0.0
-    body_roll: Tilt = 0.0
-    body_pitch: Tilt = 0.0
-    slope_forward: Tilt = 0.0
-    slope_left: Tilt = 0.0
+    body_height: Length | None = None  #: Of the base's origin over the ground [m].
+    body_x: Offset = 0.0  #: Shift of the base over its feet, forward [m].
+    body_y: Offset = 0.0  #: To the left [m].
+    body_roll: Tilt = 0.0  #: Of the base against the ground, right side down [rad].
+    body_pitch: Tilt = 0.0  #: Nose down [rad].
+    slope_forward: Tilt = 0.0  #: Angle by which the ground rises ahead [rad].
+    slope_left: Tilt = 0.0  #: By which it rises to the left [rad].
+    #: Of the ground: greatest tangential over normal force of a foot [1]; no limit by default.
     friction_coefficient: Friction | None = None
-    payload_mass: Mass = 0.0
-    payload_x: Offset = 0.0
-    payload_y: Offset = 0.0
-    payload_z: Offset = 0.0
+    payload_mass: Mass = 0.0  #: Of a load on the body [kg].
+    payload_x: Offset = 0.0  #: Place of its centre of mass in the base's axes [m].
+    payload_y: Offset = 0.0  #: Likewise.
+    payload_z: Offset = 0.0  #: Likewise.
+    #: Share of slowing and speeding up with every step with which the ground's forces point from
+    #: the feet to the hips; 0, the default, for constant speed.
     surge: Annotated[float, BeforeValidator(_SURGE)] = 0.0
+    #: Path of the body over its feet: ``none``, or the ``least`` that keeps the margin.
     sway: Literal["none", "least"] | None = None
+    #: Distance that the sway keeps from every edge of the support [m].
     stability_margin: Height | None = None
 
 

@@ -12,15 +12,10 @@ from actuators.arrays import Array
 
 @dataclass(frozen=True)
 class Ground:
-    """An inclined plane under the robot.
+    """An inclined plane under the robot."""
 
-    Attributes:
-        forward: Angle by which the ground rises along the world's x axis [rad].
-        left: Angle by which it rises along the world's y axis [rad].
-    """
-
-    forward: float = 0.0
-    left: float = 0.0
+    forward: float = 0.0  #: Angle by which the ground rises along the world's x axis [rad].
+    left: float = 0.0  #: Angle by which it rises along the world's y axis [rad].
 
     @property
     def level(self) -> bool:

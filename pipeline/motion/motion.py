@@ -21,29 +21,21 @@ class Segment:
 
     Both ends belong to the segment: the last sample of one and the first of the next share their
     time but hold the left and the right limit, because forces jump at contact events.
-
-    Attributes:
-        name: For people, e.g. ``"support of lf, lr, rm"``.
-        time: Increasing, shape (N,) [s].
-        configuration: Pinocchio configuration, shape (N, nq) [m, quaternion, rad].
-        velocity: Pinocchio tangent velocity, shape (N, nv) [m/s, rad/s].
-        acceleration: Its derivative, shape (N, nv) [m/s^2, rad/s^2].
-        stance: Names of the legs whose feet carry load.
-        ground_normal: Unit vector in the world frame (z opposes gravity) that points out of the
-            ground, shape (3,); the standing feet rest on one plane with this normal.
-        foot_target: Where the feet should be in the base frame, shape (N, L, 3) [m]; None where
-            the motion was not made from feet.
-        rocks: Whether it stands on two feet, whose forces leave the moment about their line open.
     """
 
-    name: str
-    time: Array
-    configuration: Array
-    velocity: Array
-    acceleration: Array
-    stance: tuple[str, ...]
+    name: str  #: For people, e.g. ``"support of lf, lr, rm"``.
+    time: Array  #: Increasing, shape (N,) [s].
+    configuration: Array  #: Pinocchio configuration, shape (N, nq) [m, quaternion, rad].
+    velocity: Array  #: Pinocchio tangent velocity, shape (N, nv) [m/s, rad/s].
+    acceleration: Array  #: Its derivative, shape (N, nv) [m/s^2, rad/s^2].
+    stance: tuple[str, ...]  #: Names of the legs whose feet carry load.
+    #: Unit vector in the world frame (z opposes gravity) that points out of the ground, shape (3,);
+    #: the standing feet rest on one plane with this normal.
     ground_normal: Array = field(default_factory=level_ground)
+    #: Where the feet should be in the base frame, shape (N, L, 3) [m]; None where the motion was
+    #: not made from feet.
     foot_target: Array | None = None
+    #: Whether it stands on two feet, whose forces leave the moment about their line open.
     rocks: bool = False
 
     def __post_init__(self) -> None:
@@ -85,14 +77,10 @@ class Segment:
 
 @dataclass(frozen=True)
 class Motion:
-    """Segments in order of time.
+    """Segments in order of time."""
 
-    Attributes:
-        segments: At least one; each starts where the one before ended.
-        period: Duration after which the motion repeats [s], or None when it does not.
-    """
-
-    segments: tuple[Segment, ...]
+    segments: tuple[Segment, ...]  #: At least one; each starts where the one before ended.
+    #: Duration after which the motion repeats [s], or None when it does not.
     period: float | None = None
 
     def __post_init__(self) -> None:

@@ -18,18 +18,12 @@ _ON_EDGE = 1e-12  # [m]
 
 @dataclass(frozen=True)
 class SupportEdges:
-    """Lines between any two feet, seen from above, and which of them bound the hull.
+    """Lines between any two feet, seen from above, and which of them bound the hull."""
 
-    Attributes:
-        start: A point of each line [m], shape (N, E, 2).
-        edge: Along it, to the other foot [m], shape (N, E, 2).
-        length: Of that [m], shape (N, E).
-        used: Whether all feet lie on it or to its left, so that it bounds the hull, shape (N, E).
-    """
-
-    start: Array
-    edge: Array
-    length: Array
+    start: Array  #: A point of each line [m], shape (N, E, 2).
+    edge: Array  #: Along it, to the other foot [m], shape (N, E, 2).
+    length: Array  #: Of that [m], shape (N, E).
+    #: Whether all feet lie on it or to its left, so that it bounds the hull, shape (N, E).
     used: NDArray[np.bool_]
 
     @property

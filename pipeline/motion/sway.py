@@ -55,15 +55,10 @@ def _rows(knots: int, share: Array, order: int) -> Array:
 
 @dataclass(frozen=True)
 class Sway:
-    """A periodic path of the body.
+    """A periodic path of the body."""
 
-    Attributes:
-        coefficients: Of the spline [m], shape (knots, 2).
-        period: [s].
-    """
-
-    coefficients: Array
-    period: float
+    coefficients: Array  #: Of the spline [m], shape (knots, 2).
+    period: float  #: [s].
 
     def course(self, share: Array) -> Course:
         """The path at shares of the period, shape (N,), in the body's axes; z is zero."""
@@ -82,21 +77,13 @@ class Sway:
 
 @dataclass(frozen=True)
 class _Points:
-    """What has to stay inside the support, over all samples of a motion.
+    """What has to stay inside the support, over all samples of a motion."""
 
-    Attributes:
-        centre: Of mass, seen from above in the world [m], shape (N, 2).
-        zero_moment: Point without tipping moment, likewise.
-        height: Of the centre of mass over the feet's plane [m], shape (N,).
-        feet: By segment: standing feet in the world [m], shape (N_s, F, 3).
-        share: Of the period, shape (N,).
-    """
-
-    centre: Array
-    zero_moment: Array
-    height: Array
-    feet: tuple[Array, ...]
-    share: Array
+    centre: Array  #: Of mass, seen from above in the world [m], shape (N, 2).
+    zero_moment: Array  #: Point without tipping moment, likewise.
+    height: Array  #: Of the centre of mass over the feet's plane [m], shape (N,).
+    feet: tuple[Array, ...]  #: By segment: standing feet in the world [m], shape (N_s, F, 3).
+    share: Array  #: Of the period, shape (N,).
 
 
 def _points(robot: Robot, motion: Motion) -> _Points:

@@ -21,16 +21,12 @@ Profile = tuple[Array, Array, Array]
 
 @dataclass(frozen=True)
 class TransferPath:
-    """One shape of the transfer.
+    """One shape of the transfer."""
 
-    Attributes:
-        name: How the robot file and the command line call it.
-        advance: Phase in [0, 1], shape (N,), to progress over ground from 0 to 1 with derivatives.
-        lift: Phase to height from 0 over 1 (at phase 0.5) back to 0 with derivatives.
-    """
-
-    name: str
+    name: str  #: How the robot file and the command line call it.
+    #: Phase in [0, 1], shape (N,), to progress over ground from 0 to 1 with derivatives.
     advance: Callable[[Array], Profile]
+    #: Phase to height from 0 over 1 (at phase 0.5) back to 0 with derivatives.
     lift: Callable[[Array], Profile]
 
 

@@ -110,22 +110,15 @@ def _parted(chains: LegChains, coordinate: Array) -> tuple[Array, Array | None]:
 
 @dataclass(frozen=True)
 class LegPosture:
-    """Sines, lever arms and feet of the legs: what forces and positions share.
+    """Sines, lever arms and feet of the legs: what forces and positions share."""
 
-    Attributes:
-        chains: The legs.
-        cos: Of the joint angles, shape (L, K, N); 1 where a joint slides or is none.
-        sin: Likewise.
-        arm: By joint, from its origin to the foot in its own frame [m], shape (3, L, N), or
-            (3, L, 1) for the last one; K of them.
-        foot: Foot points in the base frame [m], shape (3, L, N).
-    """
-
-    chains: LegChains
-    cos: Array
-    sin: Array
+    chains: LegChains  #: The legs.
+    cos: Array  #: Of the joint angles, shape (L, K, N); 1 where a joint slides or is none.
+    sin: Array  #: Likewise.
+    #: By joint, from its origin to the foot in its own frame [m], shape (3, L, N), or (3, L, 1) for
+    #: the last one; K of them.
     arm: tuple[Array, ...]
-    foot: Array
+    foot: Array  #: Foot points in the base frame [m], shape (3, L, N).
 
     @property
     def feet(self) -> Array:
@@ -208,18 +201,13 @@ def foot_force_torques(chains: LegChains, q: Array, force: Array) -> Array:
 
 @dataclass(frozen=True)
 class Swept:
-    """What the joints do to the feet, in the base frame, component first.
+    """What the joints do to the feet, in the base frame, component first."""
 
-    Attributes:
-        tip: Foot points [m], shape (3, L, N).
-        columns: Velocity of the foot per unit of each joint's [m/rad, 1], shape (3, K, L, N); zero
-            where a leg has no joint.
-        axes: Unit axes, shape (3, K, L, N); None where they were not asked for.
-    """
-
-    tip: Array
+    tip: Array  #: Foot points [m], shape (3, L, N).
+    #: Velocity of the foot per unit of each joint's [m/rad, 1], shape (3, K, L, N); zero where a
+    #: leg has no joint.
     columns: Array
-    axes: Array | None
+    axes: Array | None  #: Unit axes, shape (3, K, L, N); None where they were not asked for.
 
 
 def swept(chains: LegChains, coordinate: Array, *, axes: bool = False) -> Swept:

@@ -25,25 +25,17 @@ FEWEST_JOINTS, MOST_JOINTS = 1, 7
 
 @dataclass(frozen=True, eq=False)
 class LegChains:
-    """Constant geometry of L legs with up to K joints each, read from a Pinocchio model.
+    """Constant geometry of L legs with up to K joints each, read from a Pinocchio model."""
 
-    Attributes:
-        names: Leg names.
-        rotation: Placement of each joint in its parent, shape (K joints, L, 3, 3).
-        offset: Origin of each joint in its parent [m], shape (K joints, L, 3).
-        axis: Unit axis of each joint in its own frame, shape (K joints, L, 3); zero where a leg
-            has no such joint.
-        slides: Whether a joint is prismatic, shape (K joints, L).
-        foot: Foot point in the frame of the last joint [m], shape (L, 3).
-        nominal: Posture about which a leg with joints to spare moves least, shape (L, K) [rad, m].
-    """
-
-    names: tuple[str, ...]
-    rotation: Array
-    offset: Array
+    names: tuple[str, ...]  #: Leg names.
+    rotation: Array  #: Placement of each joint in its parent, shape (K joints, L, 3, 3).
+    offset: Array  #: Origin of each joint in its parent [m], shape (K joints, L, 3).
+    #: Unit axis of each joint in its own frame, shape (K joints, L, 3); zero where a leg has no
+    #: such joint.
     axis: Array
-    slides: NDArray[np.bool_]
-    foot: Array
+    slides: NDArray[np.bool_]  #: Whether a joint is prismatic, shape (K joints, L).
+    foot: Array  #: Foot point in the frame of the last joint [m], shape (L, 3).
+    #: Posture about which a leg with joints to spare moves least, shape (L, K) [rad, m].
     nominal: Array
 
     @property

@@ -14,19 +14,14 @@ from actuators.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class LegColumns:
-    """Legs of up to K joints among J columns; joints outside the legs belong to none.
+    """Legs of up to K joints among J columns; joints outside the legs belong to none."""
 
-    Attributes:
-        columns: Of each leg's joints, shape (L, K). Where a leg has fewer, its last joint's column
-            stands once more: reading there is harmless, for the kinematics pays no heed to it;
-            writing goes through `by_joint` or `of`.
-        counts: Joints of each leg, shape (L,).
-        size: J, joints outside the legs included.
-    """
-
+    #: Of each leg's joints, shape (L, K). Where a leg has fewer, its last joint's column stands
+    #: once more: reading there is harmless, for the kinematics pays no heed to it; writing goes
+    #: through `by_joint` or `of`.
     columns: NDArray[np.intp]
-    counts: NDArray[np.intp]
-    size: int
+    counts: NDArray[np.intp]  #: Joints of each leg, shape (L,).
+    size: int  #: J, joints outside the legs included.
 
     @cached_property
     def real(self) -> NDArray[np.bool_]:

@@ -17,19 +17,12 @@ _SHOWN: Final = 12  # names in one line
 
 @dataclass(frozen=True)
 class PublishedRobot:
-    """One robot of the package.
+    """One robot of the package."""
 
-    Attributes:
-        name: By which the package calls it.
-        urdf: Its file.
-        srdf: Poses with names; None where the package has none.
-        pose: Name of its reference pose; empty where it names none.
-    """
-
-    name: str
-    urdf: Path
-    srdf: Path | None
-    pose: str
+    name: str  #: By which the package calls it.
+    urdf: Path  #: Its file.
+    srdf: Path | None  #: Poses with names; None where the package has none.
+    pose: str  #: Name of its reference pose; empty where it names none.
 
 
 @cache

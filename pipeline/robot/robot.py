@@ -30,16 +30,11 @@ class Robot:
     """A robot file together with its Pinocchio model.
 
     The model is never changed after loading.
-
-    Attributes:
-        spec: The robot file.
-        urdf: The URDF's text.
-        model: Pinocchio model; free-flyer base where the robot file says ``floating``.
     """
 
-    spec: RobotSpec
-    urdf: str
-    model: pin.Model
+    spec: RobotSpec  #: The robot file.
+    urdf: str  #: The URDF's text.
+    model: pin.Model  #: Pinocchio model; free-flyer base where the robot file says ``floating``.
 
     @property
     def floating(self) -> bool:

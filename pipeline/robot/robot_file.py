@@ -30,66 +30,41 @@ _MOST_EXTENDED: Final = 20
 
 @dataclass(frozen=True)
 class LegSpec:
-    """One leg as the robot file names it.
+    """One leg as the robot file names it."""
 
-    Attributes:
-        name: Short name, e.g. ``"rm"``.
-        joints: From the base outward.
-        foot: Frame at the foot point.
-        side: ``"left"`` or ``"right"``.
-        station: ``"front"``, ``"middle"`` or ``"rear"``; empty for a URDF of the user's own.
-        neutral_foot: Foot at mid-stroke in the base frame [m].
-        start_posture: Joint positions that name the knee's branch [rad, m], one for each joint;
-            zero where none is stated.
-        start_stated: Whether the robot file states them.
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    foot: str
-    side: str
-    station: str
-    neutral_foot: tuple[float, float, float]
+    name: str  #: Short name, e.g. ``"rm"``.
+    joints: tuple[str, ...]  #: From the base outward.
+    foot: str  #: Frame at the foot point.
+    side: str  #: ``"left"`` or ``"right"``.
+    station: str  #: ``"front"``, ``"middle"`` or ``"rear"``; empty for a URDF of the user's own.
+    neutral_foot: tuple[float, float, float]  #: Foot at mid-stroke in the base frame [m].
+    #: Joint positions that name the knee's branch [rad, m], one for each joint; zero where none is
+    #: stated.
     start_posture: tuple[float, ...]
-    start_stated: bool = False
+    start_stated: bool = False  #: Whether the robot file states them.
 
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """A robot file after loading.
+    """A robot file after loading."""
 
-    Attributes:
-        path: The file.
-        sources: The file and those it extends, for hashes.
-        name: Of the robot.
-        urdf: The URDF's path.
-        base_link: Root link.
-        floating: Whether the base floats on its legs or is fixed to a stand.
-        build: Which builder makes the URDF, or None for a URDF of the user's own.
-        zero_pose: Zero pose and positive directions, in words.
-        parameters: Numbers with unit, basis and source, SI on reading.
-        legs: In order.
-        gait: Table ``[gait]`` as written; `pipeline.motion.gait_table` reads it.
-        standing_feet: Legs that stand in the standing mode.
-        held: Joints outside the legs and where they are held [rad, m].
-        assumed: Keys of the file that are guesses, each with its reason.
-        actuator_table: What joints have of their own, as written; `pipeline.machine` reads it.
-    """
-
-    path: Path
-    sources: tuple[Path, ...]
-    name: str
-    urdf: Path
-    base_link: str
-    floating: bool
-    build: str | None
-    zero_pose: str
-    parameters: ParameterSet
-    legs: tuple[LegSpec, ...]
-    gait: Mapping[str, Any]
-    standing_feet: tuple[str, ...]
+    path: Path  #: The file.
+    sources: tuple[Path, ...]  #: The file and those it extends, for hashes.
+    name: str  #: Of the robot.
+    urdf: Path  #: The URDF's path.
+    base_link: str  #: Root link.
+    floating: bool  #: Whether the base floats on its legs or is fixed to a stand.
+    build: str | None  #: Which builder makes the URDF, or None for a URDF of the user's own.
+    zero_pose: str  #: Zero pose and positive directions, in words.
+    parameters: ParameterSet  #: Numbers with unit, basis and source, SI on reading.
+    legs: tuple[LegSpec, ...]  #: In order.
+    gait: Mapping[str, Any]  #: Table ``[gait]`` as written; `pipeline.motion.gait_table` reads it.
+    standing_feet: tuple[str, ...]  #: Legs that stand in the standing mode.
+    #: Joints outside the legs and where they are held [rad, m].
     held: tuple[tuple[str, float], ...] = ()
+    #: Keys of the file that are guesses, each with its reason.
     assumed: tuple[tuple[str, str], ...] = ()
+    #: What joints have of their own, as written; `pipeline.machine` reads it.
     actuator_table: Mapping[str, Any] = field(default_factory=dict)
 
     @property

@@ -66,42 +66,25 @@ _SHOWN = 8  # names in one line
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was checked.
+    """One thing that was checked."""
 
-    Attributes:
-        subject: Link, joint, leg or robot.
-        check: What was asked.
-        passed: Whether it holds.
-        detail: Numbers, with the remedy where it fails.
-        note: Passed, but the reader should know.
-        tolerable: Failed, but a comparison with a log goes on, with a warning.
-    """
-
-    subject: str
-    check: str
-    passed: bool
-    detail: str
-    note: bool = False
-    tolerable: bool = False
+    subject: str  #: Link, joint, leg or robot.
+    check: str  #: What was asked.
+    passed: bool  #: Whether it holds.
+    detail: str  #: Numbers, with the remedy where it fails.
+    note: bool = False  #: Passed, but the reader should know.
+    tolerable: bool = False  #: Failed, but a comparison with a log goes on, with a warning.
 
 
 @dataclass(frozen=True)
 class Body:
-    """Links that move as one, because fixed joints hold them together.
+    """Links that move as one, because fixed joints hold them together."""
 
-    Attributes:
-        joint: That moves it; empty for the body at the root.
-        links: The first is the one that the joint carries.
-        inertia: Of all links together, in the joint's frame.
-        reaches: Distance from this joint to those that hang on the body [m].
-        carries: Whether any body further out has mass.
-    """
-
-    joint: str
-    links: tuple[ET.Element, ...]
-    inertia: pin.Inertia
-    reaches: tuple[float, ...]
-    carries: bool
+    joint: str  #: That moves it; empty for the body at the root.
+    links: tuple[ET.Element, ...]  #: The first is the one that the joint carries.
+    inertia: pin.Inertia  #: Of all links together, in the joint's frame.
+    reaches: tuple[float, ...]  #: Distance from this joint to those that hang on the body [m].
+    carries: bool  #: Whether any body further out has mass.
 
     @property
     def name(self) -> str:

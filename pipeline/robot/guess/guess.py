@@ -31,27 +31,17 @@ _STANCES, _STROKE = 60, 0.2
 
 @dataclass(frozen=True)
 class Guess:
-    """A robot as found.
+    """A robot as found."""
 
-    Attributes:
-        source: Its URDF.
-        base_link: The root.
-        limbs: Legs.
-        held: Joints outside the legs, where they are held [rad, m], and why.
-        stance: Where it stands.
-        pace: How it walks; None where no stroke was found.
-        mass: Of all links [kg].
-        motors: Of the joints; None where nobody knows them.
-    """
-
-    source: Source
-    base_link: str
-    limbs: tuple[Limb, ...]
+    source: Source  #: Its URDF.
+    base_link: str  #: The root.
+    limbs: tuple[Limb, ...]  #: Legs.
+    #: Joints outside the legs, where they are held [rad, m], and why.
     held: tuple[tuple[str, float, str], ...]
-    stance: Stance
-    pace: Pace | None
-    mass: float
-    motors: KnownMotors | None = None
+    stance: Stance  #: Where it stands.
+    pace: Pace | None  #: How it walks; None where no stroke was found.
+    mass: float  #: Of all links [kg].
+    motors: KnownMotors | None = None  #: Of the joints; None where nobody knows them.
 
 
 def guess_robot(

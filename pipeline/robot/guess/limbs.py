@@ -29,19 +29,12 @@ _LOW = 0.15
 
 @dataclass(frozen=True)
 class Limb:
-    """One leg as found.
+    """One leg as found."""
 
-    Attributes:
-        name: Short name.
-        joints: From the base outward.
-        foot: Frame at the foot point.
-        reason: Why this is its foot.
-    """
-
-    name: str
-    joints: tuple[str, ...]
-    foot: str
-    reason: str
+    name: str  #: Short name.
+    joints: tuple[str, ...]  #: From the base outward.
+    foot: str  #: Frame at the foot point.
+    reason: str  #: Why this is its foot.
 
 
 def find_limbs(

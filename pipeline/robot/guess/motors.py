@@ -35,15 +35,10 @@ class _Known(Table):
 
 @dataclass(frozen=True)
 class KnownMotors:
-    """Motors of a known robot.
+    """Motors of a known robot."""
 
-    Attributes:
-        name: Of the folder.
-        table: ``[actuators]`` of its robot file.
-    """
-
-    name: str
-    table: Mapping[str, Any]
+    name: str  #: Of the folder.
+    table: Mapping[str, Any]  #: ``[actuators]`` of its robot file.
 
 
 def known_motors(names: Sequence[str], joints: Sequence[str]) -> KnownMotors | None:

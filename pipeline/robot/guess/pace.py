@@ -28,17 +28,11 @@ _HEIGHT = 0.3  # [m]
 
 @dataclass(frozen=True)
 class Pace:
-    """Numbers of a walk.
+    """Numbers of a walk."""
 
-    Attributes:
-        stroke: Of the feet [m].
-        lift: Of the feet [m].
-        period: [s].
-    """
-
-    stroke: float
-    lift: float
-    period: float
+    stroke: float  #: Of the feet [m].
+    lift: float  #: Of the feet [m].
+    period: float  #: [s].
 
 
 def find_pace(chains: LegChains, stance: Stance, limits: tuple[Array, Array]) -> Pace | None:

@@ -19,23 +19,14 @@ STANDING_POSES = ("standing", "stand", "half_sitting", "home", "default")
 
 @dataclass(frozen=True)
 class Source:
-    """A URDF and what lies beside it.
+    """A URDF and what lies beside it."""
 
-    Attributes:
-        name: Of the robot.
-        urdf: The file.
-        text: Its content.
-        published: Whether it is known by name and not by its place.
-        srdf: Poses with names; None without.
-        pose: Name of the pose that the publisher refers to; empty where there is none.
-    """
-
-    name: str
-    urdf: Path
-    text: str
-    published: bool
-    srdf: Path | None
-    pose: str
+    name: str  #: Of the robot.
+    urdf: Path  #: The file.
+    text: str  #: Its content.
+    published: bool  #: Whether it is known by name and not by its place.
+    srdf: Path | None  #: Poses with names; None without.
+    pose: str  #: Name of the pose that the publisher refers to; empty where there is none.
 
     def reference(self, out: Path) -> str:
         """How a robot file at `out` names the URDF."""

@@ -58,61 +58,37 @@ _REASON = (
 
 @dataclass(frozen=True)
 class Stance:
-    """Where the robot stands.
+    """Where the robot stands."""
 
-    Attributes:
-        feet: In the base frame, on one level [m], shape (L, 3).
-        posture: Of the legs, shape (L, K) [rad, m].
-        margin: Static stability [m].
-        levelled: By how much a foot was raised or lowered to be level [m].
-        reason: Where it is from.
-    """
-
-    feet: Array
-    posture: Array
-    margin: float
-    levelled: float
-    reason: str
+    feet: Array  #: In the base frame, on one level [m], shape (L, 3).
+    posture: Array  #: Of the legs, shape (L, K) [rad, m].
+    margin: float  #: Static stability [m].
+    levelled: float  #: By how much a foot was raised or lowered to be level [m].
+    reason: str  #: Where it is from.
 
 
 @dataclass(frozen=True)
 class _Drawn:
-    """Postures that were drawn, M of each leg.
+    """Postures that were drawn, M of each leg."""
 
-    Attributes:
-        q: Shape (M, L, K) [rad, m].
-        feet: Shape (M, L, 3) [m].
-        origins: Of their joints, shape (M, L, K, 3) [m].
-        marks: For torque, limits and singularity, shape (M, L); negative where one does not stand.
-    """
-
-    q: Array
-    feet: Array
-    origins: Array
+    q: Array  #: Shape (M, L, K) [rad, m].
+    feet: Array  #: Shape (M, L, 3) [m].
+    origins: Array  #: Of their joints, shape (M, L, K, 3) [m].
+    #: For torque, limits and singularity, shape (M, L); negative where one does not stand.
     marks: Array
 
 
 @dataclass(frozen=True)
 class Standing:
-    """A robot whose stance is sought.
+    """A robot whose stance is sought."""
 
-    Attributes:
-        model: With a floating base.
-        chains: Its legs.
-        layout: Their joints among the columns.
-        columns: Of the joints in Pinocchio's configuration, shape (J,).
-        held: Positions of all joints for those outside the legs, shape (J,) [rad, m].
-        margin: Of static stability.
-        where: File, for messages.
-    """
-
-    model: pin.Model
-    chains: LegChains
-    layout: LegColumns
-    columns: NDArray[np.intp]
-    held: Array
-    margin: Margin
-    where: str
+    model: pin.Model  #: With a floating base.
+    chains: LegChains  #: Its legs.
+    layout: LegColumns  #: Their joints among the columns.
+    columns: NDArray[np.intp]  #: Of the joints in Pinocchio's configuration, shape (J,).
+    held: Array  #: Positions of all joints for those outside the legs, shape (J,) [rad, m].
+    margin: Margin  #: Of static stability.
+    where: str  #: File, for messages.
 
     @cached_property
     def limits(self) -> tuple[Array, Array]:

@@ -22,28 +22,19 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class FootTracking:
-    """What one leg does with its foot's path.
+    """What one leg does with its foot's path."""
 
-    Attributes:
-        leg: Its name.
-        joints: Number of its joints.
-        directions: In how many directions they move the foot.
-        cannot_move: Unit vectors in the base frame along which they do not, at the first sample.
-        deviation: Largest distance of the foot from its path [m].
-        deviation_time: When [s]; not a number where the foot follows.
-        least_singular_value: Of the Jacobian, among as many as there are directions [m/rad]: the
-            smaller, the nearer to a stretched or folded leg.
-        singular_time: When it is that small [s].
-    """
-
-    leg: str
-    joints: int
-    directions: int
+    leg: str  #: Its name.
+    joints: int  #: Number of its joints.
+    directions: int  #: In how many directions they move the foot.
+    #: Unit vectors in the base frame along which they do not, at the first sample.
     cannot_move: tuple[Vector, ...]
-    deviation: float
-    deviation_time: float
+    deviation: float  #: Largest distance of the foot from its path [m].
+    deviation_time: float  #: When [s]; not a number where the foot follows.
+    #: Of the Jacobian, among as many as there are directions [m/rad]: the smaller, the nearer to a
+    #: stretched or folded leg.
     least_singular_value: float
-    singular_time: float
+    singular_time: float  #: When it is that small [s].
 
 
 def foot_tracking(

@@ -45,15 +45,10 @@ _PRIMES = (2, 3, 5, 7, 11, 13, 17)
 
 @dataclass(frozen=True)
 class Freedom:
-    """What a leg's joints can do to its foot.
+    """What a leg's joints can do to its foot."""
 
-    Attributes:
-        joints: Number of joints.
-        directions: Directions in which the foot moves, in postures that are not singular.
-    """
-
-    joints: int
-    directions: int
+    joints: int  #: Number of joints.
+    directions: int  #: Directions in which the foot moves, in postures that are not singular.
 
     @property
     def square(self) -> bool:
