@@ -72,8 +72,7 @@ class ContactForces:
 def ground_frame(normal: Array) -> Array | None:
     """The smallest rotation from the world to a frame whose z axis is a normal; None for none.
 
-    Args:
-        normal: Upward unit vector in the world frame, shape (3,).
+    `normal`: upward unit vector in the world frame, shape (3,).
     """
     x, y, z = normal
     if z == 1.0:
@@ -97,17 +96,13 @@ def least_tangential_forces(
     closed form, and of the feet that bear a load only. With one, every force lies in its (circular)
     cone, and the tangential forces are the least for which that is so.
 
-    Args:
-        wrench: Force and moment about the origin that the ground must supply, in a frame whose z
-            axis is the ground's normal [N, N*m], shape (N, 6).
-        feet: Foot points in the same frame [m], shape (N, F, 3), F >= 2; two meet all of the wrench
-            but the moment about their line.
-        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
-
-    Returns:
-        Forces on the robot [N], shape (N, F, 3). Rows that nothing satisfies come back in the
-        closed form, with a foot that pulls or slides, and it is for the caller to refuse them. Feet
-        in one line give normal forces that are not finite.
+    `wrench`: force and moment about the origin that the ground must supply, in a frame whose z axis
+    is the ground's normal [N, N*m], shape (N, 6). `feet`: foot points in the same frame [m], shape
+    (N, F, 3), F >= 2; two meet all of the wrench but the moment about their line.
+    `friction_coefficient`: greatest tangential over normal force [1]; None for no limit. Returns
+    forces on the robot [N], shape (N, F, 3). Rows that nothing satisfies come back in the closed
+    form, with a foot that pulls or slides, and it is for the caller to refuse them. Feet in one
+    line give normal forces that are not finite.
     """
     force = _closed_form(wrench, feet)
     if feet.shape[1] > 3:

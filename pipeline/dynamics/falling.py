@@ -23,12 +23,8 @@ def refuse_falling(
 ) -> None:
     """Refuse forces that break a bound, as they do only where no forces are within them.
 
-    Args:
-        robot: The robot.
-        segment: The motion.
-        force: On the standing feet, z along the ground's normal [N], shape (N, K, 3).
-        feet: In the same frame [m], shape (N, K, 3).
-        friction_coefficient: None for no limit.
+    `force`: on the standing feet, z along the ground's normal [N], shape (N, K, 3). `feet`: in the
+    same frame [m], shape (N, K, 3). `friction_coefficient`: None for no limit.
 
     Raises:
         TippingError: A foot would have to pull.

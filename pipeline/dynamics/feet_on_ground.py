@@ -21,14 +21,10 @@ def inverse_dynamics(
 ) -> Array:
     """Generalised forces without contact, by Pinocchio's RNEA over the batch.
 
-    Args:
-        model: Its armature is zero, reflected rotor inertia being the actuator chain's.
-        motion: Configuration (N, nq), velocity (N, nv) and acceleration (N, nv).
-        pool: Of the model.
-        threads: For Pinocchio's thread pool; the result is the same with any number.
-
-    Returns:
-        Generalised forces, shape (N, nv) [N, N*m].
+    `model`: its armature is zero, reflected rotor inertia being the actuator chain's. `motion`:
+    configuration (N, nq), velocity (N, nv) and acceleration (N, nv). `threads`: for Pinocchio's
+    thread pool; the result is the same with any number. Returns generalised forces, shape (N, nv)
+    [N, N*m].
     """
     q, v, a = (x.T for x in motion)
     # Pinocchio drops the sample axis of a single sample.
@@ -41,10 +37,8 @@ class FeetOnGround:
 
     Forces are in the ground's frame: origin in the base's, z axis along the ground's normal.
 
-    Args:
-        chains: The legs.
-        q: Joint positions by leg [rad, m], shape (N, L, K).
-        turn: From the base's axes to the ground's, shape (N, 3, 3); None where they are the same.
+    `q`: joint positions by leg [rad, m], shape (N, L, K). `turn`: from the base's axes to the
+    ground's, shape (N, 3, 3); None where they are the same.
     """
 
     def __init__(self, chains: LegChains, q: Array, turn: Array | None) -> None:
@@ -69,15 +63,11 @@ class FeetOnGround:
     ) -> Array:
         """Forces that supply a wrench, with the least tangential parts.
 
-        Args:
-            wrench: Force and moment demanded of the base, in its frame [N, N*m], shape (N, 6).
-            standing: Which feet do, shape (N, L).
-            friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
-            least: Feet that stand; samples with fewer have no forces.
-
-        Returns:
-            Shape (N, L, 3) [N]; zero in the air. See `least_tangential_forces` for samples at which
-            nothing supplies the wrench.
+        `wrench`: force and moment demanded of the base, in its frame [N, N*m], shape (N, 6).
+        `standing`: which feet do, shape (N, L). `friction_coefficient`: greatest tangential over
+        normal force [1]; None for no limit. `least`: feet that stand; samples with fewer have no
+        forces. Returns shape (N, L, 3) [N]; zero in the air. See `least_tangential_forces` for
+        samples at which nothing supplies the wrench.
         """
         feet = self.points
         turned = self._to_ground(wrench.reshape(-1, 2, 3)).reshape(-1, 6)
@@ -100,8 +90,7 @@ class FeetOnGround:
     def torque(self, force: Array) -> Array:
         """What forces put into the legs' joints, shape (N, L, K) [N*m, N where one slides].
 
-        Args:
-            force: On every foot [N], shape (N, L, 3).
+        `force`: on every foot [N], shape (N, L, 3).
         """
         return self._posture.force_torques(self.to_base(force))
 

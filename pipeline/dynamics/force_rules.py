@@ -47,9 +47,7 @@ class Stance:
     def loaded_torque(self, force: Array, rows: Rows = ALL) -> Array:
         """What the standing legs' joints must apply, shape (n, Q) [N*m].
 
-        Args:
-            force: At some samples, shape (n, K, 3) [N].
-            rows: Which.
+        `force`: at some samples, shape (n, K, 3) [N].
         """
         from_ground = np.einsum("nqi,nqi->nq", self.unit_torque[rows], force[:, self.foot])
         return np.asarray(self.demand.torque[rows][:, self.loaded] - from_ground)
@@ -103,14 +101,9 @@ class Descent:
     def step(self, rows: NDArray[np.intp], force: Array, slope: Array, curvature: Array) -> Array:
         """Forces that minimise a quadratic model of the cost.
 
-        Args:
-            rows: Samples, shape (n,).
-            force: At which the model was made, within bounds [N], shape (n, K, 3).
-            slope: Derivative of the cost with each joint's torque, shape (n, Q).
-            curvature: Second derivative, not negative, likewise.
-
-        Returns:
-            Forces within bounds [N], shape (n, K, 3).
+        `rows`: samples, shape (n,). `force`: at which the model was made, within bounds [N], shape
+        (n, K, 3). `slope`: derivative of the cost with each joint's torque, shape (n, Q). Returns
+        forces within bounds [N], shape (n, K, 3).
         """
         d = self._basis.shape[-1]
         effect, basis = self._effect[rows], self._basis[rows]

@@ -21,8 +21,7 @@ _SAMPLES = 51
 def check_gait(robot: Robot) -> list[Finding]:
     """Walk one cycle and say whether it can be walked.
 
-    Args:
-        robot: With legs; one on a fixed base walks nowhere, and nothing is judged.
+    `robot`: with legs; one on a fixed base walks nowhere, and nothing is judged.
     """
     spec = robot.spec
     if not robot.floating or not spec.legs:
@@ -42,8 +41,7 @@ def check_gait(robot: Robot) -> list[Finding]:
 def check_with_gait(path: Path) -> list[Finding]:
     """Check a robot file and its gait, or a bare URDF.
 
-    Args:
-        path: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``.
+    `path`: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``.
 
     Raises:
         PipelineError: The file cannot be read at all.

@@ -29,11 +29,8 @@ _MOST_FRICTION = 1e3  # beyond this no coefficient is looked for
 def internal_basis(feet: Array) -> Array:
     """Orthonormal basis of the forces that add up to no force and no moment.
 
-    Args:
-        feet: Foot points [m], shape (N, F, 3), F >= 3, not in one line; or two.
-
-    Returns:
-        Shape (N, F, 3, D) with D = 3 F - 6; for two feet 1, a squeeze along their line.
+    `feet`: foot points [m], shape (N, F, 3), F >= 3, not in one line; or two. Returns shape (N, F,
+    3, D) with D = 3 F - 6; for two feet 1, a squeeze along their line.
     """
     n, count, _ = feet.shape
     if count == 2:
@@ -55,11 +52,7 @@ def internal_basis(feet: Array) -> Array:
 def tangential_metric(basis: Array) -> Array:
     """Matrix of the sum of squared tangential forces in z, normals weighted little.
 
-    Args:
-        basis: Shape (..., F, 3, D).
-
-    Returns:
-        Shape (..., D, D).
+    `basis`: shape (..., F, 3, D). Returns shape (..., D, D).
     """
     weight = np.array([1.0, 1.0, NORMAL_WEIGHT])[:, None]
     flat = basis.reshape(*basis.shape[:-3], -1, basis.shape[-1])
@@ -70,9 +63,8 @@ def tangential_metric(basis: Array) -> Array:
 def out_of_bounds(force: Array, friction_coefficient: float | None) -> NDArray[np.bool_]:
     """Samples at which a foot pulls or leaves its friction cone, shape (N,), beyond rounding.
 
-    Args:
-        force: z along the ground's normal [N], shape (N, F, 3).
-        friction_coefficient: None for no limit.
+    `force`: z along the ground's normal [N], shape (N, F, 3). `friction_coefficient`: None for no
+    limit.
     """
     slack = TOLERANCE * np.abs(force).max(axis=(1, 2), keepdims=True)[..., 0]
     normal = force[..., 2]
@@ -90,9 +82,8 @@ class Bounds:
     inside, so that what comes out is the minimum over the cone itself, and a sample for which there
     is none over the planes has none over the cone. They are kept for the next question.
 
-    Args:
-        basis: Of the internal forces, shape (F, 3, D).
-        friction_coefficient: Greatest tangential over normal force [1]; None for no limit.
+    `basis`: of the internal forces, shape (F, 3, D). `friction_coefficient`: greatest tangential
+    over normal force [1]; None for no limit.
     """
 
     def __init__(self, basis: Array, friction_coefficient: float | None) -> None:
@@ -105,13 +96,9 @@ class Bounds:
     def minimum(self, metric: Array, gradient: Array, start: Array) -> Array | None:
         """Forces that minimise z' metric z / 2 + gradient' z.
 
-        Args:
-            metric: Positive definite, shape (D, D).
-            gradient: At z = 0, shape (D,).
-            start: Force at z = 0 [N], shape (F, 3).
-
-        Returns:
-            Force [N], shape (F, 3); None where no force is within the bounds.
+        `metric`: positive definite, shape (D, D). `gradient`: at z = 0, shape (D,). `start`: force
+        at z = 0 [N], shape (F, 3). Returns force [N], shape (F, 3); None where no force is within
+        the bounds.
         """
         import qpsolvers  # a tenth of a second, for motions that need it
 
@@ -171,10 +158,8 @@ def _cleaned(rows: Array) -> Array:
 def held_by_friction(start: Array, basis: Array, friction_coefficient: float) -> Array | None:
     """Least tangential forces of one sample within the friction cones; None where there are none.
 
-    Args:
-        start: Forces that meet the wrench [N], shape (F, 3).
-        basis: Shape (F, 3, D).
-        friction_coefficient: Greatest tangential over normal force [1].
+    `start`: forces that meet the wrench [N], shape (F, 3). `basis`: shape (F, 3, D).
+    `friction_coefficient`: greatest tangential over normal force [1].
     """
     metric = tangential_metric(basis)
     weighted = start * np.array([1.0, 1.0, NORMAL_WEIGHT])
@@ -185,10 +170,8 @@ def held_by_friction(start: Array, basis: Array, friction_coefficient: float) ->
 def least_friction(start: Array, basis: Array, enough: float) -> float:
     """The least friction coefficient with which any forces meet the wrench of one sample.
 
-    Args:
-        start: Forces that meet the wrench [N], shape (F, 3).
-        basis: Shape (F, 3, D).
-        enough: A coefficient that suffices; infinite where none is known.
+    `start`: forces that meet the wrench [N], shape (F, 3). `basis`: shape (F, 3, D). `enough`: a
+    coefficient that suffices; infinite where none is known.
     """
     low, high = 0.0, enough
     if not np.isfinite(enough):

@@ -27,15 +27,8 @@ def segment_demand(
 ) -> tuple[JointDemand, ContactForces | None]:
     """Joint torques over one segment, with the contact forces they rest on.
 
-    Args:
-        robot: With floating base the ground carries it; with fixed base there is no contact.
-        segment: The motion.
-        forces: How the ground's forces are chosen.
-        quasi_static: Leave out the links' inertial terms: gravity alone.
-        threads: For Pinocchio's thread pool.
-
-    Returns:
-        The demand and the contact forces (None for a fixed base).
+    `robot`: with floating base the ground carries it; with fixed base there is no contact. Returns
+    the demand and the contact forces (None for a fixed base).
 
     Raises:
         StanceError: A foot would have to pull or slide; names foot, instant, force and margin.

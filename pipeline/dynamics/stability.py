@@ -11,13 +11,8 @@ from pipeline.robot.robot import Robot
 def stability_margins(robot: Robot, segment: Segment) -> Array:
     """Margin of static stability along a segment.
 
-    Args:
-        robot: A robot with a floating base.
-        segment: The motion.
-
-    Returns:
-        Distance of the centre of mass's vertical projection from the nearest edge of the support
-        polygon [m], shape (N,); negative outside.
+    Returns distance of the centre of mass's vertical projection from the nearest edge of the
+    support polygon [m], shape (N,); negative outside.
     """
     feet, centre = stance_and_centre(robot, segment)
     return support_margin(feet, centre[:, :2])

@@ -20,11 +20,7 @@ _NOTABLE = 1e-3
 def margin_and_remedy(robot: Robot, segment: Segment, sample: int, margin: float) -> str:
     """How much margin there is, what takes it, and what to change so that the robot stands.
 
-    Args:
-        robot: With its payload.
-        segment: The motion.
-        sample: When it tips.
-        margin: Of static stability then [m].
+    `margin`: of static stability then [m].
     """
     words = f"static margin {1e3 * margin:.1f} mm"
     if segment.foot_target is None:

@@ -41,9 +41,7 @@ class Drivetrains:
     def turned(self, joint: int, motion: Array) -> Array:
         """Motion of a joint's motor at the joint side, theta = C q, (...).
 
-        Args:
-            joint: Column.
-            motion: Position, velocity or acceleration of all joints (..., J).
+        `motion`: position, velocity or acceleration of all joints (..., J).
         """
         own: Array = motion[..., joint]
         if joint in self.coupled:
@@ -54,9 +52,7 @@ class Drivetrains:
     def load(self, joint: int, demand: Callable[[int], Array]) -> Array:
         """What one drivetrain supplies at the joint side, sigma of tau = C^T sigma, (...) [N*m].
 
-        Args:
-            joint: Column.
-            demand: Torque (...) [N*m] asked of a joint, by column.
+        `demand`: torque (...) [N*m] asked of a joint, by column.
         """
         own = demand(joint)
         for k, (other, turns) in self.coupled.items():
@@ -67,9 +63,7 @@ class Drivetrains:
     def carried(self, joint: int, motor: Array) -> Array:
         """What other joints' motors bring to a joint besides its own, (...) [N*m].
 
-        Args:
-            joint: Column.
-            motor: Torque of all motors brought to their joint side (..., J) [N*m].
+        `motor`: torque of all motors brought to their joint side (..., J) [N*m].
         """
         out = np.zeros(motor.shape[:-1])
         for k, (other, turns) in self.coupled.items():
@@ -91,8 +85,7 @@ class Drivetrains:
     def inverse(self, joint: ShaftSeries) -> ChainResult:
         """Return everything the drivetrains need; a loss that a joint does not have is zero there.
 
-        Args:
-            joint: Series at all joints, in their order; see `Chain.inverse`.
+        `joint`: series at all joints, in their order; see `Chain.inverse`.
         """
         if len(self._groups) == 1 and not self.coupled:
             return replace(self._groups[0][0].inverse(joint), chain=self.name)
@@ -137,9 +130,7 @@ class Drivetrains:
     def holding(self, torque: Array, position: Array | None = None) -> HoldingResult:
         """Return what holds joint torques at standstill; see `Chain.holding`.
 
-        Args:
-            torque: (..., J) [N*m].
-            position: (..., J) [rad].
+        `torque`: (..., J) [N*m]. `position`: (..., J) [rad].
         """
         asked = np.array(torque, dtype=float)
         for k, own in enumerate(self.joints):
@@ -163,12 +154,7 @@ Actuators = Chain | Drivetrains
 
 
 def drivetrains_of(actuators: Actuators, names: Sequence[str]) -> Drivetrains:
-    """A drivetrain per joint.
-
-    Args:
-        actuators: For all joints.
-        names: Of the joints, in the order of the columns.
-    """
+    """A drivetrain per joint."""
     if isinstance(actuators, Drivetrains):
         return actuators
     return Drivetrains(actuators.name, joints_of(actuators, tuple(names)))

@@ -104,9 +104,7 @@ class JointModel:
     def drive_load(self, position: Array, torque: Array) -> Array:
         """What the drivetrain has to supply with springs and ripples beside it, (...) [N*m].
 
-        Args:
-            position: Of the joint (...) [rad].
-            torque: Demanded by bodies and ground (...) [N*m].
+        `position`: of the joint (...) [rad]. `torque`: demanded by bodies and ground (...) [N*m].
         """
         for law in self.position_torques:
             torque = torque + law.torque(position)
@@ -127,10 +125,8 @@ class JointModel:
     def holding(self, low: Array, high: Array, position: Array) -> tuple[Array, Array]:
         """Motor torques that hold a load between `low` and `high` (...) [N*m] at standstill.
 
-        Args:
-            low: Least load (...) [N*m].
-            high: Greatest load (...) [N*m].
-            position: Of the joint (...) [rad].
+        `low`: least load (...) [N*m]. `high`: greatest load (...) [N*m]. `position`: of the joint
+        (...) [rad].
         """
         return held(self.path, low, high, position)
 
@@ -168,9 +164,7 @@ class JointModel:
 def joints_of(chain: Chain | None, names: tuple[str, ...]) -> tuple[JointModel, ...]:
     """A joint model per name, all with the same actuator.
 
-    Args:
-        chain: The actuator; None where a log's torque is the actuator's own at the joint side.
-        names: Of the joints.
+    `chain`: the actuator; None where a log's torque is the actuator's own at the joint side.
     """
     if chain is None:
         return tuple(map(JointModel, names))

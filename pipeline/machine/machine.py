@@ -146,9 +146,7 @@ def link_name(model: pin.Model, joint: int) -> str:
 def machine_of_robot(robot: Robot, actuators: Actuators | None) -> MachineModel:
     """A machine of a robot file.
 
-    Args:
-        robot: From a robot file.
-        actuators: Of all joints; None where the log's torque is the actuator's at the joint side.
+    `actuators`: of all joints; None where the log's torque is the actuator's at the joint side.
     """
     return MachineModel(
         name=robot.spec.name,
@@ -167,10 +165,8 @@ def machine_of_urdf(
 ) -> MachineModel:
     """A machine of a bare URDF: fixed base, no legs.
 
-    Args:
-        path: The URDF.
-        joints: Columns; all joints of one degree of freedom by default.
-        actuators: As for `machine_of_robot`.
+    `joints`: columns; all joints of one degree of freedom by default. `actuators`: as for
+    `machine_of_robot`.
 
     Raises:
         ModelError: It moves in joints that are not columns.

@@ -43,13 +43,8 @@ def motors_of(
 ) -> Motors:
     """The motors of a machine.
 
-    Args:
-        catalog: Components and alternatives.
-        own: What the robot file says of its joints.
-        every: Alternatives that count, by name.
-        names: Of the joints.
-        robot: Mass of the robot [kg].
-        stated: Whether the catalogue is the user's; what the robot file states is stated, too.
+    `robot`: mass of the robot [kg]. `stated`: whether the catalogue is the user's; what the robot
+    file states is stated, too.
     """
     joints = tuple(names)
     usual = own.usual if own.usual in every else ""

@@ -115,9 +115,7 @@ class OwnActuators:
     def actuators(self, catalog: Catalog, alternative: str) -> Actuators:
         """One alternative with what single joints have of their own.
 
-        Args:
-            catalog: Components and alternatives.
-            alternative: One of them, or `AS_BUILT` where joints are built differently.
+        `alternative`: one of them, or `AS_BUILT` where joints are built differently.
 
         Raises:
             CatalogError: No such alternative.
@@ -185,10 +183,6 @@ def without_folder(spec: RobotSpec) -> RobotSpec:
 
 def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
     """The actuators that a robot file gives its joints.
-
-    Args:
-        spec: The robot file.
-        catalog: Components and alternatives that it may name.
 
     Raises:
         RobotFileError: A key, joint, alternative or number is unknown, or a number cannot be; names

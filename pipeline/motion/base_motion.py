@@ -33,9 +33,7 @@ def surge(gait: Gait, share: Array) -> Course:
     (S / pi) sin(w t), w = 4 pi / T, counted from the middle of a support less T/4, and the body's
     way the same times g / (h w^2).
 
-    Args:
-        gait: The gait.
-        share: Of the period, from the first touch-down, shape (N,).
+    `share`: of the period, from the first touch-down, shape (N,).
     """
     duty = float(np.mean(list(gait.footfall.duty.values())))
     rate = 4.0 * np.pi / gait.period  # [rad/s]
@@ -51,10 +49,8 @@ def surge(gait: Gait, share: Array) -> Course:
 def base_motion(gait: Gait, time: Array, shift: Course | None) -> BaseMotion:
     """The base over a stretch of time.
 
-    Args:
-        gait: The gait; at t = 0 the unswayed base is at the origin and looks along x.
-        time: Shape (N,) [s].
-        shift: Sway in the axes of the unswayed body, shape (N, 3).
+    `gait`: the gait; at t = 0 the unswayed base is at the origin and looks along x. `time`: shape
+    (N,) [s]. `shift`: sway in the axes of the unswayed body, shape (N, 3).
     """
     n = time.size
     gone, angle = displaced(gait.twist, time)
@@ -78,10 +74,8 @@ def base_motion(gait: Gait, time: Array, shift: Course | None) -> BaseMotion:
 def base_quaternions(ground: Ground, body: Array, heading: Array) -> Array:
     """Orientation of the base in the world, x y z w, shape (N, 4).
 
-    Args:
-        ground: The plane it stands on.
-        body: Rotation from the base to the ground's axes at zero heading, shape (3, 3).
-        heading: Turn to the left about the ground's normal [rad], shape (N,).
+    `body`: rotation from the base to the ground's axes at zero heading, shape (3, 3). `heading`:
+    turn to the left about the ground's normal [rad], shape (N,).
     """
     if ground.level and np.array_equal(body, np.eye(3)) and not heading.any():
         return np.tile([0.0, 0.0, 0.0, 1.0], (heading.size, 1))  # upright to the last bit
@@ -112,11 +106,7 @@ class BaseSeries:
 
 
 def base_in_world(segment: Segment) -> BaseSeries:
-    """What Pinocchio's components in the base's axes mean in the world.
-
-    Args:
-        segment: Of a robot with a floating base.
-    """
+    """What Pinocchio's components in the base's axes mean in the world."""
     turn = Rotation.from_quat(segment.configuration[:, 3:7])
     v, w = segment.velocity[:, :3], segment.velocity[:, 3:6]
     # The origin's acceleration has what the axes' own turning adds to the components' derivative.

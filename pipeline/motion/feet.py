@@ -49,12 +49,8 @@ def along_ground(vector: Array) -> Plane:
 def displaced(stride: Array, share: Array) -> tuple[Plane, Array]:
     """Displacement and turn of the unswayed body over shares of a period.
 
-    Args:
-        stride: Over one period [m, m, rad], shape (3,).
-        share: Shape (N,), of any sign.
-
-    Returns:
-        Displacement in the axes of the start [m], complex, and turn [rad], each of shape (N,).
+    `stride`: over one period [m, m, rad], shape (3,). `share`: shape (N,), of any sign. Returns
+    displacement in the axes of the start [m], complex, and turn [rad], each of shape (N,).
     """
     angle = stride[2] * share
     turn = np.ones(share.size, dtype=np.complex128)  # mean of exp(i angle) on the way
@@ -65,10 +61,7 @@ def displaced(stride: Array, share: Array) -> tuple[Plane, Array]:
 def support_course(gait: Gait, leg: int, local: Array) -> Course:
     """A standing foot relative to the unswayed body.
 
-    Args:
-        gait: The gait.
-        leg: Index.
-        local: Share of the support that has passed, shape (N,).
+    `local`: share of the support that has passed, shape (N,).
     """
     duty = gait.footfall.duty[gait.legs[leg]]
     foothold = _seen_from(gait.stride * duty, along_ground(gait.neutral[leg]), local - 0.5)
@@ -79,10 +72,7 @@ def support_course(gait: Gait, leg: int, local: Array) -> Course:
 def transfer_course(gait: Gait, leg: int, local: Array) -> Course:
     """A foot in the air relative to the unswayed body.
 
-    Args:
-        gait: The gait.
-        leg: Index.
-        local: Share of the transfer that has passed, shape (N,).
+    `local`: share of the transfer that has passed, shape (N,).
     """
     duty = gait.footfall.duty[gait.legs[leg]]
     duration = (1 - duty) * gait.period

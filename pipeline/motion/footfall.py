@@ -170,10 +170,7 @@ def refuse_unknown(name: object) -> None:
 def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     """A gait by name.
 
-    Args:
-        name: One of `GAITS`.
-        legs: Of the robot.
-        duty: Duty factor of every leg; the gait's own by default.
+    `name`: one of `GAITS`. `duty`: duty factor of every leg; the gait's own by default.
 
     Raises:
         GaitError: No gait of that name, or none for this number of legs.
@@ -193,10 +190,8 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
 def in_turn(sets: Sequence[Sequence[str]], duty: float | None, name: str) -> Footfall:
     """Sets of legs that swing one after another, each for its share of the period.
 
-    Args:
-        sets: Every leg once; at least two sets. The first touches down at the period's start.
-        duty: Duty factor of every leg; by default one set is in the air at any time.
-        name: Of the gait.
+    `sets`: every leg once; at least two sets. The first touches down at the period's start. `duty`:
+    duty factor of every leg; by default one set is in the air at any time.
     """
     n = len(sets)
     share = 1 - 1 / n if duty is None else duty

@@ -78,8 +78,7 @@ def gait_table(spec: RobotSpec) -> GaitTable:
 def gait_of(spec: RobotSpec) -> Gait:
     """The gait of a robot file.
 
-    Args:
-        spec: With legs; its table ``[gait]`` and, for what that leaves out, its parameters.
+    `spec`: with legs; its table ``[gait]`` and, for what that leaves out, its parameters.
 
     Raises:
         GaitError: A number is missing or contradicts another, or too few feet stand.
@@ -298,11 +297,7 @@ def _from_stroke(
 def _refuse_other_strokes(
     table: GaitTable, spec: RobotSpec, legs: tuple[str, ...], follows: Array
 ) -> None:
-    """A stated stroke that speed, duty factor and period contradict.
-
-    Raises:
-        GaitError: One does.
-    """
+    """A stated stroke that speed, duty factor and period contradict."""
     if table.stroke is None:
         return
     if isinstance(table.stroke, dict):

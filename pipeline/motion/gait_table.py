@@ -193,11 +193,6 @@ BY_LEG: Final = ("phase", "duty_factor", "stroke", "lift")
 def read_gait_table(table: Mapping[str, Any], legs: tuple[str, ...], where: str) -> GaitTable:
     """Check a table ``[gait]``.
 
-    Args:
-        table: As TOML gives it.
-        legs: Names of the robot's legs.
-        where: File, for messages.
-
     Raises:
         GaitError: An unknown key or leg, a value that is none, or two ways to say one thing; one
             line with all of it.
@@ -271,9 +266,6 @@ def _refuse_other_sets(sets: Legs | None, legs: tuple[str, ...], where: str) -> 
 def read_gait_file(path: FilePath) -> dict[str, Any]:
     """The table ``[gait]`` of a file that holds nothing else.
 
-    Args:
-        path: TOML.
-
     Raises:
         GaitError: Missing, malformed, or without that table.
     """
@@ -292,9 +284,7 @@ def read_gait_file(path: FilePath) -> dict[str, Any]:
 def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
     """A robot file with a gait file's table instead of its own.
 
-    Args:
-        robot: Robot file.
-        gait: Gait file; None for the robot file's own gait.
+    `gait`: gait file; None for the robot file's own gait.
 
     Raises:
         RobotFileError: The robot file cannot be used.
@@ -311,10 +301,8 @@ def spec_with_gait(robot: FilePath, gait: FilePath | None) -> RobotSpec:
 def changed_table(table: Mapping[str, Any], key: str, value: object) -> dict[str, Any]:
     """The table with one key changed as ``--set gait.KEY=VALUE`` writes it.
 
-    Args:
-        table: Before.
-        key: Without ``gait.``; ``KEY.LEG`` for one leg of a number by leg.
-        value: As TOML gives it, or as written there; a bare number is a share.
+    `key`: without ``gait.``; ``KEY.LEG`` for one leg of a number by leg. `value`: as TOML gives it,
+    or as written there; a bare number is a share.
 
     Raises:
         GaitError: A list or table that TOML does not read.

@@ -39,12 +39,7 @@ class Segment:
     rocks: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what no later stage could compute with.
-
-        Raises:
-            InvalidMotionError: No samples, times that do not increase, shapes that differ, values
-                that are not finite, or a ground whose normal is no upward unit vector.
-        """
+        """Refuse what no later stage could compute with."""
         normal = self.ground_normal
         if not (normal.shape == (3,) and abs(np.linalg.norm(normal) - 1) < 1e-9 and normal[2] > 0):
             raise InvalidMotionError(
@@ -84,11 +79,7 @@ class Motion:
     period: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a motion without segments.
-
-        Raises:
-            InvalidMotionError: If there is no segment.
-        """
+        """Refuse a motion without segments."""
         if not self.segments:
             raise InvalidMotionError("the motion has no segments; at least 1 is needed")
 

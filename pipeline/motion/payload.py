@@ -15,9 +15,6 @@ def with_payload(robot: Robot) -> Robot:
     """The robot with the payload of its ``[gait]`` fixed to the base link; itself without one.
 
     The load is a point mass: give the place of its centre of mass. The URDF's text stays without.
-
-    Args:
-        robot: As loaded.
     """
     table = gait_table(robot.spec)
     if not table.payload_mass:

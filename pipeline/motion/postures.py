@@ -14,9 +14,7 @@ from pipeline.robot.robot import Robot
 def start_postures(robot: Robot, target: Array) -> Array:
     """Joint positions with every foot at mid-support, each leg on its own branch [rad], (L, 3).
 
-    Args:
-        robot: With the neutral feet that name the branch.
-        target: Feet at mid-support in the base frame [m], shape (L, 3).
+    `target`: feet at mid-support in the base frame [m], shape (L, 3).
 
     Raises:
         OutOfReachError: A foot is not reached.
@@ -37,11 +35,7 @@ def refuse_beyond_limits(
 ) -> None:
     """Refuse joint positions outside the URDF's limits.
 
-    Args:
-        robot: With limits.
-        q: Joint positions [rad, m], shape (N, J).
-        time: For messages [s], shape (N,).
-        remedy: What to do.
+    `q`: joint positions [rad, m], shape (N, J). `time`: for messages [s], shape (N,).
 
     Raises:
         GaitError: One lies beyond; names joint, instant and limits.

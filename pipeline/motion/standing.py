@@ -22,9 +22,7 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     (section II.C of the paper). Height, shift and tilt of the body and the slope of the ground are
     those of ``[gait]``.
 
-    Args:
-        robot: The robot.
-        feet: Legs that stand; the robot file's by default.
+    `feet`: legs that stand; the robot file's by default.
 
     Raises:
         OutOfReachError: A foot target lies outside a leg's reach.

@@ -45,8 +45,7 @@ def _left_of(start: Array, edge: Array, length: Array, point: Array) -> Array:
 def support_edges(feet: Array) -> SupportEdges:
     """The lines between any two feet.
 
-    Args:
-        feet: Foot points [m], shape (N, F, 2 or more), in any order around the hull.
+    `feet`: foot points [m], shape (N, F, 2 or more), in any order around the hull.
     """
     xy = feet[..., :2]
     n_feet = xy.shape[1]
@@ -61,12 +60,7 @@ def support_edges(feet: Array) -> SupportEdges:
 
 
 def stance_and_centre(robot: Robot, segment: Segment) -> tuple[Array, Array]:
-    """Standing feet (N, F, 3) and centre of mass (N, 3) from the base, world's directions [m].
-
-    Args:
-        robot: With a floating base.
-        segment: The motion.
-    """
+    """Standing feet (N, F, 3) and centre of mass (N, 3) from the base, world's directions [m]."""
     q = segment.configuration
     stance = [robot.leg_names.index(leg) for leg in segment.stance]
     feet = foot_positions(robot.chains, robot.leg_positions(q))[:, stance]
@@ -80,13 +74,9 @@ def stance_and_centre(robot: Robot, segment: Segment) -> tuple[Array, Array]:
 def support_margin(feet: Array, point: Array) -> Array:
     """Distance of a point from the nearest edge of the feet's convex hull, seen from above.
 
-    Args:
-        feet: Foot points [m], shape (N, F, 3), the same order around the hull at every sample not
-            being required.
-        point: Projected point [m], shape (N, 2).
-
-    Returns:
-        Margin [m], shape (N,); negative outside the hull.
+    `feet`: foot points [m], shape (N, F, 3), the same order around the hull at every sample not
+    being required. `point`: projected point [m], shape (N, 2). Returns margin [m], shape (N,);
+    negative outside the hull.
     """
     edges = support_edges(feet)
     margin: Array = np.where(edges.used, edges.distance(point), np.inf).min(axis=1)
@@ -98,12 +88,9 @@ def longitudinal_margin(feet: Array, point: Array) -> Array:
 
     The longitudinal stability margin of Song and Waldron (1989): along the x axis, the nearer one.
 
-    Args:
-        feet: Foot points [m], shape (N, F, 3), x along the heading.
-        point: Projected point [m], shape (N, 2).
-
-    Returns:
-        Margin [m], shape (N,); negative where the point lies outside along that line.
+    `feet`: foot points [m], shape (N, F, 3), x along the heading. `point`: projected point [m],
+    shape (N, 2). Returns margin [m], shape (N,); negative where the point lies outside along that
+    line.
     """
     edges = support_edges(feet)
     distance, along = edges.distance(point), edges.inward[..., 0]

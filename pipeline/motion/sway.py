@@ -122,13 +122,8 @@ def followed_ways(robot: Robot, gait: Gait, posture: Array) -> Array:
 
     A leg of two joints moves its foot in a plane; sway across it would drag the foot.
 
-    Args:
-        robot: With legs.
-        gait: For the body's tilt.
-        posture: Joint positions at mid-support, shape (L, K).
-
-    Returns:
-        Orthonormal columns in the ground's plane, shape (2, ways).
+    `posture`: joint positions at mid-support, shape (L, K). Returns orthonormal columns in the
+    ground's plane, shape (2, ways).
     """
     _, jacobians = foot_jacobians(robot.chains, posture[None])
     across = [(np.eye(3) - j @ np.linalg.pinv(j, rcond=_FLAT)) for j in jacobians[0]]
@@ -139,11 +134,7 @@ def followed_ways(robot: Robot, gait: Gait, posture: Array) -> Array:
 def least_sway(robot: Robot, gait: Gait, posture: Array, walked: Callable[[Sway], Motion]) -> Sway:
     """The least path of the body that keeps the gait's margin.
 
-    Args:
-        robot: With a floating base.
-        gait: With a margin.
-        posture: Joint positions at mid-support, shape (L, K).
-        walked: The gait's motion with a sway.
+    `posture`: joint positions at mid-support, shape (L, K).
 
     Raises:
         GaitError: No path keeps it; says how much of a margin one could.

@@ -27,13 +27,9 @@ FEWEST_SAMPLES = 25
 def walking_motion(robot: Robot, *, samples: int = DEFAULT_SAMPLES) -> Motion:
     """One period of the robot file's gait.
 
-    Args:
-        robot: With legs and a floating base.
-        samples: In half a period, ends included; a segment has its share of them, at least
-            `FEWEST_SAMPLES` where there are as many.
-
-    Returns:
-        Closed segments, one for every set of legs that stand, from t = 0.
+    `samples`: in half a period, ends included; a segment has its share of them, at least
+    `FEWEST_SAMPLES` where there are as many. Returns closed segments, one for every set of legs
+    that stand, from t = 0.
 
     Raises:
         GaitError: The numbers contradict each other, too few feet stand, or no sway keeps the

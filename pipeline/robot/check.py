@@ -31,11 +31,8 @@ MASS_TOLERANCE = 0.005
 def check_file(path: Path) -> list[Finding]:
     """Check a robot file or a bare URDF.
 
-    Args:
-        path: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``.
-
-    Returns:
-        Every check with its outcome.
+    `path`: ``.toml`` robot file, URDF, or the name of a robot in ``example-robot-data``. Returns
+    every check with its outcome.
 
     Raises:
         PipelineError: The file cannot be read at all.
@@ -97,12 +94,8 @@ def _masses(robot: Robot) -> Iterator[Finding]:
 def refuse_impossible(robot: Robot, *, tolerant: bool = False) -> tuple[str, ...]:
     """Stop before a body that cannot exist gives numbers that look like any other.
 
-    Args:
-        robot: Loaded.
-        tolerant: Go on where a finding is tolerable, for a comparison with a log.
-
-    Returns:
-        What was found and does no harm, for the run's record.
+    `tolerant`: go on where a finding is tolerable, for a comparison with a log. Returns what was
+    found and does no harm, for the run's record.
 
     Raises:
         UnphysicalModelError: A body's mass or inertia is impossible, a limit missing or in another
@@ -202,12 +195,8 @@ def _symmetry(robot: Robot) -> Iterator[Finding]:
 def _counterparts(robot: Robot, points: Array) -> dict[int, int | None]:
     """Of every left leg the right leg whose point mirrors its own, if any does.
 
-    Args:
-        robot: With legs.
-        points: One of each leg in the base frame [m], shape (L, 3).
-
-    Returns:
-        Indices of legs; left out are those in the middle plane, their own counterparts.
+    `points`: one of each leg in the base frame [m], shape (L, 3). Returns indices of legs; left out
+    are those in the middle plane, their own counterparts.
     """
     legs = robot.spec.legs
     right = [k for k, leg in enumerate(legs) if leg.side == "right"]
@@ -229,13 +218,6 @@ def _mirror_difference(robot: Robot, data: pin.Data, left: int, right: int, k: i
     """Largest relative difference of one body and its axis from the mirror image of another.
 
     In the base frame at the zero pose: which way a file turns its joint frames is its own matter.
-
-    Args:
-        robot: With legs.
-        data: After its forward kinematics.
-        left: Index of a leg.
-        right: Index of its counterpart.
-        k: Which of their joints.
     """
     flip = np.diag([1.0, -1.0, 1.0])
     model, chains = robot.model, robot.chains

@@ -1,9 +1,8 @@
 """Joint positions, velocities and accelerations from a prescribed foot path.
 
-Positions come in closed form where a leg has one (`pipeline.robot.inverse.closed_form`), from
-damped least squares where it has three joints of another build, and of least motion or least miss
-where it has more or fewer joints than a foot has coordinates. Velocities and accelerations follow
-exactly, from ``x_dot = J q_dot`` and ``x_ddot = J q_ddot + J_dot q_dot``.
+Positions come from damped least squares; where a leg has more or fewer joints than a foot has
+coordinates, on to least motion or least miss (`pipeline.robot.inverse.least_motion`). Velocities
+and accelerations follow exactly, from ``x_dot = J q_dot`` and ``x_ddot = J q_ddot + J_dot q_dot``.
 """
 
 from __future__ import annotations
@@ -14,20 +13,11 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.errors import OutOfReachError
-from pipeline.robot.inverse.closed_form import closed_form, closed_form_legs
-from pipeline.robot.inverse.damped import approach, square_solve
-from pipeline.robot.inverse.least_motion import Freedom, LeastMotion, freedoms
-from pipeline.robot.kinematics import (
-    bias_acceleration,
-    foot_jacobians,
-    foot_positions,
-    samples_last,
-    swept,
-)
+from pipeline.robot.inverse.least_motion import LeastMotion, freedoms
+from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import LegChains
 
 ACCEPTED = 1e-9  # [m]
-_SINGULAR = 1e8  # condition number of a leg's Jacobian that is none any more
 _JUMP = 0.2  # [rad] between two samples that no velocity explains
 _PATH = 16  # samples; fewer are too coarse for velocities to predict the next position
 
@@ -35,51 +25,29 @@ _PATH = 16  # samples; fewer are too coarse for velocities to predict the next p
 def reach(chains: LegChains, target: Array, start: Array) -> tuple[Array, Array]:
     """Joint positions that bring the feet as close to their targets as their legs get.
 
-    Args:
-        chains: The legs.
-        target: Foot positions in the base frame [m], shape (N, L, 3).
-        start: Posture that names the branch (knee up or down) [rad, m], shape (L, K).
-
-    Returns:
-        Joint positions [rad, m], shape (N, L, K), and by how much a foot misses what its leg
-        should reach [m], shape (N, L): all of the way to the target where the leg moves its foot
-        in every direction, nothing where it lacks one and stands as near as it gets.
+    `target`: foot positions in the base frame [m], shape (N, L, 3). `start`: posture that names the
+    branch (knee up or down) [rad, m], shape (L, K). Returns joint positions [rad, m], shape (N, L,
+    K), and by how much a foot misses what its leg should reach [m], shape (N, L): all of the way to
+    the target where the leg moves its foot in every direction, nothing where it lacks one and
+    stands as near as it gets.
     """
     n_samples, n_legs = target.shape[:2]
     q = np.zeros((n_samples, n_legs, chains.depth))
     miss = np.zeros((n_samples, n_legs))
-    direct = closed_form_legs(chains, start)
-    if direct.size:
-        found = closed_form(chains, direct, target[:, direct], start)
-        reached = np.isfinite(found).all(axis=(0, 2))
-        direct = direct[reached]  # the iteration finds how far the others are off
-    if direct.size:
-        q[:, direct, :3] = found[:, reached]
-        feet = foot_positions(chains.of(direct.tolist()), q[:, direct])
-        miss[:, direct] = np.linalg.norm(target[:, direct] - feet, axis=-1)
-    for freedom, legs in _groups(chains, set(direct.tolist())):
-        own, n = chains.of(legs).shortened(freedom.joints), freedom.joints
-        if freedom.square:
-            q[:, legs, :n], miss[:, legs] = approach(own, target[:, legs], start[legs, :n])
-        else:
-            least = LeastMotion(own, freedom)
-            q[:, legs, :n], left = least.positions(target[:, legs], start[legs, :n])
-            miss[:, legs] = 0.0 if freedom.lacks else left
+    for problem, legs in _problems(chains):
+        n = problem.freedom.joints
+        q[:, legs, :n], left = problem.positions(target[:, legs], start[legs, :n])
+        miss[:, legs] = 0.0 if problem.freedom.lacks else left
     return q, miss
 
 
 def solve_positions(chains: LegChains, target: Array, start: Array, time: Array) -> Array:
     """Joint positions that bring the feet to their targets.
 
-    Args:
-        chains: The legs.
-        target: Foot positions in the base frame [m], shape (N, L, 3).
-        start: Posture that names the branch (knee up or down) [rad, m], shape (L, K).
-        time: For messages [s], shape (N,).
-
-    Returns:
-        Joint positions [rad, m], shape (N, L, K). A leg that lacks a direction puts its foot as
-        near as it gets; `pipeline.robot.inverse.foot_tracking` says how near.
+    `target`: foot positions in the base frame [m], shape (N, L, 3). `start`: posture that names the
+    branch (knee up or down) [rad, m], shape (L, K). `time`: for messages [s], shape (N,). Returns
+    joint positions [rad, m], shape (N, L, K). A leg that lacks a direction puts its foot as near as
+    it gets; `foot_tracking` says how near.
 
     Raises:
         OutOfReachError: A target is not reached; names leg, instant and how far it is off.
@@ -96,11 +64,8 @@ def solve_positions(chains: LegChains, target: Array, start: Array, time: Array)
 def beyond_reach(leg: str, target: Array, miss: float, time: float) -> OutOfReachError:
     """What to say of a target that no posture reaches.
 
-    Args:
-        leg: Its name.
-        target: Of its foot in the base frame [m], shape (3,).
-        miss: What is left [m].
-        time: In the motion [s].
+    `target`: of its foot in the base frame [m], shape (3,). `miss`: what is left [m]. `time`: in
+    the motion [s].
     """
     x, y, z = target
     return OutOfReachError(
@@ -120,43 +85,29 @@ def solve_rates(
 ) -> tuple[Array, Array]:
     """Joint velocities and accelerations that move the feet as prescribed.
 
-    Args:
-        chains: The legs.
-        q: Joint positions from `solve_positions` [rad, m], shape (N, L, K).
-        foot_velocity: In the base frame, relative to the base [m/s], shape (N, L, 3).
-        foot_acceleration: Likewise [m/s^2], shape (N, L, 3).
-        time: For messages [s], shape (N,).
-        target: Where the feet should be [m], shape (N, L, 3); where they are by default. A leg
-            that lacks a direction needs it: how it turns depends on how far it is off.
-
-    Returns:
-        Joint velocities [rad/s, m/s] and accelerations [rad/s^2, m/s^2], each (N, L, K).
+    `q`: joint positions from `solve_positions` [rad, m], shape (N, L, K). `foot_velocity`: in the
+    base frame, relative to the base [m/s], shape (N, L, 3). `foot_acceleration`: likewise [m/s^2],
+    shape (N, L, 3). `time`: for messages [s], shape (N,). `target`: where the feet should be [m],
+    shape (N, L, 3); where they are by default. A leg that lacks a direction needs it: how it turns
+    depends on how far it is off. Returns joint velocities [rad/s, m/s] and accelerations [rad/s^2,
+    m/s^2], each (N, L, K).
 
     Raises:
         OutOfReachError: The leg is stretched (singular) at a sample.
     """
     velocity, acceleration = np.zeros(q.shape), np.zeros(q.shape)
     goal = foot_positions(chains, q) if target is None else target
-    for freedom, legs in _groups(chains, set()):
-        own, n = chains.of(legs).shortened(freedom.joints), freedom.joints
-        posture = q[:, legs, :n]
-        moved = foot_velocity[:, legs], foot_acceleration[:, legs]
-        if freedom.square:
-            parts = _square_rates(own, posture, *moved, time)
-        else:
-            _refuse_singular(own, freedom, posture, time)
-            parts = LeastMotion(own, freedom).rates(posture, *moved, goal[:, legs])
+    for problem, legs in _problems(chains):
+        n = problem.freedom.joints
+        path = goal[:, legs], foot_velocity[:, legs], foot_acceleration[:, legs]
+        parts = problem.rates(q[:, legs, :n], *path, time)
         velocity[:, legs, :n], acceleration[:, legs, :n] = parts
     _refuse_jumps(chains, q, velocity, time)
     return velocity, acceleration
 
 
 def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> None:
-    """Between samples a joint goes as far as its velocities say, or it changed its branch.
-
-    Raises:
-        OutOfReachError: One did not.
-    """
+    """Between samples a joint goes as far as its velocities say, or it changed its branch."""
     step = np.diff(time)[:, None, None]
     if time.size < _PATH or step.min() <= 0:
         return
@@ -174,38 +125,9 @@ def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> 
         )
 
 
-def _groups(chains: LegChains, but: set[int]) -> Iterator[tuple[Freedom, list[int]]]:
-    """Legs of the same freedom, without some."""
+def _problems(chains: LegChains) -> Iterator[tuple[LeastMotion, list[int]]]:
+    """Legs of the same freedom, and what they are to do."""
     free = freedoms(chains)
     for kind in dict.fromkeys(free):
-        legs = [i for i, own in enumerate(free) if own == kind and i not in but]
-        if legs:
-            yield kind, legs
-
-
-def _square_rates(
-    chains: LegChains, q: Array, foot_velocity: Array, foot_acceleration: Array, time: Array
-) -> tuple[Array, Array]:
-    """Of legs with three joints that move their feet in every direction, each (N, M, 3)."""
-    columns = swept(chains, samples_last(q)).columns
-    rate, condition = square_solve(columns, foot_velocity.transpose(2, 1, 0))
-    _refuse(chains, condition, time)
-    bias = bias_acceleration(chains, samples_last(q), rate.transpose(1, 0, 2))
-    faster, _ = square_solve(columns, foot_acceleration.transpose(2, 1, 0) - bias)
-    return rate.transpose(2, 1, 0), faster.transpose(2, 1, 0)
-
-
-def _refuse_singular(chains: LegChains, freedom: Freedom, q: Array, time: Array) -> None:
-    values = np.linalg.svd(foot_jacobians(chains, q)[1], compute_uv=False)
-    with np.errstate(divide="ignore"):
-        _refuse(chains, (values[..., 0] / values[..., freedom.directions - 1]).T, time)
-
-
-def _refuse(chains: LegChains, condition: Array, time: Array) -> None:
-    singular = ~(condition < _SINGULAR)
-    if singular.any():
-        leg, sample = np.unravel_index(int(singular.argmax()), singular.shape)
-        raise OutOfReachError(
-            f"leg '{chains.names[leg]}' is stretched or folded to a singular posture at "
-            f"t = {time[sample]:.4g} s; shorten the stroke or move the neutral foot"
-        )
+        legs = [i for i, own in enumerate(free) if own == kind]
+        yield LeastMotion(chains.of(legs).shortened(kind.joints), kind), legs

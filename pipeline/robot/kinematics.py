@@ -128,12 +128,9 @@ class LegPosture:
     def force_torques(self, force: Array) -> Array:
         """Joint torques J^T f that forces on the first F of the feet put into their joints.
 
-        Args:
-            force: In the base frame [N], shape (N, F, 3).
-
-        Returns:
-            Torques [N*m], forces [N] where a joint slides, shape (N, F, K), positive in the joints'
-            positive directions; zero where a leg has no joint.
+        `force`: in the base frame [N], shape (N, F, 3). Returns torques [N*m], forces [N] where a
+        joint slides, shape (N, F, K), positive in the joints' positive directions; zero where a leg
+        has no joint.
         """
         n, k, _ = force.shape
         chains = self.chains if k == len(self.chains.names) else self.chains.of(range(k))
@@ -154,9 +151,7 @@ def leg_posture(chains: LegChains, q: Array) -> LegPosture:
 def posture_at(chains: LegChains, angle: Array) -> LegPosture:
     """Work out the legs at joint positions that are the caller's to give away.
 
-    Args:
-        chains: The legs.
-        angle: Joint positions [rad, m], shape (L, K, N); overwritten.
+    `angle`: joint positions [rad, m], shape (L, K, N); overwritten.
     """
     angle, shift = _parted(chains, angle)
     cos, sin = np.cos(angle), np.sin(angle, out=angle)
@@ -174,12 +169,7 @@ def posture_at(chains: LegChains, angle: Array) -> LegPosture:
 def foot_positions(chains: LegChains, q: Array) -> Array:
     """Foot points in the base frame.
 
-    Args:
-        chains: The legs.
-        q: Joint positions [rad, m], shape (N, L, K).
-
-    Returns:
-        Positions [m], shape (N, L, 3).
+    `q`: joint positions [rad, m], shape (N, L, K). Returns positions [m], shape (N, L, 3).
     """
     return leg_posture(chains, q).feet
 
@@ -187,14 +177,9 @@ def foot_positions(chains: LegChains, q: Array) -> Array:
 def foot_force_torques(chains: LegChains, q: Array, force: Array) -> Array:
     """Joint torques J^T f that forces on the feet put into the joints.
 
-    Args:
-        chains: The legs.
-        q: Joint positions [rad, m], shape (N, L, K).
-        force: Force on each foot [N] in the base frame, shape (N, L, 3).
-
-    Returns:
-        Torques [N*m], forces [N] where a joint slides, shape (N, L, K), positive in the joints'
-        positive directions.
+    `q`: joint positions [rad, m], shape (N, L, K). `force`: force on each foot [N] in the base
+    frame, shape (N, L, 3). Returns torques [N*m], forces [N] where a joint slides, shape (N, L, K),
+    positive in the joints' positive directions.
     """
     return leg_posture(chains, q).force_torques(force)
 
@@ -213,10 +198,7 @@ class Swept:
 def swept(chains: LegChains, coordinate: Array, *, axes: bool = False) -> Swept:
     """Feet and the columns of their Jacobians, from the foot inward.
 
-    Args:
-        chains: The legs.
-        coordinate: Joint positions [rad, m], shape (L, K, N); overwritten.
-        axes: Whether to work out the joints' axes, too.
+    `coordinate`: joint positions [rad, m], shape (L, K, N); overwritten.
     """
     angle, shift = _parted(chains, coordinate)
     cos, sin = np.cos(angle), np.sin(angle, out=angle)
@@ -246,13 +228,8 @@ def swept(chains: LegChains, coordinate: Array, *, axes: bool = False) -> Swept:
 def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
     """Foot points and their Jacobians in the base frame.
 
-    Args:
-        chains: The legs.
-        q: Joint positions [rad, m], shape (N, L, K).
-
-    Returns:
-        Positions [m], shape (N, L, 3), and Jacobians [m/rad, 1],
-        shape (N, L, 3 xyz, K joints); a column is zero where a leg has no joint.
+    `q`: joint positions [rad, m], shape (N, L, K). Returns positions [m], shape (N, L, 3), and
+    Jacobians [m/rad, 1], shape (N, L, 3 xyz, K joints); a column is zero where a leg has no joint.
     """
     legs = swept(chains, samples_last(q))
     return legs.tip.transpose(2, 1, 0), legs.columns.transpose(3, 2, 0, 1)
@@ -261,13 +238,8 @@ def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
 def foot_jacobian_rates(chains: LegChains, q: Array, q_dot: Array) -> Array:
     """Time derivative of the foot Jacobians times the joint velocity.
 
-    Args:
-        chains: The legs.
-        q: Joint positions [rad, m], shape (N, L, K).
-        q_dot: Joint velocities [rad/s, m/s], shape (N, L, K).
-
-    Returns:
-        The bias acceleration of the feet [m/s^2], shape (N, L, 3).
+    `q`: joint positions [rad, m], shape (N, L, K). `q_dot`: joint velocities [rad/s, m/s], shape
+    (N, L, K). Returns the bias acceleration of the feet [m/s^2], shape (N, L, 3).
     """
     return bias_acceleration(chains, samples_last(q), samples_last(q_dot)).transpose(2, 1, 0)
 
@@ -275,13 +247,8 @@ def foot_jacobian_rates(chains: LegChains, q: Array, q_dot: Array) -> Array:
 def bias_acceleration(chains: LegChains, coordinate: Array, rate: Array) -> Array:
     """The feet's acceleration while all joints keep their velocity.
 
-    Args:
-        chains: The legs.
-        coordinate: Joint positions [rad, m], shape (L, K, N); overwritten.
-        rate: Joint velocities [rad/s, m/s], shape (L, K, N).
-
-    Returns:
-        In the base frame [m/s^2], shape (3, L, N).
+    `coordinate`: joint positions [rad, m], shape (L, K, N); overwritten. `rate`: joint velocities
+    [rad/s, m/s], shape (L, K, N). Returns in the base frame [m/s^2], shape (3, L, N).
     """
     angle, shift = _parted(chains, coordinate)
     cos, sin = np.cos(angle), np.sin(angle, out=angle)

@@ -129,12 +129,9 @@ def leg_chains(
 ) -> LegChains:
     """Read the legs' geometry out of a model.
 
-    Args:
-        model: Pinocchio model.
-        legs: For each leg its name, its joint names from the base outward and the foot frame.
-        base_joint: Index of the joint that carries the base (0 for a fixed base).
-        nominal: Posture about which legs with joints to spare move least, shape (L, K); zero by
-            default.
+    `legs`: for each leg its name, its joint names from the base outward and the foot frame.
+    `base_joint`: index of the joint that carries the base (0 for a fixed base). `nominal`: posture
+    about which legs with joints to spare move least, shape (L, K); zero by default.
 
     Raises:
         UrdfError: A joint or frame is missing, of several coordinates, or not the child of the one

@@ -54,9 +54,8 @@ class LegColumns:
     def by_joint(self, values: Array, elsewhere: Array | float = 0.0) -> Array:
         """Legs' values by joint: (N, L, K) to (N, J).
 
-        Args:
-            values: By leg; what stands where a leg has no joint is dropped.
-            elsewhere: For joints outside the legs, shape (J,) or one number.
+        `values`: by leg; what stands where a leg has no joint is dropped. `elsewhere`: for joints
+        outside the legs, shape (J,) or one number.
         """
         if self._in_a_row:
             return values.reshape(values.shape[0], self.size)
@@ -67,12 +66,7 @@ class LegColumns:
 
 
 def leg_columns(joints: Sequence[str], legs: Sequence[Sequence[str]]) -> LegColumns:
-    """Where the legs' joints stand among all.
-
-    Args:
-        joints: All, in the order of the columns.
-        legs: Joint names of each leg, base outward.
-    """
+    """Where the legs' joints stand among all."""
     at = {name: k for k, name in enumerate(joints)}
     depth = max((len(leg) for leg in legs), default=0)
     columns = np.array(

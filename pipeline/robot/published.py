@@ -68,8 +68,7 @@ def published_robot(name: str) -> PublishedRobot:
 def named_robot(given: str) -> PublishedRobot | None:
     """The robot of the package that a command names, with or without `SCHEME`.
 
-    Returns:
-        None where a file is meant: one that is there, or that is written like one.
+    Returns None where a file is meant: one that is there, or that is written like one.
 
     Raises:
         UrdfError: Neither a file nor a robot, or a robot without a URDF.
@@ -84,9 +83,7 @@ def named_robot(given: str) -> PublishedRobot | None:
 def urdf_path(text: str, robot_file: Path) -> Path:
     """Where the URDF that a robot file names lies.
 
-    Args:
-        text: ``robot.urdf``: a path beside the robot file, or ``example-robot-data:NAME``.
-        robot_file: The file that names it.
+    `text`: ``robot.urdf``: a path beside the robot file, or ``example-robot-data:NAME``.
 
     Raises:
         UrdfError: The package has no such robot.

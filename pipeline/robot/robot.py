@@ -145,12 +145,8 @@ class Robot:
     def configuration(self, joint_positions: Array, base_position: Array | None = None) -> Array:
         """Assemble Pinocchio configurations.
 
-        Args:
-            joint_positions: In the order of `joints` [rad], shape (N, J).
-            base_position: Of a floating base that stays upright [m], shape (N, 3).
-
-        Returns:
-            Shape (N, nq).
+        `joint_positions`: in the order of `joints` [rad], shape (N, J). `base_position`: of a
+        floating base that stays upright [m], shape (N, 3). Returns shape (N, nq).
         """
         n = joint_positions.shape[0]
         q = np.tile(pin.neutral(self.model), (n, 1))
@@ -162,12 +158,8 @@ class Robot:
     def tangent(self, joint_values: Array, base_linear: Array | None = None) -> Array:
         """Assemble Pinocchio velocities or accelerations.
 
-        Args:
-            joint_values: In the order of `joints`, shape (N, J).
-            base_linear: Linear part of a floating base in its own frame, shape (N, 3).
-
-        Returns:
-            Shape (N, nv).
+        `joint_values`: in the order of `joints`, shape (N, J). `base_linear`: linear part of a
+        floating base in its own frame, shape (N, 3). Returns shape (N, nv).
         """
         v = np.zeros((joint_values.shape[0], self.model.nv))
         v[:, self.velocity_index] = joint_values
@@ -216,11 +208,7 @@ def load_robot(spec: RobotSpec) -> Robot:
 
 
 def _refuse_left_over(robot: Robot) -> None:
-    """Every joint of the URDF is a leg's, or held.
-
-    Raises:
-        UrdfError: Some are neither.
-    """
+    """Every joint of the URDF is a leg's, or held."""
     known = set(robot.joints)
     moving = list(robot.model.names)[2 if robot.floating else 1 :]
     left = [name for name in moving if name not in known]
@@ -234,11 +222,7 @@ def _refuse_left_over(robot: Robot) -> None:
 
 
 def _refuse_other_base(robot: Robot) -> None:
-    """Feet are placed in the frame of the base link, which Pinocchio takes to be the root.
-
-    Raises:
-        UrdfError: The robot file names another link.
-    """
+    """Feet are placed in the frame of the base link, which Pinocchio takes to be the root."""
     first = 2 if robot.floating else 1  # after the universe and the free flyer
     root = next(
         str(frame.name)

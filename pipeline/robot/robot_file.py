@@ -80,9 +80,6 @@ class RobotSpec:
     def with_parameters(self, values: Mapping[str, float]) -> RobotSpec:
         """The same robot with some parameters at other values.
 
-        Args:
-            values: Name to value in SI units.
-
         Raises:
             actuators.errors.ActuatorError: A name is unknown or a value out of bounds.
         """
@@ -129,9 +126,6 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 def load_robot_file(path: Path) -> RobotSpec:
     """Load and check a robot file.
-
-    Args:
-        path: TOML file.
 
     Raises:
         RobotFileError: Missing file, malformed TOML, unknown or missing key, contradiction.
@@ -220,11 +214,7 @@ def merged_gait(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str,
 def _refuse_missing(
     schema: type[FileTable[Any]], numbers: Mapping[str, str], table: Mapping[str, Any], where: str
 ) -> None:
-    """Name all keys that a file lacks, so that who writes one need not run it for each.
-
-    Raises:
-        RobotFileError: At least one is missing.
-    """
+    """Name all keys that a file lacks, so that who writes one need not run it for each."""
     if any(not isinstance(table.get(key, {}), dict) for key in FileTable.model_fields):
         return
     lacking = []
@@ -250,11 +240,6 @@ def _refuse_missing(
 
 def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
     """A list of leg names, each known and named once.
-
-    Args:
-        value: As TOML gives it.
-        names: Of the robot's legs.
-        where: File and key, for messages.
 
     Raises:
         RobotFileError: It is something else.
@@ -287,11 +272,7 @@ def _leg(name: str, leg: OwnLegTable | BuiltLegTable, parameters: ParameterSet) 
 
 
 def _refuse_shared(legs: tuple[LegSpec, ...], held: Mapping[str, float], where: str) -> None:
-    """A joint belongs to one leg, or is held.
-
-    Raises:
-        RobotFileError: One does not.
-    """
+    """A joint belongs to one leg, or is held."""
     owner: dict[str, str] = {}
     for leg in legs:
         for joint in leg.joints:

@@ -65,10 +65,7 @@ _ANY_SIGN: Final = (
 def check_parameters(parameters: ParameterSet, build: str | None, where: str) -> None:
     """Refuse numbers that no robot or gait can have, after loading and after a change.
 
-    Args:
-        parameters: All of a robot file's.
-        build: Which builder makes the URDF, or None for a URDF of the user's own.
-        where: For the message.
+    `build`: which builder makes the URDF, or None for a URDF of the user's own.
 
     Raises:
         RobotFileError: A mass, length or period that is not positive, a unit that is wrong by a

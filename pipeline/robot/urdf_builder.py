@@ -70,8 +70,7 @@ _FOOT = """  <joint name="{leg}_foot_joint" type="fixed">
 def build_urdf(spec: RobotSpec) -> str:
     """The URDF as text, the same for the same robot file.
 
-    Args:
-        spec: A robot file with ``build``.
+    `spec`: a robot file with ``build``.
 
     Raises:
         RobotFileError: The masses of the legs leave nothing for the trunk, or a link would be
@@ -167,16 +166,8 @@ def _box(
 ) -> str:
     """A link that is a solid cuboid; its rotational inertia is the solid's about the com.
 
-    Args:
-        name: Of the link.
-        mass: [kg].
-        size: Edge lengths along the link's axes [m].
-        centre: Of the solid in the link's frame [m].
-        com: Centre of mass in the link's frame [m].
-        material: A key of the colours.
-
-    Raises:
-        RobotFileError: It would be denser than any metal.
+    `mass`: [kg]. `size`: edge lengths along the link's axes [m]. `centre`: of the solid in the
+    link's frame [m]. `com`: centre of mass in the link's frame [m].
     """
     volume = math.prod(size)
     if mass > DENSEST * volume:

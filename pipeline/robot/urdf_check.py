@@ -99,10 +99,6 @@ def _note(subject: str, check: str, detail: str) -> Finding:
 def check_urdf(text: str, where: str) -> list[Finding]:
     """Check a URDF's bodies, joints and limits.
 
-    Args:
-        text: The URDF.
-        where: Its file, for messages.
-
     Raises:
         UrdfError: A fault of structure; one line with its place.
     """
@@ -121,12 +117,7 @@ def check_urdf(text: str, where: str) -> list[Finding]:
 
 
 def merged_bodies(root: ET.Element, model: pin.Model) -> list[Body]:
-    """The bodies of a URDF, the root's first, then as the joints stand in the file.
-
-    Args:
-        root: Elements whose structure holds.
-        model: Of the same text, with a fixed base.
-    """
+    """The bodies of a URDF, the root's first, then as the joints stand in the file."""
     links = {_name(link): link for link in root.findall("link")}
     joints = root.findall("joint")
     held: dict[str, list[str]] = {}

@@ -21,11 +21,9 @@ def with_inertials(
 ) -> str:
     """A URDF with other bodies; comments, meshes and layout stay, but inside what is replaced.
 
-    Args:
-        text: The URDF; its structure holds (`read_elements`).
-        where: Its file, for messages.
-        bodies: Link to its body in the link's frame; None leaves a comment in place of the element.
-        why: That comment, which stands beside every element that was replaced, too.
+    `text`: the URDF; its structure holds (`read_elements`). `bodies`: link to its body in the
+    link's frame; None leaves a comment in place of the element. `why`: that comment, which stands
+    beside every element that was replaced, too.
 
     Raises:
         UrdfError: A link that the text does not have.

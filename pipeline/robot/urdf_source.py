@@ -68,10 +68,6 @@ def read_urdf(path: Path) -> str:
 def parse_elements(text: str, where: str) -> Placed:
     """The elements of a URDF, without a look at what they say.
 
-    Args:
-        text: The URDF.
-        where: Its file, for messages.
-
     Raises:
         UrdfError: Malformed XML, or another kind of file.
     """
@@ -127,11 +123,7 @@ def _fault(element: ET.Element, where: str, words: str) -> UrdfError:
 def numbers(element: ET.Element, key: str, where: str, default: Sequence[float]) -> Array:
     """The finite numbers of an attribute.
 
-    Args:
-        element: Which holds it.
-        key: The attribute.
-        where: File, for messages.
-        default: Without the attribute; its length is what is expected.
+    `default`: without the attribute; its length is what is expected.
 
     Raises:
         UrdfError: Another count, or words that are no finite numbers.
@@ -173,10 +165,6 @@ def place(element: ET.Element, where: str) -> tuple[Array, Array]:
 
 def read_elements(text: str, where: str) -> Placed:
     """The elements of a URDF whose structure holds: every name, number and place was looked at.
-
-    Args:
-        text: The URDF.
-        where: Its file, for messages.
 
     Raises:
         UrdfError: Malformed XML, a wrong root, a name that is missing, doubled or unknown, a number

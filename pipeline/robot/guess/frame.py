@@ -38,12 +38,7 @@ def refuse_turned(
 ) -> None:
     """Stop where names or feet say that the base's axes point elsewhere.
 
-    Args:
-        root: The base's link.
-        limbs: Legs.
-        chains: The same.
-        posture: A pose that stands if any is known, else zero, shape (L, K) [rad, m].
-        where: File, for messages.
+    `posture`: a pose that stands if any is known, else zero, shape (L, K) [rad, m].
 
     Raises:
         RobotFileError: They do; says how to turn the root.
@@ -68,12 +63,8 @@ def refuse_turned(
 def quarter_turns(limbs: Sequence[Limb], hips: Array) -> int:
     """Quarter turns about z after which all legs stand where their names say.
 
-    Args:
-        limbs: Legs.
-        hips: In the base frame [m], shape (L, 3).
-
-    Returns:
-        0 where they do so already, where names say too little, or where no turn helps.
+    `hips`: in the base frame [m], shape (L, 3). Returns 0 where they do so already, where names say
+    too little, or where no turn helps.
     """
     said = [_said(limb) for limb in limbs]
     if len({one for one in said if one is not None and all(one)}) < 3:

@@ -49,11 +49,9 @@ def guess_robot(
 ) -> Guess:
     """Find out about a robot.
 
-    Args:
-        given: A URDF's path, or a robot's name in ``example-robot-data``.
-        margin: Of static stability: feet (1, F, 3) and a point (1, 2) to (1,) [m].
-        feet: Frames at the feet; none to look for them.
-        base: The base's link; the root by default.
+    `given`: a URDF's path, or a robot's name in ``example-robot-data``. `margin`: of static
+    stability: feet (1, F, 3) and a point (1, 2) to (1,) [m]. `feet`: frames at the feet; none to
+    look for them. `base`: the base's link; the root by default.
 
     Raises:
         RobotFileError: Something cannot be found; one line says which option names it.
@@ -99,11 +97,7 @@ def guess_robot(
 
 
 def _refuse_stuck(model: pin.Model, joints: Sequence[str], where: str) -> None:
-    """A leg's joint without a range.
-
-    Raises:
-        RobotFileError: There is one.
-    """
+    """A leg's joint without a range."""
     at = [model.joints[model.getJointId(joint)].idx_q for joint in joints]
     low, high = model.lowerPositionLimit[at], model.upperPositionLimit[at]
     stuck = [f"'{joint}'" for joint, a, b in zip(joints, low, high, strict=True) if a == b]
@@ -115,11 +109,7 @@ def _refuse_stuck(model: pin.Model, joints: Sequence[str], where: str) -> None:
 
 
 def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
-    """The first stance, from the best mark down, that leaves a stroke to walk with.
-
-    Raises:
-        RobotFileError: No stance was found.
-    """
+    """The first stance, from the best mark down, that leaves a stroke to walk with."""
     best: tuple[float, Stance, Pace | None] | None = None
     for stance in islice(standing.candidates(), _STANCES):
         pace = find_pace(standing.chains, stance, standing.limits)

@@ -42,11 +42,7 @@ def find_limbs(
 ) -> tuple[Limb, ...]:
     """The legs of a robot.
 
-    Args:
-        model: With a floating base.
-        configuration: A pose that stands, if any is known, else the zero pose.
-        feet: Frames that the user named; none to look for them.
-        where: File, for messages.
+    `feet`: frames that the user named; none to look for them.
 
     Raises:
         RobotFileError: No legs, fewer than three, or two feet on one leg; says what to name.
@@ -166,11 +162,7 @@ def _shared(model: pin.Model, chosen: Sequence[int]) -> tuple[int, int, int] | N
 def _refuse(
     model: pin.Model, chosen: Sequence[int], paths: Sequence[list[int]], where: str
 ) -> None:
-    """Too few feet, two on one leg, or legs that are too long.
-
-    Raises:
-        RobotFileError: Any of these; says what to name.
-    """
+    """Too few feet, two on one leg, or legs that are too long."""
     if len(chosen) < _FEWEST:
         found = f" ({_some(model, chosen)})" if chosen else ""
         feet = {0: "no foot", 1: "one foot", 2: "two feet"}[len(chosen)]

@@ -44,9 +44,7 @@ class KnownMotors:
 def known_motors(names: Sequence[str], joints: Sequence[str]) -> KnownMotors | None:
     """The motors of a robot; None where nobody knows them.
 
-    Args:
-        names: By which the robot may be known.
-        joints: Of its legs; all must be among those whose motors are known, and all of those there.
+    `joints`: of its legs; all must be among those whose motors are known, and all of those there.
 
     Raises:
         RobotFileError: The table cannot be used.
@@ -68,10 +66,6 @@ def names_of(name: str, urdf: str) -> tuple[str, str]:
 
 def known_folder(folder: str, where: str) -> Path:
     """The folder of actuator files that ``known:NAME`` means.
-
-    Args:
-        folder: As written.
-        where: File and key, for messages.
 
     Raises:
         RobotFileError: There is none of that name.

@@ -38,13 +38,8 @@ class Pace:
 def find_pace(chains: LegChains, stance: Stance, limits: tuple[Array, Array]) -> Pace | None:
     """The longest stroke of a row of shorter and shorter ones that every leg can do.
 
-    Args:
-        chains: The legs.
-        stance: About which they walk.
-        limits: Lower and upper of the legs' joints, each (L, K) [rad, m].
-
-    Returns:
-        None where the legs cannot take even the shortest.
+    `limits`: lower and upper of the legs' joints, each (L, K) [rad, m]. Returns None where the legs
+    cannot take even the shortest.
     """
     height = float((chains.offset[0, :, 2] - stance.feet[:, 2]).mean())
     about = replace(chains, nominal=stance.posture)

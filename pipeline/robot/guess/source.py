@@ -58,8 +58,7 @@ def source_of(given: str) -> Source:
 def standing_pose(source: Source) -> tuple[str, dict[str, float]] | None:
     """The SRDF's pose for standing: its name, and joint positions [rad, m].
 
-    Returns:
-        None where there is no SRDF, or no pose in it that is called as poses for standing are.
+    Returns None where there is no SRDF, or no pose in it that is called as poses for standing are.
 
     Raises:
         RobotFileError: The SRDF is malformed.

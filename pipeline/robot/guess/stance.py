@@ -173,11 +173,7 @@ class Standing:
         return np.array(pin.centerOfMass(self.model, self.model.createData(), q))
 
     def _drawn(self) -> tuple[_Drawn, Array]:
-        """Postures of every leg, and the least singular value that is not singular, (L,).
-
-        Raises:
-            RobotFileError: A leg has none that stands.
-        """
+        """Postures of every leg, and the least singular value that is not singular, (L,)."""
         chains, (limited, lower, upper), (low, high) = self.chains, self._limited, self._range
         q = low + (high - low) * spread(_POSTURES, chains.depth)[:, None, :]
         q = np.where(chains.real, q, 0.0)
@@ -221,13 +217,8 @@ class Standing:
     ) -> tuple[float, Array, Array]:
         """The postures of the best mark with feet at a height.
 
-        Args:
-            drawn: All postures.
-            near: Those whose feet are at the height, shape (M, L).
-            height: Of the feet in the base frame [m].
-
-        Returns:
-            The mark, the feet, levelled (L, 3) [m], and the postures (L, K).
+        `near`: those whose feet are at the height, shape (M, L). `height`: of the feet in the base
+        frame [m]. Returns the mark, the feet, levelled (L, 3) [m], and the postures (L, K).
         """
         pairs, n_legs, marks = self._pairs, near.shape[1], drawn.marks
         centre, usual = self._usual

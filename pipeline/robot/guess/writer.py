@@ -17,9 +17,7 @@ _PLACES = 4  # digits of feet and postures [m, rad]
 def robot_text(guess: Guess, out: Path) -> str:
     """The robot file of a guess, every guess with its reason under ``[assumed]``.
 
-    Args:
-        guess: What was found.
-        out: Where the file will stand; it names the URDF from there.
+    `out`: where the file will stand; it names the URDF from there.
     """
     assumed = {"robot.base_link": "the root of the URDF's tree of links"}
     lines = [

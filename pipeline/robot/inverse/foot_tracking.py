@@ -42,10 +42,8 @@ def foot_tracking(
 ) -> tuple[FootTracking, ...]:
     """Judge a motion leg by leg.
 
-    Args:
-        chains: The legs.
-        pieces: Stretches of the motion: time (N,) [s], joint positions (N, L, K) [rad, m], and
-            where the feet should be in the base frame (N, L, 3) [m].
+    `pieces`: stretches of the motion: time (N,) [s], joint positions (N, L, K) [rad, m], and where
+    the feet should be in the base frame (N, L, 3) [m].
     """
     time = np.concatenate([t for t, _, _ in pieces])
     q = np.concatenate([position for _, position, _ in pieces])

@@ -26,8 +26,17 @@ from functools import lru_cache
 import numpy as np
 
 from actuators.arrays import Array
+from pipeline.errors import OutOfReachError
 from pipeline.robot.inverse.damped import approach
-from pipeline.robot.kinematics import Swept, cross, foot_positions, samples_last, swept
+from pipeline.robot.kinematics import (
+    Swept,
+    cross,
+    foot_jacobian_rates,
+    foot_jacobians,
+    foot_positions,
+    samples_last,
+    swept,
+)
 from pipeline.robot.leg_chains import LegChains
 
 _ITERATIONS = 30
@@ -39,6 +48,8 @@ _SLIGHT = 1e-9
 #: Of the largest singular value: a direction in which the foot hardly moves, whatever the posture,
 #: is one that the leg lacks.
 _RANK = 1e-2
+#: Condition number of a leg's Jacobian that is none any more.
+_SINGULAR = 1e8
 _POSES = 25
 _PRIMES = (2, 3, 5, 7, 11, 13, 17)
 
@@ -49,11 +60,6 @@ class Freedom:
 
     joints: int  #: Number of joints.
     directions: int  #: Directions in which the foot moves, in postures that are not singular.
-
-    @property
-    def square(self) -> bool:
-        """Whether joints and coordinates are three of each."""
-        return self.joints == 3 and self.directions == 3
 
     @property
     def lacks(self) -> bool:
@@ -73,32 +79,26 @@ def freedoms(chains: LegChains) -> tuple[Freedom, ...]:
 
 
 class LeastMotion:
-    """The problem for legs of one freedom.
-
-    Args:
-        chains: Those legs alone, each of n joints.
-        freedom: Theirs.
-    """
+    """The problem for legs of one freedom."""
 
     def __init__(self, chains: LegChains, freedom: Freedom) -> None:
-        self.chains = chains
+        self.chains, self.freedom = chains, freedom
         self.turns = (~chains.slides).astype(np.float64)  # (n, L)
         metric = np.where(chains.slides.T, 1 / chains.reach[:, None] ** 2, 1.0)
         slight = _SLIGHT * chains.reach[:, None] ** 2 if freedom.lacks else 1.0
         self.weight = metric * slight * (freedom.joints > freedom.directions)  # w W, (L, n)
         self.s = 1.0 if freedom.lacks else 0.0
+        self.square = freedom.joints == freedom.directions == 3  # nothing is left to choose
 
     def positions(self, target: Array, start: Array) -> tuple[Array, Array]:
         """Postures, and what is left to the targets.
 
-        Args:
-            target: Foot positions in the base frame [m], shape (N, L, 3).
-            start: Shape (L, n) [rad, m].
-
-        Returns:
-            Shapes (N, L, n) and (N, L) [m].
+        `target`: foot positions in the base frame [m], shape (N, L, 3). `start`: shape (L, n) [rad,
+        m]. Returns shapes (N, L, n) and (N, L) [m].
         """
-        q, _ = approach(self.chains, target, start)
+        q, left = approach(self.chains, target, start)
+        if self.square:
+            return q, left
         n, level = q.shape[-1], self._multipliers(q, target)
         for _ in range(_ITERATIONS):
             legs, _, matrix = self._system(q, level)
@@ -117,16 +117,22 @@ class LeastMotion:
         return q, np.linalg.norm(target - foot_positions(self.chains, q), axis=-1)
 
     def rates(
-        self, q: Array, velocity: Array, acceleration: Array, target: Array
+        self, q: Array, target: Array, velocity: Array, acceleration: Array, time: Array
     ) -> tuple[Array, Array]:
         """Joint velocities and accelerations of the least motion, each (N, L, n).
 
-        Args:
-            q: Postures from `positions`, shape (N, L, n).
-            velocity: Of the targets [m/s], shape (N, L, 3).
-            acceleration: Of the targets [m/s^2], shape (N, L, 3).
-            target: Where they are [m], shape (N, L, 3).
+        `q`: postures from `positions`, shape (N, L, n). `target`, `velocity`, `acceleration`: of
+        the feet [m, m/s, m/s^2], shape (N, L, 3). `time`: for messages [s], shape (N,).
+
+        Raises:
+            OutOfReachError: The leg is stretched (singular) at a sample.
         """
+        jacobians = np.ascontiguousarray(foot_jacobians(self.chains, q)[1])
+        self._refuse_singular(jacobians, time)
+        if self.square:
+            q_dot = _solve(jacobians, velocity)
+            bias = foot_jacobian_rates(self.chains, q, q_dot)
+            return q_dot, _solve(jacobians, acceleration - bias)
         n, level = q.shape[-1], self._multipliers(q, target)
         legs, second, matrix = self._system(q, level)
         both = _solve(matrix, np.zeros(q.shape), velocity)
@@ -138,6 +144,16 @@ class LeastMotion:
         third = self._derivative_rate(legs, column_rates, rate)
         turning += np.einsum("nlc,cjkln,kln->nlj", level, third, rate, optimize=True)
         return q_dot, _solve(matrix, turning, acceleration - bias)[..., :n]
+
+    def _refuse_singular(self, jacobians: Array, time: Array) -> None:
+        values = np.linalg.svd(jacobians, compute_uv=False)
+        singular = ~(values[..., 0] < _SINGULAR * values[..., self.freedom.directions - 1])
+        if singular.any():
+            leg, sample = np.unravel_index(int(singular.T.argmax()), singular.T.shape)
+            raise OutOfReachError(
+                f"leg '{self.chains.names[leg]}' is stretched or folded to a singular posture at "
+                f"t = {time[sample]:.4g} s; shorten the stroke or move the neutral foot"
+            )
 
     def _multipliers(self, q: Array, target: Array) -> Array:
         """The l of postures that are solutions, or nearly, shape (N, L, 3)."""
@@ -182,6 +198,5 @@ def _symmetric(pairs: Array) -> Array:
     return np.where(upper, pairs, pairs.swapaxes(1, 2))
 
 
-def _solve(matrix: Array, first: Array, second: Array) -> Array:
-    right = np.concatenate([first, second], axis=-1)
-    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0])
+def _solve(matrix: Array, *right: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, np.concatenate(right, axis=-1)[..., None])[..., 0])

@@ -118,9 +118,8 @@ def _written(q: Array) -> str:
 def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float]:
     """Postures of one leg that reach a point, those nearest to the middle of the limits first.
 
-    Returns:
-        Each with as many coordinates as the leg has joints [rad, m], and the least distance that
-        was left [m].
+    Returns each with as many coordinates as the leg has joints [rad, m], and the least distance
+    that was left [m].
     """
     count = len(robot.spec.legs[leg].joints)
     lower, upper = (limit[leg] for limit in _limits(robot))

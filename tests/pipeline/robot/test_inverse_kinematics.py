@@ -1,4 +1,4 @@
-"""Inverse kinematics of any leg: closed form, iteration, joints to spare, directions that lack."""
+"""Inverse kinematics of any leg: iteration, joints to spare, directions that lack."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import pytest
 from scipy.optimize import minimize
 
 from pipeline.errors import OutOfReachError
-from pipeline.robot.inverse.closed_form import closed_form, closed_form_legs
 from pipeline.robot.inverse.damped import approach
 from pipeline.robot.inverse.foot_tracking import foot_tracking
 from pipeline.robot.inverse.least_motion import Freedom, freedoms
@@ -130,40 +129,20 @@ def _jacobian(chains: LegChains, at: float, q: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ["hexapod", "hexapod_axis90", "solo12", "anymal_c"])
-def test_closed_form_and_iteration_agree(root: Path, name: str) -> None:
+def test_feet_lead_back_to_the_posture_they_are_from(root: Path, name: str) -> None:
     robot = load_robot(load_robot_file(root / "urdf" / f"{name}.toml"))
     start, chains = neutral_postures(robot), robot.chains
-    legs = closed_form_legs(chains, start)
-    assert legs.size == len(chains.names)
     rng = np.random.default_rng(2)
     wanted = start + rng.uniform(-0.2, 0.2, (50, *start.shape))
-    target = foot_positions(chains, wanted)
-    np.testing.assert_allclose(closed_form(chains, legs, target, start), wanted, atol=1e-12)
-    iterated, miss = approach(chains, target, start)
-    np.testing.assert_allclose(iterated, wanted, atol=1e-9)
+    found, miss = reach(chains, foot_positions(chains, wanted), start)
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
     assert miss.max() < 1e-11
-
-
-def test_closed_form_leaves_to_the_iteration_what_it_cannot_decide(root: Path) -> None:
-    """A stretched start posture names no branch of the knee; skew axes have no closed form."""
-    chains = load_robot(load_robot_file(root / "urdf" / "solo12.toml")).chains
-    assert closed_form_legs(chains, np.zeros((4, 3))).size == 0
-    tilted = chains.axis.copy()
-    tilted[2, 1] = [0.0, np.cos(1e-3), np.sin(1e-3)]
-    skew = replace(chains, axis=tilted)
-    start = np.full((4, 3), 0.4)
-    assert closed_form_legs(skew, start).tolist() == [0, 2, 3]
-    target = foot_positions(skew, np.full((3, 4, 3), 0.5))
-    np.testing.assert_allclose(
-        foot_positions(skew, reach(skew, target, start)[0]), target, atol=1e-9
-    )
 
 
 def test_a_long_path_is_followed_as_its_samples_are(tmp_path: Path) -> None:
     """From coarse to fine or one by one: the same postures."""
     leg = (("revolute", "0.2 0 1"), ("revolute", "0.1 1 0"), PITCH)
     chains = stance(walker(tmp_path, (leg,) * 3).chains)
-    assert closed_form_legs(chains, chains.nominal).size == 0
     x, _, _ = path(chains)
     together, _ = approach(chains, x, chains.nominal)
     alone = np.concatenate([approach(chains, x[k : k + 50], chains.nominal)[0] for k in (0, 100)])
