@@ -147,28 +147,64 @@ def level_of(
     joints: Sequence[int],
     certain: bool,
 ) -> tuple[str, str]:
-    """How far a name is to be trusted, and why not further."""
-    nothing, *others = rivals
+    """How far a name is to be trusted, and why not further.
+
+    Args:
+        confidence: In the set of which it is one.
+        number: Of its term; None for the bodies.
+        rivals: From `Confidence.rivals`.
+        joints: At which it acts.
+        certain: Whether its estimate differs from nothing.
+    """
     search, state = confidence.search, confidence.state
     less = search.at(state, UNCERTAINTIES[0]) if number is None else search.without(state, number)
-    left, before = (rms(validation_errors(search, x), joints) for x in (state, less))
-    if nothing.sure < limits.SURE and left > before:
+    errors = validation_errors(search, state)
+    farther = rms(errors, joints) > rms(validation_errors(search, less), joints)  # not of NaN
+    return graded(
+        rivals,
+        closer=not farther,
+        certain=certain,
+        law=number is None or confidence.settled.pool.terms[number].effect.has_law,
+        beside_curve=number is not None and confidence.beside_curve(number),
+        more_left=bool((errors > limits.UNEXPLAINED * confidence.noise)[list(joints)].any()),
+    )
+
+
+def graded(
+    rivals: Sequence[Rival],
+    *,
+    closer: bool,
+    certain: bool,
+    law: bool,
+    beside_curve: bool,
+    more_left: bool,
+) -> tuple[str, str]:
+    """Level of a name and the reason why it is none higher.
+
+    Args:
+        rivals: Nothing first.
+        closer: Whether the model with it is closer to the validation rows.
+        certain: Whether its estimate differs from nothing.
+        law: Whether it is a law and no curve.
+        beside_curve: Whether a curve stands at its joint over the same variable.
+        more_left: Whether more than noise is left at its joints.
+    """
+    nothing, *others = rivals
+    if nothing.sure < limits.SURE and not closer:
         return limits.SUSPECTED, limits.IDLE_NAME
     if nothing.behind <= 0.0 or not certain:
         return limits.SUSPECTED, limits.NOTHING
-    open_ = [r for r in others if not r.excluded]
+    open_ = [words_of(r.key) for r in others if r.key and not r.excluded]
     if open_:
-        words = "; ".join(words_of(r.key) for r in open_ if r.key)
-        return limits.APPROXIMATE, f"{words} would explain the log as well"
-    if not nothing.excluded:
-        return limits.APPROXIMATE, "parts of the log disagree whether it is there"
-    if number is not None and not confidence.settled.pool.terms[number].effect.has_law:
-        return limits.APPROXIMATE, limits.SHAPELESS
-    if number is not None and confidence.beside_curve(number):
-        return limits.APPROXIMATE, limits.BESIDE
-    if (validation_errors(search, state) > limits.UNEXPLAINED * confidence.noise)[joints].any():
-        return limits.APPROXIMATE, limits.MORE_LEFT
-    return limits.CONFIRMED, ""
+        return limits.APPROXIMATE, f"{'; '.join(open_)} would explain the log as well"
+    reasons = {
+        "parts of the log disagree whether it is there": not nothing.excluded,
+        limits.SHAPELESS: not law,
+        limits.BESIDE: beside_curve,
+        limits.MORE_LEFT: more_left,
+    }
+    reason = next((words for words, holds in reasons.items() if holds), "")
+    return (limits.APPROXIMATE if reason else limits.CONFIRMED), reason
 
 
 def words_of(key: Key) -> str:

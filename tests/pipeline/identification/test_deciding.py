@@ -44,6 +44,11 @@ def test_any_effect_may_be_the_rival(name: str, log) -> None:  # type: ignore[no
     assert (motion.position <= expected.upper + 1e-9).all()
     speed = np.abs(np.diff(motion.position, axis=0)).max(axis=0) / np.diff(motion.time).min()
     assert (speed <= expected.velocity_limit * 1.01).all()
+    # At rest at both ends, without a jump of the acceleration.
+    rate = 1.0 / np.diff(motion.time).min()
+    acceleration = np.diff(motion.position, 2, axis=0) * rate**2
+    assert np.abs(acceleration[[0, -1]]).max() < 0.05 * np.abs(acceleration).max()
+    assert np.abs(motion.position[[1, -2]] - motion.position[[0, -1]]).max() < 1e-4
 
 
 def test_the_effect_itself_cannot_be_told_apart(log) -> None:  # type: ignore[no-untyped-def]
