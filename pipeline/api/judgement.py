@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from pipeline.paper.calibration.store import calibrated_numbers
+from pipeline.paper.calibration.store import Calibrated, calibrated_numbers
 from pipeline.paper.judgement.basis import Basis, Judged
 from pipeline.paper.judgement.judge import judge
-from pipeline.paper.judgement.readings import reading_rows
-from pipeline.paper.judgement.sensitivity import sensitivity_rows
+from pipeline.paper.judgement.leave_one_out import Prediction
+from pipeline.paper.judgement.readings import ReadingRow, reading_rows
+from pipeline.paper.judgement.sensitivity import Sensitivity, sensitivities
+from pipeline.paper.omissions import Omission
 from pipeline.simulation.settings import Settings
 from reports.table import Table, table_of
 from reports.tables import judgement as tables
@@ -23,15 +25,13 @@ def judged(given: Settings, by: Basis) -> tuple[Judged, list[Table]]:
         table_of(tables.RotorFrictionRow, judgement.ranges),
         table_of(tables.BreakEvenRow, judgement.break_even),
         tables.energy_per_minute(judgement.per_minute),
-        *([tables.omissions(judgement.omissions)] if judgement.omissions else []),
+        *([table_of(Omission, judgement.omissions)] if judgement.omissions else []),
     ]
     if by.results is not None:
-        readings = [tables.ReadingRow(**r) for r in reading_rows(by.results, by.published)]
-        indices = [tables.SensitivityRow(**r) for r in sensitivity_rows(by.results)]
         out += [
-            table_of(tables.ReadingRow, readings),
-            table_of(tables.LeaveOneOutRow, judgement.predictions),
-            table_of(tables.CalibrationRow, calibrated_numbers(by.results, by.prior)),
-            table_of(tables.SensitivityRow, indices),
+            table_of(ReadingRow, reading_rows(by.results, by.published)),
+            table_of(Prediction, judgement.predictions),
+            table_of(Calibrated, calibrated_numbers(by.results, by.prior)),
+            table_of(Sensitivity, sensitivities(by.results)),
         ]
     return Judged(judgement, by), out

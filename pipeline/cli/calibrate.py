@@ -36,17 +36,19 @@ def run_calibrate(options: argparse.Namespace) -> int:
         print(path.name)
     numbers = calibrated_numbers(results, load_prior())
     worst = max(numbers, key=lambda n: n.r_hat)
-    least = min(n.effective for n in numbers)
+    least = min(n.effective_sample_size for n in numbers)
     print(
         f"posterior of {results['posterior']['walkers']} walkers: greatest R-hat {worst.r_hat:.3f} "
-        f"({worst.key}), least effective sample size {least:.0f}"
+        f"({worst.parameter}), least effective sample size {least:.0f}"
     )
     shares = results["posterior"]["paths"].items()
     print("path of the foot: " + ", ".join(f"{name} {p['share']:.0%}" for name, p in shares))
     for verdict in ("not determined", "against the prior"):
-        keys = [n.key for n in numbers if n.verdict == verdict]
+        keys = [n.parameter for n in numbers if n.verdict == verdict]
         print(f"{verdict}: {', '.join(keys) or 'none'}")
-    bound = [f"{n.key} ({n.bound}, {n.at_bound:.0%})" for n in numbers if n.at_bound >= AT_LEAST]
+    bound = [
+        f"{n.parameter} ({n.bound}, {n.at_bound:.0%})" for n in numbers if n.at_bound >= AT_LEAST
+    ]
     print(f"at a bound in 5 % of the posterior or more: {', '.join(bound) or 'none'}")
     print("run `make urdf` to build the URDFs from the calibrated robot file")
     return 0

@@ -126,10 +126,16 @@ class Published(Table):
         """Its half width in SI units."""
         return to_si(self.half_width, self.unit)
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Between which, in `unit`, a value comes out as printed."""
+        half = self.half_width + 1e-9 * max(1.0, abs(self.value))
+        return self.value - half, self.value + half
+
     def reproduced(self, computed: float) -> bool:
         """Whether a computed value, in `unit`, lies within the half width of the printed one."""
-        slack = 1e-9 * max(1.0, abs(self.value))
-        return abs(computed - self.value) <= self.half_width + slack
+        low, high = self.ends
+        return low <= computed <= high
 
 
 def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:

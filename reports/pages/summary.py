@@ -197,14 +197,14 @@ def _readings(found: Sequence[CalibratedReading]) -> TableBlock:
 def _number_words(numbers: Sequence[Calibrated]) -> list[str]:
     """Numbers by what the targets did to them, and how often each lies at a bound."""
     against = [
-        f"`{n.key}` ({n.shift:+.1f})"
+        f"`{n.parameter}` ({n.shift_over_prior:+.1f})"
         for n in numbers
-        if n.verdict == "against the prior" and n.shift is not None
+        if n.verdict == "against the prior" and n.shift_over_prior is not None
     ]
-    free = [f"`{n.key}`" for n in numbers if n.verdict == "not determined"]
-    fixed = [f"`{n.key}`" for n in numbers if n.verdict == FIXED]
+    free = [f"`{n.parameter}`" for n in numbers if n.verdict == "not determined"]
+    fixed = [f"`{n.parameter}`" for n in numbers if n.verdict == FIXED]
     bound = [
-        f"`{n.key}` ({n.bound}, {percent(n.at_bound)})"
+        f"`{n.parameter}` ({n.bound}, {percent(n.at_bound)})"
         for n in sorted(numbers, key=lambda n: -n.at_bound)
         if n.at_bound >= AT_LEAST
     ]

@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from pipeline.paper.constants.motor_constants import asked_frictions
 from pipeline.paper.hexapod import PUBLISHED_LEG
 from pipeline.paper.judgement.basis import Judged
 from pipeline.paper.judgement.evidence import Interval
 from pipeline.paper.judgement.judge import NOTABLE
 from pipeline.paper.judgement.rows import REPRODUCED, Row, headline
-from pipeline.paper.judgement.sensitivity import Index, leading
+from pipeline.paper.judgement.sensitivity import Sensitivity, leading
+from pipeline.paper.motor_constants import asked_frictions
 from pipeline.paper.published import CYCLE, EVEN, EXTRA, ROLES
 from reports.page import Number
 from reports.table import Table
@@ -159,7 +159,7 @@ def roles_text() -> str:
     return " ".join(f"*{role}*: {meaning}." for role, meaning in ROLES.items())
 
 
-def measure_next(ranked: Sequence[Index]) -> str:
+def measure_next(ranked: Sequence[Sensitivity]) -> str:
     """Which number to measure next, if the sensitivities can tell.
 
     Args:
@@ -168,9 +168,9 @@ def measure_next(ranked: Sequence[Index]) -> str:
     return WORDS("measure_next", leading(ranked))
 
 
-def index_words(row: Index) -> str:
+def index_words(row: Sensitivity) -> str:
     """A number with its share of the variance."""
-    return f"`{row.parameter}` ({100 * row.total:.0f} ± {percent(row.half_width)})"
+    return f"`{row.parameter}` ({100 * row.total:.0f} ± {percent(row.total_95)})"
 
 
 def _span(interval: Interval) -> str:

@@ -12,9 +12,7 @@ from typing import ClassVar
 import numpy as np
 
 from actuators.units import from_si
-from pipeline.paper.calibration.store import VERDICTS
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
-from pipeline.paper.omissions.omissions import Omission
 from pipeline.paper.published import ROLES
 from reports.column import column
 from reports.table import Table, table_of
@@ -25,7 +23,6 @@ PRIOR_HIGH = "97.5 % quantile of the same"
 LEFT_LOW = "2.5 % quantile of what everything else says, this figure left out of the fit"
 LEFT_HIGH = "97.5 % quantile of the same"
 _ROLE = "; ".join(f"{role}: {meaning}" for role, meaning in ROLES.items())
-_MORE = "by how much it is more than in the first row"
 
 
 @dataclass(frozen=True)
@@ -93,28 +90,6 @@ class RotorFrictionRow:
 
 
 @dataclass(frozen=True)
-class ReadingRow:
-    """The open readings of the paper, each calibrated on its own."""
-
-    table: ClassVar = "readings"
-    about: ClassVar = (
-        "limit rows: peak over the data sheet's limit, less one; positive is a breach."
-    )
-    axis_deg: float = column(
-        "angle of joint 1's axis from the vertical, in the frontal plane", "deg"
-    )
-    standing_legs_counted: float = column("middle legs that Fig. 21 counts as loaded", "1")
-    consumption: str = column(
-        "drawn: what the supply delivers, E_el(+); net: less what flows back, E_el(+) - E_el(-)"
-    )
-    numbers: str = column("with which numbers: fitted to this reading, or those of this run")
-    id: str = column("printed value, limit:<alternative>.<quantity>, or discriminator")
-    unit: str = column("unit of computed")
-    computed: float = column("with these numbers", "see unit")
-    verdict: str = column("for printed values and limits")
-
-
-@dataclass(frozen=True)
 class ConclusionRow:
     """Sections V and IV.A, sentence by sentence."""
 
@@ -147,135 +122,6 @@ class ConclusionRow:
         "1",
         of=lambda r: r.posterior_share,
     )
-
-
-@dataclass(frozen=True)
-class OmissionRow:
-    """What the paper leaves out, and how far its answer moves with it."""
-
-    table: ClassVar = "omissions"
-    about: ClassVar = (
-        "Each row changes one thing against the numbers of the run; nothing here is fitted."
-    )
-    left_out: str = column("what the paper leaves out", of=lambda r: r.name or "nothing")
-    assumption: str = column("how it is put in")
-    value: float = column(
-        "with which number; empty where there is none",
-        "see unit",
-        of=lambda r: r.number and r.number.value_as_written,
-    )
-    unit: str = column("unit of value", of=lambda r: r.number.unit if r.number else "")
-    basis: str = column(
-        "of value, as in parameters.csv", of=lambda r: r.number.basis if r.number else ""
-    )
-    source: str = column("of value", of=lambda r: r.number.source if r.number else "")
-    break_even: float = column(
-        "fraction of time standing above which the irreversible actuator uses less, both "
-        "middle legs; empty where there is none",
-        "1",
-    )
-    break_even_change: float = column(_MORE, "1", of=lambda r: r.moved)
-    note: str = column("in words")
-
-
-@dataclass(frozen=True)
-class LeaveOneOutRow:
-    """Each target predicted from the rest."""
-
-    table: ClassVar = "leave_one_out"
-    id: str = column(
-        "target, or the energy difference that the break-even implies", of=lambda r: r.name
-    )
-    without: str = column("left out of the calibration together, with what follows from them")
-    unit: str = column("unit of the numbers")
-    published: float = column("as printed; walking_extra_J: implied by the break-even", "see unit")
-    half_width: float = column("of the published value", "see unit")
-    predicted: float = column(
-        "median of the posterior without it", "see unit", of=lambda r: r.median
-    )
-    low: float = column(
-        "2.5 % quantile of the same, or of the data sheet's rounding",
-        "see unit",
-        of=lambda r: r.interval[0],
-    )
-    high: float = column("97.5 % quantile of the same", "see unit", of=lambda r: r.interval[1])
-    inside: bool = column("whether prediction and published value overlap")
-    sets: float = column("how many draws of that posterior have such a value", "1")
-    by: str = column("what predicts it")
-
-
-@dataclass(frozen=True)
-class CalibrationRow:
-    """Every free number before and after."""
-
-    table: ClassVar = "calibration"
-    parameter: str = column("robot or component, and name in its file", of=lambda r: r.key)
-    unit: str = column("unit of the numbers")
-    prior: float = column(
-        "centre of prior knowledge; empty where there was none",
-        "see unit",
-        of=lambda r: None if r.prior is None else from_si(r.prior, r.unit),
-    )
-    prior_low: float = column(
-        "lower end of the 95 % belief",
-        "see unit",
-        of=lambda r: r.prior_interval and from_si(r.prior_interval[0], r.unit),
-    )
-    prior_high: float = column(
-        "upper end of the 95 % belief",
-        "see unit",
-        of=lambda r: r.prior_interval and from_si(r.prior_interval[1], r.unit),
-    )
-    calibrated: float = column(
-        "at the set nearest to the prior", "see unit", of=lambda r: from_si(r.value, r.unit)
-    )
-    low: float = column(
-        "2.5 % quantile of the posterior, or the calibrated number where that is less",
-        "see unit",
-        of=lambda r: from_si(r.low, r.unit),
-    )
-    high: float = column(
-        "97.5 % quantile of the posterior, or the calibrated number where that is greater",
-        "see unit",
-        of=lambda r: from_si(r.high, r.unit),
-    )
-    shift_over_prior: float = column(
-        "mean of the posterior less the prior's centre, in prior standard deviations",
-        "1",
-        of=lambda r: r.shift,
-    )
-    spread_over_prior: float = column(
-        "standard deviation of the posterior, in prior standard deviations",
-        "1",
-        of=lambda r: r.spread,
-    )
-    at_lower_share: float = column(
-        "share of the posterior at the number's lower bound", "1", of=lambda r: r.at_lower
-    )
-    at_upper_share: float = column(
-        "share of the posterior at the number's upper bound", "1", of=lambda r: r.at_upper
-    )
-    verdict: str = column("; ".join(f"{v}: {meaning}" for v, meaning in VERDICTS.items()))
-    r_hat: float = column("nested R-hat of groups of walkers; 1 where they agree", "1")
-    effective_sample_size: float = column(
-        "independent draws that say as much", "1", of=lambda r: r.effective
-    )
-
-
-@dataclass(frozen=True)
-class SensitivityRow:
-    """Which unpublished number moves which conclusion."""
-
-    table: ClassVar = "sensitivities"
-    about: ClassVar = (
-        "Every number uniform within one prior standard deviation of the calibrated point."
-    )
-    output: str = column("walking ratio, energy difference or break-even")
-    parameter: str = column("robot or component, and name in its file")
-    first_order: float = column("Sobol index of the number alone", "1")
-    first_order_95: float = column("half width of its 95 % interval", "1")
-    total: float = column("Sobol index with all interactions", "1")
-    total_95: float = column("half width of its 95 % interval", "1")
 
 
 @dataclass(frozen=True)
@@ -319,22 +165,6 @@ class MinuteRow:
         "J",
     )
     left_out_high_J: float = column("97.5 % quantile of the same", "J")
-
-
-def omissions(rows: Sequence[Omission]) -> Table:
-    """What the paper leaves out, with the ratios of all alternatives that the run has."""
-    table = table_of(OmissionRow, rows)
-    columns, meanings = dict(table.columns), dict(table.meanings)
-    note, said = columns.pop("note"), meanings.pop("note")
-    for name in rows[0].ratios:
-        header = f"ratio_{name}"
-        columns[header] = [row.ratios[name] for row in rows]
-        meaning = f"walking energy of the middle right leg, {name} over ideal actuator"
-        meanings[header] = (meaning, "1")
-    for name in rows[0].ratios:
-        columns[f"ratio_{name}_change"] = [row.ratios_moved[name] for row in rows]
-        meanings[f"ratio_{name}_change"] = (_MORE, "1")
-    return Table(table.name, columns | {"note": note}, meanings | {"note": said}, table.description)
 
 
 def energy_per_minute(lines: Sequence[EnergyPerMinute]) -> Table:

@@ -19,9 +19,9 @@ from pipeline.paper.calibration.checkpoint import Checkpoint
 from pipeline.paper.calibration.prior import PRIOR_FILE, Prior
 from pipeline.paper.calibration.problem import fixed_before
 from pipeline.paper.calibration.tasks import OUTPUTS, Point, Reading
-from pipeline.paper.constants.motor_constants import KEYS, friction_ranges
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.hexapod import ROBOT
+from pipeline.paper.motor_constants import KEYS, friction_ranges
 from pipeline.paper.published import EXTRA, HELD, PUBLISHED_FILE, Published
 
 #: Given a title and a total, returns what is called per finished task.

@@ -34,7 +34,6 @@ from actuators.arrays import Array
 from actuators.chain import Chain
 from pipeline.paper.calibration.prior import Free
 from pipeline.paper.calibration.problem import Problem, Target
-from pipeline.paper.constants.motor_constants import KEYS
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.hexapod import (
     MIDDLE_LEGS,
@@ -47,6 +46,7 @@ from pipeline.paper.hexapod import (
     printed_leg,
     with_splits,
 )
+from pipeline.paper.motor_constants import KEYS
 from pipeline.paper.published import EXTRA, HELD, PAIR
 
 #: Targets that take the place of a coordinate, in the order in which they are solved for: each

@@ -20,8 +20,6 @@ from actuators.loading.build import Catalog
 from actuators.units import from_si
 from pipeline.errors import PipelineError
 from pipeline.paper.calibration.prior import Prior
-from pipeline.paper.constants.motor_constants import FeasibleSet, feasible_set
-from pipeline.paper.constants.table_entries import entries
 from pipeline.paper.hexapod import (
     ROBOT,
     Outcome,
@@ -31,13 +29,14 @@ from pipeline.paper.hexapod import (
     solve_posture,
     with_splits,
 )
+from pipeline.paper.motor_constants import FeasibleSet, feasible_set
 from pipeline.paper.published import EVEN, EXTRA, Published
 from pipeline.paper.quantities import computed
 from pipeline.robot.robot_file import RobotSpec
 
 #: Rows met exactly by solving the posture.
 EXACT = ("standing_reaction_rm", "standing_torque_2", "standing_torque_3")
-#: Met by the choice of the motor's constants, see `pipeline.paper.constants.motor_constants`.
+#: Met by the choice of the motor's constants, see `pipeline.paper.motor_constants`.
 CHOSEN = ("ideal_current_2", "ideal_voltage_2", "rotor_current_2")
 _STEEP = 200.0  # residual per relative excess over a motor limit
 _STEP = 1e-4  # of a prior standard deviation, for derivatives
@@ -249,10 +248,10 @@ def fixed_before(published: Mapping[str, Published]) -> set[str]:
 
     The posture gives Table III, the motor's constants give Tables IV and V.
     """
-    out = {p.id for p in published.values() if p.role in ("input", "symmetry")} | set(EXACT)
-    out |= {e.id for e in entries(published) if e.alternative != "reversible"}
+    put_in = {p.id for p in published.values() if p.role in ("input", "symmetry")} | set(EXACT)
+    tables = {name for name in published if name.startswith(("ideal_", "rotor_"))}
     # Energies are made of what the others fix, or put in by a prior that need not give them.
-    return {name for name in out if not name.endswith("_leg_energy_3s")}
+    return {name for name in put_in | tables if not name.endswith("_leg_energy_3s")}
 
 
 def extra_target(published: Mapping[str, Published], standing_legs: int) -> Target:

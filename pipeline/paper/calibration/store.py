@@ -1,8 +1,4 @@
-"""The calibration's results: one file of numbers, and the calibrated values in their own files.
-
-Everything is prepared first and then moved into place, so that an interrupted calibration leaves
-the old files as they were.
-"""
+"""The calibration's results: one file of numbers, and the calibrated values in their own files."""
 
 from __future__ import annotations
 
@@ -12,21 +8,22 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import tomlkit
 
 from actuators.loading.build import CATALOG, load_catalog
-from actuators.units import from_si
-from pipeline.paper.calibration.fingerprint import Fingerprint, fingerprint
+from actuators.units import from_si, to_si
+from pipeline.paper.calibration.fingerprint import fingerprint
 from pipeline.paper.calibration.prior import Prior, load_prior
-from pipeline.paper.constants.motor_constants import KEYS, UNITS
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.hexapod import POSTURE, ROBOT, SPLITS
+from pipeline.paper.motor_constants import UNITS
 from pipeline.paper.published import load_published
 from pipeline.robot.robot_file import load_robot_file
 from reports.atomic import replacing
+from reports.column import column
 
 RESULTS_FILE = Path(__file__).parent / "results" / "calibration.json"
 _DIGITS = 9
@@ -61,75 +58,77 @@ _FIXED_SOURCE = "middle of all motor constants that give Tables IV to VI as prin
 
 @dataclass(frozen=True)
 class Calibrated:
-    """One number after calibration, SI.
+    """Every free number before and after."""
 
-    Attributes:
-        key: ``robot.<name>`` or ``<component>.<name>``.
-        unit: As its file writes it.
-        value: At the nearest point.
-        low: 2.5 % quantile of the posterior, or the value where that is less.
-        high: 97.5 % quantile of the posterior, or the value where that is greater.
-        verdict: One of `VERDICTS`.
-        r_hat: How well groups of walkers agree on it: 1 where they do [1].
-        effective: Effective number of independent draws behind these numbers.
-        prior: Centre before; None for the motor's constants, which Tables IV to VI fix.
-        prior_interval: 95 % belief before; None likewise.
-        shift: Mean of the posterior less the prior's centre, in prior standard deviations.
-        spread: Standard deviation of the posterior, in prior standard deviations.
-        at_lower: Share of the posterior at the lower bound [1].
-        at_upper: Share of the posterior at the upper bound [1].
-    """
-
-    key: str
-    unit: str
-    value: float
-    low: float
-    high: float
-    verdict: str
-    r_hat: float
-    effective: float
-    prior: float | None = None
-    prior_interval: tuple[float, float] | None = None
-    shift: float | None = None
-    spread: float | None = None
-    at_lower: float = 0.0
-    at_upper: float = 0.0
+    table: ClassVar = "calibration"
+    parameter: str = column("robot or component, and name in its file")
+    unit: str = column("unit of the numbers")
+    prior: float | None = column(
+        "centre of prior knowledge; empty where there was none", "see unit"
+    )
+    prior_low: float | None = column("lower end of the 95 % belief", "see unit")
+    prior_high: float | None = column("upper end of the 95 % belief", "see unit")
+    calibrated: float = column("at the set nearest to the prior", "see unit")
+    low: float = column(
+        "2.5 % quantile of the posterior, or the calibrated number where that is less", "see unit"
+    )
+    high: float = column(
+        "97.5 % quantile of the posterior, or the calibrated number where that is greater",
+        "see unit",
+    )
+    shift_over_prior: float | None = column(
+        "mean of the posterior less the prior's centre, in prior standard deviations", "1"
+    )
+    spread_over_prior: float | None = column(
+        "standard deviation of the posterior, in prior standard deviations", "1"
+    )
+    at_lower_share: float = column("share of the posterior at the number's lower bound", "1")
+    at_upper_share: float = column("share of the posterior at the number's upper bound", "1")
+    verdict: str = column("; ".join(f"{v}: {meaning}" for v, meaning in VERDICTS.items()))
+    r_hat: float = column("nested R-hat of groups of walkers; 1 where they agree", "1")
+    effective_sample_size: float = column("independent draws that say as much", "1")
 
     @property
     def at_bound(self) -> float:
         """Share of the posterior at either bound [1]."""
-        return self.at_lower + self.at_upper
+        return self.at_lower_share + self.at_upper_share
 
     @property
     def bound(self) -> str:
         """The bound near which most of it lies: ``lower``, ``upper``, or empty for none."""
         if self.at_bound == 0:
             return ""
-        return "lower" if self.at_lower > self.at_upper else "upper"
+        return "lower" if self.at_lower_share > self.at_upper_share else "upper"
 
 
 def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibrated]:
     """What the calibration says of every free number and of the motor's constants."""
     known, nearest = results["posterior"]["numbers"], results["nearest"]
+
+    def row(
+        key: str, unit: str, before: tuple[float, ...], after: tuple[float, ...], verdict: str
+    ) -> Calibrated:
+        """Before: centre and 95 %; after: nearest, low and high, SI."""
+        own, value = known[key], after[0]
+        ends = (value, min(after), max(after))
+        moved = (own["mean"], own["spread"], own["at_lower"], own["at_upper"])
+        return Calibrated(
+            *(key, unit),
+            *((from_si(x, unit) for x in before) if before else (None, None, None)),
+            *(from_si(x, unit) for x in ends),
+            *(moved if before else (None, None, 0.0, 0.0)),
+            *(verdict, own["r_hat"], own["effective"]),
+        )
+
     out = []
     for free, coordinate in zip(prior.free, nearest["z"], strict=True):
         own = known[free.key]
-        low, high, value = (free.value(float(q)) for q in (own["low"], own["high"], coordinate))
-        shift, spread = own["mean"], own["spread"]
-        out.append(
-            Calibrated(
-                *(free.key, free.unit, value, min(low, value), max(high, value)),
-                number_verdict(shift, spread, free.spread),
-                *(own["r_hat"], own["effective"], free.centre, free.interval),
-                *(shift, spread, own["at_lower"], own["at_upper"]),
-            )
-        )
-    for key in KEYS:
-        own, value = known[key], nearest["constants"][key]
-        low, high = min(own["low"], value), max(own["high"], value)
-        out.append(
-            Calibrated(key, UNITS[key], value, low, high, FIXED, own["r_hat"], own["effective"])
-        )
+        after = [free.value(q) for q in (coordinate, own["low"], own["high"])]
+        verdict = number_verdict(own["mean"], own["spread"], free.spread)
+        out.append(row(free.key, free.unit, (free.centre, *free.interval), (*after,), verdict))
+    for key, unit in UNITS.items():
+        after = [nearest["constants"][key], known[key]["low"], known[key]["high"]]
+        out.append(row(key, unit, (), (*after,), FIXED))
     return out
 
 
@@ -153,6 +152,9 @@ def number_verdict(shift: float, spread: float, prior_spread: float) -> str:
 def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[Path]:
     """Write the results and the calibrated values, all or nothing.
 
+    Everything is prepared first and then moved into place, so that an interrupted calibration
+    leaves the old files as they were.
+
     Args:
         results: From `pipeline.paper.calibration.calibrate.calibrate`.
         robot: Robot file whose numbers are replaced; comments and order stay.
@@ -163,75 +165,65 @@ def save(results: dict[str, Any], robot: Path, catalog: Path = CATALOG) -> list[
     """
     components = [path for path in catalog.glob("*.toml") if path.stem != "alternatives"]
     before = {path: path.read_text(encoding="utf-8") for path in (robot, *components)}
-    documents = {path: tomlkit.parse(text) for path, text in before.items()}
-    _fill_in(documents, results, robot, catalog)
-    texts = {path: tomlkit.dumps(document) for path, document in documents.items()}
+    owners = {robot: ROBOT} | {path: path.stem for path in components}
+    documents = {owners[path]: tomlkit.parse(text) for path, text in before.items()}
+    _fill_in(documents, results)
+    texts = {path: tomlkit.dumps(documents[owner]) for path, owner in owners.items()}
     texts = {path: text for path, text in texts.items() if text != before[path] or path == robot}
     with replacing(*texts, RESULTS_FILE) as (*temporary, results_file):
         staged = dict(zip(texts, temporary, strict=True))
         for path, text in texts.items():
             staged[path].write_text(text, encoding="utf-8")
-        results["numbers"] = _fingerprint_of(staged, robot, catalog)
+        with tempfile.TemporaryDirectory() as name:  # the catalogue as it is about to be
+            for path in catalog.glob("*.toml"):
+                shutil.copyfile(staged.get(path, path), Path(name) / path.name)
+            after, spec = load_catalog(name), load_robot_file(staged[robot])
+            results["numbers"] = fingerprint(spec, after, load_published(), load_prior())
         text = json.dumps(_rounded(results), separators=(",", ":"))
         results_file.write_text(text + "\n", encoding="utf-8")
     return [*texts, RESULTS_FILE]
 
 
-def _fingerprint_of(staged: Mapping[Path, Path], robot: Path, catalog: Path) -> Fingerprint:
-    """The numbers of the files as they are about to be."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        for path in catalog.glob("*.toml"):
-            shutil.copyfile(staged.get(path, path), folder / path.name)
-        spec = load_robot_file(staged[robot])
-        return fingerprint(spec, load_catalog(folder), load_published(), load_prior())
-
-
-def _fill_in(
-    documents: Mapping[Path, Any], results: Mapping[str, Any], robot: Path, catalog: Path
-) -> None:
-    """Put every calibrated number into its file."""
+def _fill_in(documents: Mapping[str, Any], results: Mapping[str, Any]) -> None:
+    """Put every calibrated number into its file, by the robot or the component."""
+    parameters = {name: document.get("parameters") for name, document in documents.items()}
     for number in calibrated_numbers(results, load_prior()):
-        component, name = number.key.split(".")
-        path = robot if component == ROBOT else catalog / f"{component}.toml"
+        component, name = number.parameter.split(".")
         reason = _REASONS[number.verdict] + (
             f"; at its {number.bound} bound in {100 * number.at_bound:.0f} % of the posterior"
             if number.at_bound >= AT_LEAST
             else ""
         )
-        entry = documents[path]["parameters"][name]
-        _replace(entry, number.value, number.low, number.high, reason)
-        if number.verdict == FIXED:
-            entry["source"] = _FIXED_SOURCE
+        ends = [to_si(x, number.unit) for x in (number.calibrated, number.low, number.high)]
+        source = _FIXED_SOURCE if number.verdict == FIXED else _SOURCE
+        _replace(parameters[component][name], ends, source, reason)
     nearest = results["nearest"]
     rows = ("the reaction of 192.6 N", "joint 2 in Table III", "joint 3 in Table III")
     for name, row in zip(POSTURE, rows, strict=True):
-        spread = [m["posture"][name] for m in results["sets"]]
-        low, high = (float(q) for q in np.quantile(spread, [0.025, 0.975]))
-        value, entry = nearest["posture"][name], documents[robot]["parameters"][name]
-        _replace(entry, value, min(low, value), max(high, value), f"solved from {row}")
-    total = float(documents[catalog / "requirement.toml"]["parameters"]["ratio"]["value"])
+        spread = np.quantile([m["posture"][name] for m in results["sets"]], [0.025, 0.975])
+        value = nearest["posture"][name]
+        ends = [value, min(spread[0], value), max(spread[1], value)]
+        _replace(parameters[ROBOT][name], ends, _SOURCE, f"solved from {row}")
+    total = float(parameters["requirement"]["ratio"]["value"])
     for free, following in SPLITS.items():
-        first, second = (
-            documents[catalog / f"{reference.split('.')[0]}.toml"]["parameters"]["ratio"]
-            for reference in (free, following)
-        )
+        names = [reference.split(".")[0] for reference in (free, following)]
+        first, second = (parameters[name]["ratio"] for name in names)
         low, high = first["interval"]
         second["value"] = total / float(first["value"])
         second["interval"] = [float(f"{total / float(end):.8g}") for end in (high, low)]
         second["basis"] = "derived"
-        second["source"] = f"{total:g} over the ratio of {free.split('.')[0]}"
+        second["source"] = f"{total:g} over the ratio of {names[0]}"
         second["reason"] = ""
-    documents[robot]["gait"]["transfer_path"] = nearest["path"]
+    documents[ROBOT]["gait"]["transfer_path"] = nearest["path"]
 
 
-def _replace(entry: Any, value: float, low: float, high: float, reason: str) -> None:
-    """Put a calibrated number, SI, into its table."""
+def _replace(entry: Any, ends: list[float], source: str, reason: str) -> None:
+    """Put a calibrated number into its table: value, low and high, SI."""
     unit = str(entry["unit"])
-    written = [float(f"{from_si(x, unit):.8g}") for x in (value, low, high)]
+    written = [float(f"{from_si(float(x), unit):.8g}") for x in ends]
     entry["value"] = written[0]
     entry["basis"] = "calibrated"
-    entry["source"] = _SOURCE
+    entry["source"] = source
     entry["reason"] = reason
     entry["interval"] = [min(written), max(written)]
 

@@ -22,7 +22,6 @@ from pipeline.errors import PipelineError
 from pipeline.paper.calibration.posterior import Posterior, sample
 from pipeline.paper.calibration.prior import load_prior
 from pipeline.paper.calibration.problem import Evaluation, Problem
-from pipeline.paper.constants.motor_constants import KEYS
 from pipeline.paper.hexapod import (
     MIDDLE_LEGS,
     POSTURE,
@@ -33,6 +32,7 @@ from pipeline.paper.hexapod import (
     printed_leg,
     totals,
 )
+from pipeline.paper.motor_constants import KEYS
 from pipeline.paper.published import EVEN, EXTRA, load_published
 from pipeline.robot.robot_file import load_robot_file
 

@@ -1,15 +1,19 @@
-"""What a stored calibration says of a computed quantity: before the fit, and with it left out."""
+"""What a stored calibration says of computed quantities: before the fit, and with one left out."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from pipeline.paper.hexapod import Totals
+from pipeline.paper.published import CYCLE, EVEN, EXTRA, HELD, PAIR
+from pipeline.simulation.energy_change import break_even
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 #: Quantiles shown as low and high.
 BAND = (0.025, 0.975)
@@ -17,55 +21,76 @@ BAND = (0.025, 0.975)
 LEAST = 10
 Interval = tuple[float, float]
 NONE: Interval = (math.nan, math.nan)
+#: Whose energy per cycle and power standing Fig. 21 compares.
+SUBJECTS = {
+    "middle_legs": ("pair_cycle_J", "pair_stand_W"),
+    "robot_on_3_feet": ("cycle_J", "stand_3_W"),
+    "robot_on_6_feet": ("cycle_J", "stand_6_W"),
+}
+_RATIO = "walking_ratio_irreversible"
+#: Under which name the sets stand that were fitted without a figure.
+LEFT_OUT_BY = {
+    **{name: name for name in (HELD, "walking_ratio_rotor", "walking_ratio_reversible")},
+    **dict.fromkeys((_RATIO, EVEN, EXTRA, *SUBJECTS), f"{_RATIO}+{EXTRA}"),
+}
+#: Sets of numbers by what they had to meet: `posterior` every target, `prior` only the posture,
+#: Tables III to V and the motor's limits, others every target but those that name them, joined by
+#: ``+``. A row for each set: what the paper prints, in SI; ``<alternative> <key of the totals>``;
+#: where the lines of Fig. 21 cross; what the sentences compare. Empty where the stored sets belong
+#: to other numbers.
+Sets = Mapping[str, "DataFrame"]
+_STANDING = [f"{name}_leg_energy_3s" for name in ("ideal", "rotor", "reversible", "irreversible")]
 
 
-@dataclass(frozen=True)
-class Point:
-    """One set of numbers: what the paper prints, computed in SI, and the whole robot's energy."""
-
-    values: Mapping[str, float]
-    totals: Totals
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Sets of numbers, by what they were asked to meet.
-
-    Attributes:
-        posterior: Every target: draws of the posterior.
-        prior: Nothing but the standing posture, the motor's constants, which Tables III to V
-            fix, and the motor's limits: what data sheets and literature say of the rest.
-        left_out: Every target but some: draws of the posterior without them, by their names joined
-            with ``+``.
-    """
-
-    posterior: Sequence[Point]
-    prior: Sequence[Point]
-    left_out: Mapping[str, Sequence[Point]]
-
-    def of_totals(self, values: Callable[[Totals], Mapping[str, float]]) -> Evidence:
-        """The same sets, with what follows from the whole robot's energy as their values."""
-
-        def points(own: Sequence[Point]) -> list[Point]:
-            return [Point(values(p.totals), p.totals) for p in own]
-
-        left_out = {key: points(own) for key, own in self.left_out.items()}
-        return Evidence(points(self.posterior), points(self.prior), left_out)
-
-
-def evidence(results: Mapping[str, Any]) -> Evidence:
+def evidence(results: Mapping[str, Any]) -> Sets:
     """The sets of a stored calibration."""
-
-    def points(stored: Sequence[Mapping[str, Any]]) -> list[Point]:
-        return [Point(numbers(p["values"]), p["totals"]) for p in stored]
-
-    left_out = {key: points(stored) for key, stored in results["left_out"].items()}
-    return Evidence(points(results["sets"]), points(results["prior"]), left_out)
+    out = {"posterior": _frame(results["sets"]), "prior": _frame(results["prior"])}
+    # Tables IV and V fix them, so that the prior says nothing of its own.
+    out["prior"] = out["prior"].drop(columns=_STANDING[:2])
+    return out | {key: _frame(sets) for key, sets in results["left_out"].items()}
 
 
-def numbers(values: Mapping[str, Any]) -> dict[str, float]:
-    """Stored values, with NaN where none was."""
-    return {key: math.nan if value is None else float(value) for key, value in values.items()}
+def _frame(sets: Sequence[Mapping[str, Any]]) -> DataFrame:
+    from pandas import DataFrame
+
+    rows = []
+    for one in sets:
+        totals = {f"{a} {key}": x for a, own in one["totals"].items() for key, x in own.items()}
+        rows.append(compared(one["values"]) | totals | crossings(one["totals"]))
+    return DataFrame(rows, dtype=float)
+
+
+def compared(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Computed quantities, and how far standing energies are apart [J in 3 s].
+
+    ``ideal_most`` is by how much the ideal actuator draws more than any other, ``ordered`` the
+    least step from one actuator to the next with more friction.
+    """
+    if any(name not in values for name in _STANDING):
+        return dict(values)
+    energies = np.array([values[name] for name in _STANDING])
+    steps = {"ideal_most": energies[0] - energies[1:].max(), "ordered": -np.diff(energies).max()}
+    return {**values, **{name: float(step) for name, step in steps.items()}}
+
+
+def crossing(whole: Totals, cycle: str, stand: str) -> float:
+    """Fraction of time standing at which reversible and irreversible cost the same.
+
+    Args:
+        whole: Per alternative: energies per cycle [J] and powers standing [W].
+        cycle: Whose energy per cycle.
+        stand: Whose power standing.
+    """
+    reversible, irreversible = (whole[name] for name in PAIR)
+    saved = (reversible[stand] - irreversible[stand]) * CYCLE
+    return break_even(irreversible[cycle] - reversible[cycle], saved)
+
+
+def crossings(whole: Totals) -> dict[str, float]:
+    """The crossing for every subject; none without both actuators that may cross."""
+    if any(name not in whole for name in PAIR):
+        return {}
+    return {subject: crossing(whole, *keys) for subject, keys in SUBJECTS.items()}
 
 
 def quantiles(values: Sequence[float]) -> Interval:

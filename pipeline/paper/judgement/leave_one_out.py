@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from actuators.units import from_si
 from pipeline.paper.calibration.problem import extra_target
-from pipeline.paper.constants.data_sheet import data_sheet
-from pipeline.paper.constants.table_entries import joint_torques
-from pipeline.paper.judgement.evidence import LEAST, NONE, Evidence, Interval, quantiles
+from pipeline.paper.judgement.evidence import LEAST, NONE, Sets, quantiles
+from pipeline.paper.motor_constants import data_sheet, joint_torques
 from pipeline.paper.published import EVEN, EXTRA, Published
+from reports.column import column
 
 #: What each exactly met target fixes; nothing else knows these numbers of the robot.
 _FIXES = {
@@ -26,68 +27,68 @@ _FIXES = {
 
 @dataclass(frozen=True)
 class Prediction:
-    """A target as the rest predicts it, in its unit.
+    """Each target predicted from the rest."""
 
-    Attributes:
-        name: Its id.
-        without: Targets left out together, joined with ``+``.
-        unit: Of the numbers.
-        published: Printed, or implied by the printed break-even.
-        half_width: Of it.
-        by: What predicts it.
-        median: Predicted; NaN where nothing or too few sets predict it.
-        interval: 95 % of the prediction.
-        sets: How many sets met the others and have such a value; 0 for a data sheet.
-    """
-
-    name: str
-    without: str
-    unit: str
-    published: float
-    half_width: float
-    by: str
-    median: float = math.nan
-    interval: Interval = NONE
-    sets: int = 0
-
-    @property
-    def inside(self) -> bool | None:
-        """Whether prediction and printed value overlap; None where nothing predicts it."""
-        if math.isnan(self.median):
-            return None
-        low, high = self.interval
-        return low <= self.published + self.half_width and high >= self.published - self.half_width
+    table: ClassVar = "leave_one_out"
+    id: str = column("target, or the energy difference that the break-even implies")
+    without: str = column("left out of the calibration together, with what follows from them")
+    unit: str = column("unit of the numbers")
+    published: float = column("as printed; walking_extra_J: implied by the break-even", "see unit")
+    half_width: float = column("of the published value", "see unit")
+    predicted: float = column("median of the posterior without it", "see unit")
+    low: float = column("2.5 % quantile of the same, or of the data sheet's rounding", "see unit")
+    high: float = column("97.5 % quantile of the same", "see unit")
+    inside: bool | None = column("whether prediction and published value overlap")
+    sets: int = column("how many draws of that posterior have such a value", "1")
+    by: str = column("what predicts it")
 
 
-def leave_one_out(published: Mapping[str, Published], known: Evidence) -> list[Prediction]:
+def leave_one_out(published: Mapping[str, Published], sets: Sets) -> list[Prediction]:
     """Every target, left out.
 
     Args:
         published: The printed values.
-        known: The calibration's sets.
+        sets: The calibration's; none of those without some targets where it is empty.
     """
-
-    def head(name: str, without: str) -> tuple[str, str, str, float, float]:
-        if name == EXTRA:
-            target = extra_target(published, 1)
-            return name, without, "J", target.centre, target.half_width
-        row = published[name]
-        return name, without, row.unit, row.value, row.half_width
-
-    rows = [Prediction(*head(name, name), f"nothing: it fixes {of}") for name, of in _FIXES.items()]
+    nothing = (math.nan, *NONE)
+    rows = [
+        _predicted(published, name, name, nothing, f"nothing: it fixes {of}")
+        for name, of in _FIXES.items()
+    ]
     for name, edges in _from_data_sheet(published).items():
         low, middle, high = sorted(math.copysign(e, published[name].value) for e in edges)
-        rows.append(Prediction(*head(name, name), "the motor's data sheet", middle, (low, high)))
-    for without, points in known.left_out.items():
-        targets = without.split("+")
+        found = (middle, low, high)
+        rows.append(_predicted(published, name, name, found, "the motor's data sheet"))
+    for without, frame in sets.items():
+        targets = without.split("+") if without not in ("posterior", "prior") else []
         for name in [*targets, EVEN] if EXTRA in targets else targets:
-            own = Prediction(*head(name, without), "the other targets and the prior")
-            values = [from_si(p.values[name], own.unit) for p in points]
-            values = [v for v in values if not math.isnan(v)]
+            unit = published[name].unit if name in published else "J"
+            values = [from_si(value, unit) for value in frame[name].dropna()]
             median = float(np.median(values)) if len(values) >= LEAST else math.nan
-            interval = quantiles(values)
-            rows.append(replace(own, median=median, interval=interval, sets=len(values)))
+            found = (median, *quantiles(values))
+            by = "the other targets and the prior"
+            rows.append(_predicted(published, name, without, found, by, len(values)))
     return rows
+
+
+def _predicted(
+    published: Mapping[str, Published],
+    name: str,
+    without: str,
+    found: tuple[float, float, float],
+    by: str,
+    sets: int = 0,
+) -> Prediction:
+    """A row; `found` is what is predicted, least and most, all NaN where nothing predicts it."""
+    if name == EXTRA:
+        target = extra_target(published, 1)
+        unit, value, half = "J", target.centre, target.half_width
+    else:
+        unit, value, half = (getattr(published[name], a) for a in ("unit", "value", "half_width"))
+    median, low, high = found
+    overlap = low <= value + half and high >= value - half
+    inside = None if math.isnan(median) else overlap
+    return Prediction(name, without, unit, value, half, median, low, high, inside, sets, by)
 
 
 def _from_data_sheet(published: Mapping[str, Published]) -> dict[str, Sequence[float]]:

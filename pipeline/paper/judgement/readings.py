@@ -7,16 +7,16 @@ a motor is taken off its consumption.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from actuators.units import from_si
 from pipeline.paper.hexapod import PUBLISHED_LEG
-from pipeline.paper.judgement.evidence import numbers
 from pipeline.paper.judgement.rows import MISSED, REPRODUCED
 from pipeline.paper.published import CYCLE, EVEN, Published
 from pipeline.paper.quantities import pair_break_even
+from reports.column import column
 
 #: Half widths within which the search meets a row whose tolerance is a hard edge.
 SEARCH_SLACK = 0.02
@@ -24,33 +24,19 @@ SEARCH_SLACK = 0.02
 
 @dataclass(frozen=True)
 class CalibratedReading:
-    """One reading, calibrated on its own; numbers are NaN where nothing walks.
+    """One reading, calibrated on its own; numbers are NaN where nothing walks."""
 
-    Attributes:
-        axis_deg: Angle of joint 1's axis from the vertical.
-        legs: Middle legs that Fig. 21 counts as loaded.
-        net: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
-        worst_error: Largest misfit of a fitted row, in half widths.
-        worst_row: Its name.
-        worst_limit: Largest motor quantity over its limit, less one.
-        worst_limit_name: Its name.
-        prior_distance: Half the squared distance from the prior's centre, in sigmas.
-        ideal_energy: Consumption of the middle right leg per cycle, ideal actuator [J].
-        ratio_joint_2: E_el(+) over E_m(+) at joint 2 with the ideal actuator.
-        ratio_others: The larger of the same ratios at joints 1 and 3.
-    """
-
-    axis_deg: float
-    legs: int
-    net: bool
-    worst_error: float = math.nan
-    worst_row: str = "none walks"
-    worst_limit: float = math.nan
+    axis_deg: float  #: Angle of joint 1's axis from the vertical.
+    legs: int  #: Middle legs that Fig. 21 counts as loaded.
+    net: bool  #: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
+    worst_error: float = math.nan  #: Largest misfit of a fitted row, in half widths.
+    worst_row: str = "none walks"  #: Its name.
+    worst_limit: float = math.nan  #: Largest motor quantity over its limit, less one.
     worst_limit_name: str = "none walks"
-    prior_distance: float = math.nan
-    ideal_energy: float = math.nan
-    ratio_joint_2: float = math.nan
-    ratio_others: float = math.nan
+    prior_distance: float = math.nan  #: Half the squared distance from the prior's centre, sigmas.
+    ideal_energy: float = math.nan  #: Of the middle right leg per cycle, ideal actuator [J].
+    ratio_joint_2: float = math.nan  #: E_el(+) over E_m(+) at joint 2 with the ideal actuator.
+    ratio_others: float = math.nan  #: The larger of the same ratios at joints 1 and 3.
 
     @property
     def meets_all(self) -> bool:
@@ -108,21 +94,38 @@ def consumption(point: Mapping[str, Any], *, net: bool) -> dict[str, dict[str, f
     }
 
 
+def walking_ratios(point: Mapping[str, Any], *, net: bool) -> dict[str, float]:
+    """Consumption of the middle right leg over the ideal actuator's, by alternative."""
+    energy = {name: legs[PUBLISHED_LEG] for name, legs in consumption(point, net=net).items()}
+    return {name: e / energy["ideal"] for name, e in energy.items() if name != "ideal"}
+
+
 def supported(found: Sequence[CalibratedReading]) -> CalibratedReading | None:
     """The reading that meets everything and asks least of the prior, or None."""
-    good = [r for r in found if r.meets_all]
-    return min(good, key=lambda r: r.prior_distance) if good else None
+    good = (r for r in found if r.meets_all)
+    return min(good, key=lambda r: r.prior_distance, default=None)
 
 
-def verdict(found: Sequence[CalibratedReading], point: Mapping[str, Any]) -> tuple[str, ...]:
+def verdict(found: Sequence[CalibratedReading], point: Mapping[str, Any]) -> tuple[str, str]:
     """In words: which reading the numbers support, what speaks against it, what stays open.
 
     Args:
         found: Every reading.
         point: The calibrated point, for what another reading makes of its numbers.
     """
+    net, drawn = (
+        ", ".join(f"{ratio:.1f}" for ratio in walking_ratios(point, net=n).values())
+        for n in (True, False)
+    )
+    names = ", ".join(name for name in point["drawn"] if name != "ideal")
+    same_numbers = (
+        "The paper also leaves open whether *consumption* is what the supply delivers, E_el(+), or "
+        "that less what flows back, E_el(+) - E_el(-). Everything here is E_el(+). Net of what "
+        f"returns, the ratios of {names} to ideal would be {net} instead of {drawn} with "
+        "these numbers. "
+    )
     axis_and_legs = _axis_and_legs([r for r in found if not r.net])
-    return axis_and_legs, _same_numbers_text(point) + _net([r for r in found if r.net])
+    return axis_and_legs, same_numbers + _net([r for r in found if r.net])
 
 
 def _axis_and_legs(found: Sequence[CalibratedReading]) -> str:
@@ -135,12 +138,10 @@ def _axis_and_legs(found: Sequence[CalibratedReading]) -> str:
             f"is {nearest.name} with {nearest.worst_row} off by {nearest.worst_error:.2f} half "
             "widths."
         )
-    rivals = sorted(
-        (r for r in found if r.meets_all and r is not best), key=lambda r: r.prior_distance
-    )
+    rivals = [r for r in found if r.meets_all and r is not best]
     also = "; ".join(
         f"{r.name} also meets every row, at a prior distance of {r.prior_distance:.1f}"
-        for r in rivals
+        for r in sorted(rivals, key=lambda r: r.prior_distance)
     )
     failing = "; ".join(f"{r.name} ({r.missed})" for r in found if not r.meets_all)
     return (
@@ -153,22 +154,6 @@ def _axis_and_legs(found: Sequence[CalibratedReading]) -> str:
         + (f"Out of reach: {failing}. " if failing else "")
         + "The layout remains an objection: with the feet 260 mm from the mid-plane and a coxa, "
         "joint 1 lies only 40 to 90 mm from it."
-    )
-
-
-def _same_numbers_text(point: Mapping[str, Any]) -> str:
-    """What the calibrated numbers make of consumption net of what returns."""
-    ratios = []
-    for net in (True, False):
-        energy = consumption(point, net=net)
-        ideal = energy.pop("ideal")[PUBLISHED_LEG]
-        ratios.append(", ".join(f"{legs[PUBLISHED_LEG] / ideal:.1f}" for legs in energy.values()))
-    names = ", ".join(name for name in point["drawn"] if name != "ideal")
-    return (
-        "The paper also leaves open whether *consumption* is what the supply delivers, E_el(+), or "
-        "that less what flows back, E_el(+) - E_el(-). Everything here is E_el(+). Net of what "
-        f"returns, the ratios of {names} to ideal would be {ratios[0]} instead of {ratios[1]} with "
-        "these numbers. "
     )
 
 
@@ -190,73 +175,78 @@ def _net(found: Sequence[CalibratedReading]) -> str:
     )
 
 
+@dataclass(frozen=True)
+class ReadingRow:
+    """The open readings of the paper, each calibrated on its own."""
+
+    table: ClassVar = "readings"
+    about: ClassVar = (
+        "limit rows: peak over the data sheet's limit, less one; positive is a breach."
+    )
+    axis_deg: float = column(
+        "angle of joint 1's axis from the vertical, in the frontal plane", "deg"
+    )
+    standing_legs_counted: int = column("middle legs that Fig. 21 counts as loaded", "1")
+    consumption: str = column(
+        "drawn: what the supply delivers, E_el(+); net: less what flows back, E_el(+) - E_el(-)"
+    )
+    numbers: str = column("with which numbers: fitted to this reading, or those of this run")
+    id: str = column("printed value, limit:<alternative>.<quantity>, or discriminator")
+    unit: str = column("unit of computed")
+    computed: float | None = column("with these numbers", "see unit")
+    verdict: str = column("for printed values and limits")
+
+
 def reading_rows(
     results: Mapping[str, Any], published: Mapping[str, Published]
-) -> list[dict[str, Any]]:
+) -> list[ReadingRow]:
     """Every reading with every printed value, its constraints and the discriminators.
 
     Args:
         results: The stored calibration.
         published: The printed values.
     """
-    rows = []
+    out = []
     for entry in results["readings"]:
-        head = _head(entry["axis_deg"], entry["legs"], net=bool(entry["net"]))
-        rows += [head | row for row in _reading_rows(entry, published)]
-    return rows + _same_numbers(results["nearest"], published)
+        words = "net" if entry["net"] else "drawn"
+        rows = _reading_rows(entry["point"], published, net=entry["net"])
+        own = (entry["axis_deg"], entry["legs"], words, "own calibration")
+        out += [ReadingRow(*own, *row) for row in rows]
+    same = _same_numbers(results["nearest"], published)
+    return out + [ReadingRow(0.0, 1, "net", "as calibrated for drawn", *row) for row in same]
+
+
+#: Id, unit, number and verdict.
+_Cells = tuple[str, str, float | None, str]
 
 
 def _reading_rows(
-    entry: Mapping[str, Any], published: Mapping[str, Published]
-) -> list[dict[str, Any]]:
-    point = entry["point"]
+    point: Mapping[str, Any] | None, published: Mapping[str, Published], *, net: bool
+) -> Iterator[_Cells]:
     if point is None:
-        return [_row("search", "1", math.nan, "no point: the robot cannot walk")]
-    values = numbers(point["values"])
-    rows = [_value_row(p, from_si(values[p.id], p.unit)) for p in published.values()]
+        yield "search", "1", math.nan, "no point: the robot cannot walk"
+        return
+    for p in published.values():
+        yield _printed(p, point["values"][p.id])
     for name, excess in point["excess"].items():
         word = "within the data sheet" if excess <= 0 else "breach"
-        rows.append(_row(f"limit:{name}", "1", excess, word))
-    ideal = consumption(point, net=bool(entry["net"]))["ideal"][PUBLISHED_LEG]
-    rows.append(_row("ideal_leg_energy_cycle", "J", ideal))
+        yield f"limit:{name}", "1", excess, word
+    yield "ideal_leg_energy_cycle", "J", consumption(point, net=net)["ideal"][PUBLISHED_LEG], ""
     for joint, ratio in point["electrical_over_mechanical"].items():
-        rows.append(_row(f"electrical_over_mechanical:{joint}", "1", ratio))
-    return [*rows, _row("prior_distance", "1", point["prior_distance"])]
+        yield f"electrical_over_mechanical:{joint}", "1", ratio, ""
+    yield "prior_distance", "1", point["prior_distance"], ""
 
 
-def _same_numbers(
-    point: Mapping[str, Any], published: Mapping[str, Published]
-) -> list[dict[str, Any]]:
+def _same_numbers(point: Mapping[str, Any], published: Mapping[str, Published]) -> Iterator[_Cells]:
     """The net reading of the calibrated point itself."""
-    energy = consumption(point, net=True)
-    ideal = energy["ideal"][PUBLISHED_LEG]
-    values = {
-        f"walking_ratio_{name}": legs[PUBLISHED_LEG] / ideal
-        for name, legs in energy.items()
-        if name != "ideal"
-    }
-    held = point["values"]["reversible_leg_energy_3s"] / CYCLE
-    values[EVEN] = pair_break_even(energy, held, 1)
-    rows = [_value_row(published[name], value) for name, value in values.items()]
-    rows.append(_row("ideal_leg_energy_cycle", "J", ideal))
-    head = _head(0.0, 1, net=True) | {"numbers": "as calibrated for drawn"}
-    return [head | row for row in rows]
+    for name, ratio in walking_ratios(point, net=True).items():
+        yield _printed(published[f"walking_ratio_{name}"], ratio)
+    held, energy = point["values"]["reversible_leg_energy_3s"] / CYCLE, consumption(point, net=True)
+    yield _printed(published[EVEN], pair_break_even(energy, held, 1))
+    yield "ideal_leg_energy_cycle", "J", energy["ideal"][PUBLISHED_LEG], ""
 
 
-def _head(axis_deg: float, legs: int, *, net: bool) -> dict[str, Any]:
-    return {
-        "axis_deg": axis_deg,
-        "standing_legs_counted": legs,
-        "consumption": "net" if net else "drawn",
-        "numbers": "own calibration",
-    }
-
-
-def _value_row(printed: Published, ours: float) -> dict[str, Any]:
-    """A printed value beside ours, in its unit."""
-    fits = REPRODUCED if printed.reproduced(ours) else MISSED
-    return _row(printed.id, printed.unit, ours, fits)
-
-
-def _row(name: str, unit: str, value: float | None, verdict: str = "") -> dict[str, Any]:
-    return {"id": name, "unit": unit, "computed": value, "verdict": verdict}
+def _printed(row: Published, value: float | None) -> _Cells:
+    """What stands beside a printed value, in its unit; NaN where there is none."""
+    ours = math.nan if value is None else from_si(value, row.unit)
+    return row.id, row.unit, ours, REPRODUCED if row.reproduced(ours) else MISSED

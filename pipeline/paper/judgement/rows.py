@@ -1,177 +1,134 @@
 """What the paper says beside what is computed here: one table, of which the files are views.
 
-A row is a printed number, a sentence about numbers, or a crossing of the lines of Fig. 21.
+A row is a printed number, a sentence about numbers, or a crossing of the lines of Fig. 21. *Much
+higher* has no number in the paper: `sentences.csv` takes it for at least twice as high.
 """
 
 from __future__ import annotations
 
+import csv
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 
+from actuators.elements.inertia import Inertia
+from actuators.energy.energy import integral, stage_energies
+from actuators.loading.build import WINDING
 from actuators.units import from_si
-from pipeline.paper.calibration.problem import fixed_before
-from pipeline.paper.constants.motor_constants import asked_frictions
-from pipeline.paper.judgement.evidence import NONE, Evidence, Interval, Point, quantiles
-from pipeline.paper.published import EVEN, EXTRA, HELD, ROLES, Published
+from pipeline.paper.hexapod import Outcome, Totals, printed_leg
+from pipeline.paper.judgement.evidence import (
+    LEFT_OUT_BY,
+    NONE,
+    SUBJECTS,
+    Interval,
+    Sets,
+    crossings,
+    quantiles,
+)
+from pipeline.paper.motor_constants import asked_frictions
+from pipeline.paper.published import EVEN, PAIR, ROLES, Published
 
+SENTENCES_FILE = Path(__file__).parent / "sentences.csv"
 REPRODUCED = "reproduced"
 MISSED = "not reproduced"
 CONTRADICTED = "contradicted"
 #: Part that a sentence plays in the calibration; printed numbers have one of `ROLES`.
 PUT_IN, FITTED, FOLLOWS = "put in", "fitted", "follows"
-#: Targets that the others predict when they are left out, and under which name the sets stand.
-PREDICTED_BY = {
-    HELD: HELD,
-    "walking_ratio_rotor": "walking_ratio_rotor",
-    "walking_ratio_reversible": "walking_ratio_reversible",
-    "walking_ratio_irreversible": f"walking_ratio_irreversible+{EXTRA}",
-    EVEN: f"walking_ratio_irreversible+{EXTRA}",
-}
 
 
 @dataclass(frozen=True)
 class Row:
-    """One statement of the paper and, once judged, what it comes to here.
+    """One statement of the paper and, once judged, what it comes to here."""
 
-    Attributes:
-        id: Short name: of the printed value it rests on, where there is one.
-        where: Table or section.
-        quantity: What is computed.
-        unit: Of the numbers.
-        published: As printed; NaN for a sentence.
-        role: One of `ROLES`, or of `PUT_IN`, `FITTED` and `FOLLOWS` for a sentence.
-        value: The quantity in `unit`, from the printed values' computed counterparts in SI.
-        test: Whether the statement is true of such a value.
-        needs: The computed counterparts without which there is no value.
-        sentence: In the paper's terms; empty for a number.
-        words: What the paper has for a number in it.
-        joint: Of the middle right leg; empty for all of it.
-        half_width: Half of the last printed digit, or of the words' range.
-        left_out_by: Key of the sets that predict it; empty where none do.
-        computed: Ours, in `unit`.
-        verdict: `REPRODUCED`, `MISSED`, or `CONTRADICTED` where other printed values leave no way.
-        prior: 95 % of what data sheets and literature say; NaN where other rows fix it.
-        prior_share: Share of the prior's draws that pass the test.
-        left_out: 95 % of what the other targets predict; NaN where it is no target.
-        left_out_share: Share of these sets that pass the test.
-        posterior_share: Share of the posterior that does; NaN where that was asked for.
-        remark: In words, may be empty.
-    """
-
-    id: str
-    where: str
-    quantity: str
-    unit: str
-    published: float
-    role: str
-    value: Callable[[Mapping[str, float]], float]
-    test: Callable[[float], bool]
-    needs: tuple[str, ...]
-    sentence: str = ""
-    words: str = ""
-    joint: str = ""
-    half_width: float = 0.0
-    left_out_by: str = ""
-    computed: float = math.nan
-    verdict: str = ""
-    prior: Interval = NONE
-    prior_share: float = math.nan
-    left_out: Interval = NONE
-    left_out_share: float = math.nan
-    posterior_share: float = math.nan
-    remark: str = ""
+    id: str  #: Short name of what is computed.
+    where: str  #: Table or section.
+    quantity: str  #: What is computed.
+    unit: str  #: Of the numbers.
+    role: str = ""  #: One of `ROLES`; of `PUT_IN`, `FITTED` and `FOLLOWS` for a sentence.
+    at_least: float = -math.inf  #: True of numbers from here, in `unit`,
+    at_most: float = math.inf  #: to here.
+    published: float = math.nan  #: As printed; NaN for a sentence.
+    half_width: float = 0.0  #: Half of the last printed digit, or of the words' range.
+    sentence: str = ""  #: In the paper's terms; empty for a number.
+    words: str = ""  #: What the paper has for a number in it.
+    joint: str = ""  #: Of the middle right leg; empty for all of it.
+    computed: float = math.nan  #: Ours, in `unit`.
+    verdict: str = ""  #: `CONTRADICTED` where other printed values leave no way to the number.
+    prior: Interval = NONE  #: 95 % of what data sheets and literature say; NaN where fixed.
+    prior_share: float = math.nan  #: Share of the prior's draws of which it is true.
+    left_out: Interval = NONE  #: 95 % of what the other targets predict; NaN where no target.
+    left_out_share: float = math.nan  #: Share of these sets of which it is true.
+    posterior_share: float = math.nan  #: Share of the posterior; NaN where that was asked for.
+    remark: str = ""  #: In words, may be empty.
 
     @property
     def holds(self) -> bool:
         """Whether the statement is true of ours."""
         return self.verdict == REPRODUCED
 
+    def true_of(self, value: float) -> bool:
+        """Whether the statement is true of a value in `unit`; never of NaN."""
+        return self.at_least <= value <= self.at_most
+
 
 def judged(
-    rows: Iterable[Row],
-    ours: Mapping[str, float],
-    known: Evidence | None,
-    *,
-    fixed: Iterable[str] = (),
-    unmet: Sequence[str] = (),
+    rows: Iterable[Row], ours: Mapping[str, float], sets: Sets, unmet: Sequence[str] = ()
 ) -> tuple[Row, ...]:
     """Every row that can be computed, with what is known of it.
 
     Args:
         rows: Not judged yet.
-        ours: Computed counterparts, SI; without those for which the catalogue has no actuator.
-        known: The calibration's sets; None where they belong to other numbers.
-        fixed: Ids of rows of which the prior says nothing.
+        ours: What is computed, SI, by the rows' ids; without those for which the catalogue has no
+            actuator.
+        sets: The calibration's; empty where they belong to other numbers.
         unmet: Ids that stay unmet at the rotor friction that leaves the fewest.
     """
     out = []
     for row in rows:
-        if any(name not in ours for name in row.needs):
+        if row.id not in ours:
             continue
-        value = row.value(ours)
-        verdict = REPRODUCED if row.test(value) else MISSED
-        if verdict == MISSED and row.id in unmet:
-            verdict = CONTRADICTED
-        row = replace(row, computed=value, verdict=verdict)
-        out.append(row if known is None else _with_sets(row, known, row.id in set(fixed)))
+        value = from_si(ours[row.id], row.unit)
+        missed = CONTRADICTED if row.id in unmet else MISSED
+        verdict = REPRODUCED if row.true_of(value) else missed
+        prior, prior_share = _of_sets(row, sets, "prior")
+        left_out, left_out_share = _of_sets(row, sets, LEFT_OUT_BY.get(row.id, ""))
+        asked_for = row.role in (PUT_IN, FITTED)
+        posterior = math.nan if asked_for else _of_sets(row, sets, "posterior")[1]
+        known = (prior, prior_share, left_out, left_out_share, posterior)
+        names = ("prior", "prior_share", "left_out", "left_out_share", "posterior_share")
+        changes = dict(zip(names, known, strict=True))
+        out.append(replace(row, computed=value, verdict=verdict, **changes))
     return tuple(out)
 
 
-def _with_sets(row: Row, known: Evidence, is_fixed: bool) -> Row:
-    """A row with what the calibration's sets say of it."""
-
-    def of(points: Sequence[Point]) -> tuple[Interval, float]:
-        values = [row.value(p.values) for p in points]
-        share = float(np.mean([row.test(v) for v in values])) if values else math.nan
-        return quantiles(values), share
-
-    prior = (NONE, math.nan) if is_fixed else of(known.prior)
-    left_out = of(known.left_out[row.left_out_by]) if row.left_out_by else (NONE, math.nan)
-    asked_for = row.role in (PUT_IN, FITTED)
-    posterior = math.nan if asked_for else of(known.posterior)[1]
-    return replace(
-        row,
-        prior=prior[0],
-        prior_share=prior[1],
-        left_out=left_out[0],
-        left_out_share=left_out[1],
-        posterior_share=posterior,
-    )
+def _of_sets(row: Row, sets: Sets, name: str) -> tuple[Interval, float]:
+    """95 % of what some sets say, and the share of them of which the row is true."""
+    if name not in sets or row.id not in sets[name]:
+        return NONE, math.nan
+    values = [from_si(value, row.unit) for value in sets[name][row.id]]
+    return quantiles(values), float(np.mean([row.true_of(value) for value in values]))
 
 
 def printed_numbers(
-    published: Mapping[str, Published],
-    ours: Mapping[str, float],
-    unmet: Sequence[str],
-    known: Evidence | None,
+    published: Mapping[str, Published], ours: Mapping[str, float], unmet: Sequence[str], sets: Sets
 ) -> tuple[Row, ...]:
     """A row for every printed value that was computed; for the arguments see `judged`."""
-    fixed = fixed_before(published) | {f"{a}_leg_energy_3s" for a in ("ideal", "rotor")}
     rows = [
         Row(
-            p.id,
-            p.where,
-            p.quantity,
-            p.unit,
-            p.value,
-            p.role,
-            lambda values, p=p: from_si(values[p.id], p.unit),  # type: ignore[misc]
-            p.reproduced,
-            (p.id,),
+            *(p.id, p.where, p.quantity, p.unit, p.role, *p.ends, p.value, p.half_width),
             joint=p.joint,
-            half_width=p.half_width,
-            left_out_by=PREDICTED_BY.get(p.id, ""),
-            remark=_remark(p, published, known),
+            remark=_remark(p, published, sets),
         )
         for p in published.values()
     ]
-    return judged(rows, ours, known, fixed=fixed, unmet=unmet)
+    return judged(rows, ours, sets, unmet)
 
 
-def _remark(row: Published, published: Mapping[str, Published], known: Evidence | None) -> str:
+def _remark(row: Published, published: Mapping[str, Published], sets: Sets) -> str:
     asked = asked_frictions(published)
     if row.id in asked:
         return "asks for a rotor friction of " + ", ".join(
@@ -181,16 +138,101 @@ def _remark(row: Published, published: Mapping[str, Published], known: Evidence 
         )
     if row.id == "rotor_leg_energy_3s":
         text = f"3 s times the rounded {published['rotor_power_2'].value:g} W"
-        if known is not None:
-            sets = [from_si(p.values[row.id], row.unit) for p in known.posterior]
-            text += f"; unrounded {min(sets):.4g} to {max(sets):.4g} J"
+        if sets:
+            own = sets["posterior"][row.id]
+            text += f"; unrounded {own.min():.4g} to {own.max():.4g} J"
         return text
-    if row.id == EVEN and known is not None:
-        none = float(np.mean([math.isnan(p.values[EVEN]) for p in known.prior]))
-        return (
-            f"prior: of the draws that have one; {100 * none:.0f} % have none, see conclusions.csv"
-        )
+    if row.id == EVEN and sets:
+        none = 100 * sets["prior"][EVEN].isna().mean()
+        return f"prior: of the draws that have one; {none:.0f} % have none, see conclusions.csv"
     return ""
+
+
+@cache
+def sentences() -> tuple[Row, ...]:
+    """The sentences of sections V and IV.A, the latter at every joint that they speak of."""
+    with SENTENCES_FILE.open(encoding="utf-8", newline="") as file:
+        lines = list(csv.DictReader(file))
+    rows = []
+    for said in lines:
+        at_least = float(said["at_least"] or -math.inf)
+        if said["more_than"]:
+            at_least = math.nextafter(float(said["more_than"]), math.inf)
+        row = Row(
+            *(said["id"], f"Section {said['section']}", said["quantity"], said["unit"]),
+            *(said["role"], at_least, float(said["at_most"] or math.inf)),
+            sentence=said["sentence"],
+            words=said["words"],
+        )
+        joints = said["joints"].split()
+        rows += [replace(row, id=f"{row.id} {j}", joint=j) for j in joints] or [row]
+    return tuple(rows)
+
+
+def stage_ratios(outcomes: Mapping[str, Outcome]) -> dict[str, float]:
+    """What the sentences of section IV.A compare, by their ids: ``<energy> / <energy> <joint>``.
+
+    Args:
+        outcomes: The middle legs' walk with the paper's alternatives, or some of them.
+
+    Returns:
+        Ratios of energies of the middle right leg per cycle; NaN where nothing is below.
+    """
+    walks = {name: outcome.walking for name, outcome in outcomes.items()}
+    if "rotor" in walks:
+        chain = outcomes["rotor"].chain
+        rotor = chain.element("rotor_inertia")
+        assert isinstance(rotor, Inertia)
+        light = chain.replaced(replace(rotor, inertia=0.0))
+        walks["rotor without inertia"] = light.inverse(walks["rotor"].joint)
+    energy = {}
+    for name, walk in walks.items():
+        for e in stage_energies(walk):
+            energy |= {f"{name}:{e.stage}+": e.forward, f"{name}:{e.stage}-": e.reverse}
+        losses = [power for element, power in walk.losses.items() if element != WINDING]
+        if losses:
+            energy[f"{name}:dissipated"] = integral(walk.joint.time, np.sum(losses, axis=0))
+    legs = {name: printed_leg(own)[0] for name, own in energy.items()}
+    out = {}
+    for row in sentences():
+        above, _, below = row.id.removesuffix(f" {row.joint}").partition(" / ")
+        if above in legs and below in legs:
+            over, under = (float(legs[name][int(row.joint) - 1]) for name in (above, below))
+            out[row.id] = over / under if under else math.nan
+    return out
+
+
+def break_evens(whole: Totals, sets: Sets) -> tuple[Row, ...]:
+    """Where the lines of Fig. 21 cross, for every subject.
+
+    Args:
+        whole: Ours.
+        sets: The calibration's; empty where they belong to other numbers.
+    """
+    quantity = "fraction of time standing above which the irreversible actuator uses less"
+    rows = [Row(subject, "Fig. 21", quantity, "1") for subject in SUBJECTS]
+    found = judged(rows, crossings(whole), sets)
+    return tuple(replace(row, remark=_note(row, whole, known=bool(sets))) for row in found)
+
+
+def _note(row: Row, whole: Totals, *, known: bool) -> str:
+    cycle, stand = SUBJECTS[row.id]
+    reversible, irreversible = (whole[name] for name in PAIR)
+    if row.holds:
+        note = "above this share of standing the irreversible actuator uses less"
+    elif irreversible[cycle] <= reversible[cycle]:
+        note = "no break-even: walking, the irreversible actuator uses no more than the reversible"
+    else:
+        note = (
+            f"no break-even: standing, the reversible actuator holds for {reversible[stand]:.3g} "
+            f"W, the irreversible one for {irreversible[stand]:.3g} W"
+        )
+    if not known:
+        return note
+    return note + (
+        f"; no break-even in {100 * (1 - row.prior_share):.0f} % of the prior's draws and in "
+        f"{100 * (1 - row.left_out_share):.0f} % of the sets without the irreversible figures"
+    )
 
 
 def headline(rows: Iterable[Row]) -> dict[str, tuple[int, int]]:

@@ -10,7 +10,7 @@ from pipeline.choice.answer.break_even import cost, rows
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import Mode
-from pipeline.paper.omissions.omissions import idle_break_even
+from pipeline.paper.omissions import idle_break_even
 from pipeline.paper.published import PAIR
 
 

@@ -16,7 +16,8 @@ from pipeline.cli.options import settings_of
 from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.judgement.basis import Basis, Judged, basis
-from pipeline.paper.judgement.sensitivity import Index
+from pipeline.paper.judgement.sensitivity import Sensitivity
+from pipeline.paper.omissions import Omission
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.settings import Settings
@@ -160,7 +161,7 @@ def test_the_page_lays_out_section_iv_a_and_what_is_left_out(shipped: Judged) ->
     assert rows.headers == ("sentence: ratio", "joint 1", "joint 2", "joint 3", "holds", "paper")
     assert len(rows.rows) == 10
     assert [row[4] for row in rows.rows].count("no") == 2
-    rows, said = paper_sections.omissions(tables.omissions(judgement.omissions))
+    rows, said = paper_sections.omissions(table_of(Omission, judgement.omissions))
     assert rows.rows[0][1:3] == (pytest.approx(0.94, abs=1e-4), 0.0)
     assert len(rows.rows) == len(said) == len(judgement.omissions)
     assert any(str(row[0]).endswith("0.672 W") for row in rows.rows)
@@ -181,8 +182,11 @@ def test_without_one_of_the_papers_actuators_what_needs_it_is_left_out(
 
 
 def test_what_to_measure_next_is_named_only_where_it_is_known() -> None:
-    clear = measure_next([Index("a", 0.6, 0.1), Index("b", 0.3, 0.1)])
-    assert clear.startswith("**Measure next:** `a`")
-    close = measure_next([Index("a", 0.6, 0.2), Index("b", 0.4, 0.1)])
+    def said(first: tuple[float, float], second: tuple[float, float]) -> str:
+        named = zip("ab", (first, second), strict=True)
+        return measure_next([Sensitivity("", name, 0.0, 0.0, *own) for name, own in named])
+
+    assert said((0.6, 0.1), (0.3, 0.1)).startswith("**Measure next:** `a`")
+    close = said((0.6, 0.2), (0.4, 0.1))
     assert "Measure next" not in close
     assert all(word in close for word in ("`a`", "`b`", "overlap"))

@@ -27,7 +27,7 @@ from pipeline.paper.hexapod import (
     standing_state,
     with_splits,
 )
-from pipeline.paper.judgement.fig_21 import crossing
+from pipeline.paper.judgement.evidence import crossing
 from pipeline.paper.published import CYCLE, DIMENSIONS, EXTRA
 from pipeline.paper.quantities import computed, pair_break_even
 from pipeline.robot.robot import Robot

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.paper.constants.motor_constants import (
+from pipeline.paper.motor_constants import (
     KEYS,
     Frictions,
     asked_frictions,

@@ -13,7 +13,7 @@ from pipeline.paper.calibration.calibrate import posterior_summary
 from pipeline.paper.calibration.posterior import Posterior, sample
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.calibration.problem import Problem, Target
-from pipeline.paper.constants.motor_constants import KEYS
+from pipeline.paper.motor_constants import KEYS
 from pipeline.paper.published import EXTRA, HELD
 
 

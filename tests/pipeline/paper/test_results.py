@@ -24,8 +24,8 @@ from pipeline.paper.calibration.store import (
     number_verdict,
     save,
 )
-from pipeline.paper.constants.motor_constants import KEYS
 from pipeline.paper.errors import CalibrationError
+from pipeline.paper.motor_constants import KEYS
 from pipeline.paper.published import EVEN, EXTRA, Published
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 
@@ -121,15 +121,15 @@ def test_a_point_is_admissible_with_every_row_met_and_no_limit_exceeded(
 
 
 def test_numbers_after_calibration_are_judged(results: dict[str, Any], prior: Prior) -> None:
-    numbers = {n.key: n for n in calibrated_numbers(results, prior)}
+    numbers = {n.parameter: n for n in calibrated_numbers(results, prior)}
     assert {n.verdict for n in numbers.values()} <= set(VERDICTS)
     assert any(n.verdict == "not determined" for n in numbers.values())  # ten figures, 27 numbers
     for n in numbers.values():
-        assert n.low <= n.value <= n.high
+        assert n.low <= n.calibrated <= n.high
         assert 0 <= n.at_bound <= 1
         assert n.bound == ("" if n.at_bound == 0 else n.bound)
     assert numbers["planetary.coulomb"].verdict == "against the prior"
-    assert {n.key for n in numbers.values() if n.verdict == FIXED} == set(KEYS)
+    assert {n.parameter for n in numbers.values() if n.verdict == FIXED} == set(KEYS)
 
 
 @pytest.mark.parametrize(

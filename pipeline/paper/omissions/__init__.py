@@ -1,1 +1,0 @@
-"""What the paper leaves out, put in: how far its answer moves."""
