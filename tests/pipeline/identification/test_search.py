@@ -165,6 +165,17 @@ def test_evidence_of_other_noise_is_that_of_other_densities() -> None:
     assert rise == pytest.approx(marginal(two, log, state) - marginal(one, log, state), abs=1e-4)
 
 
+def test_columns_promise_what_a_step_to_their_optimum_gains() -> None:
+    log, state = log_of(FOUR, {2: 0.8}), State(((0, (0,)),), UNCERTAINTIES[0])
+    columns, L, x, _ = Search(log.pool, WEIGHTS).solve(state)
+    off = np.array([0.3, -0.2, 0.1])
+    for step, gain in ((0.0, 0.0), (1.0, 0.5 * float(np.sum((L.T @ off) ** 2)))):
+        held = np.zeros(log.pool.size)
+        held[columns] = x + step * off
+        search = Search(replace(log.pool, held=held), WEIGHTS)
+        assert search.promised(state) == pytest.approx(gain, abs=1e-5)
+
+
 def test_a_coordinate_may_be_as_large_as_the_effort_and_a_body_as_the_urdf_is_unsure() -> None:
     search = Search(log_of(FOUR, {}).pool, WEIGHTS)
     precision = search.precision(np.arange(search.pool.size), 0.1)
