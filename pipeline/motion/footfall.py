@@ -148,17 +148,17 @@ DYNAMIC_GAITS: Final = frozenset(
 )
 
 
-def refuse_unknown(name: object) -> None:
-    """Say of a name that is no gait's whether it is a dynamic one, or which one was meant.
+def known_gait(name: object) -> str:
+    """The name of a gait of `GAITS`.
 
     Raises:
-        GaitError: It is not in `GAITS`.
+        GaitError: It is none; says whether it is a dynamic one, or which one was meant.
     """
     words = one_line(name)
     if not isinstance(name, str):
         raise GaitError(f"{words}: expected the name of a gait: {', '.join(sorted(GAITS))}")
     if name in GAITS:
-        return
+        return name
     if re.sub(r"[\s-]+", "_", words.strip().lower()) in DYNAMIC_GAITS:
         raise GaitError(
             f"{words} is a dynamic gait: at times fewer than {LEAST_FEET} feet stand, and every "
@@ -175,8 +175,7 @@ def named(name: str, legs: Sequence[LegSpec], duty: float | None) -> Footfall:
     Raises:
         GaitError: No gait of that name, or none for this number of legs.
     """
-    refuse_unknown(name)
-    gait = GAITS[name]
+    gait = GAITS[known_gait(name)]
     if gait.legs is not None and len(legs) != gait.legs:
         fit = [g.name for g in GAITS.values() if g.legs in (None, len(legs))]
         raise GaitError(

@@ -9,7 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Final, Literal
 
@@ -20,7 +20,7 @@ from actuators.errors import UnitError, closest, one_line
 from actuators.text_file import UnreadableTextError, parsed, read_toml_file
 from actuators.units import quantity
 from pipeline.errors import GaitError
-from pipeline.motion.footfall import refuse_unknown
+from pipeline.motion.footfall import known_gait
 from pipeline.motion.transfer_path import transfer_path
 from pipeline.robot.robot_file import FOOTFALLS, RobotSpec, load_robot_file, merged_gait
 
@@ -28,21 +28,28 @@ _HEADINGS: Final = {"forward": 0.0, "left": 90.0, "backward": 180.0, "right": -9
 #: No walking robot is larger or steps further [m], none leans or climbs beyond [rad].
 _LONGEST, _STEEPEST = 10.0, math.radians(89.0)
 
-Check = Callable[[object], float]
+Legs = list[list[str]]
 
 
-def _number(written: object, dimension: str) -> float:
-    try:
-        return quantity(written, dimension)
-    except UnitError as error:
-        raise ValueError(str(error)) from None
+def _worded(read: Callable[[Any], Any]) -> BeforeValidator:
+    """What the project's readers refuse, as pydantic wants it said."""
+
+    def validate(written: object) -> object:
+        try:
+            return read(written)
+        except (UnitError, GaitError) as error:
+            raise ValueError(str(error)) from None
+
+    return BeforeValidator(validate)
 
 
-def _size(dimension: str, low: float, high: float, words: str, *, low_too: bool = False) -> Check:
+def _size(
+    dimension: str, low: float, high: float, words: str = "", *, low_too: bool = False
+) -> Callable[[object], float]:
     """A check of one number: of this dimension, within bounds."""
 
     def check(written: object) -> float:
-        value = _number(written, dimension)
+        value = quantity(written, dimension)
         if not (low < value < high or (low_too and value == low)):
             raise ValueError(f"{one_line(written)}: {words}")
         return value
@@ -50,95 +57,67 @@ def _size(dimension: str, low: float, high: float, words: str, *, low_too: bool 
     return check
 
 
-def _each(check: Check) -> Callable[[object], float | dict[str, float]]:
+def _each(check: Callable[[object], float]) -> BeforeValidator:
     """The check for one number for all legs, or a table with one for each."""
 
-    def checked(written: object) -> float | dict[str, float]:
+    def of_legs(written: object) -> float | dict[str, float]:
         if not isinstance(written, dict):
             return check(written)
         out = {}
         for leg, value in written.items():
             try:
                 out[str(leg)] = check(value)
-            except ValueError as error:
+            except (UnitError, ValueError) as error:
                 raise ValueError(f"({one_line(leg)}) {error}") from None
         return out
 
-    return checked
+    return _worded(of_legs)
 
 
 def _direction(written: object) -> float:
     if isinstance(written, str) and written in _HEADINGS:
         return math.radians(_HEADINGS[written])
     try:
-        return _number(written, "angle")
-    except ValueError:
-        words = ", ".join(_HEADINGS)
+        return quantity(written, "angle")
+    except UnitError:
         raise ValueError(
-            f"{one_line(written)}: expected {words}, or an angle to the left such as '30 deg'"
+            f"{one_line(written)}: expected {', '.join(_HEADINGS)}, or an angle to the left such "
+            "as '30 deg'"
         ) from None
-
-
-def _name(written: object) -> str:
-    try:
-        refuse_unknown(written)
-    except GaitError as error:
-        raise ValueError(str(error)) from None
-    return str(written)
-
-
-def _path(written: object) -> str:
-    try:
-        return transfer_path(str(written)).name
-    except GaitError as error:
-        raise ValueError(str(error)) from None
 
 
 _LENGTH = _size("length", 0, _LONGEST, "must lie above 0 and below 10 m")
 _HEIGHT = _size("length", 0, _LONGEST, "must not be negative, and below 10 m", low_too=True)
 _SHARE = _size(
-    "ratio",
-    0,
-    1,
+    *("ratio", 0, 1),
     "a foot stands for a share above 0 and below 1 of the period: at 0 it never carries, at 1 it "
     "never steps; give a number such as 0.75",
 )
+_SPEED = _size("velocity", 0, 100.0, "must not be negative, and below 100 m/s", low_too=True)
+_MASS = _size("mass", 0, 1e5, "must not be negative, and below 1e5 kg", low_too=True)
 _FRICTION = _size("ratio", 0, math.inf, "must lie above 0: give a number such as 0.6")
 _SURGE = _size("ratio", 0, 2.0, "must lie from 0 to below 2", low_too=True)
-_PHASE = _size("ratio", -math.inf, math.inf, "")
-Length = Annotated[float, BeforeValidator(_LENGTH)]
-Height = Annotated[float, BeforeValidator(_HEIGHT)]
-Offset = Annotated[
-    float, BeforeValidator(_size("length", -_LONGEST, _LONGEST, "must lie within 10 m"))
-]
-Time = Annotated[
-    float, BeforeValidator(_size("time", 1e-3, 1e6, "must lie above 1 ms and below 1e6 s"))
-]
-Speed = Annotated[
-    float,
-    BeforeValidator(
-        _size("velocity", 0, 100.0, "must not be negative, and below 100 m/s", low_too=True)
-    ),
-]
-Rate = Annotated[
-    float, BeforeValidator(_size("angular velocity", -100.0, 100.0, "must lie within 100 rad/s"))
-]
-Tilt = Annotated[
-    float, BeforeValidator(_size("angle", -_STEEPEST, _STEEPEST, "must lie within 89 deg"))
-]
-Mass = Annotated[
-    float,
-    BeforeValidator(_size("mass", 0, 1e5, "must not be negative, and below 1e5 kg", low_too=True)),
-]
-Lengths = Annotated[float | dict[str, float], BeforeValidator(_each(_LENGTH))]
-Heights = Annotated[float | dict[str, float], BeforeValidator(_each(_HEIGHT))]
-Shares = Annotated[float | dict[str, float], BeforeValidator(_each(_SHARE))]
-Phases = Annotated[dict[str, float], BeforeValidator(_each(_PHASE))]
+_OFFSET = _size("length", -_LONGEST, _LONGEST, "must lie within 10 m")
+_TILT = _size("angle", -_STEEPEST, _STEEPEST, "must lie within 89 deg")
+_TIME = _size("time", 1e-3, 1e6, "must lie above 1 ms and below 1e6 s")
+_RATE = _size("angular velocity", -100.0, 100.0, "must lie within 100 rad/s")
+Name = Annotated[str, _worded(known_gait)]
+Path = Annotated[str, _worded(lambda name: transfer_path(str(name)).name)]
+Phases = Annotated[dict[str, float], _each(_size("ratio", -math.inf, math.inf))]
+Shares = Annotated[float | dict[str, float], _each(_SHARE)]
+Lengths = Annotated[float | dict[str, float], _each(_LENGTH)]
+Heights = Annotated[float | dict[str, float], _each(_HEIGHT)]
 Direction = Annotated[float, BeforeValidator(_direction)]
-Friction = Annotated[float, BeforeValidator(_FRICTION)]
-Path = Annotated[str, BeforeValidator(_path)]
-Name = Annotated[str, BeforeValidator(_name)]
-Legs = list[list[str]]
+Length = Annotated[float, _worded(_LENGTH)]
+Height = Annotated[float, _worded(_HEIGHT)]
+Offset = Annotated[float, _worded(_OFFSET)]
+Tilt = Annotated[float, _worded(_TILT)]
+Time = Annotated[float, _worded(_TIME)]
+Speed = Annotated[float, _worded(_SPEED)]
+Rate = Annotated[float, _worded(_RATE)]
+Mass = Annotated[float, _worded(_MASS)]
+Friction = Annotated[float, _worded(_FRICTION)]
+Surge = Annotated[float, _worded(_SURGE)]
 
 
 class GaitTable(BaseModel):
@@ -162,8 +141,7 @@ class GaitTable(BaseModel):
     yaw_rate: Rate | None = None  #: Of the body, to the left [rad/s].
     #: Path of a foot relative to the body while it stands, of the longest or by leg [m].
     stroke: Lengths | None = None
-    #: Height of a foot at the middle of its transfer, of all or by leg [m].
-    lift: Heights | None = None
+    lift: Heights | None = None  #: Height of a foot at the middle of its transfer [m].
     body_height: Length | None = None  #: Of the base's origin over the ground [m].
     body_x: Offset = 0.0  #: Shift of the base over its feet, forward [m].
     body_y: Offset = 0.0  #: To the left [m].
@@ -179,7 +157,7 @@ class GaitTable(BaseModel):
     payload_z: Offset = 0.0  #: Likewise.
     #: Share of slowing and speeding up with every step with which the ground's forces point from
     #: the feet to the hips; 0, the default, for constant speed.
-    surge: Annotated[float, BeforeValidator(_SURGE)] = 0.0
+    surge: Surge = 0.0
     #: Path of the body over its feet: ``none``, or the ``least`` that keeps the margin.
     sway: Literal["none", "least"] | None = None
     #: Distance that the sway keeps from every edge of the support [m].
@@ -239,12 +217,16 @@ def _expected(key: str, message: str, legs: tuple[str, ...]) -> str:
     return message[0].lower() + message[1:]
 
 
+def _refuse_unknown_legs(named: Iterable[str], legs: tuple[str, ...], where: str) -> None:
+    for name in named:
+        if name not in legs:
+            raise GaitError(f"{where}: leg '{one_line(name)}' is not known; {closest(name, legs)}")
+
+
 def _refuse_other_legs(value: object, legs: tuple[str, ...], where: str) -> None:
     if not isinstance(value, dict):
         return
-    for name in value:
-        if name not in legs:
-            raise GaitError(f"{where}: leg '{one_line(name)}' is not known; {closest(name, legs)}")
+    _refuse_unknown_legs(value, legs, where)
     missing = [leg for leg in legs if leg not in value]
     if missing:
         raise GaitError(f"{where}: says nothing of {', '.join(missing)}; give every leg a number")
@@ -254,11 +236,9 @@ def _refuse_other_sets(sets: Legs | None, legs: tuple[str, ...], where: str) -> 
     two = where.endswith("tripods")
     if sets is None or (two and not sets):  # no tripods is no gait at all, said where one is asked
         return
-    for name in (name for group in sets for name in group):
-        if name not in legs:
-            raise GaitError(f"{where}: leg '{one_line(name)}' is not known; {closest(name, legs)}")
-    wrong = len(sets) < 2 or (two and len(sets) != 2)
-    if wrong or sorted(name for group in sets for name in group) != sorted(legs):
+    named = [name for group in sets for name in group]
+    _refuse_unknown_legs(named, legs, where)
+    if len(sets) < 2 or (two and len(sets) != 2) or sorted(named) != sorted(legs):
         parts = "two sets" if two else "two or more sets"
         raise GaitError(f"{where} must part the legs {', '.join(legs)} in {parts}")
 
