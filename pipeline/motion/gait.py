@@ -76,33 +76,36 @@ def gait_table(spec: RobotSpec) -> GaitTable:
 
 
 def gait_of(spec: RobotSpec) -> Gait:
-    """The gait of a robot file.
-
-    `spec`: with legs; its table ``[gait]`` and, for what that leaves out, its parameters.
+    """The gait of a robot file: its table ``[gait]`` and, for what that leaves out, its parameters.
 
     Raises:
         GaitError: A number is missing or contradicts another, or too few feet stand.
     """
     table = gait_table(spec)
-    legs = tuple(leg.name for leg in spec.legs)
-    if not table.tripods and table.tripods is not None:
-        raise GaitError(f"{spec.path}: gait.tripods is empty: the robot has no gait; state one")
     try:
-        footfall = replace(_footfall(table, spec), least=table.least_feet)
-        footfall.stances()  # refuses too few feet before any number is asked for
+        return _gait(table, spec)
     except GaitError as error:
         raise GaitError(f"{spec.path}: {str(error).removeprefix(f'{spec.path}: ')}") from None
-    ground = Ground(table.slope_forward, table.slope_left)
-    neutral = neutral_feet(table, spec)
-    twist, stride, period = _numbers(table, spec, footfall, neutral)
+
+
+def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
+    legs = tuple(leg.name for leg in spec.legs)
+    footfall = replace(_footfall(table, spec), least=table.least_feet)
+    footfall.stances()  # refuses too few feet before any number is asked for
+    neutral, duty = neutral_feet(table, spec), by_leg(footfall.duty, legs)
+    twist, stride, period = _numbers(table, spec, duty, neutral)
     lift = lifts(table, spec)
     sway = table.sway or ("least" if footfall.name == "crawl" else "none")
     if sway == "none" and table.stability_margin is not None:
         raise GaitError(
-            f"{spec.path}: gait.stability_margin is kept by the body's sway; state "
-            "gait.sway = 'least', too"
+            "gait.stability_margin is kept by the body's sway; state gait.sway = 'least', too"
         )
     margin = DEFAULT_MARGIN if table.stability_margin is None else table.stability_margin
+    # Half the body's way ahead and back; see `pipeline.motion.base_motion.surge`.
+    share = float(np.mean(list(footfall.duty.values())))
+    stroke = float(np.hypot(twist[0], twist[1])) * share * period
+    rate, height = 4.0 * np.pi / period, -float(neutral[:, 2].mean())  # [rad/s], [m]
+    surge = table.surge * spec.parameters["gravity"] / height * stroke / np.pi / rate**2
     return Gait(
         legs=legs,
         footfall=footfall,
@@ -111,34 +114,14 @@ def gait_of(spec: RobotSpec) -> Gait:
         stride=stride,
         lift=lift,
         neutral=neutral,
-        ground=ground,
+        ground=Ground(table.slope_forward, table.slope_left),
         body=body_rotation(table),
         path=table.transfer_path,
-        surge=_surge(table, spec, footfall, twist, period, neutral),
+        surge=float(surge),
         margin=margin if sway == "least" else None,
         margin_stated=table.stability_margin is not None,
         source=str(spec.path),
     )
-
-
-def _surge(
-    table: GaitTable,
-    spec: RobotSpec,
-    footfall: Footfall,
-    twist: Array,
-    period: float,
-    neutral: Array,
-) -> float:
-    """Half the body's way ahead and back [m]; see `pipeline.motion.base_motion.surge`."""
-    if not table.surge:
-        return 0.0
-    duty = float(np.mean(list(footfall.duty.values())))
-    stroke, height = (
-        float(np.hypot(twist[0], twist[1])) * duty * period,
-        -float(neutral[:, 2].mean()),
-    )
-    rate = 4.0 * np.pi / period  # [rad/s]
-    return float(table.surge * spec.parameters["gravity"] / height * stroke / np.pi / rate**2)
 
 
 def lifts(table: GaitTable, spec: RobotSpec) -> Array:
@@ -149,8 +132,7 @@ def lifts(table: GaitTable, spec: RobotSpec) -> Array:
 def neutral_feet(table: GaitTable, spec: RobotSpec) -> Array:
     """Feet at mid-support from the base, axes along the ground [m], shape (L, 3)."""
     feet = np.array([leg.neutral_foot for leg in spec.legs], dtype=np.float64)
-    feet[:, 0] -= table.body_x
-    feet[:, 1] -= table.body_y
+    feet[:, :2] -= [table.body_x, table.body_y]
     if table.body_height is not None:
         feet[:, 2] = -table.body_height
     return feet
@@ -166,25 +148,23 @@ def body_rotation(table: GaitTable) -> Array:
 
 
 def _footfall(table: GaitTable, spec: RobotSpec) -> Footfall:
-    legs = tuple(leg.name for leg in spec.legs)
     duty = table.duty_factor
-    if isinstance(duty, dict) and table.phase is None:
+    if table.tripods is not None and not table.tripods:
+        raise GaitError("gait.tripods is empty: the robot has no gait; state one")
+    if table.phase is not None:
+        return own(table.phase, _shares(table, tuple(leg.name for leg in spec.legs)))
+    if isinstance(duty, dict):
         raise GaitError(
-            f"{spec.path}: gait.duty_factor by leg needs gait.phase by leg, too; a gait by name "
-            "has one duty factor"
+            "gait.duty_factor by leg needs gait.phase by leg, too; a gait by name has one duty "
+            "factor"
         )
-    common = duty if isinstance(duty, float) else None
-    sets = table.sets if table.sets is not None else table.tripods
-    if sets is not None:
-        name = "tripod" if table.tripods is not None else "sets in turn"
-        return in_turn(sets, common, name)
-    if table.phase is None:
-        return named(table.name or _USUAL.get(len(legs), "wave"), spec.legs, common)
-    shares = _shares(table, spec, legs)
-    return own(table.phase, shares)
+    sets = table.sets or table.tripods
+    if sets:
+        return in_turn(sets, duty, "tripod" if table.tripods else "sets in turn")
+    return named(table.name or _USUAL.get(len(spec.legs), "wave"), spec.legs, duty)
 
 
-def _shares(table: GaitTable, spec: RobotSpec, legs: tuple[str, ...]) -> dict[str, float]:
+def _shares(table: GaitTable, legs: tuple[str, ...]) -> dict[str, float]:
     """Duty factors of the user's own phases; strokes by leg give them where none is stated."""
     duty = table.duty_factor
     if isinstance(duty, dict):
@@ -193,20 +173,20 @@ def _shares(table: GaitTable, spec: RobotSpec, legs: tuple[str, ...]) -> dict[st
         return dict.fromkeys(legs, duty)
     if not isinstance(table.stroke, dict):
         raise GaitError(
-            f"{spec.path}: gait.duty_factor is missing: the share of the period for which a foot "
-            "stands, one number or a table by leg"
+            "gait.duty_factor is missing: the share of the period for which a foot stands, one "
+            "number or a table by leg"
         )
     if table.speed is None or table.period is None or table.yaw_rate:
         raise GaitError(
-            f"{spec.path}: gait.stroke by leg without gait.duty_factor needs gait.speed and "
-            "gait.period, straight ahead, from which the duty factors follow"
+            "gait.stroke by leg without gait.duty_factor needs gait.speed and gait.period, "
+            "straight ahead, from which the duty factors follow"
         )
     out = {leg: stroke / (table.speed * table.period) for leg, stroke in table.stroke.items()}
     for leg, share in out.items():
         if not 0 < share < 1:
             raise GaitError(
-                f"{spec.path}: gait.stroke of leg '{leg}' is {share:.3g} of the way that the body "
-                "goes in a period; expected above 0 and below 1"
+                f"gait.stroke of leg '{leg}' is {share:.3g} of the way that the body goes in a "
+                "period; expected above 0 and below 1"
             )
     return out
 
@@ -236,33 +216,27 @@ def _foot_speeds(twist: Array, neutral: Array) -> Array:
 
 
 def _numbers(
-    table: GaitTable, spec: RobotSpec, footfall: Footfall, neutral: Array
+    table: GaitTable, spec: RobotSpec, duty: Array, neutral: Array
 ) -> tuple[Array, Array, float]:
     """Twist, stride and period from what is stated of speed, period and stroke."""
-    legs = tuple(leg.name for leg in spec.legs)
-    duty = by_leg(footfall.duty, legs)
     ahead = np.array([np.cos(table.heading), np.sin(table.heading), 0.0])
     ahead[np.abs(ahead) < 1e-15] = 0.0  # straight is straight
     if table.yaw_rate is None and table.speed is None:
         return _from_stroke(table, spec, ahead, duty)
     twist = (table.speed or 0.0) * ahead + np.array([0.0, 0.0, table.yaw_rate or 0.0])
-    speeds = _foot_speeds(twist, neutral)
     if not twist.any():
         raise GaitError(
-            f"{spec.path}: gait.speed and gait.yaw_rate are both 0: the robot stands; state one, "
-            "or use `stand`"
+            "gait.speed and gait.yaw_rate are both 0: the robot stands; state one, or use `stand`"
         )
-    if table.period is None:
-        stroke = _largest(_of(table, spec, "stroke", "foot_stroke"))
-        period = stroke / float((speeds * duty).max())
+    ways = _foot_speeds(twist, neutral) * duty
+    period = table.period
+    if period is None:
+        stroke = _of(table, spec, "stroke", "foot_stroke")
+        period = float(np.max(list(stroke.values()) if isinstance(stroke, dict) else stroke))
+        period /= float(ways.max())
     else:
-        period = table.period
-        _refuse_other_strokes(table, spec, legs, speeds * duty * period)
+        _refuse_other_strokes(table, spec, ways * period)
     return twist, twist * period, period
-
-
-def _largest(stroke: float | dict[str, float]) -> float:
-    return max(stroke.values()) if isinstance(stroke, dict) else stroke
 
 
 def _from_stroke(
@@ -270,13 +244,10 @@ def _from_stroke(
 ) -> tuple[Array, Array, float]:
     """Stroke and period give the speed."""
     stroke = _of(table, spec, "stroke", "foot_stroke")
-    period = table.period
-    if period is None:
-        stated = _of(table, spec, "period", "gait_period")
-        assert isinstance(stated, float)
-        period = stated
+    period = _of(table, spec, "period", "gait_period")
+    assert isinstance(period, float)
+    largest = max(stroke.values()) if isinstance(stroke, dict) else stroke
     share = float(duty.max())
-    largest = _largest(stroke)
     speed = largest / (share * period)
     # The parameters are those of a foot that stands half the time; so are they held together.
     alone = table.stroke is None and table.period is None and np.all(duty == 0.5)
@@ -284,32 +255,29 @@ def _from_stroke(
         speed = spec.parameters["walking_speed"]
         if abs(speed * period * share - largest) > _AGREE * largest:
             raise GaitError(
-                f"{spec.path}: at {speed:.4g} m/s a foot on the ground moves "
-                f"{speed * period * share:.4g} m in half a period of {period:.4g} s, "
-                f"but foot_stroke is {largest:.4g} m; change one"
+                f"at {speed:.4g} m/s a foot on the ground moves {speed * period * share:.4g} m in "
+                f"half a period of {period:.4g} s, but foot_stroke is {largest:.4g} m; change one"
             )
     if isinstance(stroke, dict):
-        legs = tuple(leg.name for leg in spec.legs)
-        _refuse_other_strokes(table, spec, legs, speed * duty * period)
+        _refuse_other_strokes(table, spec, speed * duty * period)
     return speed * ahead, largest / share * ahead, period
 
 
-def _refuse_other_strokes(
-    table: GaitTable, spec: RobotSpec, legs: tuple[str, ...], follows: Array
-) -> None:
+def _refuse_other_strokes(table: GaitTable, spec: RobotSpec, follows: Array) -> None:
     """A stated stroke that speed, duty factor and period contradict."""
     if table.stroke is None:
         return
+    names = tuple(leg.name for leg in spec.legs)
     if isinstance(table.stroke, dict):
-        stated, found, names = by_leg(table.stroke, legs), follows, legs
+        stated, found = by_leg(table.stroke, names), follows
     else:
         stated, found = np.array([table.stroke]), np.array([follows.max()])
-        names = (legs[int(follows.argmax())],)
+        names = (names[int(follows.argmax())],)
     off = np.abs(found - stated) > _AGREE * stated
     if off.any():
         k = int(off.argmax())
         raise GaitError(
-            f"{spec.path}: at the stated speed, period and duty factor the foot of leg "
+            "at the stated speed, period and duty factor the foot of leg "
             f"'{one_line(names[k])}' moves {found[k]:.4g} m on the ground, but gait.stroke is "
             f"{stated[k]:.4g} m; change one or leave one out"
         )

@@ -95,17 +95,17 @@ def samples_last(q: Array) -> Array:
     return np.array(np.moveaxis(q, 0, -1), order="C")
 
 
-def _parted(chains: LegChains, coordinate: Array) -> tuple[Array, Array | None]:
-    """Angles of the joints that turn, displacements of those that slide, each (L, K, N).
+def _turned(chains: LegChains, coordinate: Array) -> tuple[Array, Array, Array | None]:
+    """Cosines and sines of joints that turn, displacements of those that slide, each (L, K, N).
 
     Overwrites the coordinates; None where no joint slides.
     """
-    if chains.turning_only:
-        return coordinate, None
-    slides = chains.slides.T[:, :, None]
-    shift = np.where(slides, coordinate, 0.0) if slides.any() else None
-    coordinate *= chains.real[:, :, None] & ~slides
-    return coordinate, shift
+    shift = None
+    if not chains.turning_only:
+        slides = chains.slides.T[:, :, None]
+        shift = np.where(slides, coordinate, 0.0) if slides.any() else None
+        coordinate *= chains.real[:, :, None] & ~slides
+    return np.cos(coordinate), np.sin(coordinate, out=coordinate), shift
 
 
 @dataclass(frozen=True)
@@ -145,16 +145,7 @@ class LegPosture:
 
 def leg_posture(chains: LegChains, q: Array) -> LegPosture:
     """Work out the legs at joint positions q [rad, m], shape (N, L, K)."""
-    return posture_at(chains, samples_last(q))
-
-
-def posture_at(chains: LegChains, angle: Array) -> LegPosture:
-    """Work out the legs at joint positions that are the caller's to give away.
-
-    `angle`: joint positions [rad, m], shape (L, K, N); overwritten.
-    """
-    angle, shift = _parted(chains, angle)
-    cos, sin = np.cos(angle), np.sin(angle, out=angle)
+    cos, sin, shift = _turned(chains, samples_last(q))
     arm: list[Array] = []
     r = chains.foot.T[:, :, None]
     for j in reversed(range(chains.depth)):
@@ -167,19 +158,15 @@ def posture_at(chains: LegChains, angle: Array) -> LegPosture:
 
 
 def foot_positions(chains: LegChains, q: Array) -> Array:
-    """Foot points in the base frame.
-
-    `q`: joint positions [rad, m], shape (N, L, K). Returns positions [m], shape (N, L, 3).
-    """
+    """Foot points in the base frame [m], (N, L, 3), at joint positions q [rad, m], (N, L, K)."""
     return leg_posture(chains, q).feet
 
 
 def foot_force_torques(chains: LegChains, q: Array, force: Array) -> Array:
-    """Joint torques J^T f that forces on the feet put into the joints.
+    """Joint torques J^T f that forces on all feet put into the joints, shape (N, L, K).
 
-    `q`: joint positions [rad, m], shape (N, L, K). `force`: force on each foot [N] in the base
-    frame, shape (N, L, 3). Returns torques [N*m], forces [N] where a joint slides, shape (N, L, K),
-    positive in the joints' positive directions.
+    `q`: joint positions [rad, m], shape (N, L, K). `force`: in the base frame [N], shape (N, L, 3).
+    See `LegPosture.force_torques`.
     """
     return leg_posture(chains, q).force_torques(force)
 
@@ -200,9 +187,8 @@ def swept(chains: LegChains, coordinate: Array, *, axes: bool = False) -> Swept:
 
     `coordinate`: joint positions [rad, m], shape (L, K, N); overwritten.
     """
-    angle, shift = _parted(chains, coordinate)
-    cos, sin = np.cos(angle), np.sin(angle, out=angle)
-    n_legs, depth, n = angle.shape
+    cos, sin, shift = _turned(chains, coordinate)
+    n_legs, depth, n = cos.shape
     # One array of vectors that every joint further in carries along: the foot, then from the
     # outermost joint inward each joint's column and, where asked for, its axis.
     step = 2 if axes else 1
@@ -226,10 +212,10 @@ def swept(chains: LegChains, coordinate: Array, *, axes: bool = False) -> Swept:
 
 
 def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
-    """Foot points and their Jacobians in the base frame.
+    """Foot points [m], (N, L, 3), and their Jacobians [m/rad, 1], (N, L, 3 xyz, K joints).
 
-    `q`: joint positions [rad, m], shape (N, L, K). Returns positions [m], shape (N, L, 3), and
-    Jacobians [m/rad, 1], shape (N, L, 3 xyz, K joints); a column is zero where a leg has no joint.
+    In the base frame, at joint positions `q` [rad, m], shape (N, L, K); a column is zero where a
+    leg has no joint.
     """
     legs = swept(chains, samples_last(q))
     return legs.tip.transpose(2, 1, 0), legs.columns.transpose(3, 2, 0, 1)
@@ -238,21 +224,12 @@ def foot_jacobians(chains: LegChains, q: Array) -> tuple[Array, Array]:
 def foot_jacobian_rates(chains: LegChains, q: Array, q_dot: Array) -> Array:
     """Time derivative of the foot Jacobians times the joint velocity.
 
-    `q`: joint positions [rad, m], shape (N, L, K). `q_dot`: joint velocities [rad/s, m/s], shape
-    (N, L, K). Returns the bias acceleration of the feet [m/s^2], shape (N, L, 3).
+    `q`: joint positions [rad, m], `q_dot`: velocities [rad/s, m/s], shape (N, L, K). Returns the
+    feet's acceleration while all joints keep their velocity [m/s^2], shape (N, L, 3).
     """
-    return bias_acceleration(chains, samples_last(q), samples_last(q_dot)).transpose(2, 1, 0)
-
-
-def bias_acceleration(chains: LegChains, coordinate: Array, rate: Array) -> Array:
-    """The feet's acceleration while all joints keep their velocity.
-
-    `coordinate`: joint positions [rad, m], shape (L, K, N); overwritten. `rate`: joint velocities
-    [rad/s, m/s], shape (L, K, N). Returns in the base frame [m/s^2], shape (3, L, N).
-    """
-    angle, shift = _parted(chains, coordinate)
-    cos, sin = np.cos(angle), np.sin(angle, out=angle)
-    n_legs, depth, n = angle.shape
+    rate = samples_last(q_dot)
+    cos, sin, shift = _turned(chains, samples_last(q))
+    n_legs, depth, n = cos.shape
     # Place, velocity and acceleration of the foot as seen from what the joint carries.
     seen = np.zeros((3, 3, n_legs, n))
     seen[:, 0] = chains.foot.T[:, :, None]
@@ -269,4 +246,4 @@ def bias_acceleration(chains: LegChains, coordinate: Array, rate: Array) -> Arra
             seen[:, 1] += own * np.where(slides, speed, 0.0)
         seen = _to_parent(chains, j, _turn(chains, j, seen, cos[:, j], sin[:, j]))
         seen[:, 0] += chains.offset[j].T[:, :, None]
-    return seen[:, 2]
+    return seen[:, 2].transpose(2, 1, 0)

@@ -11,8 +11,12 @@ which the leg plane swings fore and aft.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from xml.sax.saxutils import escape
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+
+from jinja2 import Environment, FileSystemLoader, Template
 
 from pipeline.errors import RobotFileError
 from pipeline.robot.robot_file import STATIONS, LegSpec, RobotSpec
@@ -20,57 +24,28 @@ from pipeline.robot.robot_file import STATIONS, LegSpec, RobotSpec
 FOOT_RADIUS = 0.012  # [m] visual only; the foot point is the sphere's centre
 #: Osmium's: no link is denser [kg/m^3].
 DENSEST = 22600.0
-_COLOURS = {
+_COLOURS: Final = {
     "trunk": "0.35 0.40 0.45 1",
     "drive": "0.20 0.20 0.22 1",
     "femur": "0.80 0.45 0.15 1",
     "tibia": "0.15 0.45 0.70 1",
     "foot": "0.10 0.10 0.10 1",
 }
-_ROBOT = """<?xml version="1.0"?>
-<robot name="{name}">
-  <!-- Built from {file} by `make urdf`; change that file, not this one. -->
-{parts}</robot>
-"""
-_VISUAL = """    <visual>
-{origin}      <geometry>
-        {shape}
-      </geometry>
-      <material name="{material}">
-        <color rgba="{colour}" />
-      </material>
-    </visual>
-"""
-_LINK = """  <link name="{name}">
-    <inertial>
-      <origin xyz="{com}" rpy="0 0 0" />
-      <mass value="{mass}" />
-      <inertia ixx="{ixx}" ixy="0" ixz="0" iyy="{iyy}" iyz="0" izz="{izz}" />
-    </inertial>
-{visual}  </link>
-"""
-_JOINT = """  <joint name="{name}" type="revolute">
-    <origin xyz="{origin}" rpy="0 0 0" />
-    <parent link="{parent}" />
-    <child link="{child}" />
-    <axis xyz="{axis}" />
-    <limit lower="{lower}" upper="{upper}" effort="{effort}" velocity="{velocity}" />
-  </joint>
-"""
-_FOOT = """  <joint name="{leg}_foot_joint" type="fixed">
-    <origin xyz="{origin}" rpy="0 0 0" />
-    <parent link="{parent}" />
-    <child link="{foot}" />
-  </joint>
-  <link name="{foot}">
-{visual}  </link>
-"""
+Point = tuple[float, float, float]
+
+
+@cache
+def _template() -> Template:
+    folder = FileSystemLoader(Path(__file__).parent)
+    environment = Environment(
+        loader=folder, autoescape=True, trim_blocks=True, keep_trailing_newline=True
+    )
+    environment.filters |= {"number": _number, "numbers": _numbers}
+    return environment.get_template("robot.urdf.jinja")
 
 
 def build_urdf(spec: RobotSpec) -> str:
-    """The URDF as text, the same for the same robot file.
-
-    `spec`: a robot file with ``build``.
+    """The URDF of a robot file with ``build``, as text, the same for the same file.
 
     Raises:
         RobotFileError: The masses of the legs leave nothing for the trunk, or a link would be
@@ -78,10 +53,25 @@ def build_urdf(spec: RobotSpec) -> str:
     """
     p = spec.parameters
     width = 2 * (p["joint_2_lateral"] - p["coxa_length"]) + p["link_width"]
-    size, com = (p["body_length"], width, p["trunk_height"]), (0, p["trunk_com_left"], 0)
-    trunk = _box(spec.base_link, trunk_mass(spec), size, (0, 0, 0), com, "trunk")
-    parts = [trunk, *(part for leg in spec.legs for part in _leg(spec, leg))]
-    return _ROBOT.format(name=_name(spec.name), file=spec.path.name, parts="".join(parts))
+    size, com = (p["body_length"], width, p["trunk_height"]), (0.0, p["trunk_com_left"], 0.0)
+    return _template().render(
+        name=spec.name,
+        file=spec.path.name,
+        colours=_COLOURS,
+        foot_radius=FOOT_RADIUS,
+        effort=p["joint_effort_limit"],
+        velocity=p["joint_velocity_limit"],
+        trunk=_box(spec.base_link, "trunk", trunk_mass(spec), size, (0.0, 0.0, 0.0), com),
+        legs=[
+            {
+                "name": leg.name,
+                "foot": leg.foot,
+                "foot_place": (0.0, 0.0, -p["tibia_length"]),
+                "joints": list(_joints(spec, leg)),
+            }
+            for leg in spec.legs
+        ],
+    )
 
 
 def leg_mass(spec: RobotSpec) -> float:
@@ -105,69 +95,49 @@ def trunk_mass(spec: RobotSpec) -> float:
     return mass
 
 
-def _leg(spec: RobotSpec, leg: LegSpec) -> list[str]:
-    """Hip, femur and tibia, each on its joint, and the foot."""
+def _joints(spec: RobotSpec, leg: LegSpec) -> Iterator[dict[str, Any]]:
+    """The joints of hip, femur and tibia, each with the link that it carries."""
     p = spec.parameters
     out = 1.0 if leg.side == "left" else -1.0  # y of "outward"
     angle, width, coxa = p["joint_1_axis_angle"], p["link_width"], p["coxa_length"]
-    femur, tibia, hip = p["femur_length"], p["tibia_length"], (0, out * p["coxa_length"] / 2, 0)
+    femur, tibia = p["femur_length"], p["tibia_length"]
     # An axis is a pseudo-vector: mirrored in the x-z plane, its x and z components change sign.
     axis_1, raising = (0.0, -math.sin(angle), -out * math.cos(angle)), (out, 0.0, 0.0)
     shoulder = (STATIONS[leg.station] * p["hip_spacing"], out * (p["joint_2_lateral"] - coxa), 0.0)
-    names = [spec.base_link, *(f"{leg.name}_{part}_link" for part in ("hip", "femur", "tibia"))]
-    limits = [
+    hip, knee = (0.0, out * coxa, 0.0), (0.0, out * femur, 0.0)
+    thick = (width, coxa + width, width), (width, femur, width), (width / 2, width / 2, tibia)
+    centres = (0.0, out * coxa / 2, 0.0), (0.0, out * femur / 2, 0.0), (0.0, 0.0, -tibia / 2)
+    coms = (
+        centres[0],
+        (0.0, out * femur * p["femur_com"], 0.0),
+        (0.0, 0.0, -tibia * p["tibia_com"]),
+    )
+    masses = p["hip_link_mass"], p["femur_mass"], p["tibia_mass"]
+    limits = (
         (-p["joint_1_range"], p["joint_1_range"]),
         (p["joint_2_lower"], p["joint_2_upper"]),
         (p["joint_3_lower"], p["joint_3_upper"]),
-    ]
-    origins = (shoulder, (0, out * coxa, 0), (0, out * femur, 0))
-    boxes = [
-        _box(names[1], p["hip_link_mass"], (width, coxa + width, width), hip, hip, "drive"),
-        _box(
-            *(names[2], p["femur_mass"], (width, femur, width)),
-            *((0, out * femur / 2, 0), (0, out * femur * p["femur_com"], 0), "femur"),
-        ),
-        _box(
-            *(names[3], p["tibia_mass"], (width / 2, width / 2, tibia)),
-            *((0, 0, -tibia / 2), (0, 0, -tibia * p["tibia_com"]), "tibia"),
-        ),
-    ]
-    parts = []
-    for k, axis in enumerate((axis_1, raising, raising)):
-        joint = _JOINT.format(
-            name=_name(leg.joints[k]),
-            origin=_numbers(origins[k]),
-            parent=_name(names[k]),
-            child=_name(names[k + 1]),
-            axis=_numbers(axis),
-            lower=_number(limits[k][0]),
-            upper=_number(limits[k][1]),
-            effort=_number(p["joint_effort_limit"]),
-            velocity=_number(p["joint_velocity_limit"]),
-        )
-        parts += [joint, boxes[k]]
-    foot = _FOOT.format(
-        leg=_name(leg.name),
-        origin=_numbers((0, 0, -tibia)),
-        parent=_name(names[3]),
-        foot=_name(leg.foot),
-        visual=_visual(f'<sphere radius="{_number(FOOT_RADIUS)}" />', "foot"),
     )
-    return [*parts, foot]
+    parent = spec.base_link
+    for k, (link, part) in enumerate((("hip", "drive"), ("femur", "femur"), ("tibia", "tibia"))):
+        child = _box(f"{leg.name}_{link}_link", part, masses[k], thick[k], centres[k], coms[k])
+        yield {
+            "name": leg.joints[k],
+            "origin": (shoulder, hip, knee)[k],
+            "parent": parent,
+            "child": child,
+            "axis": (axis_1, raising, raising)[k],
+            "limits": limits[k],
+        }
+        parent = child["name"]
 
 
 def _box(
-    name: str,
-    mass: float,
-    size: Sequence[float],
-    centre: Sequence[float],
-    com: Sequence[float],
-    material: str,
-) -> str:
-    """A link that is a solid cuboid; its rotational inertia is the solid's about the com.
+    name: str, part: str, mass: float, size: Point, centre: Point, com: Point
+) -> dict[str, Any]:
+    """A link of some kg that is a solid cuboid, lengths in its frame [m].
 
-    `mass`: [kg]. `size`: edge lengths along the link's axes [m]. `centre`: of the solid in the
-    link's frame [m]. `com`: centre of mass in the link's frame [m].
+    Its rotational inertia is the solid's about the centre of mass `com`.
     """
     volume = math.prod(size)
     if mass > DENSEST * volume:
@@ -176,27 +146,16 @@ def _box(
             "metal; masses in kg, lengths in the unit stated?"
         )
     (x, y, z), m = size, mass / 12
-    return _LINK.format(
-        name=_name(name),
-        com=_numbers(com),
-        mass=_number(mass),
-        ixx=_number(m * (y * y + z * z)),
-        iyy=_number(m * (x * x + z * z)),
-        izz=_number(m * (x * x + y * y)),
-        visual=_visual(
-            f'<box size="{_numbers(size)}" />',
-            material,
-            f'      <origin xyz="{_numbers(centre)}" rpy="0 0 0" />\n',
-        ),
-    )
-
-
-def _visual(shape: str, material: str, origin: str = "") -> str:
-    return _VISUAL.format(origin=origin, shape=shape, material=material, colour=_COLOURS[material])
-
-
-def _name(text: str) -> str:
-    return escape(text, {'"': "&quot;"})
+    moments = (m * (y * y + z * z), m * (x * x + z * z), m * (x * x + y * y))
+    return {
+        "name": name,
+        "part": part,
+        "mass": mass,
+        "size": size,
+        "centre": centre,
+        "com": com,
+        "moments": moments,
+    }
 
 
 def _number(value: float) -> str:
