@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -65,47 +64,43 @@ def guess_robot(
     root = next(str(f.name) for f in model.frames if f.type == pin.FrameType.BODY)
     _refuse_base(model, root, base, where)
     pose_name, pose = standing_pose(source) or ("", {})
+    names = [str(name) for name in list(model.names)[2:]]
+    index = {name: int(model.joints[model.getJointId(name)].idx_q) for name in names}
     q = pin.neutral(model)
-    for joint, value in pose.items():
-        if model.existJointName(joint):
-            q[model.joints[model.getJointId(joint)].idx_q] = value
+    for joint in index.keys() & pose.keys():
+        q[index[joint]] = pose[joint]
     limbs = find_limbs(model, q, feet, where)
     refused(check_urdf(source.text, where), where, where)
-    mass = float(sum(inertia.mass for inertia in model.inertias))
+    limits = model.lowerPositionLimit, model.upperPositionLimit
     of_legs = [joint for limb in limbs for joint in limb.joints]
-    others = [str(name) for name in list(model.names)[2:] if str(name) not in of_legs]
-    held = tuple((joint, *_held(model, joint, pose, pose_name)) for joint in others)
+    others = [name for name in names if name not in of_legs]
+    bounds = {name: (float(limits[0][at]), float(limits[1][at])) for name, at in index.items()}
+    held = tuple((joint, *_held(bounds[joint], joint, pose, pose_name)) for joint in others)
     joints = [*of_legs, *others]
-    columns = np.array([model.joints[model.getJointId(j)].idx_q for j in joints], dtype=np.intp)
     layout = leg_columns(joints, [limb.joints for limb in limbs])
     chains = leg_chains(model, [(limb.name, limb.joints, limb.foot) for limb in limbs], 1)
-    _refuse_stuck(model, of_legs, where)
-    known = np.array([[pose.get(joint, 0.0) for joint in joints]])
-    refuse_turned(root, limbs, chains, layout.by_leg(known)[0], where)
-    position = np.array([*[0.0] * len(of_legs), *[value for _, value, _ in held]])
-    standing = Standing(model, chains, layout, columns, position, margin, where)
-    stance = None
-    if pose and all(joint in pose for joint in of_legs):
-        posture = layout.by_leg(known)[0]
-        stance = standing.of_pose(posture, f"pose '{pose_name}' of {_name(source.srdf)}")
-    if stance is not None:
-        pace = find_pace(chains, stance, standing.limits)
-    else:
-        stance, pace = _searched(standing)
-    motors = known_motors(names_of(source.name, source.text), of_legs)
-    return Guess(source, root, limbs, held, stance, pace, mass, motors)
-
-
-def _refuse_stuck(model: pin.Model, joints: Sequence[str], where: str) -> None:
-    """A leg's joint without a range."""
-    at = [model.joints[model.getJointId(joint)].idx_q for joint in joints]
-    low, high = model.lowerPositionLimit[at], model.upperPositionLimit[at]
-    stuck = [f"'{joint}'" for joint, a, b in zip(joints, low, high, strict=True) if a == b]
+    stuck = [f"'{joint}'" for joint in of_legs if bounds[joint][0] == bounds[joint][1]]
     if stuck:
         raise RobotFileError(
             f"{where}: limits of {', '.join(stuck)}: lower equals upper, so that the leg cannot "
             "move there; write their range in the URDF, or make them continuous"
         )
+    posture = layout.by_leg(np.array([[pose.get(joint, 0.0) for joint in joints]]))[0]
+    refuse_turned(root, limbs, chains, posture, where)
+    columns = np.array([index[joint] for joint in joints], dtype=np.intp)
+    position = np.array([*[0.0] * len(of_legs), *[value for _, value, _ in held]])
+    standing = Standing(model, chains, layout, columns, position, margin, where)
+    stance = None
+    if pose and all(joint in pose for joint in of_legs):
+        srdf = source.srdf.name if source.srdf else ""
+        stance = standing.of_pose(posture, f"pose '{pose_name}' of {srdf}")
+    if stance is not None:
+        pace = find_pace(chains, stance, standing.limits)
+    else:
+        stance, pace = _searched(standing)
+    motors = known_motors(names_of(source.name, source.text), of_legs)
+    mass = float(sum(inertia.mass for inertia in model.inertias))
+    return Guess(source, root, limbs, held, stance, pace, mass, motors)
 
 
 def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
@@ -128,10 +123,6 @@ def _searched(standing: Standing) -> tuple[Stance, Pace | None]:
     return best[1], best[2]
 
 
-def _name(path: Path | None) -> str:
-    return path.name if path else ""
-
-
 def _refuse_base(model: pin.Model, root: str, base: str | None, where: str) -> None:
     if base is None or base == root:
         return
@@ -148,11 +139,10 @@ def _refuse_base(model: pin.Model, root: str, base: str | None, where: str) -> N
 
 
 def _held(
-    model: pin.Model, joint: str, pose: dict[str, float], pose_name: str
+    limits: tuple[float, float], joint: str, pose: dict[str, float], pose_name: str
 ) -> tuple[float, str]:
     """Where a joint outside the legs is held, and why."""
-    at = model.joints[model.getJointId(joint)].idx_q
-    low, high = float(model.lowerPositionLimit[at]), float(model.upperPositionLimit[at])
+    low, high = limits
     if joint in pose and low <= pose[joint] <= high:
         return round(pose[joint], 6), f"the pose '{pose_name}'"
     if low <= 0 <= high or low >= high:

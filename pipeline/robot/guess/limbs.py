@@ -52,29 +52,32 @@ def find_limbs(
     data = model.createData()
     pin.framesForwardKinematics(model, data, configuration)
     if feet:
-        chosen = [_named(model, foot, where) for foot in feet]
-        reason = "named by --foot"
+        chosen, reason = [_named(model, foot, where) for foot in feet], "named by --foot"
     else:
         chosen, reason = _looked_for(model, data, where)
-    paths = [_path(model, model.frames[k].parentJoint) for k in chosen]
-    _refuse(model, chosen, paths, where)
-    joints = [tuple(str(model.names[j]) for j in path) for path in paths]
-    frames = [str(model.frames[k].name) for k in chosen]
-    places = np.array([data.oMf[k].translation for k in chosen])
-    names = _leg_names(joints, places)
+    _refuse(model, chosen, where)
+    joints = [tuple(str(model.names[j]) for j in _path(model, k)) for k in chosen]
+    names = _leg_names(joints, np.array([data.oMf[k].translation for k in chosen]))
     return tuple(
-        Limb(name, own, frame, reason)
-        for name, own, frame in zip(names, joints, frames, strict=True)
+        Limb(name, own, str(model.frames[k].name), reason)
+        for name, own, k in zip(names, joints, chosen, strict=True)
     )
 
 
 def _bodies(model: pin.Model) -> list[int]:
     """Frames of links that joints move."""
-    return [
-        k
-        for k, frame in enumerate(model.frames)
-        if frame.type == pin.FrameType.BODY and frame.parentJoint > _ROOT
-    ]
+    frames = enumerate(model.frames)
+    return [k for k, f in frames if f.type == pin.FrameType.BODY and f.parentJoint > _ROOT]
+
+
+def _path(model: pin.Model, frame: int) -> list[int]:
+    """Joints from the base to a frame."""
+    return [int(j) for j in model.supports[model.frames[frame].parentJoint] if j > _ROOT]
+
+
+def _out(model: pin.Model, frame: int) -> float:
+    """From the frame's joint [m]."""
+    return float(np.linalg.norm(model.frames[frame].placement.translation))
 
 
 def _named(model: pin.Model, foot: str, where: str) -> int:
@@ -103,7 +106,7 @@ def _looked_for(model: pin.Model, data: pin.Data, where: str) -> tuple[list[int]
     low = min(height.values())
     levels = [*height.values(), *(float(place.translation[2]) for place in data.oMi[_ROOT:])]
     lowest = [k for k in ends if height[k] <= low + _LOW * max(np.ptp(levels), 1e-9)]
-    bare = [k for k in lowest if np.linalg.norm(model.frames[k].placement.translation) < 1e-6]
+    bare = [k for k in lowest if _out(model, k) < 1e-6]
     if len(lowest) >= _FEWEST and bare:
         end = model.frames[bare[0]].name
         raise RobotFileError(
@@ -120,21 +123,10 @@ def _outermost(model: pin.Model, frames: list[int]) -> list[int]:
     best: dict[int, int] = {}
     for k in frames:
         joint = model.frames[k].parentJoint
-        out = float(np.linalg.norm(model.frames[k].placement.translation))
-        kept = best.get(joint)
-        if kept is None or out > np.linalg.norm(model.frames[kept].placement.translation) + 1e-9:
+        if joint not in best or _out(model, k) > _out(model, best[joint]) + 1e-9:
             best[joint] = k
-    above = {j for joint in best for j in _path(model, joint)[:-1]}
+    above = {j for k in best.values() for j in _path(model, k)[:-1]}
     return [k for joint, k in best.items() if joint not in above]
-
-
-def _path(model: pin.Model, joint: int) -> list[int]:
-    """Joints from the base to one, itself included."""
-    path: list[int] = []
-    while joint > _ROOT:
-        path.insert(0, int(joint))
-        joint = model.parents[joint]
-    return path
 
 
 def _some(model: pin.Model, frames: Sequence[int]) -> str:
@@ -152,16 +144,14 @@ def _shared(model: pin.Model, chosen: Sequence[int]) -> tuple[int, int, int] | N
     """Two feet that hang on one joint, and that joint; None where every leg has its own."""
     owner: dict[int, int] = {}
     for k in chosen:
-        for joint in _path(model, model.frames[k].parentJoint):
+        for joint in _path(model, k):
             if joint in owner:
                 return owner[joint], k, joint
             owner[joint] = k
     return None
 
 
-def _refuse(
-    model: pin.Model, chosen: Sequence[int], paths: Sequence[list[int]], where: str
-) -> None:
+def _refuse(model: pin.Model, chosen: Sequence[int], where: str) -> None:
     """Too few feet, two on one leg, or legs that are too long."""
     if len(chosen) < _FEWEST:
         found = f" ({_some(model, chosen)})" if chosen else ""
@@ -178,10 +168,10 @@ def _refuse(
             f"{where}: feet '{one}' and '{other}' both hang on joint '{model.names[shared[2]]}'; a "
             "leg has one foot and joints of its own: name the feet with --foot, one for each leg"
         )
-    for k, path in zip(chosen, paths, strict=True):
-        if len(path) > MOST_JOINTS:
+    for k in chosen:
+        if (count := len(_path(model, k))) > MOST_JOINTS:
             raise RobotFileError(
-                f"{where}: {len(path)} joints lead to foot '{model.frames[k].name}'; a leg has at "
+                f"{where}: {count} joints lead to foot '{model.frames[k].name}'; a leg has at "
                 f"most {MOST_JOINTS}: name a frame further in with --foot"
             )
 
@@ -196,10 +186,9 @@ def _leg_names(joints: Sequence[tuple[str, ...]], places: Array) -> list[str]:
     plain = all(re.fullmatch(r"\w+", name, re.ASCII) for name in names)
     if plain and len({name.lower() for name in names}) == len(names):
         return names
-    order = np.argsort(-places[:, 0], kind="stable")
     out = [""] * len(names)
-    for side, sign in (("left", 1), ("right", -1)):
-        own = [k for k in order if (places[k, 1] >= 0) == (sign > 0)]
-        for number, k in enumerate(own, start=1):
+    for side, own in (("left", places[:, 1] >= 0), ("right", places[:, 1] < 0)):
+        legs = np.flatnonzero(own)
+        for number, k in enumerate(legs[np.argsort(-places[legs, 0], kind="stable")], start=1):
             out[k] = f"{side}_{number}"
     return out

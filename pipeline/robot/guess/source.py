@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 import os
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
 from pathlib import Path
 
-from actuators.errors import one_line
 from pipeline.errors import RobotFileError
 from pipeline.robot.published import SCHEME, named_robot
-from pipeline.robot.urdf_source import read_urdf
+from pipeline.robot.urdf_source import number, read_urdf
 
 #: Poses of an SRDF that are meant to stand, those before others.
 STANDING_POSES = ("standing", "stand", "half_sitting", "home", "default")
@@ -62,36 +60,23 @@ def standing_pose(source: Source) -> tuple[str, dict[str, float]] | None:
 
     Raises:
         RobotFileError: The SRDF is malformed.
+        UrdfError: A position is no number.
     """
     if source.srdf is None:
         return None
     try:
         root = ET.fromstring(source.srdf.read_bytes())
     except ET.ParseError as error:
-        line, _ = error.position
         raise RobotFileError(
-            f"{source.srdf}: line {line}: malformed XML; correct it, or move it away and the "
-            "stance is sought"
+            f"{source.srdf}: line {error.position[0]}: malformed XML; correct it, or move it away "
+            "and the stance is sought"
         ) from None
     poses: dict[str, dict[str, float]] = {}
     for state in root.findall("group_state"):
-        values = {}
+        own = poses.setdefault(state.get("name", ""), {})
         for joint in state.findall("joint"):
-            words = joint.get("value", "").split()
-            if len(words) == 1:  # a floating base has seven
-                values[joint.get("name", "")] = _number(words[0], source.srdf)
-        poses.setdefault(state.get("name", ""), {}).update(values)
-    for name in (source.pose, *STANDING_POSES):
-        if poses.get(name):
-            return name, poses[name]
-    return None
-
-
-def _number(word: str, where: Path) -> float:
-    try:
-        number = float(word)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise RobotFileError(f"{where}: joint value '{one_line(word)}', expected a finite number")
-    return number
+            if len(joint.get("value", "").split()) == 1:  # a floating base has seven
+                own[joint.get("name", "")] = number(joint, "value", str(source.srdf))
+    return next(
+        ((name, poses[name]) for name in (source.pose, *STANDING_POSES) if poses.get(name)), None
+    )

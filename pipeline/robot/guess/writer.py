@@ -31,6 +31,7 @@ def robot_text(guess: Guess, out: Path) -> str:
         'base = "floating"',
     ]
     stance = guess.stance
+    levelled = f", feet levelled by up to {1e3 * stance.levelled:.2g} mm"
     for limb, foot, posture in zip(guess.limbs, stance.feet, stance.posture, strict=True):
         key = f"legs.{_key(limb.name)}"
         lines += [
@@ -42,37 +43,26 @@ def robot_text(guess: Guess, out: Path) -> str:
             f"neutral_foot = {_numbers(foot)}",
             f"start_posture = {_numbers(posture[: len(limb.joints)])}",
         ]
-        assumed[f"{key}.joints"] = "the chain of joints from the base to the foot"
-        assumed[f"{key}.foot"] = limb.reason
-        assumed[f"{key}.side"] = "the side of the foot in the stance"
-        levelled = f", feet levelled by up to {1e3 * stance.levelled:.2g} mm"
-        assumed[f"{key}.neutral_foot"] = stance.reason + (
-            levelled if stance.levelled >= 0.5 * 10**-_PLACES else ""
-        )
-        assumed[f"{key}.start_posture"] = "the same"
+        assumed |= {
+            f"{key}.joints": "the chain of joints from the base to the foot",
+            f"{key}.foot": limb.reason,
+            f"{key}.side": "the side of the foot in the stance",
+            f"{key}.neutral_foot": stance.reason
+            + (levelled if stance.levelled >= 0.5 * 10**-_PLACES else ""),
+            f"{key}.start_posture": "the same",
+        }
     if guess.held:
         lines += ["", "[held]  # [rad, m]"]
-        for joint, value, reason in guess.held:
-            lines.append(f"{_key(joint)} = {value!r}")
-            assumed[f"held.{_key(joint)}"] = reason
-    lines += _gait(guess)
-    lines += ["", "[assumed]"]
+        lines += [f"{_key(joint)} = {value!r}" for joint, value, _ in guess.held]
+        assumed |= {f"held.{_key(joint)}": reason for joint, _, reason in guess.held}
+    # The slowest of the usual gaits for so many legs; six walk in two tripods.
+    gait = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
+    lines += ["", "[gait]", f'name = "{gait}"', 'transfer_path = "harmonic"', "", "[assumed]"]
     lines += [f"{_text(key)} = {_text(reason)}" for key, reason in assumed.items()]
-    lines += _parameters(guess)
-    text = "\n".join(lines) + "\n"
-    return text + _motors(guess) if guess.motors else text
-
-
-def _motors(guess: Guess) -> str:
-    """The joints' actuators, as the project knows them."""
-    assert guess.motors is not None
-    return "\n" + tomlkit.dumps({"actuators": dict(guess.motors.table)})
-
-
-def _gait(guess: Guess) -> list[str]:
-    """The slowest of the usual gaits for so many legs; six walk in two tripods."""
-    name = {4: "crawl", 6: "tripod"}.get(len(guess.limbs), "wave")
-    return ["", "[gait]", f'name = "{name}"', 'transfer_path = "harmonic"']
+    text = "\n".join([*lines, *_parameters(guess)]) + "\n"
+    if guess.motors:
+        text += "\n" + tomlkit.dumps({"actuators": dict(guess.motors.table)})
+    return text
 
 
 def _parameters(guess: Guess) -> list[str]:
@@ -82,15 +72,13 @@ def _parameters(guess: Guess) -> list[str]:
         if guess.pace
         else "no stroke was found within reach and limits: change the stance"
     )
-    lines = _parameter(
-        "total_mass", float(f"{guess.mass:.6g}"), "kg", "derived", "the sum of the URDF's links"
-    )
-    numbers = {
-        "foot_stroke": (1e3 * pace.stroke, "mm", why),
-        "foot_lift": (1e3 * pace.lift, "mm", "a share of the stroke"),
-        "gait_period": (pace.period, "s", "slow; goes with the root of the hips' height"),
-    }
-    for name, (value, unit, reason) in numbers.items():
+    mass = float(f"{guess.mass:.6g}")
+    lines = _parameter("total_mass", mass, "kg", "derived", "the sum of the URDF's links")
+    for name, value, unit, reason in (
+        ("foot_stroke", 1e3 * pace.stroke, "mm", why),
+        ("foot_lift", 1e3 * pace.lift, "mm", "a share of the stroke"),
+        ("gait_period", pace.period, "s", "slow; goes with the root of the hips' height"),
+    ):
         number = float(f"{value:.9g}")
         lines += _parameter(name, number, unit, "assumed", "python -m pipeline init")
         low, high = (float(f"{factor * number:.6g}") for factor in (0.5, 2.0))
@@ -99,14 +87,8 @@ def _parameters(guess: Guess) -> list[str]:
 
 
 def _parameter(name: str, value: float, unit: str, basis: str, source: str) -> list[str]:
-    return [
-        "",
-        f"[parameters.{name}]",
-        f"value = {value!r}",
-        f'unit = "{unit}"',
-        f'basis = "{basis}"',
-        f"source = {_text(source)}",
-    ]
+    head = ["", f"[parameters.{name}]", f"value = {value!r}", f'unit = "{unit}"']
+    return [*head, f'basis = "{basis}"', f"source = {_text(source)}"]
 
 
 def _numbers(values: Array) -> str:
