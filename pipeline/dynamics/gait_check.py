@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipeline.dynamics.joint_demand import motion_demand
-from pipeline.dynamics.stability import stability_margins
 from pipeline.errors import PipelineError
 from pipeline.motion.gait import gait_of
+from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.check import check_file
 from pipeline.robot.robot import Robot, load_robot

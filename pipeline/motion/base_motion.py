@@ -14,16 +14,6 @@ from pipeline.motion.ground import Ground
 from pipeline.motion.motion import Segment
 
 
-@dataclass(frozen=True)
-class BaseMotion:
-    """The base as Pinocchio's free flyer wants it."""
-
-    position: Array  #: In the world [m], shape (N, 3).
-    quaternion: Array  #: From the base to the world, x y z w, shape (N, 4).
-    velocity: Array  #: Linear and angular in the base's axes [m/s, rad/s], shape (N, 6).
-    acceleration: Array  #: Time derivative of those components, shape (N, 6).
-
-
 def surge(gait: Gait, share: Array) -> Course:
     """The body's way ahead of its even course and back, twice a period, shape (N, 3).
 
@@ -46,11 +36,13 @@ def surge(gait: Gait, share: Array) -> Course:
     )
 
 
-def base_motion(gait: Gait, time: Array, shift: Course | None) -> BaseMotion:
-    """The base over a stretch of time.
+def base_motion(gait: Gait, time: Array, shift: Course | None) -> tuple[Array, Array, Array]:
+    """The base over a stretch of time (N,) [s], as Pinocchio's free flyer wants it.
 
-    `gait`: the gait; at t = 0 the unswayed base is at the origin and looks along x. `time`: shape
-    (N,) [s]. `shift`: sway in the axes of the unswayed body, shape (N, 3).
+    `gait`: at t = 0 the unswayed base is at the origin and looks along x. `shift`: sway in the axes
+    of the unswayed body, shape (N, 3). Returns place in the world and quaternion x y z w, (N, 7),
+    linear and angular velocity in the base's axes [m/s, rad/s] and these components' derivative,
+    each (N, 6).
     """
     n = time.size
     gone, angle = displaced(gait.twist, time)
@@ -66,9 +58,8 @@ def base_motion(gait: Gait, time: Array, shift: Course | None) -> BaseMotion:
     velocity[:, :3], velocity[:, 3:] = linear @ gait.body, spin @ gait.body
     acceleration[:, :3] = rate @ gait.body
     position = place if gait.ground.level else place @ gait.ground.rotation.T
-    return BaseMotion(
-        position, base_quaternions(gait.ground, gait.body, angle), velocity, acceleration
-    )
+    quaternion = base_quaternions(gait.ground, gait.body, angle)
+    return np.hstack([position, quaternion]), velocity, acceleration
 
 
 def base_quaternions(ground: Ground, body: Array, heading: Array) -> Array:

@@ -47,13 +47,11 @@ def standing_posture(robot: Robot, feet: tuple[str, ...] | None = None) -> Segme
     q = solve_positions(robot.chains, in_base, start, time)
     refuse_beyond_limits(robot, robot.joint_positions(q), time)
     still = robot.tangent(np.zeros((1, len(robot.joints))))
-    configuration = robot.configuration(robot.joint_positions(q), np.zeros((1, 3)))
-    if robot.floating:
-        configuration[:, 3:7] = base_quaternions(ground, body, time)
+    base = np.hstack([np.zeros((1, 3)), base_quaternions(ground, body, time)])
     return Segment(
         name="standing on " + ", ".join(stance),
         time=time,
-        configuration=configuration,
+        configuration=robot.configuration(robot.joint_positions(q), base),
         velocity=still,
         acceleration=still,
         stance=stance,

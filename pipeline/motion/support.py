@@ -83,6 +83,16 @@ def support_margin(feet: Array, point: Array) -> Array:
     return margin
 
 
+def stability_margins(robot: Robot, segment: Segment) -> Array:
+    """Margin of static stability of a robot with a floating base along a segment.
+
+    The distance of the centre of mass's vertical projection from the nearest edge of the support
+    polygon [m], shape (N,); negative outside.
+    """
+    feet, centre = stance_and_centre(robot, segment)
+    return support_margin(feet, centre[:, :2])
+
+
 def longitudinal_margin(feet: Array, point: Array) -> Array:
     """Distance from a point to the support's edge straight ahead or straight behind.
 

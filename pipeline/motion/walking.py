@@ -102,19 +102,13 @@ def _segment(
     q_dot, q_ddot = solve_rates(
         robot.chains, q, feet.velocity, feet.acceleration, time, feet.position
     )
-    base = base_motion(gait, time, shift)
-    configuration = robot.configuration(robot.joint_positions(q), base.position)
-    configuration[:, 3:7] = base.quaternion
-    velocity = robot.tangent(robot.joint_rates(q_dot), base.velocity[:, :3])
-    acceleration = robot.tangent(robot.joint_rates(q_ddot), base.acceleration[:, :3])
-    velocity[:, 3:6] = base.velocity[:, 3:]
-    acceleration[:, 3:6] = base.acceleration[:, 3:]
+    place, rate, faster = base_motion(gait, time, shift)
     return Segment(
         name="support of " + ", ".join(stance),
         time=time,
-        configuration=configuration,
-        velocity=velocity,
-        acceleration=acceleration,
+        configuration=robot.configuration(robot.joint_positions(q), place),
+        velocity=robot.tangent(robot.joint_rates(q_dot), rate),
+        acceleration=robot.tangent(robot.joint_rates(q_ddot), faster),
         stance=stance,
         ground_normal=gait.ground.normal,
         foot_target=feet.position,

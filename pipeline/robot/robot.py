@@ -142,29 +142,28 @@ class Robot:
 
         return np.asarray(Rotation.from_quat(quaternion).as_matrix())
 
-    def configuration(self, joint_positions: Array, base_position: Array | None = None) -> Array:
-        """Assemble Pinocchio configurations.
+    def configuration(self, joint_positions: Array, base: Array | None = None) -> Array:
+        """Pinocchio configurations, shape (N, nq).
 
-        `joint_positions`: in the order of `joints` [rad], shape (N, J). `base_position`: of a
-        floating base that stays upright [m], shape (N, 3). Returns shape (N, nq).
+        `joint_positions`: in the order of `joints` [rad, m], shape (N, J). `base`: of a floating
+        one its place, shape (N, 3) [m], or place and quaternion x y z w, shape (N, 7).
         """
-        n = joint_positions.shape[0]
-        q = np.tile(pin.neutral(self.model), (n, 1))
+        q = np.tile(pin.neutral(self.model), (len(joint_positions), 1))
         q[:, self.position_index] = joint_positions
-        if self.floating and base_position is not None:
-            q[:, :3] = base_position
+        if self.floating and base is not None:
+            q[:, : base.shape[1]] = base
         return q
 
-    def tangent(self, joint_values: Array, base_linear: Array | None = None) -> Array:
-        """Assemble Pinocchio velocities or accelerations.
+    def tangent(self, joint_values: Array, base: Array | None = None) -> Array:
+        """Pinocchio velocities or accelerations, shape (N, nv).
 
-        `joint_values`: in the order of `joints`, shape (N, J). `base_linear`: linear part of a
-        floating base in its own frame, shape (N, 3). Returns shape (N, nv).
+        `joint_values`: in the order of `joints`, shape (N, J). `base`: of a floating one its linear
+        part in its own frame, shape (N, 3), or linear and angular part, shape (N, 6).
         """
-        v = np.zeros((joint_values.shape[0], self.model.nv))
+        v = np.zeros((len(joint_values), self.model.nv))
         v[:, self.velocity_index] = joint_values
-        if self.floating and base_linear is not None:
-            v[:, :3] = base_linear
+        if self.floating and base is not None:
+            v[:, : base.shape[1]] = base
         return v
 
     def pool(self, threads: int) -> pin.ModelPool:

@@ -16,10 +16,10 @@ from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, PAPER, GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
-from pipeline.dynamics.stability import stability_margins
 from pipeline.machine.drivetrains import Actuators
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
 from pipeline.robot.robot import Robot
 from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES, ForceChoice

@@ -14,11 +14,11 @@ from scipy.optimize import minimize
 from pipeline.dynamics.contact_forces import ContactForces, least_tangential_forces
 from pipeline.dynamics.force_rules import GroundForces
 from pipeline.dynamics.joint_demand import motion_demand, segment_demand
-from pipeline.dynamics.stability import stability_margins
 from pipeline.errors import GaitError, SlidingError, TippingError
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.payload import with_payload
 from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 

@@ -12,11 +12,11 @@ import pytest
 
 from pipeline.api.init import robot_file_of
 from pipeline.dynamics.joint_demand import motion_demand
-from pipeline.dynamics.stability import stability_margins
 from pipeline.errors import GaitError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
 from pipeline.motion.postures import start_postures
+from pipeline.motion.support import stability_margins
 from pipeline.motion.sway import Sway, followed_ways
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
