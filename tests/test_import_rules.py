@@ -35,6 +35,7 @@ LEAVES = {
     *("actuators.units", "actuators.parameters", "actuators.errors", "actuators.text_file"),
     "actuators.checked",
     *(
+        "pipeline.checkpoint",
         "pipeline.errors",
         "pipeline.progress",
         "pipeline.spread",

@@ -17,8 +17,7 @@ from typing import Any, Final
 from pipeline.blind.answer import ask, read_answer
 from pipeline.blind.machines.trial import make
 from pipeline.blind.score import Score, score
-from pipeline.paper.calibration.checkpoint import Checkpoint
-from pipeline.spread import spread
+from pipeline.checkpoint import Checkpoint
 
 _ROOM: Final = Path(__file__).parent
 Block = tuple[str, int, int, str | None]
@@ -72,18 +71,13 @@ def run_trials(
         PipelineError: A trial cannot be made, or workers ended before the work did.
     """
     point = Checkpoint(out / "answers.jsonl", _key(seed))
-    names = [(f"{source} {k}", source, k) for k in range(trials) for source in sources]
-    left = [task for task in names if task[0] not in point.done]
-    blocks: list[Block] = []
-    for _, source, k in left:
-        here = None if scheduler else str(out / "trials" / source / f"{k:04d}")
-        blocks.append((source, seed, k, here))
-    done = len(names) - len(left)
-    for place, result in spread(
-        answered, blocks, workers=workers, scheduler=scheduler, title="trials", done=done
-    ):
-        point.add(left[place][0], result)
-    return [_judged(point.done[name]) for name, _, _ in names]
+    blocks: dict[str, Block] = {}
+    for k in range(trials):
+        for source in sources:
+            here = None if scheduler else str(out / "trials" / source / f"{k:04d}")
+            blocks[f"{source} {k}"] = (source, seed, k, here)
+    found = point.run(answered, blocks, workers=workers, scheduler=scheduler, title="trials")
+    return [_judged(one) for one in found]
 
 
 def _judged(done: dict[str, Any]) -> Score:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.paper.calibration.calibrate import Effort, calibrate
@@ -25,12 +23,8 @@ def run_calibrate(options: argparse.Namespace) -> int:
     """
     _refuse_options(options)
     refuse_other_robot(options.robot)
-    results = calibrate(
-        options.robot,
-        Effort(workers=options.workers, seed=options.seed),
-        WORK,
-        _progress,
-    )
+    effort = Effort(workers=options.workers, seed=options.seed)
+    results = calibrate(options.robot, effort, WORK)
     results["robot"] = options.robot.name
     for path in save(results, options.robot):
         print(path.name)
@@ -89,17 +83,3 @@ def refuse_other_robot(path: Path) -> None:
             f"{path}: the result is written into this file, which does not hold "
             f"{', '.join(lacking)}; {such}"
         )
-
-
-def _progress(title: str, total: int) -> Callable[[int], None]:
-    """A progress bar on a terminal, nothing elsewhere."""
-    from tqdm import tqdm
-
-    bar = tqdm(total=total, desc=title, disable=not sys.stderr.isatty(), leave=True)
-
-    def tick(count: int) -> None:
-        bar.update(count)
-        if bar.n >= total:
-            bar.close()
-
-    return tick

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -32,6 +32,7 @@ Number = TypeVar("Number", float, Array)
 MIDDLE_LEGS = ("lm", "rm")
 PUBLISHED_LEG = "rm"
 JOINTS_PER_LEG = 3
+COLUMNS = JOINTS_PER_LEG * len(MIDDLE_LEGS)  # per set of numbers
 #: Robot numbers solved from the reaction and the torques of Table III.
 POSTURE = ("trunk_com_left", "joint_2_lateral", "body_height")
 #: Samples per half period: within 0.2 % of the converged energies, see tests.
@@ -39,58 +40,31 @@ SAMPLES = 81
 ROBOT = "robot"
 #: Of each pair whose product is published, the ratio that is free, and the one that follows.
 SPLITS = {"harmonic_drive.ratio": "timing_belt.ratio", "planetary.ratio": "hypoid.ratio"}
+_SAMPLED = ("position", "velocity", "acceleration", "torque", "direction")
 #: Per alternative: energy per cycle [J] and standing power [W] of the robot and its middle legs.
 Totals = dict[str, dict[str, float]]
 
 
 @dataclass(frozen=True)
 class Demand:
-    """What W sets of numbers ask of the joints of L legs: columns C = 3 L W, set by set.
+    """What W sets of numbers ask of the joints of both middle legs: columns C = 6 W, set by set."""
 
-    Attributes:
-        series: Over a cycle (N, C); its time may be (N, C), each column's own [s].
-        standing: Torques standing on three feet (C,) [N*m].
-        legs: Names.
-    """
-
-    series: ShaftSeries
-    standing: Array
-    legs: tuple[str, ...] = MIDDLE_LEGS
-
-    @property
-    def columns(self) -> int:
-        """Columns per set."""
-        return JOINTS_PER_LEG * len(self.legs)
+    series: ShaftSeries  #: Over a cycle (N, C); its time may be (N, C), each column's own [s].
+    standing: Array  #: Torques standing on three feet (C,) [N*m].
 
     @property
     def count(self) -> int:
         """How many sets."""
-        return self.standing.size // self.columns
+        return self.standing.size // COLUMNS
 
     def taken(self, sets: NDArray[np.intp]) -> Demand:
         """Some of the sets, also more than once, by number (W,)."""
-        return self._chosen((self.columns * sets[:, None] + np.arange(self.columns)).ravel())
-
-    def of_leg(self, leg: str) -> Demand:
-        """One of the legs."""
-        first = JOINTS_PER_LEG * self.legs.index(leg)
-        every = np.arange(self.standing.size).reshape(self.count, self.columns)
-        own = self._chosen(every[:, first : first + JOINTS_PER_LEG].ravel())
-        return replace(own, legs=(leg,))
-
-    def _chosen(self, columns: NDArray[np.intp]) -> Demand:
+        columns = (COLUMNS * sets[:, None] + np.arange(COLUMNS)).ravel()
         s = self.series
         time = s.time if s.time.ndim == 1 else s.time[:, columns]
-        series = ShaftSeries(
-            tuple(s.joints[k] for k in columns),
-            time,
-            s.position[:, columns],
-            s.velocity[:, columns],
-            s.acceleration[:, columns],
-            s.torque[:, columns],
-            s.direction[:, columns],
-        )
-        return replace(self, series=series, standing=self.standing[columns])
+        arrays = (getattr(s, name)[:, columns] for name in _SAMPLED)
+        joints = tuple(s.joints[k] for k in columns)
+        return Demand(ShaftSeries(joints, time, *arrays), self.standing[columns])
 
 
 def joined(demands: Sequence[Demand]) -> Demand:
@@ -98,54 +72,37 @@ def joined(demands: Sequence[Demand]) -> Demand:
     length = max(d.series.time.size for d in demands)
 
     def padded(name: str) -> Array:
-        return np.concatenate([_padded(d.series, name, length) for d in demands], axis=1)
+        every = []
+        for d in demands:
+            values = getattr(d.series, name)
+            columns = np.broadcast_to(values.T, (len(d.series.joints), len(values))).T
+            every.append(columns[np.minimum(np.arange(length), len(values) - 1)])
+        return np.concatenate(every, axis=1)
 
-    names = ("time", "position", "velocity", "acceleration", "torque", "direction")
     joints = tuple(joint for d in demands for joint in d.series.joints)
-    standing = np.concatenate([d.standing for d in demands])
-    return Demand(ShaftSeries(joints, *(padded(name) for name in names)), standing)
-
-
-def _padded(series: ShaftSeries, name: str, length: int) -> Array:
-    values: Array = getattr(series, name)
-    columns = values[:, None] if values.ndim == 1 else values
-    rows = np.minimum(np.arange(length), len(values) - 1)
-    return np.broadcast_to(columns[rows], (length, len(series.joints)))
+    series = ShaftSeries(joints, *(padded(name) for name in ("time", *_SAMPLED)))
+    return Demand(series, np.concatenate([d.standing for d in demands]))
 
 
 @dataclass(frozen=True)
 class RobotPart:
-    """What a robot asks of its middle legs.
+    """What a robot asks of its middle legs."""
 
-    Attributes:
-        robot: With the posture solved.
-        reaction: Vertical force on the middle right foot, standing [N].
-        demand: One set.
-    """
-
-    robot: Robot
-    reaction: float
-    demand: Demand
+    robot: Robot  #: With the posture solved.
+    reaction: float  #: Vertical force on the middle right foot, standing [N].
+    demand: Demand  #: One set.
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one alternative makes of a demand.
+    """What one alternative makes of a demand."""
 
-    Attributes:
-        chain: The alternative.
-        walking: Every joint over a cycle.
-        holding: Every joint, standing on three feet.
-        drawn: Electrical energy E_el(+) per cycle, by leg, (W,) [J].
-        returned: E_el(-) per cycle, by leg, (W,) [J].
-        excess: Largest of a motor quantity over its limit, less one, by quantity, (W,).
-    """
-
-    chain: Chain
-    walking: ChainResult
-    holding: HoldingResult
-    drawn: Mapping[str, Array]
-    returned: Mapping[str, Array]
+    chain: Chain  #: The alternative.
+    walking: ChainResult  #: Every joint over a cycle.
+    holding: HoldingResult  #: Every joint, standing on three feet.
+    drawn: Mapping[str, Array]  #: Electrical energy E_el(+) per cycle, by leg, (W,) [J].
+    returned: Mapping[str, Array]  #: E_el(-) per cycle, by leg, (W,) [J].
+    #: Largest of a motor quantity over its limit, less one, by quantity, (W,).
     excess: Mapping[str, Array]
 
     def consumed(self, leg: str, *, net: bool = False) -> float:
@@ -159,14 +116,15 @@ class Outcome:
         return {n: printed_leg(getattr(self.holding, n))[0] for n in names}
 
 
-def by_leg(values: Array, legs: int = len(MIDDLE_LEGS)) -> Array:
-    """Values of every column (C,) by set, leg and joint, (W, L, 3)."""
-    return values.reshape(-1, legs, JOINTS_PER_LEG)
+def by_leg(values: Array) -> dict[str, Array]:
+    """Values of every column (C,) by leg, of each set and joint, (W, 3)."""
+    legs = values.reshape(-1, len(MIDDLE_LEGS), JOINTS_PER_LEG)
+    return {leg: legs[:, k] for k, leg in enumerate(MIDDLE_LEGS)}
 
 
 def printed_leg(values: Array) -> Array:
     """Values of the columns (C,) of both legs, for the printed one by set and joint, (W, 3)."""
-    return by_leg(values)[:, MIDDLE_LEGS.index(PUBLISHED_LEG)]
+    return by_leg(values)[PUBLISHED_LEG]
 
 
 def robot_part(spec: RobotSpec, samples: int = SAMPLES) -> RobotPart:
@@ -253,15 +211,15 @@ def chain_at(
         name: Which.
         values: Numbers that stand in for the catalogue's, SI by reference: one, or one per set.
     """
-    own = {k: np.repeat(v, demand.columns) if np.ndim(v) else v for k, v in values.items()}
+    own = {k: np.repeat(v, COLUMNS) if np.ndim(v) else v for k, v in values.items()}
     return catalog.chain(name, own)
 
 
-def drawn(demand: Demand, chain: Chain) -> Array:
-    """E_el(+) per cycle of the printed leg alone, (W,) [J]; both made for one leg."""
+def drawn(demand: Demand, chain: Chain) -> dict[str, Array]:
+    """E_el(+) per cycle by leg, (W,) [J], with an alternative made for the demand."""
     power = chain.inverse(demand.series).electrical_power
     forward, _ = split_integral(demand.series.time, power)
-    return by_leg(forward, len(demand.legs)).sum(axis=(1, 2))
+    return {leg: energy.sum(axis=1) for leg, energy in by_leg(forward).items()}
 
 
 def outcome(demand: Demand, chain: Chain) -> Outcome:
@@ -275,15 +233,11 @@ def outcome(demand: Demand, chain: Chain) -> Outcome:
         "rms_current": rms_over_time(demand.series.time, walking.current)
         / motor.continuous_current,
     }
-    forward, reverse = (by_leg(e).sum(axis=2) for e in (energy.forward, energy.reverse))
-    return Outcome(
-        chain,
-        walking,
-        chain.holding(demand.standing),
-        {leg: forward[:, k] for k, leg in enumerate(demand.legs)},
-        {leg: reverse[:, k] for k, leg in enumerate(demand.legs)},
-        {name: by_leg(peak).max(axis=(1, 2)) - 1 for name, peak in peaks.items()},
-    )
+    both = (energy.forward, energy.reverse)
+    forward, reverse = ({k: e.sum(axis=1) for k, e in by_leg(own).items()} for own in both)
+    excess = {name: peak.reshape(-1, COLUMNS).max(axis=1) - 1 for name, peak in peaks.items()}
+    held = chain.holding(demand.standing)
+    return Outcome(chain, walking, held, forward, reverse, excess)
 
 
 def outcomes(

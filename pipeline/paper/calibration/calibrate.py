@@ -6,16 +6,16 @@ import hashlib
 import logging
 import math
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from actuators.loading.build import CATALOG
+from pipeline.checkpoint import Checkpoint
 from pipeline.paper.calibration import tasks
-from pipeline.paper.calibration.checkpoint import Checkpoint
 from pipeline.paper.calibration.prior import PRIOR_FILE, Prior
 from pipeline.paper.calibration.problem import fixed_before
 from pipeline.paper.calibration.tasks import OUTPUTS, Point, Reading
@@ -24,8 +24,6 @@ from pipeline.paper.hexapod import ROBOT
 from pipeline.paper.motor_constants import KEYS, friction_ranges
 from pipeline.paper.published import EXTRA, HELD, PUBLISHED_FILE, Published
 
-#: Given a title and a total, returns what is called per finished task.
-Progress = Callable[[str, int], Callable[[int], None]]
 logger = logging.getLogger("legwatt")
 _GROUPS = 8  # of walkers, which have to agree
 AT_BOUND = 0.02  # coordinates this close to a bound count as lying at it
@@ -49,33 +47,24 @@ _EVALUATIONS = 30  # of the full problem, per search
 
 @dataclass(frozen=True)
 class Effort:
-    """How much is computed.
+    """How much is computed."""
 
-    Attributes:
-        starts: Of the search for the nearest point, per transfer path: draws of the posterior.
-        robots: In the bank from which the posterior takes them.
-        ensembles: Of walkers in the posterior, each started by itself.
-        steps: Of their walkers.
-        left_out_steps: Of the one ensemble per target left out.
-        sets: Of the posterior that are evaluated in full, and per target left out.
-        left_out_sets: Likewise, per target left out.
-        prior_draws: From the prior for what it says by itself.
-        sobol: Base sample of the sensitivity analysis, a power of two.
-        workers: Processes.
-        seed: Of everything random.
-    """
+    starts: int = 4  #: Of the search for the nearest point, per path: draws of the posterior.
+    robots: int = 300  #: In the bank from which the posterior takes them.
+    ensembles: int = 2  #: Of walkers in the posterior, each started by itself.
+    steps: int = 3000  #: Of their walkers.
+    left_out_steps: int = 800  #: Of the one ensemble per target left out.
+    sets: int = 250  #: Of the posterior that are evaluated in full.
+    left_out_sets: int = 60  #: Likewise, per target left out.
+    prior_draws: int = 300  #: From the prior for what it says by itself.
+    sobol: int = 256  #: Base sample of the sensitivity analysis, a power of two.
+    workers: int = 2  #: Processes.
+    seed: int = 1  #: Of everything random.
 
-    starts: int = 4
-    robots: int = 300
-    ensembles: int = 2
-    steps: int = 3000
-    left_out_steps: int = 800
-    sets: int = 250
-    left_out_sets: int = 60
-    prior_draws: int = 300
-    sobol: int = 256
-    workers: int = 2
-    seed: int = 1
+
+#: Title of a stage, function of the robot and further arguments, and these by the task's name:
+#: results in the order of the names.
+_Run = Callable[[str, Callable[..., Any], Mapping[str, tuple[Any, ...]]], list[Any]]
 
 
 def input_hash(robot: Path, effort: Effort) -> str:
@@ -86,37 +75,20 @@ def input_hash(robot: Path, effort: Effort) -> str:
     """
     digest = hashlib.sha256(f"{effort.seed}".encode())
     paper = Path(__file__).parents[1]
-    code = [*paper.glob("*.py"), *paper.glob("calibration/*.py"), *paper.glob("constants/*.py")]
+    code = [*paper.glob("*.py"), *paper.glob("calibration/*.py")]
     files = [PRIOR_FILE, PUBLISHED_FILE, robot, *sorted(CATALOG.glob("*.toml")), *sorted(code)]
     for path in files:
         digest.update(path.read_bytes())
     return digest.hexdigest()
 
 
-@dataclass(frozen=True)
-class _Run:
-    """Where the tasks of one calibration run, each named for its result to be found again."""
-
-    robot: str
-    effort: Effort
-    store: Checkpoint
-    pool: ProcessPoolExecutor
-    progress: Progress
-
-    def all(self, title: str, function: Callable[..., Any], named: Mapping[str, Any]) -> list[Any]:
-        """Results of a function of the robot and further arguments, in the order of the names."""
-        every = [(name, (self.robot, *arguments)) for name, arguments in named.items()]
-        return self.store.run(self.pool, function, every, self.progress(title, len(every)))
-
-
-def calibrate(robot: Path, effort: Effort, work: Path, progress: Progress) -> dict[str, Any]:
+def calibrate(robot: Path, effort: Effort, work: Path) -> dict[str, Any]:
     """Run everything, going on where an earlier run stopped.
 
     Args:
         robot: Robot file of the paper's hexapod.
         effort: How much.
         work: Folder for finished tasks.
-        progress: Given a title and a total, returns what is called per finished task.
 
     Returns:
         Plain results: ``nearest``, ``starts``, ``posterior`` and some of its ``sets``,
@@ -124,30 +96,33 @@ def calibrate(robot: Path, effort: Effort, work: Path, progress: Progress) -> di
 
     Raises:
         CalibrationError: No admissible point at all.
+        SpreadError: Workers ended before the work did.
     """
     task = tasks.base_problem(str(robot))
     unmet = ", ".join(task.feasible.frictions.unmet)
     logger.info("rotor friction leaves unmet: %s", unmet or "none")
     store = Checkpoint(work / "tasks.jsonl", input_hash(robot, effort))
-    with ProcessPoolExecutor(effort.workers) as pool:
-        run = _Run(str(robot), effort, store, pool, progress)
-        walkers = _posterior(run, (), effort.ensembles, effort.steps, "posterior")
-        starts = _starts(run, walkers)
-        good = [s for s in starts if s.get("admissible")]
-        if not good:
-            raise CalibrationError("no start reaches a point that meets every target and limit")
-        best = min(good, key=lambda s: s["prior_distance"])
-        members = _points(run, "posterior", _spread(walkers, effort.sets))
-        left_out = {}
-        for targets in LEAVE_OUT:
-            key = "+".join(targets)
-            found = _posterior(run, targets, 1, effort.left_out_steps, f"without {key}")
-            left_out[key] = _points(run, key, _spread(found, effort.left_out_sets))
-        draws = {f"prior/{i}": (effort.seed, i) for i in range(effort.prior_draws)}
-        before = run.all("prior", tasks.prior_point, draws)
-        readings = _readings(run, best)
-        sensitivity = _sensitivity(run, best, task.prior)
-    published = task.published
+
+    def run(
+        title: str, function: Callable[..., Any], named: Mapping[str, tuple[Any, ...]]
+    ) -> list[Any]:
+        blocks = {name: (str(robot), *arguments) for name, arguments in named.items()}
+        return store.run(partial(_apply, function), blocks, workers=effort.workers, title=title)
+
+    walkers, left_out = _posteriors(run, effort)
+    starts = _starts(run, walkers, effort)
+    good = [s for s in starts if s.get("admissible")]
+    if not good:
+        raise CalibrationError("no start reaches a point that meets every target and limit")
+    best = min(good, key=lambda s: s["prior_distance"])
+    members = _points(run, "posterior", _spread(walkers, effort.sets))
+    predicted = {
+        key: _points(run, key, _spread(found, effort.left_out_sets))
+        for key, found in left_out.items()
+    }
+    draws = {f"prior/{i}": (effort.seed, i) for i in range(effort.prior_draws)}
+    before = run("prior", tasks.prior_point, draws)
+    kept = partial(_kept, published=task.published)
     return {
         "nearest": best,
         "starts": starts,
@@ -155,30 +130,33 @@ def calibrate(robot: Path, effort: Effort, work: Path, progress: Progress) -> di
         "sets": members,
         "posterior": posterior_summary(walkers, task.prior),
         # The motor's limits are the data sheet's, so a draw beyond them is not what it says.
-        "prior": [_kept(p, published) for p in before if p.get("inside")],
-        "left_out": {
-            key: [_kept(p, published) for p in points] for key, points in left_out.items()
-        },
-        "readings": readings,
-        "sensitivity": sensitivity,
-        "rotor_friction": [asdict(row) for row in friction_ranges(published)],
+        "prior": [kept(p) for p in before if p.get("inside")],
+        "left_out": {key: [kept(p) for p in points] for key, points in predicted.items()},
+        "readings": _readings(run, best),
+        "sensitivity": _sensitivity(run, best, task.prior, effort),
+        "rotor_friction": [asdict(row) for row in friction_ranges(task.published)],
     }
 
 
-def _posterior(
-    run: _Run, without: tuple[str, ...], ensembles: int, steps: int, title: str
-) -> list[list[Point]]:
-    """Sets of the walkers of independent ensembles in the posterior, by walker."""
-    first = 100 * (1 + LEAVE_OUT.index(without)) if without else 0
-    named = {
-        f"posterior/{'+'.join(without)}/{i}": (
-            *(run.effort.seed, first + i, without),
-            *(steps, run.effort.robots),
-        )
-        for i in range(ensembles)
+def _apply(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    return function(*arguments)
+
+
+def _posteriors(
+    run: _Run, effort: Effort
+) -> tuple[list[list[Point]], dict[str, list[list[Point]]]]:
+    """Sets by walker of the posterior's ensembles, and of those without some targets."""
+    named: dict[str, tuple[Any, ...]] = {
+        f"posterior//{i}": (effort.seed, i, (), effort.steps, effort.robots)
+        for i in range(effort.ensembles)
     }
-    found = run.all(title, tasks.posterior, named)
-    return [walker for ensemble in found for walker in ensemble]
+    for i, without in enumerate(LEAVE_OUT, start=1):
+        own = (effort.seed, 100 * i, without, effort.left_out_steps, effort.robots)
+        named[f"posterior/{'+'.join(without)}/0"] = own
+    found = run("posterior, and without each target", tasks.posterior, named)
+    walkers = [walker for ensemble in found[: effort.ensembles] for walker in ensemble]
+    keys = ["+".join(without) for without in LEAVE_OUT]
+    return walkers, dict(zip(keys, found[effort.ensembles :], strict=True))
 
 
 def _spread(walkers: list[list[Point]], count: int) -> list[Point]:
@@ -187,68 +165,61 @@ def _spread(walkers: list[list[Point]], count: int) -> list[Point]:
     return [every[i] for i in np.linspace(0, len(every) - 1, min(count, len(every))).astype(int)]
 
 
-def _starts(run: _Run, walkers: list[list[Point]]) -> list[Point]:
+def _starts(run: _Run, walkers: list[list[Point]], effort: Effort) -> list[Point]:
     """Nearest points to the prior's centre, from the posterior's nearest draws of each path."""
     every = sorted((p for own in walkers for p in own), key=lambda p: float(np.dot(p["z"], p["z"])))
-    named: dict[str, tuple[Any, ...]] = {}
+    named = {}
     for path in tasks.PATHS:
-        own = [p["z"] for p in every if p["path"] == path][: run.effort.starts]
-        named |= {
-            f"start/{path}/{i}": (path, tasks.READ, z, _EVALUATIONS) for i, z in enumerate(own)
-        }
-    return run.all("nearest point", tasks.nearest, named)
+        own = [p["z"] for p in every if p["path"] == path][: effort.starts]
+        for i, z in enumerate(own):
+            named[f"start/{path}/{i}"] = (path, tasks.READ, z, _EVALUATIONS)
+    return run("nearest point", tasks.nearest, named)
 
 
 def _points(run: _Run, kind: str, sets: list[Point]) -> list[Point]:
     """Sets with all that the paper prints and the energy of the whole robot."""
     named = {f"set/{kind}/{i}": (s["path"], s["z"], s["constants"]) for i, s in enumerate(sets)}
-    return run.all(f"whole robot, {kind}", tasks.point_of, named)
+    return run(f"whole robot, {kind}", tasks.point_of, named)
 
 
 def _readings(run: _Run, best: Point) -> list[Point]:
     """Every reading of the paper, with its point closest to the rows where there is one."""
     named = {
-        f"reading/{reading}": (best["path"], reading, best["z"], _EVALUATIONS)
+        f"reading/{reading}": (best["path"], reading, best["z"], _EVALUATIONS, True)
         for reading in READINGS
     }
-    found = run.all("readings", tasks.closest, named)
+    found = run("readings", tasks.nearest, named)
     return [
         asdict(reading) | {"point": None if "failed" in point else point}
         for reading, point in zip(READINGS, found, strict=True)
     ]
 
 
-def _sensitivity(run: _Run, best: Point, prior: Prior) -> dict[str, Any]:
+def _sensitivity(run: _Run, best: Point, prior: Prior, effort: Effort) -> dict[str, Any]:
     """Sobol indices with every free number uniform within one prior sigma of the nearest point."""
     from SALib.analyze import sobol as analyze
     from SALib.sample import sobol as sample
 
-    z, seed = np.array(best["z"]), run.effort.seed
-    ends = np.maximum(z - 1.0, prior.lower), np.minimum(z + 1.0, prior.upper)
+    z = np.array(best["z"])
+    ends = np.clip([z - 1.0, z + 1.0], *prior.ends)
     names = list(prior.keys)
-    setup = {"num_vars": z.size, "names": names, "bounds": np.stack(ends, axis=1).tolist()}
-    rows = sample.sample(setup, run.effort.sobol, calc_second_order=False, seed=seed)
+    setup = {"num_vars": z.size, "names": names, "bounds": ends.T.tolist()}
+    options: dict[str, Any] = {"calc_second_order": False, "seed": effort.seed}
+    rows = sample.sample(setup, effort.sobol, **options)
     block = z.size + 2  # rows of one base point share most of the robot's coordinates
     named = {
         f"sobol/{best['path']}/{i}": (best["path"], rows[i : i + block].tolist())
         for i in range(0, len(rows), block)
     }
-    blocks = run.all("sensitivities", tasks.sensitivity_rows, named)
+    blocks = run("sensitivities", tasks.sensitivity_rows, named)
     y = np.array([row for part in blocks for row in part], dtype=float)
     missing = np.isnan(y).any(axis=1)
     y[missing] = np.nanmean(y, axis=0)  # a robot that tips says nothing; its count is reported
-    result: dict[str, Any] = {
-        "names": names,
-        "base": run.effort.sobol,
-        "missing": int(missing.sum()),
-    }
+    result: dict[str, Any] = {"names": names, "base": effort.sobol, "missing": int(missing.sum())}
     for output, column in zip(OUTPUTS, y.T, strict=True):
-        indices = analyze.analyze(
-            setup, column, calc_second_order=False, print_to_console=False, seed=seed
-        )
-        result[output] = {
-            k: np.asarray(indices[k]).tolist() for k in ("S1", "S1_conf", "ST", "ST_conf")
-        }
+        indices = analyze.analyze(setup, column, print_to_console=False, **options)
+        kinds = ("S1", "S1_conf", "ST", "ST_conf")
+        result[output] = {kind: np.asarray(indices[kind]).tolist() for kind in kinds}
     return result
 
 
@@ -271,13 +242,12 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
 
     z = np.array([[p["z"] for p in own] for own in walkers])  # (walkers, steps, D)
     constants = np.array([[[p["constants"][k] for k in KEYS] for p in own] for own in walkers])
-    every = np.moveaxis(np.concatenate([z, constants], axis=-1), -1, 0)
-    no_bound = np.full(len(KEYS), np.inf)
-    lower, upper = np.append(prior.lower, -no_bound), np.append(prior.upper, no_bound)
+    unbounded = np.outer([-1, 1], np.full(len(KEYS), np.inf))
+    lower, upper = np.concatenate([prior.ends, unbounded], axis=1)
     axes = {"chain_axis": 0, "draw_axis": 1}
     groups = np.arange(len(walkers)) * _GROUPS // len(walkers)
-    own = [key.startswith(f"{ROBOT}.") for key in prior.keys]
-    _, counts = np.unique(z[..., own].reshape(-1, sum(own)), axis=0, return_counts=True)
+    of_robot = [key.startswith(f"{ROBOT}.") for key in prior.keys]
+    _, counts = np.unique(z[..., of_robot].reshape(-1, sum(of_robot)), axis=0, return_counts=True)
     robots = float(counts.sum() ** 2 / (counts.astype(float) ** 2).sum())
 
     def effective(values: Any, *, of_robots: bool) -> float:
@@ -285,6 +255,7 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
         return 1 / (1 / draws + 1 / robots) if of_robots else draws
 
     numbers = {}
+    every = np.moveaxis(np.concatenate([z, constants], axis=-1), -1, 0)
     for key, values, least, most in zip((*prior.keys, *KEYS), every, lower, upper, strict=True):
         low, high = np.quantile(values, [0.025, 0.975])
         numbers[key] = {
@@ -304,12 +275,11 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
         if 0 < share < 1:
             error = math.sqrt(share * (1 - share) / effective(taken, of_robots=True))
         paths[path] = {"share": share, "standard_error": error}
-    sets = int(z.shape[0] * z.shape[1])
     return {
         "numbers": numbers,
         "paths": paths,
         "walkers": len(walkers),
-        "sets": sets,
+        "sets": int(z.shape[0] * z.shape[1]),
         "robots": robots,
     }
 
@@ -318,10 +288,9 @@ def _kept(point: Point, published: Mapping[str, Published]) -> Point:
     """What the judgement needs of a set of which only quantiles are shown, to six digits."""
     fixed = fixed_before(published)
 
-    def short(value: float) -> float:
-        return float(f"{value:.6g}")
+    def short(values: Mapping[str, float]) -> dict[str, float]:
+        return {key: float(f"{value:.6g}") for key, value in values.items()}
 
-    return {
-        "values": {k: short(v) for k, v in point["values"].items() if k not in fixed},
-        "totals": {a: {k: short(v) for k, v in t.items()} for a, t in point["totals"].items()},
-    }
+    values = {key: value for key, value in point["values"].items() if key not in fixed}
+    totals = {alternative: short(own) for alternative, own in point["totals"].items()}
+    return {"values": short(values), "totals": totals}

@@ -11,7 +11,7 @@ from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec
 
-Fingerprint = dict[str, float | str]
+Fingerprint = Mapping[str, float | str]
 #: Stored numbers have nine digits.
 _SAME = 1e-8
 
@@ -19,15 +19,8 @@ _SAME = 1e-8
 def fingerprint(
     spec: RobotSpec, catalog: Catalog, published: Mapping[str, Published], prior: Prior
 ) -> Fingerprint:
-    """Everything a judgement depends on, by name: SI numbers and texts.
-
-    Args:
-        spec: The robot file.
-        catalog: The actuators.
-        published: The printed values.
-        prior: What was known before.
-    """
-    out: Fingerprint = {f"robot.{name}": value for name, value in spec.parameters.items()}
+    """Everything a judgement depends on, by name: SI numbers and texts."""
+    out: dict[str, float | str] = {f"robot.{name}": x for name, x in spec.parameters.items()}
     out |= {f"gait.{key}": _text(value) for key, value in sorted(spec.gait.items())}
     out["standing.feet"] = repr(spec.standing_feet)
     out["legs"] = repr([(leg.name, leg.joints, leg.foot, leg.side) for leg in spec.legs])
@@ -50,10 +43,9 @@ def _text(value: object) -> str:
     return value if isinstance(value, str) else repr(value)
 
 
-def differences(stored: Mapping[str, float | str], now: Mapping[str, float | str]) -> list[str]:
+def differences(stored: Fingerprint, now: Fingerprint) -> list[str]:
     """Names under which two fingerprints differ, in order; empty where they are the same."""
-    names = [*now, *(name for name in stored if name not in now)]
-    return [name for name in names if not _same(stored.get(name), now.get(name))]
+    return [name for name in {**now, **stored} if not _same(stored.get(name), now.get(name))]
 
 
 def _same(a: float | str | None, b: float | str | None) -> bool:

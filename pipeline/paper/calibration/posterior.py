@@ -21,7 +21,7 @@ likelihood with edges does not have, and it asks for many walkers at once.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import emcee
@@ -39,7 +39,6 @@ from pipeline.paper.hexapod import (
     MIDDLE_LEGS,
     PUBLISHED_LEG,
     Demand,
-    Outcome,
     chain_at,
     drawn,
     outcome,
@@ -57,6 +56,7 @@ SOLVED = {
     "walking_ratio_irreversible": "planetary.coulomb",
     EXTRA: "planetary.coulomb",
 }
+_RATIO = "walking_ratio_"
 WALKERS = 32
 _STARTS = 100  # times four draws per walker, before none is said to fit
 _STEP = 1e-3  # of a prior standard deviation, for the slope of a target
@@ -68,23 +68,15 @@ _SETTLING = 0.15  # of the steps, twice, before any is kept
 
 @dataclass(frozen=True)
 class _Sets:
-    """Walkers as sets of numbers.
+    """Walkers as sets of numbers."""
 
-    Attributes:
-        demand: Of their robots.
-        leg: The same of the printed leg alone: most targets need no other.
-        ideal: What that leg draws with the ideal actuator, (W,) [J].
-        values: Numbers in SI, by reference, (W,).
-    """
-
-    demand: Demand
-    leg: Demand
-    ideal: Array
-    values: dict[str, Array]
+    demand: Demand  #: Of their robots.
+    ideal: Array  #: What the printed leg draws with the ideal actuator, (W,) [J].
+    values: dict[str, Array]  #: Numbers in SI, by reference, (W,).
 
     def taken(self, which: NDArray[np.intp]) -> _Sets:
         values = {k: v[which] for k, v in self.values.items()}
-        return _Sets(self.demand.taken(which), self.leg.taken(which), self.ideal[which], values)
+        return _Sets(self.demand.taken(which), self.ideal[which], values)
 
     def with_number(self, key: str, value: Array) -> _Sets:
         return replace(self, values={**self.values, key: value})
@@ -104,7 +96,6 @@ class Posterior:
 
     def __init__(self, task: Problem, robots: Demand, targets: Sequence[Target] = ()) -> None:
         self.task, self.robots = task, robots
-        self.robots_leg = robots.of_leg(PUBLISHED_LEG)
         self.targets = {t.name: t for t in (targets or task.targets)}
         own = {f.key: f for f in (task.prior.free[i] for i in task.actuator_columns)}
         self.solved: dict[str, Free] = {}
@@ -134,13 +125,9 @@ class Posterior:
         return self.evaluate(x)[0]
 
     def evaluate(self, x: Array) -> tuple[Array, dict[str, Array]]:
-        """Log density of walkers (W,), and their numbers in SI by reference, (W,).
-
-        Args:
-            x: Walkers (W, D).
-        """
+        """Log density of walkers (W, D), (W,), and their numbers in SI by reference, (W,)."""
         z = x[:, self.numbers]
-        lower, upper = np.array([f.ends for f in self.free]).T
+        lower, upper = np.transpose([f.ends for f in self.free])
         good = ((z >= lower) & (z <= upper)).all(axis=1)
         good &= (np.abs(x[:, self.aims]) <= 1).all(axis=1)
         good &= (x[:, 0] >= 0) & (x[:, 0] < self.robots.count)
@@ -165,9 +152,9 @@ class Posterior:
         values |= dict(zip(KEYS, x[:, self.constants].T, strict=False))
         values |= {f.key: np.full(len(x), f.centre) for f in self.solved.values()}
         robots = np.clip(x[:, 0], 0, self.robots.count - 1).astype(np.intp)
-        leg = self.robots_leg.taken(robots)
-        ideal = drawn(leg, self._chain(leg, "ideal", values))
-        return _Sets(self.robots.taken(robots), leg, ideal, values)
+        demand = self.robots.taken(robots)
+        ideal = drawn(demand, self._chain(demand, "ideal", values))[PUBLISHED_LEG]
+        return _Sets(demand, ideal, values)
 
     def _goal(self, name: str, x: Array) -> Array:
         """The value of a solved target that walkers ask for, (W,)."""
@@ -182,19 +169,16 @@ class Posterior:
         """An alternative with one number per set."""
         return chain_at(demand, self.task.catalog, name, with_splits(values, self.task.ratio))
 
-    def _outcome(self, sets: _Sets, name: str) -> Outcome:
-        return outcome(sets.demand, self._chain(sets.demand, name, sets.values))
-
     def target(self, name: str, sets: _Sets) -> Array:
         """A solved target of each set, (W,)."""
-        if name == EXTRA:
-            return _extra(*(self._outcome(sets, alternative) for alternative in PAIR))
         if name == HELD:
             chain = self._chain(sets.demand, "reversible", sets.values)
             # The torque of joint 2 is negative: the upper end of what holds is the least.
             return printed_leg(chain.holding(sets.demand.standing).high)[:, 1]
-        chain = self._chain(sets.leg, name.removeprefix("walking_ratio_"), sets.values)
-        return drawn(sets.leg, chain) / sets.ideal
+        alternatives = PAIR if name == EXTRA else [name.removeprefix(_RATIO)]
+        chains = {a: self._chain(sets.demand, a, sets.values) for a in alternatives}
+        energy = {a: drawn(sets.demand, chain) for a, chain in chains.items()}
+        return _energy_target(name, energy, sets)
 
     def _solved(self, name: str, free: Free, sets: _Sets, goal: Array) -> tuple[Array, Array]:
         """The number that gives a target, and the log density it brings, (W,) each."""
@@ -219,26 +203,31 @@ class Posterior:
 
     def _met(self, sets: _Sets) -> NDArray[np.bool_]:
         """Whether the other targets are met and every limit is kept, (W,)."""
-        found = {name: self._outcome(sets, name) for name in self.task.catalog.alternatives}
+        found = {
+            name: outcome(sets.demand, self._chain(sets.demand, name, sets.values))
+            for name in self.task.catalog.alternatives
+        }
+        energy = {name: o.drawn for name, o in found.items()}
         held = printed_leg(found["irreversible"].holding.motor_torque)
         good: NDArray[np.bool_] = (held == 0).all(axis=1)
         for o in found.values():
             good &= np.max([*o.excess.values()], axis=0) <= 0
         for name in self.targets.keys() - self.solved.keys():
             target = self.targets[name]
-            if name == EXTRA:
-                value = _extra(*(found[a] for a in PAIR))
-            else:
-                own = found[name.removeprefix("walking_ratio_")].drawn[PUBLISHED_LEG]
-                value = own / sets.ideal
-            good &= np.abs(value - target.centre) <= target.half_width
+            missed = _energy_target(name, energy, sets) - target.centre
+            good &= np.abs(missed) <= target.half_width
         return good
 
 
-def _extra(reversible: Outcome, irreversible: Outcome) -> Array:
-    """Energy per middle leg and cycle by which the irreversible actuator draws more, (W,) [J]."""
-    legs = [irreversible.drawn[leg] - reversible.drawn[leg] for leg in MIDDLE_LEGS]
-    extra: Array = np.mean(legs, axis=0)
+def _energy_target(name: str, drawn: Mapping[str, Mapping[str, Array]], sets: _Sets) -> Array:
+    """A target made of energies by alternative and leg [J], (W,).
+
+    A walking ratio, or by how much the irreversible actuator draws more per middle leg and cycle.
+    """
+    if name != EXTRA:
+        return drawn[name.removeprefix(_RATIO)][PUBLISHED_LEG] / sets.ideal
+    reversible, irreversible = (drawn[a] for a in PAIR)
+    extra: Array = np.mean([irreversible[leg] - reversible[leg] for leg in MIDDLE_LEGS], axis=0)
     return extra
 
 

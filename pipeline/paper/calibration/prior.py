@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,24 +23,14 @@ PRIOR_FILE = Path(__file__).parent / "prior.toml"
 
 
 class _Written(Table):
-    """What is known of a number before, as the file writes it.
-
-    Attributes:
-        value: Centre.
-        unit: Of the numbers.
-        deviation: One standard deviation; a factor where `scale` is ``log``.
-        bounds: Hard.
-        scale: ``log`` where the belief spreads over factors.
-        source: Where the belief comes from.
-        reason: Why.
-    """
+    """What is known of a number before, as the file writes it."""
 
     expected = "value, unit, deviation, bounds, scale, source and reason"
-    value: Number
+    value: Number  #: Centre.
     unit: str
-    deviation: Number
-    bounds: Pair
-    scale: Literal["linear", "log"]
+    deviation: Number  #: One standard deviation; a factor where `scale` is ``log``.
+    bounds: Pair  #: Hard.
+    scale: Literal["linear", "log"]  #: ``log`` where the belief spreads over factors.
     source: str
     reason: str
 
@@ -65,23 +54,14 @@ class _Written(Table):
 
 @dataclass(frozen=True)
 class Free:
-    """One free number.
+    """One free number."""
 
-    Attributes:
-        key: ``robot.<name>`` or ``<component>.<name>``.
-        centre: Prior centre, SI.
-        deviation: One standard deviation, SI or of the natural logarithm.
-        bounds: Hard, SI.
-        logarithmic: Whether the belief spreads over factors.
-        unit: As written.
-    """
-
-    key: str
-    centre: float
-    deviation: float
-    bounds: tuple[float, float]
-    logarithmic: bool
-    unit: str
+    key: str  #: ``robot.<name>`` or ``<component>.<name>``.
+    centre: float  #: Prior centre, SI.
+    deviation: float  #: One standard deviation, SI or of the natural logarithm.
+    bounds: tuple[float, float]  #: Hard, SI.
+    logarithmic: bool  #: Whether the belief spreads over factors.
+    unit: str  #: As written.
 
     @property
     def ends(self) -> tuple[float, float]:
@@ -114,10 +94,8 @@ class Free:
 
     def at(self, z: Array) -> Array:
         """SI values at coordinates (W,)."""
-        if self.logarithmic:
-            raw = self.centre * np.exp(self.deviation * z)
-        else:
-            raw = self.centre + self.deviation * z
+        away = self.deviation * z
+        raw = self.centre * np.exp(away) if self.logarithmic else self.centre + away
         return np.clip(raw, *self.bounds)
 
     def coordinate(self, value: float) -> float:
@@ -138,27 +116,19 @@ class Prior:
         return tuple(f.key for f in self.free)
 
     @cached_property
-    def lower(self) -> Array:
-        """Lower bounds in coordinates, (D,)."""
-        return np.array([f.ends[0] for f in self.free])
-
-    @cached_property
-    def upper(self) -> Array:
-        """Upper bounds in coordinates, (D,)."""
-        return np.array([f.ends[1] for f in self.free])
+    def ends(self) -> Array:
+        """Lower and upper bounds in coordinates, (2, D)."""
+        return np.transpose([f.ends for f in self.free])
 
     def values(self, z: Array) -> dict[str, float]:
         """SI values at coordinates (D,)."""
         return {f.key: f.value(float(x)) for f, x in zip(self.free, z, strict=True)}
 
-    def coordinates(self, values: Mapping[str, float]) -> Array:
-        """Coordinates (D,) of SI values."""
-        return np.array([f.coordinate(values[f.key]) for f in self.free])
-
     def draw(self, rng: np.random.Generator) -> Array:
         """Random coordinates from the Gaussian cut off at the bounds, (D,)."""
+        lower, upper = self.ends
         z = rng.normal(size=len(self.free))
-        while (outside := (z < self.lower) | (z > self.upper)).any():
+        while (outside := (z < lower) | (z > upper)).any():
             z[outside] = rng.normal(size=int(outside.sum()))
         return z
 
@@ -178,6 +148,6 @@ def load_prior(path: Path = PRIOR_FILE) -> Prior:
         w = checked(_Written, entry, f"{path.name}: '{one_line(key)}'", PriorError)
         logarithmic = w.scale == "log"
         deviation = math.log(w.deviation) if logarithmic else to_si(w.deviation, w.unit)
-        bounds = (to_si(w.bounds[0], w.unit), to_si(w.bounds[1], w.unit))
-        free.append(Free(key, to_si(w.value, w.unit), deviation, bounds, logarithmic, w.unit))
+        centre, low, high = (to_si(x, w.unit) for x in (w.value, *w.bounds))
+        free.append(Free(key, centre, deviation, (low, high), logarithmic, w.unit))
     return Prior(tuple(free))

@@ -54,45 +54,28 @@ class Target:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """One set of numbers, evaluated.
+    """One set of numbers, evaluated."""
 
-    Attributes:
-        values: Published quantities, SI, by id; and the fitted energy difference.
-        excess: Motor limits, relative: peak over limit less one; negative is inside.
-            Named ``<alternative>.<quantity>``.
-        robot: The robot's part.
-        outcomes: The actuators' part, by alternative.
-    """
-
-    values: Mapping[str, float]
+    values: Mapping[str, float]  #: Published quantities and the fitted energy difference, SI.
+    #: Peak over the motor's limit less one, by ``<alternative>.<quantity>``; negative is inside.
     excess: Mapping[str, float]
     robot: RobotPart
-    outcomes: Mapping[str, Outcome]
+    outcomes: Mapping[str, Outcome]  #: By alternative.
 
 
 @dataclass
 class Problem:
-    """What is fitted, to what, starting from which files.
+    """What is fitted, to what, starting from which files."""
 
-    Attributes:
-        spec: Robot file, its transfer path included.
-        catalog: Actuator catalogue.
-        prior: Free numbers.
-        published: All printed values.
-        standing_legs: How many middle legs Fig. 21 counts as loaded.
-        without: Targets left out.
-        constants: The motor's three constants, by reference; the mean of all allowed where None.
-        net: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
-    """
-
-    spec: RobotSpec
+    spec: RobotSpec  #: Robot file, its transfer path included.
     catalog: Catalog
-    prior: Prior
-    published: Mapping[str, Published]
-    standing_legs: int = 1
-    without: tuple[str, ...] = ()
+    prior: Prior  #: Free numbers.
+    published: Mapping[str, Published]  #: All printed values.
+    standing_legs: int = 1  #: How many middle legs Fig. 21 counts as loaded.
+    without: tuple[str, ...] = ()  #: Targets left out.
+    #: The motor's three constants, by reference; the mean of all allowed where None.
     constants: Mapping[str, float] | None = None
-    net: bool = False
+    net: bool = False  #: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
     _robots: dict[bytes, RobotPart] = field(default_factory=dict, repr=False)
 
     @property
@@ -142,20 +125,16 @@ class Problem:
         if key not in self._robots:
             if len(self._robots) > _REMEMBERED:
                 self._robots.clear()
-            own = {
-                k.split(".")[1]: v
-                for k, v in self.prior.values(z).items()
-                if k.startswith(f"{ROBOT}.")
-            }
+            own = {k.split(".")[1]: v for k, v in self._of(z, robot=True).items()}
             goal = np.array([self.published[name].value for name in EXACT])
             spec = solve_posture(self.spec.with_parameters(own), goal)
             self._robots[key] = robot_part(spec)
         return self._robots[key]
 
-    def actuators(self, z: Array) -> dict[str, float]:
-        """Numbers of components at coordinates (D,), SI, by reference."""
-        own = {k: v for k, v in self.numbers(z).items() if not k.startswith(f"{ROBOT}.")}
-        return with_splits(own, self.ratio)
+    def _of(self, z: Array, *, robot: bool) -> dict[str, float]:
+        """Numbers of the robot, or of components, SI, by reference."""
+        values = self.numbers(z)
+        return {k: v for k, v in values.items() if k.startswith(f"{ROBOT}.") == robot}
 
     def evaluate(self, z: Array) -> Evaluation:
         """Everything at coordinates (D,).
@@ -164,7 +143,8 @@ class Problem:
             PipelineError: The robot cannot take this shape.
         """
         robot = self.robot(z)
-        found = outcomes(robot.demand, self.catalog, self.actuators(z))
+        own = with_splits(self._of(z, robot=False), self.ratio)
+        found = outcomes(robot.demand, self.catalog, own)
         values = computed(robot, found, self.standing_legs, net=self.net)
         excess = {
             f"{name}.{quantity}": float(value[0])
@@ -208,7 +188,7 @@ class Problem:
             limits = np.maximum(np.array(list(point.excess.values())) + 0.005, 0.0)
             return np.concatenate([z, pull * error, _STEEP * limits])
 
-        lower, upper = self.prior.lower[columns], self.prior.upper[columns]
+        lower, upper = self.prior.ends[:, columns]
         found = optimize.least_squares(
             residuals,
             np.clip(start[columns], lower + 1e-9, upper - 1e-9),
@@ -224,11 +204,8 @@ class Problem:
 
     def unmet(self, point: Evaluation) -> list[str]:
         """Ids of printed values that a point does not give at printed precision."""
-        return [
-            p.id
-            for p in self.published.values()
-            if not p.reproduced(from_si(point.values[p.id], p.unit))
-        ]
+        values = {p: from_si(point.values[p.id], p.unit) for p in self.published.values()}
+        return [p.id for p, value in values.items() if not p.reproduced(value)]
 
     def admissible(self, point: Evaluation) -> bool:
         """Whether a point gives every printed value and every motor stays inside its limits.

@@ -53,17 +53,11 @@ _THIN = 10  # every so many steps of a walker are kept
 
 @dataclass(frozen=True)
 class Reading:
-    """How the paper is read.
+    """How the paper is read."""
 
-    Attributes:
-        axis_deg: Angle of joint 1's axis in the frontal plane [deg].
-        legs: Middle legs that Fig. 21 counts as loaded.
-        net: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
-    """
-
-    axis_deg: float = 0.0
-    legs: int = 1
-    net: bool = False
+    axis_deg: float = 0.0  #: Angle of joint 1's axis in the frontal plane [deg].
+    legs: int = 1  #: Middle legs that Fig. 21 counts as loaded.
+    net: bool = False  #: Whether consumption is E_el(+) - E_el(-) instead of E_el(+).
 
 
 #: The reading that the default robot file follows.
@@ -96,7 +90,14 @@ def problem(
     )
 
 
-def nearest(robot: str, path: str, reading: Reading, start: list[float], evaluations: int) -> Point:
+def nearest(
+    robot: str,
+    path: str,
+    reading: Reading,
+    start: list[float],
+    evaluations: int,
+    strictly: bool = False,
+) -> Point:
     """The admissible point nearest to the prior's centre, from one start.
 
     Args:
@@ -105,33 +106,23 @@ def nearest(robot: str, path: str, reading: Reading, start: list[float], evaluat
         reading: Of the paper.
         start: Coordinates (D,).
         evaluations: At most so many of the full problem.
+        strictly: Whether to go, where that misses a row, as close to the rows as the bounds allow:
+            what is then still missed is out of reach of this reading, whatever the prior says.
     """
     task = problem(robot, path, reading)
     z = _feasible(task, np.array(start))
     every = np.arange(z.size)
+    found: Point = {}
     try:
         z = task.solve(z, columns=task.actuator_columns, pull=_PULL)
         z = task.solve(z, columns=every, pull=_PULL, evaluations=evaluations)
-        return _stored(task, z, task.evaluate(z), path)
+        found = _stored(task, z, task.evaluate(z), path)
+        if strictly and not found["admissible"]:
+            z = task.solve(z, columns=every, pull=_STRICT, free=_FREE, evaluations=evaluations)
+            found = _stored(task, z, task.evaluate(z), path)
     except PipelineError as error:
-        return {"failed": str(error), "path": path}
-
-
-def closest(robot: str, path: str, reading: Reading, start: list[float], evaluations: int) -> Point:
-    """As `nearest`, and where that misses a row, as close to the rows as the bounds allow.
-
-    What is then still missed is out of reach of this reading, whatever the prior says.
-    """
-    found = nearest(robot, path, reading, start, evaluations)
-    if "failed" in found or found["admissible"]:
-        return found
-    task, z = problem(robot, path, reading), np.array(found["z"])
-    every = np.arange(z.size)
-    try:
-        z = task.solve(z, columns=every, pull=_STRICT, free=_FREE, evaluations=evaluations)
-        return _stored(task, z, task.evaluate(z), path)
-    except PipelineError:
-        return found
+        return found or {"failed": str(error), "path": path}
+    return found
 
 
 def _feasible(task: Problem, z: Array) -> Array:
@@ -149,17 +140,11 @@ def _feasible(task: Problem, z: Array) -> Array:
 
 @dataclass(frozen=True)
 class Robots:
-    """Robots drawn from the prior, in order of what the ideal actuator's printed leg draws.
+    """R robots drawn from the prior, in order of what the ideal actuator's printed leg draws."""
 
-    Attributes:
-        demand: What they ask of their joints; a robot is a set.
-        paths: The foot's path of each.
-        coordinates: Of each robot's numbers, (R, D).
-    """
-
-    demand: Demand
-    paths: tuple[str, ...]
-    coordinates: Array
+    demand: Demand  #: What they ask of their joints; a robot is a set.
+    paths: tuple[str, ...]  #: The foot's path of each.
+    coordinates: Array  #: Of each robot's numbers, (R, D).
 
 
 @cache
@@ -190,7 +175,7 @@ def robots(robot: str, seed: int, count: int) -> Robots:
             found.append((demand, path, z[task.robot_columns]))
     demands, paths, coordinates = zip(*found, strict=True)
     demand = joined(demands)
-    order = np.argsort(drawn(demand.of_leg(PUBLISHED_LEG), ideal))
+    order = np.argsort(drawn(demand, ideal)[PUBLISHED_LEG])
     return Robots(demand.taken(order), tuple(paths[i] for i in order), np.array(coordinates)[order])
 
 
@@ -219,11 +204,10 @@ def posterior(
 def sets_of(density: Posterior, own: Robots, x: Array) -> list[Point]:
     """Walkers (N, D) as sets of numbers."""
     _, values = density.evaluate(x)
-    prior, columns = density.task.prior, density.task.actuator_columns
+    prior, chosen = density.task.prior, x[:, 0].astype(np.intp)
     z = np.empty((len(x), len(prior.free)))
-    chosen = x[:, 0].astype(np.intp)
     z[:, density.task.robot_columns] = own.coordinates[chosen]
-    for i in columns:
+    for i in density.task.actuator_columns:
         free = prior.free[i]
         z[:, i] = [free.coordinate(value) for value in values[free.key]]
     return [
@@ -269,13 +253,17 @@ def _stored(task: Problem, z: Array, point: Evaluation, path: str) -> Point:
     """What is kept of a set: plain numbers."""
     p, found = point.robot.robot.spec.parameters, point.outcomes
     numbers = task.numbers(z)
+
+    def by_leg(energy: Mapping[str, Array]) -> dict[str, float]:
+        return {leg: float(energy[leg][0]) for leg in MIDDLE_LEGS}
+
     return {
         "z": z.tolist(),
         "constants": {key: numbers[key] for key in KEYS},
         "posture": {k: p[k] for k in POSTURE},
         "values": dict(point.values),
-        "drawn": {name: _by_name(o.drawn) for name, o in found.items()},
-        "returned": {name: _by_name(o.returned) for name, o in found.items()},
+        "drawn": {name: by_leg(o.drawn) for name, o in found.items()},
+        "returned": {name: by_leg(o.returned) for name, o in found.items()},
         "excess": dict(point.excess),
         "errors": {t.name: (point.values[t.name] - t.centre) / t.half_width for t in task.targets},
         "unmet": task.unmet(point),
@@ -284,10 +272,6 @@ def _stored(task: Problem, z: Array, point: Evaluation, path: str) -> Point:
         "electrical_over_mechanical": _electrical_over_mechanical(point),
         "path": path,
     }
-
-
-def _by_name(energy: Mapping[str, Array]) -> dict[str, float]:
-    return {leg: float(energy[leg][0]) for leg in MIDDLE_LEGS}
 
 
 def _electrical_over_mechanical(point: Evaluation) -> dict[str, float]:
