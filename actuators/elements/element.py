@@ -1,22 +1,27 @@
 """The element: one law between two neighbouring shafts of an actuator."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars
+from actuators.arrays import Array, Numbers, Scalars
 from actuators.shaft import ShaftSeries
+
+#: Lower and upper ends of intervals, of any shape.
+Span: TypeAlias = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Element:
+class Element(Numbers):
     """What every element of a chain answers, vectorised over samples and joints.
 
     Elements are listed from the joint to the supply. Each has a joint side and a motor side; this
     one passes everything on, and a law overrides what it does otherwise: `added` where it takes or
     gives torque, `inverse` and `forward` where it changes the motion or asks for the load.
     Subclasses are frozen dataclasses; a parameter is one number for all joints or one per joint
-    (J,). A law that an alternative does not have is simply not in its list.
+    (J,), and `rules` say which numbers it may be. A law that an alternative does not have is simply
+    not in its list.
 
     Every element is local: a sample of a joint depends on no other joint, and but for friction over
     a presliding displacement on no other sample. What is not (a warming winding, elastic
@@ -44,9 +49,7 @@ class Element:
         """
         return motor_side.with_torque(motor_side.torque - self.added(motor_side))
 
-    def holding(
-        self, low: Array, high: Array, position: Array | None = None
-    ) -> tuple[Array, Array]:
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Return the motor-side torques that hold some joint-side torque at standstill.
 
         Args:
@@ -54,17 +57,13 @@ class Element:
             high: Upper ends [N*m], same shape.
             position: Of the joint-side shaft [rad], same shape; None where nobody knows it, which
                 suits all elements but those whose torque depends on it.
-
-        Returns:
-            Lower and upper ends on the motor side [N*m].
         """
         return low, high
 
     def loss(self, joint_side: ShaftSeries) -> Array | None:
         """Return the dissipated power (N, J) [W] from the element's own law, or None.
 
-        Args:
-            joint_side: Series on the joint side; at rest its torque is the one that holds.
+        At rest the torque of the joint side is the one that holds.
         """
         return None
 
@@ -75,10 +74,8 @@ class Element:
     def drawn(self, torque: Array, velocity: Array, direction: Array) -> Scalars:
         """Return the power that the element itself draws from the supply [W]; none as a rule.
 
-        Args:
-            torque: On the joint side; at rest the one that holds [N*m], any shape.
-            velocity: Of the joint side [rad/s], same shape.
-            direction: Zero at rest, same shape.
+        All are of the joint side, of any shape: torque, at rest the one that holds [N*m], velocity
+        [rad/s] and direction, zero at rest.
         """
         return 0.0
 

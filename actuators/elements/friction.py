@@ -25,13 +25,13 @@ After a reversal s may rise instead of jumping: over a small displacement (`trav
 from abc import abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import erf
 
-from actuators.arrays import Array, Scalars, require, require_non_negative
-from actuators.elements.element import Element
+from actuators.arrays import Array, Mask, Scalars, require
+from actuators.elements.element import Element, Span
 from actuators.presliding import presliding
 from actuators.shaft import ShaftSeries
 
@@ -49,15 +49,12 @@ class FrictionLaw(Element):
     #: Presliding displacement, in place of a velocity; 0 for none [rad].
     travel: float = field(default=0.0, kw_only=True)
 
-    def __post_init__(self) -> None:
-        require_non_negative(self.name, rise=self.rise, travel=self.travel)
-
     @abstractmethod
     def free(self, side: ShaftSeries, sense: Array) -> Array:
         """Return the friction torque that no load changes, (N, J) [N*m]."""
 
     @abstractmethod
-    def share(self, velocity: Array, drives: NDArray[np.bool_]) -> Scalars:
+    def share(self, velocity: Array, drives: Mask) -> Scalars:
         """Return friction per transmitted torque, by who drives, (N, J)."""
 
     @abstractmethod
@@ -91,9 +88,7 @@ class FrictionLaw(Element):
         share = self.share(motor_side.velocity, along > 0.0)
         return motor_side.with_torque(x / (1.0 + share * along))
 
-    def holding(
-        self, low: Array, high: Array, position: Array | None = None
-    ) -> tuple[Array, Array]:
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Widen the interval by the whole dry friction at each end; monotone as shares are < 1."""
         against, along, driving, driven = self.static()
         return (
@@ -114,6 +109,10 @@ class Friction(FrictionLaw):
         UnphysicalElementError: A term would give energy, or a speed is not positive.
     """
 
+    rules: ClassVar = {
+        **{"load": "share", "skew": "signed", "asymmetry": "signed"},
+        **{"stribeck_speed": "positive", "saturation_speed": "positive"},
+    }
     coulomb: Scalars = 0.0  #: Dry friction at every speed and load [N*m].
     #: Per transmitted torque, dimensionless; below 1, or no load could drive the shaft.
     load: Scalars = 0.0
@@ -131,19 +130,8 @@ class Friction(FrictionLaw):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        signless = ("coulomb", "load", "viscous", "excess", "quadratic", "saturating")
-        values = {name: getattr(self, name) for name in signless}
-        require_non_negative(
-            self.name, **values, when_driving=self.when_driving, when_driven=self.when_driven
-        )
-        require(np.less(self.load, 1.0), self.name, "load must be below 1")
-        require(
-            np.less(np.add(self.load, self.when_driven), 1.0),
-            self.name,
-            "when_driven and load together must be below 1",
-        )
-        require(np.greater(self.stribeck_speed, 0.0), self.name, "stribeck_speed must be > 0")
-        require(np.greater(self.saturation_speed, 0.0), self.name, "saturation_speed must be > 0")
+        together = np.less(np.add(self.load, self.when_driven), 1.0)
+        require(together, self.name, "when_driven and load together must be below 1")
         for part, whole in (("skew", "coulomb"), ("asymmetry", "viscous")):
             within = np.less_equal(np.abs(getattr(self, part)), getattr(self, whole))
             require(within, self.name, f"{part} must not exceed {whole}: it would give energy")
@@ -169,7 +157,7 @@ class Friction(FrictionLaw):
             torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
         return torque
 
-    def share(self, velocity: Array, drives: NDArray[np.bool_]) -> Scalars:
+    def share(self, velocity: Array, drives: Mask) -> Scalars:
         """Return the coefficient of the quadrant of power, (N, J)."""
         return self.load + np.where(drives, self.when_driving, self.when_driven)
 

@@ -8,9 +8,8 @@ goes on as long as it takes energy out, beyond the last position its level stays
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from actuators.arrays import Array, Scalars, require, require_non_negative
+from actuators.arrays import Array, Mask, Scalars, require
 from actuators.elements.friction import FrictionLaw
 from actuators.shaft import ShaftSeries
 
@@ -42,7 +41,7 @@ class FrictionCurve(FrictionLaw):
         require(lengths == {len(self.speeds)} and len(self.speeds) > 1, self.name, "one per knot")
         ascending = self.speeds[0] == 0.0 and (np.diff(self.speeds) > 0.0).all()
         require(ascending, self.name, "speeds must ascend from 0")
-        require_non_negative(self.name, viscous=self.viscous, spots=np.array(self.spots))
+        require(np.array(self.spots) >= 0.0, self.name, "spots must not be negative")
         sorted_ = len(self.places) == len(self.spots) and (np.diff(self.places) > 0.0).all()
         require(sorted_, self.name, "places must ascend, with a spot at each")
         passive = np.array(self.levels) + self.viscous * np.array(self.speeds)
@@ -69,7 +68,7 @@ class FrictionCurve(FrictionLaw):
             level = level + np.interp(side.position, self.places, self.spots)
         return np.asarray(level * sense + skew * np.abs(sense) + self.viscous * velocity)
 
-    def share(self, velocity: Array, drives: NDArray[np.bool_]) -> Array:
+    def share(self, velocity: Array, drives: Mask) -> Array:
         """Return friction per transmitted torque, (N, J)."""
         return np.clip(self.at(self.shares, np.abs(velocity)), 0.0, _MOST_SHARE)
 

@@ -12,11 +12,11 @@ both rise in proportion to the loss, the winding by the larger thermal resistanc
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from actuators.arrays import Array, require, require_non_negative
+from actuators.arrays import Array, Numbers
 
 COPPER: Final = 0.00393  # [1/K]
 MAGNET: Final = -0.0011  # [1/K]
@@ -25,19 +25,19 @@ REFERENCE: Final = 25.0  # temperature for which data sheets hold [degC]
 
 
 @dataclass(frozen=True)
-class Heating:
+class Heating(Numbers):
     """The thermal node of one motor."""
 
+    rules: ClassVar = {
+        "time_constant": "positive",
+        **dict.fromkeys(("rise", "initial", "sensor_gain"), "signed"),
+    }
     thermal_resistance: float = 0.0  #: Winding to surroundings [K/W].
     time_constant: float = 10.0  #: [s].
     #: Warming that is not the motor's own, reached after some time constants [K].
     rise: float = 0.0
     initial: float = 0.0  #: Warmer than the data sheet's temperature when the log starts [K].
     sensor_gain: float = 0.0  #: Warming of the winding over that of the housing's sensor [1].
-
-    def __post_init__(self) -> None:
-        require_non_negative("heating", thermal_resistance=self.thermal_resistance)
-        require(self.time_constant > 0.0, "heating", "time_constant must be > 0")
 
     def temperature_rise(self, time: Array, cold_loss: Array) -> Array:
         """Return dT (N,) [K] over time (N,) [s], strictly increasing.

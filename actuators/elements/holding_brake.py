@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars, require_non_negative
-from actuators.elements.element import Element
+from actuators.arrays import Array, Scalars
+from actuators.elements.element import Element, Span
 from actuators.shaft import ShaftSeries
 
 
@@ -18,30 +18,16 @@ from actuators.shaft import ShaftSeries
 class HoldingBrake(Element):
     """A brake that engages wherever its shaft is at rest, and adds nothing in motion.
 
-    Raises:
-        UnphysicalElementError: A value is negative.
-
     Note:
         It engages and releases at once; the coil's transients and the drag of a released brake
         (a `friction` of its own) are left out.
     """
 
     static_torque: Scalars = 0.0  #: With which it holds at its own shaft [N*m].
-    #: Of the coil in motion; zero for a brake that current closes [W].
-    released_power: Scalars = 0.0
-    engaged_power: Scalars = 0.0  #: Of the coil at rest; zero for a brake that springs close [W].
+    released_power: Scalars = 0.0  #: Of the coil in motion; zero where current closes it [W].
+    engaged_power: Scalars = 0.0  #: Of the coil at rest; zero where springs close it [W].
 
-    def __post_init__(self) -> None:
-        require_non_negative(
-            self.name,
-            static_torque=self.static_torque,
-            released_power=self.released_power,
-            engaged_power=self.engaged_power,
-        )
-
-    def holding(
-        self, low: Array, high: Array, position: Array | None = None
-    ) -> tuple[Array, Array]:
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Widen the interval by the static torque."""
         return low - self.static_torque, high + self.static_torque
 

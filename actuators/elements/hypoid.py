@@ -16,11 +16,12 @@ mu tan b1 >= 1. Eq. 11 of the paper, T1 w1 = T2 w2, is the limit mu = 0.
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars, require, require_non_negative
-from actuators.elements.element import Element
+from actuators.arrays import Array, Scalars, require
+from actuators.elements.element import Element, Span
 from actuators.errors import SelfLockingError
 from actuators.shaft import ShaftSeries
 
@@ -37,6 +38,7 @@ class Hypoid(Element):
         at standstill as in motion.
     """
 
+    rules: ClassVar = {"ratio": "positive", "wheel_radius": "positive"}
     ratio: Scalars = 1.0  #: n, pinion speed over wheel speed, positive.
     pinion_angle: Scalars = 0.0  #: b1, spiral angle of the pinion [rad].
     wheel_angle: Scalars = 0.0  #: b2, spiral angle of the wheel [rad], smaller than b1.
@@ -46,19 +48,13 @@ class Hypoid(Element):
     friction: Scalars = 0.0  #: mu at the tooth contact, dimensionless; mu tan b2 must stay below 1.
 
     def __post_init__(self) -> None:
-        require_non_negative(
-            self.name, ratio=self.ratio, wheel_radius=self.wheel_radius, friction=self.friction
-        )
+        super().__post_init__()
         b1, b2 = np.asarray(self.pinion_angle), np.asarray(self.wheel_angle)
-        require(np.greater(self.ratio, 0.0), self.name, "ratio must be > 0")
-        require(np.greater(self.wheel_radius, 0.0), self.name, "wheel_radius must be > 0")
         require((b1 < np.pi / 2) & (b2 >= 0.0), self.name, "angles must lie in [0, 90) deg")
         require(b1 > b2, self.name, "pinion_angle must exceed wheel_angle, or friction gives power")
-        require(
-            self.friction * np.tan(b2) < 1.0,
-            self.name,
-            "friction x tan(wheel_angle) must be below 1, or the wheel cannot turn at all",
-        )
+        turns = self.friction * np.tan(b2) < 1.0
+        lacking = "friction x tan(wheel_angle) must be below 1, or the wheel cannot turn at all"
+        require(turns, self.name, lacking)
 
     @property
     def driving_factor(self) -> Scalars:
@@ -71,24 +67,19 @@ class Hypoid(Element):
         return self._factor(-np.asarray(self.friction))
 
     def _factor(self, friction: Scalars) -> Scalars:
-        factor: Scalars = (1.0 + friction * np.tan(self.pinion_angle)) / (
-            1.0 + friction * np.tan(self.wheel_angle)
-        )
-        return factor
+        pinion, wheel = np.tan(self.pinion_angle), np.tan(self.wheel_angle)
+        return np.asarray((1.0 + friction * pinion) / (1.0 + friction * wheel))
 
     @property
     def locking_friction(self) -> Scalars:
         """Friction at the teeth from which on the gear locks itself: 1 / tan b1."""
-        friction: Scalars = 1.0 / np.tan(self.pinion_angle)
-        return friction
+        return np.asarray(1.0 / np.tan(self.pinion_angle))
 
     @property
     def pinion_radius(self) -> Scalars:
         """r1 [m], tied to the ratio."""
-        radius: Scalars = (
-            self.wheel_radius * np.cos(self.wheel_angle) / (self.ratio * np.cos(self.pinion_angle))
-        )
-        return radius
+        turned = self.ratio * np.cos(self.pinion_angle)
+        return self.wheel_radius * np.cos(self.wheel_angle) / turned
 
     @property
     def gearing(self) -> Scalars:
@@ -99,8 +90,7 @@ class Hypoid(Element):
         """Return the signed normal force at the teeth, (N, J) [N] (Eq. 12)."""
         along = np.sign(joint_side.torque) * joint_side.direction
         across = np.cos(self.wheel_angle) + self.friction * np.sin(self.wheel_angle) * along
-        force: Array = joint_side.torque / (self.wheel_radius * across)
-        return force
+        return joint_side.torque / (self.wheel_radius * across)
 
     def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return the pinion's torque and motion (Eq. 13)."""
@@ -134,9 +124,7 @@ class Hypoid(Element):
         torque = motor_side.torque * self.ratio / factor
         return motor_side.geared(1.0 / np.asarray(self.ratio), torque)
 
-    def holding(
-        self, low: Array, high: Array, position: Array | None = None
-    ) -> tuple[Array, Array]:
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Return the span of Eq. 13 over both senses of an impending motion.
 
         Each end of the motor-side interval is a concave (lower) or convex (upper) function of the

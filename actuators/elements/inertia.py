@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from actuators.arrays import Array, Scalars, require_non_negative
+from actuators.arrays import Array, Scalars
 from actuators.elements.element import Element
 from actuators.shaft import ShaftSeries
 
@@ -11,17 +11,11 @@ from actuators.shaft import ShaftSeries
 class Inertia(Element):
     """Torque for the acceleration of a shaft; stores kinetic energy and dissipates nothing.
 
-    Raises:
-        UnphysicalElementError: The inertia is negative.
-
     Note:
         Counted here, reflected rotor inertia must not stand in the rigid-body model as well.
     """
 
     inertia: Scalars = 0.0  #: Moment of inertia about the shaft [kg*m^2].
-
-    def __post_init__(self) -> None:
-        require_non_negative(self.name, inertia=self.inertia)
 
     def added(self, side: ShaftSeries) -> Array:
         """Return inertia times acceleration; nothing at standstill."""

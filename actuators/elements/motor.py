@@ -5,14 +5,13 @@ I = torque / k        U = R I + k velocity        P = U I = torque velocity + R 
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
-import numpy as np
-
-from actuators.arrays import Array, Scalars, require, require_non_negative
+from actuators.arrays import Array, Numbers, Scalars, require
 
 
 @dataclass(frozen=True, eq=False)
-class DCMotor:
+class DCMotor(Numbers):
     """Conversion only: rotor friction and inertia are elements of their own.
 
     Raises:
@@ -23,6 +22,11 @@ class DCMotor:
         Inductance is left out: with 0.08 mH and 0.3 ohm it matters below a millisecond.
     """
 
+    rules: ClassVar = {
+        "torque_constant": "positive",
+        **dict.fromkeys(("max_speed", "supply_voltage"), "limit"),
+        **dict.fromkeys(("continuous_current", "peak_current"), "limit"),
+    }
     name: str  #: Names the row of its copper loss.
     #: k, of torque per current and of voltage per speed [N*m/A = V*s/rad].
     torque_constant: Scalars
@@ -37,22 +41,9 @@ class DCMotor:
     resistance_spread: float = 0.0  #: Of R likewise [1].
 
     def __post_init__(self) -> None:
-        require_non_negative(
-            self.name,
-            torque_constant=self.torque_constant,
-            resistance=self.resistance,
-            torque_constant_spread=self.torque_constant_spread,
-            resistance_spread=self.resistance_spread,
-            mass=self.mass,
-        )
-        require(np.greater(self.torque_constant, 0.0), self.name, "torque_constant must be > 0")
-        for limit in ("max_speed", "supply_voltage", "continuous_current", "peak_current"):
-            require(getattr(self, limit) > 0.0, self.name, f"{limit} must be > 0")
-        require(
-            self.peak_current >= self.continuous_current,
-            self.name,
-            "peak_current must not be below continuous_current",
-        )
+        super().__post_init__()
+        apart = self.peak_current >= self.continuous_current
+        require(apart, self.name, "peak_current must not be below continuous_current")
 
     def current(self, torque: Array) -> Array:
         """Return the current (...) [A] for an air-gap torque [N*m]."""

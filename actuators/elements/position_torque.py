@@ -5,11 +5,12 @@ They are conservative: what they take on one half of a closed path they give bac
 
 from abc import abstractmethod
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from actuators.arrays import Array, Scalars, require
-from actuators.elements.element import Element
+from actuators.elements.element import Element, Span
 from actuators.errors import ChainError
 from actuators.shaft import ShaftSeries
 
@@ -26,9 +27,7 @@ class PositionTorque(Element):
         """Return the torque at the series' positions, (N, J) [N*m]."""
         return self.torque(side.position)
 
-    def holding(
-        self, low: Array, high: Array, position: Array | None = None
-    ) -> tuple[Array, Array]:
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Shift the interval.
 
         Raises:
@@ -51,12 +50,9 @@ class ParallelSpring(PositionTorque):
     Its torque acts on the joint against the displacement, so that the drive supplies it on top.
     """
 
+    rules: ClassVar = {"stiffness": "signed", "rest": "signed"}
     stiffness: Scalars = 0.0  #: [N*m/rad].
     rest: Scalars = 0.0  #: Position without torque [rad].
-
-    def __post_init__(self) -> None:
-        for values in (self.stiffness, self.rest):
-            require(np.isfinite(values), self.name, "values must be finite")
 
     def torque(self, position: Array) -> Array:
         """Return stiffness (position - rest) [N*m]."""
@@ -71,18 +67,14 @@ class Ripple(PositionTorque):
     12(3), 1996), motors with slots by their cogging order.
     """
 
+    rules: ClassVar = {"amplitude": "signed", "order": "signed", "phase": "signed"}
     amplitude: float = 0.0  #: [N*m].
     order: float = 1.0  #: Periods per turn of the shaft.
     phase: float = 0.0  #: [rad].
 
-    def __post_init__(self) -> None:
-        values = [self.amplitude, self.order, self.phase]
-        require(np.isfinite(values), self.name, "values must be finite")
-
     def torque(self, position: Array) -> Array:
         """Return the ripple torque [N*m]."""
-        result: Array = self.amplitude * np.sin(self.order * position + self.phase)
-        return result
+        return np.asarray(self.amplitude * np.sin(self.order * position + self.phase))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +87,7 @@ class PositionCurve(PositionTorque):
     def __post_init__(self) -> None:
         ascending = len(self.places) == len(self.levels) and (np.diff(self.places) > 0.0).all()
         require(ascending, self.name, "places must ascend, with a level at each")
-        require(np.isfinite(self.levels), self.name, "values must be finite")
+        require(np.isfinite(self.levels), self.name, "levels must be finite")
 
     def torque(self, position: Array) -> Array:
         """Return the curve's torque [N*m]."""

@@ -1,27 +1,21 @@
 """An ideal transmission: a ratio without loss (Eq. 1 and 2 of the paper)."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars, require
-from actuators.elements.element import Element
+from actuators.arrays import Array, Scalars
+from actuators.elements.element import Element, Span
 from actuators.shaft import ShaftSeries
 
 
 @dataclass(frozen=True, eq=False)
 class Ratio(Element):
-    """Speed divided from motor side to joint side, torque multiplied, power kept.
+    """Speed divided from motor side to joint side, torque multiplied, power kept."""
 
-    Raises:
-        UnphysicalElementError: The ratio is not positive and finite.
-    """
-
+    rules: ClassVar = {"ratio": "positive"}
     ratio: Scalars = 1.0  #: Motor-side over joint-side speed, positive, dimensionless.
-
-    def __post_init__(self) -> None:
-        ratio = np.asarray(self.ratio, dtype=float)
-        require(np.isfinite(ratio) & (ratio > 0.0), self.name, "ratio must be positive and finite")
 
     def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
         """Return the faster shaft with the smaller torque."""
@@ -31,9 +25,7 @@ class Ratio(Element):
         """Return the slower shaft with the larger torque."""
         return motor_side.geared(1.0 / np.asarray(self.ratio), motor_side.torque * self.ratio)
 
-    def holding(
-        self, low: Array, high: Array, position: Array | None = None
-    ) -> tuple[Array, Array]:
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Scale the interval."""
         return low / self.ratio, high / self.ratio
 

@@ -1,9 +1,10 @@
 """A second motor at a shaft, which takes a fixed share of the shaft's torque."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
-from actuators.arrays import Array, Scalars, least_magnitude, require, require_non_negative
-from actuators.elements.element import Element
+from actuators.arrays import Array, Scalars, least_magnitude
+from actuators.elements.element import Element, Span
 from actuators.shaft import ShaftSeries
 
 
@@ -14,22 +15,15 @@ class SecondMotor(Element):
     At standstill it gives its share of the least torque that holds. Two motors lose least copper
     where each takes a share in proportion to its k^2 / R.
 
-    Raises:
-        UnphysicalElementError: A constant is not positive, or the share is not below 1.
-
     Note:
         Its rotor's friction and inertia are elements of their own, at the same shaft. Its current
         and voltage are held against no limits.
     """
 
+    rules: ClassVar = {"torque_constant": "positive", "share": "share"}
     torque_constant: Scalars = 1.0  #: k [N*m/A].
     resistance: Scalars = 0.0  #: R of its winding [ohm].
-    share: Scalars = 0.0  #: Of the shaft's torque, from 0 to below 1, dimensionless.
-
-    def __post_init__(self) -> None:
-        require_non_negative(self.name, resistance=self.resistance, share=self.share)
-        require(self.torque_constant > 0.0, self.name, "torque_constant must be > 0")
-        require(self.share < 1.0, self.name, "share must be below 1")
+    share: Scalars = 0.0  #: Of the shaft's torque, dimensionless.
 
     def added(self, side: ShaftSeries) -> Array:
         """Return what the chain's own motor need not supply, negative for a load that resists."""
@@ -39,9 +33,7 @@ class SecondMotor(Element):
         """Return both motors' torque."""
         return motor_side.with_torque(motor_side.torque / (1.0 - self.share))
 
-    def holding(
-        self, low: Array, high: Array, position: Array | None = None
-    ) -> tuple[Array, Array]:
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
         """Shift the interval by the share of the least torque that holds."""
         own = self.share * least_magnitude(low, high)
         return low - own, high - own

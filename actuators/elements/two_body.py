@@ -17,11 +17,11 @@ the single node of `actuators.elements.heating`, whose coefficient of copper hol
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars, require, require_non_negative
+from actuators.arrays import Array, Numbers, Scalars
 from actuators.elements.heating import COPPER, REFERENCE
 
 #: Temperature for which data sheets hold [K].
@@ -56,22 +56,20 @@ class Temperatures:
 
 
 @dataclass(frozen=True, eq=False)
-class TwoBody:
+class TwoBody(Numbers):
     """The thermal model of a motor; numbers may be arrays (...) that broadcast against losses.
 
     Raises:
         UnphysicalElementError: A number is not positive and finite.
     """
 
+    rules: ClassVar = dict.fromkeys(
+        ("winding_to_housing", "housing_to_ambient", "winding_time", "housing_time"), "positive"
+    )
     winding_to_housing: Scalars  #: R_wh [K/W].
     housing_to_ambient: Scalars  #: R_ha [K/W].
     winding_time: Scalars  #: Time constant of the winding [s].
     housing_time: Scalars  #: Time constant of the housing [s].
-
-    def __post_init__(self) -> None:
-        require_non_negative("thermal model", **vars(self))
-        for name, value in vars(self).items():
-            require(np.greater(value, 0.0), "thermal model", f"{name} must be > 0")
 
     def balance(
         self, copper: Array, other: Scalars = 0.0, *, ambient: float = REFERENCE_K

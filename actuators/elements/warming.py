@@ -11,36 +11,26 @@ which is added to the friction that the joint has at the reference.
 """
 
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
-from actuators.arrays import Array, require, require_non_negative
+from actuators.arrays import Array, Numbers
 
 ZERO_CELSIUS: Final = 273.15  # [K]
 
 
 @dataclass(frozen=True)
-class Warming:
-    """By how much one joint's friction falls.
+class Warming(Numbers):
+    """By how much one joint's friction falls."""
 
-    Raises:
-        UnphysicalElementError: Friction would grow, or the reference is not above absolute zero.
-    """
-
+    rules: ClassVar = {"reference": "positive"}
     coulomb: float = 0.0  #: Dry friction per kelvin [N*m/K].
     viscous: float = 0.0  #: Viscous friction per kelvin [N*m*s/(rad*K)].
     reference: float = 298.15  #: Temperature at which nothing is taken off [K].
 
-    def __post_init__(self) -> None:
-        require_non_negative("warming", coulomb=self.coulomb, viscous=self.viscous)
-        require(self.reference > 0.0, "warming", "reference must be > 0 K")
-
     def torque(self, temperature: Array, direction: Array, velocity: Array) -> Array:
         """Return what comes on top of the friction at the reference, (N,) [N*m].
 
-        Args:
-            temperature: By the joint's sensor, (N,) [degC].
-            direction: Of the motion, -1 to 1, (N,).
-            velocity: (N,) [rad/s].
+        The joint's sensor tells the temperature (N,) [degC]; the direction is -1 to 1, (N,).
         """
         warmer = temperature + ZERO_CELSIUS - self.reference  # [K]
         return -warmer * (self.coulomb * direction + self.viscous * velocity)

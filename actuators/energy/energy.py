@@ -29,10 +29,7 @@ class StageEnergy:
 
 
 def duration(time: Array) -> float:
-    """Return the time a series spans, the shortest of its columns [s].
-
-    Args:
-        time: (N,) or (N, J) [s].
+    """Return the time that a series (N,) or (N, J) [s] spans, the shortest of its columns [s].
 
     Raises:
         EnergyError: It spans none.
@@ -60,22 +57,15 @@ def integral(time: Array, power: Array) -> Array:
 
 
 def weighted(weights: Array, values: Array) -> Array:
-    """Return the weighted sum over the samples, (J,).
-
-    Args:
-        weights: (N,) or (N, J).
-        values: (N, J), or (N,).
-    """
-    total: Array = weights @ values if weights.ndim == 1 else np.einsum("nj,nj->j", weights, values)
-    return total
+    """Return the weighted sum over the samples, (J,), of weights (N,) or (N, J)."""
+    each = weights @ values if weights.ndim == 1 else np.einsum("nj,nj->j", weights, values)
+    return np.asarray(each)
 
 
 def split_integral(time: Array, power: Array) -> tuple[Array, Array]:
     """Return the integrals of the positive and of the negative part, both not negative, (J,).
 
-    Args:
-        time: (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
-        power: (N, J) [W].
+    Arguments as for `integral`.
     """
     net = integral(time, power)
     magnitude = integral(time, np.abs(power))
@@ -91,11 +81,7 @@ def split_integral(time: Array, power: Array) -> tuple[Array, Array]:
 
 
 def stage_energy(result: ChainResult, stage: str) -> StageEnergy:
-    """Return the energy through one stage.
-
-    Raises:
-        ChainError: The chain has no such stage.
-    """
+    """Return the energy through one stage."""
     forward, reverse = split_integral(result.joint.time, result.stage_power(stage))
     return StageEnergy(stage, result.joint.joints, forward, reverse)
 

@@ -7,7 +7,7 @@ continuous current bounds a root mean square and no instant; it is no edge of th
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars
+from actuators.arrays import Array
 from actuators.elements.motor import DCMotor
 
 
@@ -19,30 +19,19 @@ def operating_region(motor: DCMotor, *, joint: int = 0, reach: tuple[float, floa
         joint: Column, where the motor's constants differ by joint.
         reach: Largest speed [rad/s] and torque [N*m] of interest, where no limit is nearer.
     """
-    constant = _of(motor.torque_constant, joint)
-    resistance = _of(motor.resistance, joint)
-    fastest = min(motor.max_speed, reach[0])
-    strongest = min(motor.peak_current * constant, reach[1])
-    corners = np.array(
-        [
-            [-fastest, -strongest],
-            [fastest, -strongest],
-            [fastest, strongest],
-            [-fastest, strongest],
-        ]
+    constant, resistance = (
+        float(np.ravel(x)[joint if np.size(x) > 1 else 0])
+        for x in (motor.torque_constant, motor.resistance)
     )
-    if not np.isfinite(motor.supply_voltage):
-        return corners
-    # |voltage| <= supply as two half planes: normal . (speed, torque) <= supply.
-    normal = np.array([constant, resistance / constant])
-    for sign in (1.0, -1.0):
-        corners = _clipped(corners, sign * normal, motor.supply_voltage)
+    speed = min(motor.max_speed, reach[0])
+    torque = min(motor.peak_current * constant, reach[1])
+    corners = np.array([[-speed, -torque], [speed, -torque], [speed, torque], [-speed, torque]])
+    if np.isfinite(motor.supply_voltage):
+        # |voltage| <= supply as two half planes: normal . (speed, torque) <= supply.
+        normal = np.array([constant, resistance / constant])
+        for sign in (1.0, -1.0):
+            corners = _clipped(corners, sign * normal, motor.supply_voltage)
     return corners
-
-
-def _of(values: Scalars, joint: int) -> float:
-    column = np.ravel(values)
-    return float(column[joint if column.size > 1 else 0])
 
 
 def _clipped(corners: Array, normal: Array, bound: float) -> Array:

@@ -26,18 +26,13 @@ class LimitRow:
 
 
 def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:
-    """Return a row for every joint and limit, breached or not.
-
-    Args:
-        result: What the chain needs for the motion; its motors' limits hold.
+    """Return a row for every joint and limit of its motor, breached or not.
 
     Raises:
         EnergyError: The series spans no time.
     """
-    time = result.joint.time
-    span = duration(time)
-    rows = []
-    rms = rms_over_time(time, result.current)
+    time, span = result.joint.time, duration(result.joint.time)
+    rms, rows = rms_over_time(time, result.current), []
     for j, (joint, motor) in enumerate(zip(result.joint.joints, result.motors, strict=True)):
         for quantity, unit, limit, values in (
             ("speed", "rad/s", motor.max_speed, result.motor.velocity),
@@ -46,66 +41,52 @@ def limit_rows(result: ChainResult) -> tuple[LimitRow, ...]:
         ):
             size = np.abs(values[:, j])
             at = int(np.argmax(size))
-            share = time_over(time, size, limit) / span
-            row = (joint, quantity, unit, limit, float(size[at]), float(time[at]), share)
-            rows.append(LimitRow(*row, breach=float(size[at]) > limit))
-        rows.append(_lasting(joint, motor, float(rms[j]), float(time[0])))
+            peak, share = float(size[at]), time_over(time, size, limit) / span
+            row = (joint, quantity, unit, limit, peak, float(time[at]), share)
+            rows.append(LimitRow(*row, breach=peak > limit))
+        rows.append(_still(joint, "rms_current", "A", motor.continuous_current, rms[j], time[0]))
     return tuple(rows)
-
-
-def _lasting(joint: str, motor: DCMotor, rms: float, start: float) -> LimitRow:
-    limit = motor.continuous_current
-    return LimitRow(joint, "rms_current", "A", limit, rms, start, float(rms > limit), rms > limit)
 
 
 def standing_rows(
     holding: HoldingResult, joints: Sequence[str], motors: Sequence[DCMotor]
 ) -> tuple[LimitRow, ...]:
-    """Return a row for every joint and limit that holding still can breach.
-
-    Args:
-        holding: Arrays (J,).
-        joints: Names, in the order of the columns.
-        motors: One per joint.
-    """
+    """Return a row for every joint and limit that holding still (J,) can breach."""
     rows = []
     for j, (joint, motor) in enumerate(zip(joints, motors, strict=True)):
-        current, voltage = abs(float(holding.current[j])), abs(float(holding.voltage[j]))
-        for quantity, unit, limit, value in (
-            ("voltage", "V", motor.supply_voltage, voltage),
-            ("current", "A", motor.peak_current, current),
-        ):
-            over = value > limit
-            rows.append(LimitRow(joint, quantity, unit, limit, value, 0.0, float(over), over))
-        rows.append(_lasting(joint, motor, current, 0.0))
+        current, voltage = abs(holding.current[j]), abs(holding.voltage[j])
+        rows += [
+            _still(joint, "voltage", "V", motor.supply_voltage, voltage),
+            _still(joint, "current", "A", motor.peak_current, current),
+            _still(joint, "rms_current", "A", motor.continuous_current, current),
+        ]
     return tuple(rows)
 
 
-def rms_over_time(time: Array, values: Array) -> Array:
-    """Return the root mean square of a piecewise linear quantity, (J,).
+def _still(
+    joint: str, quantity: str, unit: str, limit: float, value: float, time: float = 0.0
+) -> LimitRow:
+    """One quantity that is the same all the time."""
+    over = bool(value > limit)
+    return LimitRow(joint, quantity, unit, limit, float(value), float(time), float(over), over)
 
-    Args:
-        time: (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
-        values: (N, J).
+
+def rms_over_time(time: Array, values: Array) -> Array:
+    """Return the root mean square of a piecewise linear quantity (N, J), (J,).
+
+    Time is (N,), or (N, J) where every column has its own [s]; repeated stamps are breaks.
 
     Raises:
         EnergyError: The series spans no time.
     """
+    duration(time)
     a, b = values[:-1], values[1:]
     square = weighted(np.diff(time, axis=0), a * a + a * b + b * b) / 3.0  # exact if linear
-    duration(time)
-    mean_square: Array = square / (time[-1] - time[0])
-    return np.sqrt(mean_square)
+    return np.sqrt(np.asarray(square / (time[-1] - time[0])))
 
 
 def time_over(time: Array, magnitude: Array, limit: float) -> float:
-    """Return for how long a piecewise linear quantity exceeds a limit [s].
-
-    Args:
-        time: (N,) [s].
-        magnitude: (N,).
-        limit: The limit.
-    """
+    """Return for how long a piecewise linear quantity (N,) exceeds a limit [s]."""
     if not np.isfinite(limit):
         return 0.0
     low = np.minimum(magnitude[:-1], magnitude[1:])

@@ -43,8 +43,7 @@ class Supply:
     @property
     def dumped_energy(self) -> Array:
         """Energy dumped, (K,) [J]."""
-        _, reverse = split_integral(self.time, self.electrical)
-        return (1.0 - self.recovered) * reverse
+        return (1.0 - self.recovered) * split_integral(self.time, self.electrical)[1]
 
 
 def supply(result: ChainResult, policy: str = "none", fraction: float = 0.0) -> Supply:

@@ -14,11 +14,11 @@ at an open-circuit voltage of U + R P / U.
 
 import math
 from dataclasses import dataclass
-from typing import Final
+from typing import ClassVar, Final
 
 import numpy as np
 
-from actuators.arrays import Array, require, require_non_negative
+from actuators.arrays import Array, Numbers, require
 
 #: Nodes of Gauss and Legendre over the charge; the integrand is smooth above the greatest power.
 _NODES, _WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(24))
@@ -26,7 +26,7 @@ HOUR: Final = 3600.0  # [s]
 
 
 @dataclass(frozen=True)
-class Battery:
+class Battery(Numbers):
     """One battery.
 
     Raises:
@@ -34,6 +34,7 @@ class Battery:
             emptier than full.
     """
 
+    rules: ClassVar = {"energy": "positive"}
     name: str  #: Of the part.
     energy: float  #: From full to empty at a small current [J].
     full: float  #: Open-circuit voltage when full [V].
@@ -43,9 +44,7 @@ class Battery:
     mass: float = 0.0  #: [kg]; no law uses it.
 
     def __post_init__(self) -> None:
-        numbers = {n: v for n, v in vars(self).items() if n != "name"}
-        require_non_negative(self.name, **numbers)
-        require(self.energy > 0.0, self.name, "energy must be > 0")
+        super().__post_init__()
         require(0.0 < self.empty <= self.full, self.name, "0 < empty <= full voltage must hold")
         require(self.returned <= 1.0, self.name, "returned must not be above 1")
 
@@ -121,7 +120,7 @@ class Battery:
             UnphysicalElementError: The shares are negative or do not sum to one.
         """
         power, shares = np.asarray(power, dtype=float), np.asarray(shares, dtype=float)
-        require_non_negative(self.name, **{"share of a mode": shares})
+        require(shares >= 0.0, self.name, "shares must not be negative")
         require(math.isclose(shares.sum(), 1.0, abs_tol=1e-6), self.name, "shares must sum to 1")
         peak = np.maximum(np.max(power, axis=-1), -np.inf if peak is None else peak)
         last = self.charge_at_end(peak, cut_off)

@@ -14,20 +14,25 @@ any current.
 
 import math
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars, require, require_non_negative
+from actuators.arrays import Array, Numbers, Scalars
 
 
 @dataclass(frozen=True, eq=False)
-class Driver:
+class Driver(Numbers):
     """One driver; numbers may be arrays that broadcast against current and voltage.
 
     Raises:
         UnphysicalElementError: A loss is negative or not finite, or a limit not positive.
     """
 
+    rules: ClassVar = {
+        "voltage_share": "positive",
+        **dict.fromkeys(("continuous_current", "peak_current", "most_voltage"), "limit"),
+    }
     name: str  #: Of the part.
     resistance: Scalars = 0.0  #: In series with the winding, 2 c R_on [ohm].
     #: Power while it is enabled, whatever the current [W]; none while it is off.
@@ -39,26 +44,11 @@ class Driver:
     least_voltage: Scalars = 0.0  #: Of the bus, below which it switches off [V].
     most_voltage: Scalars = math.inf  #: Of the bus [V].
 
-    def __post_init__(self) -> None:
-        require_non_negative(
-            self.name,
-            resistance=self.resistance,
-            idle=self.idle,
-            switching=self.switching,
-            voltage_share=self.voltage_share,
-            least_voltage=self.least_voltage,
-        )
-        for limit in ("voltage_share", "continuous_current", "peak_current", "most_voltage"):
-            require(np.greater(getattr(self, limit), 0.0), self.name, f"{limit} must be > 0")
-
     def loss(self, current: Array, bus: Scalars) -> Array:
         """Return the power that the enabled driver turns into heat, (...) [W], not negative.
 
-        The bus supplies it in addition to the motor's electrical power, whichever way that flows.
-
-        Args:
-            current: Of the motor, (...) [A].
-            bus: Voltage of the bus [V].
+        The bus [V] supplies it in addition to the motor's, whichever way its current (...) [A]
+        flows.
         """
         size = np.abs(current)
         return self.idle + self.resistance * size * size + self.switching * bus * size

@@ -2,43 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from actuators.elements.position_torque import ParallelSpring
+from actuators.arrays import Array, Index
 from actuators.supply.battery import Battery
+from pipeline.api.machine import Machine
 from pipeline.choice.answer.full import Full, through
-from pipeline.choice.asked import asked_of
-from pipeline.choice.doubt import Design, Doubt
+from pipeline.choice.asked import Asked, asked_of
+from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines, effects_of
 from pipeline.choice.group import Found, merged
-from pipeline.choice.loads import Load
+from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Feedback
+from pipeline.choice.settle import Robots
+from pipeline.choice.springs import found_springs
 from pipeline.choice.wanted import Wanted
 from pipeline.progress import Progress
 
-if TYPE_CHECKING:
-    from pipeline.api.machine import Machine
-
-Array = NDArray[np.float64]
 #: Rounds of mass fed back, at most; two or three settle it.
 _ROUNDS: Final = 5
 _POOL: Final = 8  # designs of each search, by score and by mass, among which a robot is settled
+_SEARCHES: Final = 4  # of all designs, each with drawn values of all parts
 
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
     """The answer."""
 
-    machine: Machine  #: The robot.
-    wanted: Wanted  #: What was asked.
+    asked: Asked
+    wanted: Wanted
     loads: Sequence[Load]  #: The mission's modes, with the answer's masses in the robot.
     found: Mapping[str, Found]  #: The search of each group.
     #: Designs of each group that are drawn: the answer, the best by the middle of every range, and
@@ -52,15 +49,21 @@ class Chosen:
     sides: Mapping[str, tuple[Mapping[str, Design], Sequence[Load]]]
     #: What the first search, before mass was fed back, took the answer's power for [W].
     first: Mapping[str, float]
-    present: float  #: Mass of an actuator that the bodies hold already [kg].
-    spring: ParallelSpring | None  #: Beside the actuators of all joints; None without any.
-    shelf: Shelf  #: The parts.
-    battery: Battery  #: Of the answer, at the highest voltage of its groups.
+
+    @property
+    def shelf(self) -> Shelf:
+        """The parts."""
+        return self.asked.shelf
 
     @property
     def hours(self) -> float:
         """Of the mission in a day [h]."""
         return sum(load.mode.hours for load in self.loads)
+
+    @cached_property
+    def battery(self) -> Battery:
+        """Of the answer, at the highest voltage of its groups."""
+        return self.asked.battery(self.answer)
 
     def designs(self, group: str) -> Designs:
         """The answer of one group, as one design."""
@@ -73,9 +76,8 @@ class Chosen:
 
     def through(self, robot: Mapping[str, Design], loads: Sequence[Load]) -> list[Full]:
         """Every mode through full chains."""
-        built = {
-            g: (f.demanded.joints, self.shelf.designs([robot[g]])) for g, f in self.found.items()
-        }
+        groups = self.asked.groups.items()
+        built = {g: (joints, self.shelf.designs([robot[g]])) for g, joints in groups}
         return [through(load, built, self.wanted.account) for load in loads]
 
     @property
@@ -89,7 +91,7 @@ class Chosen:
             out = max(out, float(use[0]))
         return out
 
-    def robots(self) -> tuple[Array, Array, NDArray[np.intp]]:
+    def robots(self) -> tuple[Array, Array, Index]:
         """Front of robots: power with hotel load [W], mass [kg], design of each group."""
         fronts = [(f.score[f.front], f.mass[f.front]) for f in self.found.values()]
         power, mass, taken = merged(fronts)
@@ -102,13 +104,7 @@ def choose(
     wanted: Wanted | None = None,
     progress: Progress | None = None,
 ) -> Chosen:
-    """Which motor, gear and brake for each group of joints.
-
-    Args:
-        machine: From `load`.
-        modes: Of the mission.
-        wanted: What is searched and counted.
-        progress: Told of each step.
+    """Which motor, gear and brake for each group of joints, for the modes of a mission.
 
     Raises:
         PipelineError: A mode cannot be done, or no design is within limits.
@@ -119,11 +115,14 @@ def choose(
     asked = asked_of(machine, modes, wanted)
     every = combinations(asked.shelf, brakes=wanted.brakes)
     designs = asked.shelf.designs(every)
+    present = dict.fromkeys(asked.groups, asked.present)
     if any("=" not in text for text in wanted.springs):
-        wanted = replace(wanted, springs=asked.springs(designs, wanted.springs))
+        loads = loads_of(machine, modes, asked.added(present), spring=asked.spring)
+        given = (wanted.springs, asked.groups, loads, designs, asked.account)
+        wanted = replace(wanted, springs=found_springs(*given))
         asked = asked_of(machine, modes, wanted)
     told("the mission's demand")
-    robots = asked.robots(dict.fromkeys(asked.groups, asked.present))
+    robots = Robots.about(asked, present)
     price = dict.fromkeys(asked.groups, Feedback())
     answer: dict[str, Design] = {}
     pool: dict[str, dict[Design, None]] = {g: {} for g in asked.groups}
@@ -133,34 +132,69 @@ def choose(
         found = asked.searched(designs, robots.loads, price)
         first = first or {g: float(f.power[f.finalists[0]]) for g, f in found.items()}
         for g, f in found.items():
-            pool[g] |= dict.fromkeys(_named(f, [*f.finalists[:_POOL], *f.front[:_POOL]]))
-        if turn == 1:  # with masses that are near
-            for g, f in asked.drawn(every, robots.loads, price):
-                pool[g] |= dict.fromkeys(_named(f, f.finalists[:_POOL]))
-        start = answer or {g: _named(f, f.finalists)[0] for g, f in found.items()}
+            pool[g] |= dict.fromkeys(f.names([*f.finalists[:_POOL], *f.front[:_POOL]]))
+        # With masses that are near, all designs with drawn values of all parts.
+        for sheet in drawn(asked.shelf, every, _SEARCHES, seed=1)[2] if turn == 1 else ():
+            others = asked.searched(asked.shelf.designs(every, sheet), robots.loads, price)
+            for g, f in others.items():
+                pool[g] |= dict.fromkeys(f.names(f.finalists[:_POOL]))
+        start = answer or {g: f.names(f.finalists[:1])[0] for g, f in found.items()}
         better = robots.settled(start, pool)
         if better == answer:
             break
         answer = better
-        robots = asked.robots(asked.masses(answer))
+        robots = Robots.about(asked, asked.masses(answer))
         price = robots.prices(answer)
-    asked.check(answer, robots)
+    robots.check(answer)
     found = asked.searched(designs, robots.loads, price)
     told("draws over what no sheet prints")
-    candidates = {g: _candidates(answer[g], f, pool[g]) for g, f in found.items()}
-    doubts = asked.doubts(found, candidates, price, wanted.draws, robots)
-    return Chosen(
-        *(machine, wanted, robots.loads, found, candidates, doubts, answer),
-        *(asked.sides(answer, found, price, robots), first, asked.present),
-        spring=asked.spring,
-        shelf=asked.shelf,
-        battery=asked.battery(answer),
-    )
+    candidates = {
+        g: list(dict.fromkeys([answer[g], *f.names(f.finalists), *pool[g]]))
+        for g, f in found.items()
+    }
+    doubts = _doubts(asked, found, candidates, price, robots, wanted.draws)
+    sides = _sides(asked, found, price, robots, answer)
+    return Chosen(asked, wanted, robots.loads, found, candidates, doubts, answer, sides, first)
 
 
-def _candidates(answer: Design, found: Found, pool: Iterable[Design]) -> list[Design]:
-    return list(dict.fromkeys([answer, *_named(found, found.finalists), *pool]))
+def _doubts(
+    asked: Asked,
+    found: Mapping[str, Found],
+    candidates: Mapping[str, Sequence[Design]],
+    price: Mapping[str, Feedback],
+    robots: Robots,
+    draws: int,
+) -> dict[str, Doubt]:
+    """Every group's candidates in draws of what is not printed, and of found effects."""
+    added, effects = asked.added(robots.mass), effects_of(asked.machine)
+    days = []
+    for values, own in drawn_machines(asked.machine):
+        loads = loads_of(own, asked.modes, added, along=robots.loads, spring=asked.spring)
+        days.append((values, asked.demanded(loads)))
+    return {
+        g: doubt(
+            *(f.demanded, asked.shelf, candidates[g], asked.account, price[g]),
+            draws=draws,
+            effects=effects,
+            found=[(values, demanded[g]) for values, demanded in days],
+        )
+        for g, f in found.items()
+    }
 
 
-def _named(found: Found, which: Sequence[int] | NDArray[np.intp]) -> list[Design]:
-    return [found.designs.parts[i] for i in found.looked[which]]
+def _sides(
+    asked: Asked,
+    found: Mapping[str, Found],
+    price: Mapping[str, Feedback],
+    robots: Robots,
+    answer: Mapping[str, Design],
+) -> dict[str, tuple[dict[str, Design], list[Load]]]:
+    """The best robot that can be driven back, and that locks; see `Chosen`."""
+    out = {}
+    for name, locked in (("reversible", False), ("irreversible", True)):
+        best = {
+            g: f.best(f.designs.locks(True) == locked, asked.account, price[g]) or answer[g]
+            for g, f in found.items()
+        }
+        out[name] = best, robots.at(asked.masses(best))
+    return out

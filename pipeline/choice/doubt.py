@@ -18,13 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats.qmc import LatinHypercube
 
+from actuators.arrays import Array, Index, Mask
 from actuators.loading.data_sheet import Number
+from pipeline.api.machine import Machine
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.parts.shelf import Drawn, Shelf
 from pipeline.choice.search import Demanded, Feedback
@@ -32,10 +33,6 @@ from pipeline.choice.track import Account
 from pipeline.effects.base import place_text
 from pipeline.effects.registry import effect_named
 
-if TYPE_CHECKING:
-    from pipeline.api.machine import Machine
-
-Array = NDArray[np.float64]
 Design = tuple[str, str, str]
 Unknown = tuple[str, str, Number]
 DRAWS: Final = 256
@@ -50,7 +47,7 @@ class Doubt:
 
     power: Array  #: (S, D) [W].
     score: Array  #: With what their mass costs elsewhere (S, D) [W].
-    within: NDArray[np.bool_]  #: Whether every limit is kept (S, D).
+    within: Mask  #: Whether every limit is kept (S, D).
     unknowns: tuple[Unknown, ...]  #: Part, entry and range of what was drawn, U of them.
     values: Array  #: Of these (S, U).
 
@@ -60,7 +57,7 @@ class Doubt:
         return np.asarray(self.score.mean(axis=0))
 
     @property
-    def order(self) -> NDArray[np.intp]:
+    def order(self) -> Index:
         """The answer, then from the best expected score on; those within limits first."""
         order = np.lexsort((self.expected, self.within.mean(axis=0) < 0.5))
         return np.concatenate([[0], order[order != 0]])
@@ -111,7 +108,6 @@ def doubt(
     feedback: Feedback,
     *,
     draws: int = DRAWS,
-    seed: int = 0,
     effects: Sequence[Unknown] = (),
     found: Sequence[tuple[Array, Demanded]] = (),
 ) -> Doubt:
@@ -124,13 +120,12 @@ def doubt(
         account: What is counted.
         feedback: What the mass of the actuators costs the robot.
         draws: How many.
-        seed: Of the draws.
         effects: What is drawn of a model file, E of them.
         found: Values of these (E,) and the day's demand with them, in turn for one draw after the
             other; `demanded` for all if empty.
     """
     count = len(combinations)
-    unknowns, values, sheets = drawn(shelf, combinations, draws, seed)
+    unknowns, values, sheets = drawn(shelf, combinations, draws)
     turn = np.arange(draws) % max(len(found), 1)
     if found:
         unknowns += tuple(effects)
@@ -144,9 +139,8 @@ def doubt(
         within[at] = np.all([share <= 1.0 for share in one.limits(own).values()], axis=0)
     score = power + feedback.cost(demanded, designs)
     shape = (draws, count)
-    return Doubt(
-        power.reshape(shape), score.reshape(shape), within.reshape(shape), unknowns, values
-    )
+    arrays = (power.reshape(shape), score.reshape(shape), within.reshape(shape))
+    return Doubt(*arrays, unknowns, values)
 
 
 def effects_of(machine: Machine) -> tuple[Unknown, ...]:
@@ -173,12 +167,7 @@ def drawn_machines(machine: Machine) -> Iterator[tuple[Array, Machine]]:
 
 
 def with_effects(machine: Machine, shares: Sequence[float]) -> Machine:
-    """The machine with each of `effects_of` at a share of its interval.
-
-    Args:
-        machine: With a model file.
-        shares: 0 for the lower end to 1 for the upper one.
-    """
+    """The machine with each of `effects_of` at a share of its interval, 0 for the lower end."""
     if (file := machine.model) is None:
         return machine
     left, edits = iter(shares), []
@@ -189,9 +178,8 @@ def with_effects(machine: Machine, shares: Sequence[float]) -> Machine:
             low, high = p.interval
             if effect.place_kind in _BODIES and low < high:
                 value = float(np.clip(low + next(left) * (high - low), *bounds[p.name]))
-                own.append(replace(p, value=value, interval=(value, value)))
-            else:
-                own.append(p)
+                p = replace(p, value=value, interval=(value, value))
+            own.append(p)
         edits.append(replace(edit, parameters=tuple(own)))
     return machine.with_model(replace(file, edits=tuple(edits)))
 
@@ -199,13 +187,7 @@ def with_effects(machine: Machine, shares: Sequence[float]) -> Machine:
 def drawn(
     shelf: Shelf, combinations: Sequence[Design], draws: int, seed: int = 0
 ) -> tuple[tuple[Unknown, ...], Array, list[Drawn]]:
-    """Values of what the parts of some designs do not print.
-
-    Args:
-        shelf: The parts.
-        combinations: Motor, gear and brake of each design.
-        draws: How many, a Latin hypercube.
-        seed: Of the draws.
+    """Values of what the parts of some designs do not print, a Latin hypercube.
 
     Returns:
         What was drawn, U of them; its values (S, U); the same as `Shelf.designs` takes them.

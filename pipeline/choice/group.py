@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+import fnmatch
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from itertools import takewhile
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Index, Mask
 from actuators.errors import closest
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.parts.designs import Designs
@@ -18,8 +18,6 @@ from pipeline.choice.search import Demanded, Feedback
 from pipeline.choice.track import Account
 from pipeline.robot.robot_file import RobotSpec
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 #: Designs of a group that are looked at in every draw.
 FINALISTS: Final = 24
 _FIRST: Final = 400  # looked at sample by sample before bounds decide
@@ -39,14 +37,18 @@ class Found:
     score: Array  #: Power and what their mass costs elsewhere [W].
 
     def best(
-        self, which: NDArray[np.bool_], account: Account, feedback: Feedback
+        self, which: Mask, account: Account, feedback: Feedback
     ) -> tuple[str, str, str] | None:
         """The best by score among some of the designs (D,); None if none is within limits."""
         own = self.within[which[self.within]]
         if not len(own):
             return None
         found = search(self.demanded, self.designs.taken(own), account, feedback)
-        return found.designs.parts[found.looked[found.finalists[0]]]
+        return found.names(found.finalists[:1])[0]
+
+    def names(self, which: Sequence[int] | Index) -> list[tuple[str, str, str]]:
+        """Motor, gear and brake of designs by their numbers among `looked`."""
+        return [self.designs.parts[i] for i in self.looked[which]]
 
     @property
     def mass(self) -> Array:
@@ -69,12 +71,6 @@ def search(
 ) -> Found:
     """Every design of one group; exact, and most of them by bounds alone.
 
-    Args:
-        demanded: What the day asks.
-        designs: All of them.
-        account: What is counted.
-        feedback: What the mass of the actuators costs; nothing by default.
-
     Raises:
         ChoiceError: None is within limits; says which limit removed how many.
     """
@@ -82,7 +78,9 @@ def search(
     over = {name: share > 1.0 for name, share in use.items()}
     within = np.flatnonzero(~np.any(list(over.values()), axis=0))
     if not len(within):
-        removed = sorted(((int(o.sum()), name) for name, o in over.items() if o.any()))[::-1]
+        removed = sorted(
+            ((int(o.sum()), name) for name, o in over.items() if o.any()), reverse=True
+        )
         words = ", ".join(f"{name} {n}" for n, name in removed)
         raise ChoiceError(
             f"group '{demanded.name}': none of {len(designs)} designs is within limits; "
@@ -126,54 +124,46 @@ def groups_of(spec: RobotSpec, given: Sequence[str] = ()) -> dict[str, tuple[str
         ChoiceError: A pattern fits no joint, or a joint is in no group or in two.
     """
     out: dict[str, tuple[str, ...]] = {}
-    if given:
-        for text in given:
-            name, _, patterns = text.partition("=")
-            each = [p.strip() for p in patterns.split(",") if p.strip()]
-            for pattern in each:
-                if not any(fnmatchcase(joint, pattern) for joint in spec.joints):
-                    hint = closest(pattern, spec.joints)
-                    raise ChoiceError(f"--group {text}: no joint '{pattern}': {hint}")
-            joints = [j for j in spec.joints if any(fnmatchcase(j, p) for p in each)]
-            if not name or not joints or name in out:
-                raise ChoiceError(f"--group {text}: expected NAME=PATTERN,PATTERN, each name once")
-            out[name] = tuple(joints)
-    else:
-        longest = max(len(leg.joints) for leg in spec.legs) if spec.legs else 0
-        for k in range(longest):
+    for text in given:
+        name, _, patterns = text.partition("=")
+        each = [p.strip() for p in patterns.split(",") if p.strip()]
+        for pattern in each:
+            if not fnmatch.filter(spec.joints, pattern):
+                hint = closest(pattern, spec.joints)
+                raise ChoiceError(f"--group {text}: no joint '{pattern}': {hint}")
+        joints = tuple(j for j in spec.joints if any(fnmatch.fnmatchcase(j, p) for p in each))
+        if not name or not joints or name in out:
+            raise ChoiceError(f"--group {text}: expected NAME=PATTERN,PATTERN, each name once")
+        out[name] = joints
+    if not given:
+        for k in range(max((len(leg.joints) for leg in spec.legs), default=0)):
             alike = tuple(leg.joints[k] for leg in spec.legs if k < len(leg.joints))
             out[_shared(alike, f"joint {k + 1}", out)] = alike
         legs = {joint for leg in spec.legs for joint in leg.joints}
         if others := tuple(joint for joint in spec.joints if joint not in legs):
             out["held"] = others
-    counts = {joint: sum(joint in joints for joints in out.values()) for joint in spec.joints}
-    for joint, count in counts.items():
-        if count != 1:
-            which = "no group" if count == 0 else "two groups"
-            raise ChoiceError(f"--group: joint '{joint}' is in {which}")
+    for joint in spec.joints:
+        if (count := sum(joint in joints for joints in out.values())) != 1:
+            raise ChoiceError(
+                f"--group: joint '{joint}' is in {'two groups' if count else 'no group'}"
+            )
     return out
 
 
 def _shared(joints: Sequence[str], otherwise: str, taken: Mapping[str, object]) -> str:
     """What the names of joints end in, or begin with, alike."""
-    end = _alike([joint[::-1] for joint in joints])[::-1].strip("_- ")
-    name = end or _alike(joints).strip("_- ")
+
+    def alike(names: Sequence[str]) -> str:
+        same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
+        return "".join(letters[0] for letters in same)
+
+    end = alike([joint[::-1] for joint in joints])[::-1].strip("_- ")
+    name = end or alike(joints).strip("_- ")
     return otherwise if not name or name in taken else name
 
 
-def _alike(names: Sequence[str]) -> str:
-    """What names begin with alike."""
-    same = takewhile(lambda letters: len(set(letters)) == 1, zip(*names, strict=False))
-    return "".join(letters[0] for letters in same)
-
-
 def front(power: Array, mass: Array) -> Index:
-    """Designs that none beats in power and mass, from the least power on.
-
-    Args:
-        power: (D,) [W].
-        mass: (D,) [kg].
-    """
+    """Designs (D,) that none beats in power and mass, from the least power on."""
     order = np.lexsort((mass, power))
     lightest = np.minimum.accumulate(mass[order])
     first = np.ones(len(order), dtype=np.bool_)

@@ -26,17 +26,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError
 
+from actuators.arrays import Array
 from actuators.energy.regeneration import BUS
-from actuators.shaft import ShaftSeries
-from pipeline.choice import heat
 from pipeline.choice.loads import Load
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.track import SPEED, Account, Track
 
-Array = NDArray[np.float64]
 #: Numbers of a block of designs times samples: 0.8 MB, which stay in the cache.
 BLOCK = 100_000
 _MANY = 50  # samples, or designs, from which on a hull is worth finding
@@ -56,17 +53,7 @@ class Demanded:
         total = sum(load.mode.hours for load in loads)
         tracks = []
         for load in loads:
-            one = load.series
-            at = [one.joints.index(joint) for joint in joints]
-            part = ShaftSeries(
-                tuple(joints),
-                one.time,
-                *(
-                    getattr(one, field)[:, at]
-                    for field in ("position", "velocity", "acceleration", "torque", "direction")
-                ),
-            )
-            tracks.append(Track(load, part, load.mode.hours / total))
+            tracks.append(Track(load, load.series.of(joints), load.mode.hours / total))
         return cls(name, tuple(joints), tuple(tracks))
 
     @cached_property
@@ -118,7 +105,7 @@ class Demanded:
         copper = designs.resistance / k**2 * np.stack(means) ** 2  # (M, D) [W]
         use["winding temperature"] = np.zeros(len(designs))
         hours = [track.load.mode.hours for track in self.tracks]
-        use["winding temperature"][left] = heat.share(designs.taken(left), hours, copper[:, left].T)
+        use["winding temperature"][left] = designs.taken(left).heat_use(hours, copper[:, left].T)
         return use
 
     @staticmethod
@@ -174,11 +161,9 @@ class Feedback:
 
 
 def shared(groups: Sequence[tuple[Demanded, Designs]], account: Account) -> Array:
-    """Mean over the mission of what a bus of all joints dumps, sample by sample, (D,) [W].
+    """Mean over the mission of what a bus of all joints and the hotel load dumps, (D,) [W].
 
-    Args:
-        groups: Each with its D designs: the first of all are one robot, and so on.
-        account: What is counted; the hotel load is on the bus, too.
+    Each group has its D designs: the first of all are one robot, and so on.
     """
     out = np.zeros(len(groups[0][1]))
     for k, track in enumerate(groups[0][0].tracks):

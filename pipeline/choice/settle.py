@@ -10,21 +10,20 @@ only by a better one, so that this ends and cannot swing between two.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import cycle
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuators.energy.regeneration import BUS
+from pipeline.choice.asked import Asked
 from pipeline.choice.doubt import Design
-from pipeline.choice.loads import Load
-from pipeline.choice.parts.designs import Designs
-from pipeline.choice.search import Demanded, Feedback, shared
-from pipeline.choice.track import Account
+from pipeline.choice.errors import ChoiceError
+from pipeline.choice.loads import Load, loads_of
+from pipeline.choice.search import Feedback, shared
 
-Array = NDArray[np.float64]
 Answer = Mapping[str, Design]
 NUDGE: Final = 0.1  # [kg]
 #: Share by which a robot has to be better to replace another.
@@ -35,14 +34,22 @@ _BETTER: Final = 1e-6
 class Robots:
     """Every robot's power, about the masses of one."""
 
-    groups: Mapping[str, tuple[str, ...]]  #: Joints of each group.
+    asked: Asked
     mass: Mapping[str, float]  #: Of one actuator of each group in `loads` [kg].
     loads: Sequence[Load]  #: The mission's demand.
     #: The same with `NUDGE` more at every joint of a group, along the same motions.
     nudged: Mapping[str, Sequence[Load]]
-    account: Account  #: What is counted.
-    #: A design in the middle of its ranges, then in draws of them.
-    drawn: Callable[[Design], Designs]
+
+    @classmethod
+    def about(cls, asked: Asked, mass: Mapping[str, float]) -> Robots:
+        """All robots about masses of one actuator of each group [kg]."""
+        added, common = asked.added(mass), (asked.machine, asked.modes)
+        loads = loads_of(*common, added, spring=asked.spring)
+        nudged = {}
+        for g, joints in asked.groups.items():
+            heavier = added | {j: added[j] + NUDGE for j in joints}
+            nudged[g] = loads_of(*common, heavier, along=loads, spring=asked.spring)
+        return cls(asked, mass, loads, nudged)
 
     def at(self, mass: Mapping[str, float]) -> list[Load]:
         """The mission's demand with these masses of one actuator of each group [kg]."""
@@ -52,55 +59,65 @@ class Robots:
             for g, more in self.nudged.items():
                 slope = (more[k].series.torque - load.series.torque) / NUDGE
                 torque += (mass[g] - self.mass[g]) * slope
-            loads.append(replace(load, series=replace(load.series, torque=torque)))
+            loads.append(replace(load, series=load.series.with_torque(torque)))
         return loads
-
-    def demanded(self, mass: Mapping[str, float]) -> dict[str, Demanded]:
-        """Every group's part of it."""
-        loads = self.at(mass)
-        return {g: Demanded.of(g, joints, loads) for g, joints in self.groups.items()}
 
     def cost(self, answer: Answer) -> tuple[float, float]:
         """Share of a limit used, 1 within all; mean power over the draws [W]."""
-        designs = {g: self.drawn(design) for g, design in answer.items()}
-        demanded = self.demanded({g: float(d.mass[0]) for g, d in designs.items()})
+        account = self.asked.account
+        designs = {g: self.asked.draws(design) for g, design in answer.items()}
+        demanded = self.asked.demanded(self.at({g: float(d.mass[0]) for g, d in designs.items()}))
         power, use = 0.0, 1.0
-        if self.account.policy == BUS:
+        if account.policy == BUS:
             robots = [(demanded[g], own) for g, own in designs.items()]
-            power += float(shared(robots, self.account)[1:].mean())
+            power += float(shared(robots, account)[1:].mean())
         for g, own in designs.items():
-            power += float(demanded[g].power(own, self.account)[1:].mean())
+            power += float(demanded[g].power(own, account)[1:].mean())
             first = own.taken(np.zeros(1, dtype=np.intp))
             use = max(use, *(float(x[0]) for x in demanded[g].limits(first).values()))
         return use, power
 
     def settled(self, answer: Answer, pool: Mapping[str, Iterable[Design]]) -> dict[str, Design]:
         """The answer from which no design of the pool in one group leads to a better robot."""
-        best, least, at = dict(answer), self.cost(answer), 0
-        since = 0
-        names = list(self.groups)
-        while since < len(names):
-            group, since = names[at % len(names)], since + 1
+        best, least, since = dict(answer), self.cost(answer), 0
+        for group in cycle(self.asked.groups):
+            since += 1
             for design in pool[group]:
                 use, power = self.cost({**best, group: design})
                 if use < least[0] or (use == least[0] and power < least[1] * (1.0 - _BETTER)):
                     best, least, since = {**best, group: design}, (use, power), 1
-            at += 1
+            if since == len(self.asked.groups):
+                break
         return best
 
     def prices(self, answer: Answer) -> dict[str, Feedback]:
         """What the mass at each group's joints costs, about the answer."""
-        designs = {g: self.drawn(design) for g, design in answer.items()}
-        base = {g: Demanded.of(g, joints, self.loads) for g, joints in self.groups.items()}
+        account = self.asked.account
+        designs = {g: self.asked.draws(design) for g, design in answer.items()}
+        base = self.asked.demanded(self.loads)
         out = {}
-        for g, joints in self.groups.items():
-            others = 0.0
-            for o in self.groups.keys() - {g}:
-                more = Demanded.of(o, self.groups[o], self.nudged[g])
-                rise = more.power(designs[o], self.account) - base[o].power(
-                    designs[o], self.account
-                )
+        for g in self.asked.groups:
+            heavier, others = self.asked.demanded(self.nudged[g]), 0.0
+            for o, own in designs.items():
+                if o == g:
+                    continue
+                rise = heavier[o].power(own, account) - base[o].power(own, account)
                 others += float(rise[1:].mean()) / NUDGE
-            heavier = Demanded.of(g, joints, self.nudged[g])
-            out[g] = Feedback(self.mass[g], others, heavier, NUDGE)
+            out[g] = Feedback(self.mass[g], others, heavier[g], NUDGE)
         return out
+
+    def check(self, answer: Answer) -> None:
+        """An answer's limits with its own masses and motions.
+
+        Raises:
+            ChoiceError: One is exceeded: none was found that stays within all.
+        """
+        for g, demanded in self.asked.demanded(self.loads).items():
+            limits = demanded.limits(self.asked.shelf.designs([answer[g]]))
+            worst = max(limits, key=lambda name: float(limits[name][0]))
+            if limits[worst][0] > 1.0:
+                raise ChoiceError(
+                    f"no robot found that stays within limits with its own actuators' mass: group "
+                    f"'{g}' with {self.mass[g]:.3g} kg a joint takes {limits[worst][0]:.3g} "
+                    f"of its {worst}; add lighter or stronger parts, or state --present"
+                )

@@ -17,9 +17,9 @@ from fnmatch import fnmatchcase
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
+from actuators.arrays import Array
 from actuators.elements.position_torque import ParallelSpring
 from actuators.errors import UnitError, closest, one_line
 from actuators.units import quantity
@@ -30,7 +30,6 @@ from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded
 from pipeline.choice.track import Account
 
-Array = NDArray[np.float64]
 Groups = Mapping[str, Sequence[str]]
 #: Dimensions of a spring's stiffness and angle without torque.
 _SPRING: Final = ("rotational stiffness", "angle")
@@ -84,12 +83,7 @@ def found_springs(
 ) -> tuple[str, ...]:
     """Springs as they are stated, and for a PATTERN alone the one of least power, if it saves any.
 
-    Args:
-        given: ``PATTERN`` or ``PATTERN=STIFFNESS@ANGLE`` each.
-        groups: Joints of each.
-        loads: The mission, with the springs that are stated.
-        designs: All of them.
-        account: What is counted.
+    The mission is with the springs that are stated.
 
     Raises:
         ChoiceError: No design of a group is within limits without the spring.
@@ -132,9 +126,7 @@ def _found(
         first = np.array(best or min(starts, key=lambda x: power(np.array(x), pool)))
         bounds = [(1e-3 * first[0], 1e3 * first[0]), (starts[0][1], starts[-1][1])]
         result = minimize(
-            power,
-            first,
-            (pool,),
+            *(power, first, (pool,)),
             method="Nelder-Mead",
             bounds=bounds,
             options={"xatol": 1e-3, "fatol": 0.1 * _BETTER * least, "maxiter": 100},

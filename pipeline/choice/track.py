@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from actuators.energy.regeneration import BUS
 from actuators.shaft import ShaftSeries
 from pipeline.choice.loads import Load
 from pipeline.choice.parts.designs import Designs
 
-Array = NDArray[np.float64]
-Which = NDArray[np.bool_]
 SPEED = 3  # the series w among the five
 
 
@@ -51,7 +49,7 @@ class Track:
         return np.stack([part * (s != 0.0) for part in each])
 
     @cached_property
-    def rest(self) -> Which:
+    def rest(self) -> Mask:
         """Samples at rest, (N, J)."""
         return self.series.direction == 0.0
 
@@ -63,10 +61,9 @@ class Track:
     @cached_property
     def weight(self) -> Array:
         """Of each sample in the mean over the mode, (N,)."""
-        out = np.zeros(self.series.time.size)
-        out[:-1] += 0.5 * self.step
-        out[1:] += 0.5 * self.step
-        return out / self.load.duration
+        return (
+            np.append(0.5 * self.step, 0.0) + np.append(0.0, 0.5 * self.step)
+        ) / self.load.duration
 
     @cached_property
     def grams(self) -> Array:
@@ -93,7 +90,7 @@ class Track:
     @property
     def engaged(self) -> bool:
         """Whether brakes hold at rest."""
-        return not self.load.mode.stands or self.load.mode.hold == "brake"
+        return self.load.mode.engaged
 
     def torque(self, designs: Designs) -> Array:
         """Of the motors, (D, N, J) [N*m]."""
@@ -127,12 +124,7 @@ class Track:
         return out + designs.idle * self.drivers(designs, torque)
 
     def forward(self, power: Array, recovered: float = 0.0) -> Array:
-        """Mean of what does not flow back, less a share of what does, (D,) [W].
-
-        Args:
-            power: Linear between samples, (D, N, K) [W].
-            recovered: The share.
-        """
+        """Mean of power (D, N, K) that does not flow back, less a share of what does, (D,) [W]."""
         if recovered == 1.0:
             return np.asarray(np.einsum("dnj,n->d", power, self.weight))
         out = np.einsum("dnj,n->d", np.maximum(power, 0.0), self.weight)

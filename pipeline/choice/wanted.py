@@ -59,18 +59,14 @@ def filtered(parts: Mapping[str, Part], wanted: Wanted) -> dict[str, Part]:
     for kind in wanted.kinds:
         if kind not in GEARS:
             raise ChoiceError(f"--kind {kind}: {closest(kind, GEARS)}")
-    named = {kind: False for kind in ("motor", "gear")}
-    for name, part in parts.items():
-        what = "gear" if part.kind in GEARS else part.kind
-        if what in named and name.startswith(wanted.only or ("\0",)):
-            named[what] = True  # a filter of motors alone leaves all gears
-
-    def kept(name: str, part: Part) -> bool:
-        what = "gear" if part.kind in GEARS else part.kind
-        if what not in (*named, "brake") or (wanted.without and name.startswith(wanted.without)):
-            return False
-        if what == "gear" and wanted.kinds and part.kind not in wanted.kinds:
-            return False
-        return not named.get(what) or name.startswith(wanted.only)
-
-    return {name: part for name, part in parts.items() if kept(name, part)}
+    kinds = {n: "gear" if part.kind in GEARS else part.kind for n, part in parts.items()}
+    # A filter of motors alone leaves all gears, and brakes are not filtered by it.
+    narrowed = {kinds[n] for n in parts if n.startswith(wanted.only)} & {"motor", "gear"}
+    return {
+        n: part
+        for n, part in parts.items()
+        if kinds[n] in ("motor", "gear", "brake")
+        and not n.startswith(wanted.without)
+        and (kinds[n] != "gear" or not wanted.kinds or part.kind in wanted.kinds)
+        and (kinds[n] not in narrowed or n.startswith(wanted.only))
+    }

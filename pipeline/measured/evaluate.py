@@ -60,12 +60,7 @@ class Prediction:
 
 
 def predicted(facts: Facts, quantity: Quantity, progress: Progress | None = None) -> Prediction:
-    """Power of a quantity over everything that is not published.
-
-    Args:
-        facts: Of the robot.
-        quantity: Of its quantities, one that is computed.
-        progress: Told what is being done.
+    """Power of a quantity that is computed, over everything that is not published.
 
     Raises:
         PipelineError: The facts name what the robot does not have, or it cannot do the nominal.

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
+
+import pandas as pd
 
 from pipeline.measured.evaluate import ROBOTS, predicted
 from pipeline.measured.facts import FACTS, Facts, read_facts
@@ -48,21 +50,9 @@ ANSWER = (
 
 
 def write_measured(
-    out: Path,
-    decimal: str = ".",
-    progress: Progress | None = None,
-    folder: Path = FACTS,
+    out: Path, decimal: str = ".", progress: Progress | None = None, folder: Path = FACTS
 ) -> list[str]:
-    """Predict every measured robot, and write tables, figure and page.
-
-    Args:
-        out: Folder to write.
-        decimal: As for `write_table`.
-        progress: Told what is being done.
-        folder: Of the facts.
-
-    Returns:
-        Lines for a terminal.
+    """Predict every measured robot, write tables, figure and page; return lines for a terminal.
 
     Raises:
         PipelineError: Facts or a robot cannot be used.
@@ -83,64 +73,41 @@ def write_measured(
         for table in tables.values():
             write_table(table, target, meta=meta, decimal=decimal)
         save_figures({FIGURE: lambda: _figure(tables["measured"])}, target)
-        write_html(page(every, tables, target), target / "index.html")
-    return [*_lines(tables["measured"]), f"3 tables, a figure and index.html in {out}"]
+        write_html(_page(every, tables, target), target / "index.html")
+    lines = [text.replace("**", "") for text in _sentences(tables["measured"])]
+    return [*lines, f"3 tables, a figure and index.html in {out}"]
 
 
 def tables_of(every: Mapping[str, Facts], found: Mapping[str, Predictions]) -> dict[str, Table]:
-    """The three tables.
-
-    Args:
-        every: Facts by robot.
-        found: Predictions by robot and quantity.
-    """
-    rows: list[tuple[Any, Any]] = [
-        (Measured, measured_rows),
-        (UnknownMoves, unknown_rows),
-        (MeasuredRatio, ratio_rows),
-    ]
-    tables = [
-        table_of(kind, [row for name, facts in every.items() for row in make(facts, found[name])])
-        for kind, make in rows
-    ]
-    return {table.name: table for table in tables}
+    """The three tables of facts, and of predictions by quantity, by robot."""
+    out = {}
+    kinds: dict[Any, Any] = {Measured: measured_rows, UnknownMoves: unknown_rows}
+    for kind, rows in (kinds | {MeasuredRatio: ratio_rows}).items():
+        each = [row for name, facts in every.items() for row in rows(facts, found[name])]
+        out[kind.table] = table_of(kind, each)
+    return out
 
 
-def page(every: Mapping[str, Facts], tables: Mapping[str, Table], folder: Path) -> Page:
-    """The page.
-
-    Args:
-        every: Facts by robot.
-        tables: From `tables_of`.
-        folder: That holds the figure.
-    """
+def _page(every: Mapping[str, Facts], tables: Mapping[str, Table], folder: Path) -> Page:
     measured, unknowns = tables["measured"], tables["unknowns"]
-    sections = [
-        Section(
-            "Ratios, in which much of what is not known cancels",
-            (table_block(tables["measured_ratios"]),),
-        )
-    ]
+    ratios = (table_block(tables["measured_ratios"]),)
+    sections = [Section("Ratios, in which much of what is not known cancels", ratios)]
     columns = ("quantity", "measured_W", "measured_to_W", "low_W", "nominal_W", "high_W", "note")
     moves = ("quantity", "unknown", "low", "high", "moves_by_W")
     for facts in every.values():
-        mine, moved = (
+        own, moved = (
             [robot == facts.title for robot in table.columns["robot"]]
             for table in (measured, unknowns)
         )
-        said = zip(measured.columns["assumed"], mine, strict=True)
-        likeliest = dict.fromkeys(text for text, own in said if own and text)
-        sections.append(
-            Section(
-                facts.title,
-                (
-                    Text(f"Measured: {facts.source}. {facts.note}"),
-                    table_block(measured, columns, keep=mine, digits=3),
-                    *(Text(f"**Likeliest:** {text}.") for text in likeliest),
-                    table_block(unknowns, moves, keep=moved, digits=3),
-                ),
-            )
+        assumed = zip(measured.columns["assumed"], own, strict=True)
+        likeliest = dict.fromkeys(text for text, mine in assumed if mine and text)
+        blocks: tuple[Any, ...] = (
+            Text(f"Measured: {facts.source}. {facts.note}"),
+            table_block(measured, columns, keep=own, digits=3),
+            *(Text(f"**Likeliest:** {text}.") for text in likeliest),
+            table_block(unknowns, moves, keep=moved, digits=3),
         )
+        sections.append(Section(facts.title, blocks))
     return Page(
         title="Electrical power of measured robots, predicted before any fit",
         answer=(*_sentences(measured), *ANSWER),
@@ -151,43 +118,33 @@ def page(every: Mapping[str, Facts], tables: Mapping[str, Table], folder: Path) 
     )
 
 
-def _computed(measured: Table) -> list[dict[str, Any]]:
-    """Rows of which something is predicted."""
-    columns = list(measured.columns.values())
-    rows = [dict(zip(measured.columns, row, strict=True)) for row in zip(*columns, strict=True)]
-    return [row for row in rows if row["nominal_W"] is not None]
+def _computed(measured: Table) -> Iterator[tuple[str, str, list[float], list[float]]]:
+    """Robot, quantity, watts predicted (least, likeliest, greatest) and measured of each row."""
+    for row in measured.frame().to_dict("records"):
+        if pd.notna(row["nominal_W"]):
+            watts = [row["measured_W"], row["measured_to_W"]]
+            span = [float(row[name]) for name in ("low_W", "nominal_W", "high_W")]
+            yield row["robot"], row["quantity"], span, [float(w) for w in watts if pd.notna(w)]
 
 
-def _watts(row: Mapping[str, Any], *names: str) -> str:
-    shown = [number_text(float(row[name])) for name in names if row[name] is not None]
-    return f"{' to '.join(shown)} W"
-
-
-def _sentences(measured: Table) -> tuple[str, ...]:
+def _sentences(measured: Table) -> list[str]:
     """What is predicted and measured of each robot's first computed quantity."""
     first: dict[str, str] = {}
-    for row in _computed(measured):
-        told = _watts(row, "measured_W", "measured_to_W") if row["measured_W"] else "not told"
-        likely = _watts(row, "nominal_W")
+    for robot, quantity, (low, nominal, high), watts in _computed(measured):
+        told = f"{' to '.join(map(number_text, watts))} W" if watts else "not told"
         first.setdefault(
-            str(row["robot"]),
-            f"{row['robot']}, {row['quantity']}: predicted **{_watts(row, 'low_W', 'high_W')}** "
-            f"(likeliest {likely}), measured **{told}**.",
+            robot,
+            f"{robot}, {quantity}: predicted **{number_text(low)} to {number_text(high)} W** "
+            f"(likeliest {number_text(nominal)} W), measured **{told}**.",
         )
-    return tuple(first.values())
-
-
-def _lines(measured: Table) -> list[str]:
-    return [text.replace("**", "") for text in _sentences(measured)]
+    return list(first.values())
 
 
 def _figure(measured: Table) -> Figure:
-    rows = []
-    for row in _computed(measured):
-        watts = [float(row[n]) for n in ("measured_W", "measured_to_W") if row[n] is not None]
-        label = f"{row['robot']}:\n{fill(str(row['quantity']), 24)}"
-        span = (float(row["low_W"]), float(row["nominal_W"]), float(row["high_W"]))
-        rows.append(Range(label, span, watts))
+    rows = [
+        Range(f"{robot}:\n{fill(quantity, 24)}", (span[0], span[1], span[2]), watts)
+        for robot, quantity, span, watts in _computed(measured)
+    ]
     return ranges_figure(
         rows, title="Predicted before any fit, and measured", unit="electrical power [W]"
     )

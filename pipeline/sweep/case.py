@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from functools import cache
+from itertools import chain
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -110,19 +111,10 @@ def _checked(order: Order) -> Machine:
 
 
 def rows_of_block(order: Order, block: tuple[int, tuple[tuple[Value, ...], ...]]) -> list[Row]:
-    """The rows of some cases in a row.
-
-    Args:
-        order: The machine.
-        block: Number of the first case, and the values of each.
-    """
+    """The rows of some cases in a row: number of the first, and the values of each."""
     first, cases = block
-    machine = _checked(order)
-    return [
-        row
-        for number, values in enumerate(cases, first)
-        for row in _rows(order, machine, number, values)
-    ]
+    rows = (_rows(order, _checked(order), k, values) for k, values in enumerate(cases, first))
+    return list(chain.from_iterable(rows))
 
 
 def _rows(order: Order, machine: Machine, number: int, values: tuple[Value, ...]) -> list[Row]:
@@ -141,34 +133,29 @@ def _walked(given: Settings) -> list[Row]:
     walking = walked(given, given.chains())
     tables = tables_of_walking(given, walking)
     energy, stability, limits = (
-        {header: list(values) for header, values in made.columns.items()}
-        for made in (
-            tables[name]() for name in ("robot_energy", "walking_stability", "motor_limits")
-        )
+        tables[name]().frame() for name in ("robot_energy", "walking_stability", "motor_limits")
     )
     peaks = np.max([np.abs(part.torque).max(axis=0) for part in walking.demand.segments], axis=0)
     most = int(peaks.argmax())
-    rows = []
-    for k, name in enumerate(energy["alternative"]):
-        own = [i for i, other in enumerate(limits["alternative"]) if other == name]
-        found = {
-            quantity: max(limits["peak"][i] for i in own if limits["quantity"][i] == quantity)
-            for quantity in ("speed", "voltage", "current", "rms_current")
-        }
-        over: dict[str, str] = {}
-        for i in own:
-            if limits["breach"][i]:
-                over.setdefault(limits["quantity"][i], limits["joint"][i])
-        row: list[Any] = [
-            *(values[k] for values in energy.values()),
-            min(stability["least_margin_m"]),
-            min(stability["least_normal_force_N"]),
-            max(stability["greatest_friction_needed"]),
-            float(peaks[most]),
-            walking.demand.joints[most],
-            *found.values(),
-            ", ".join(f"{quantity} of {joint}" for quantity, joint in over.items()),
-            "",
-        ]
-        rows.append(asdict(SweepRow(*row)))
+    rows: list[Row] = []
+    for record in energy.to_dict("records"):
+        own = limits[limits.alternative == record["alternative"]]
+        over = own[own.breach].drop_duplicates("quantity")
+        found = own.groupby("quantity").peak.max()
+        rows.append(
+            {
+                **{str(header): value for header, value in record.items()},
+                "least_margin_m": stability.least_margin_m.min(),
+                "least_normal_force_N": stability.least_normal_force_N.min(),
+                "greatest_friction_needed": stability.greatest_friction_needed.max(),
+                "peak_torque_Nm": float(peaks[most]),
+                "joint_of_peak_torque": walking.demand.joints[most],
+                "peak_speed_rad_s": found["speed"],
+                "peak_voltage_V": found["voltage"],
+                "peak_current_A": found["current"],
+                "peak_rms_current_A": found["rms_current"],
+                "beyond": ", ".join(f"{row.quantity} of {row.joint}" for row in over.itertuples()),
+                "refusal": "",
+            }
+        )
     return rows

@@ -77,54 +77,51 @@ class Axis:
 
 
 def read_axis(text: str, machine: Machine) -> Axis:
-    """One ``NAME=VALUES`` of ``--vary``.
-
-    Args:
-        text: As above.
-        machine: Whose numbers are varied.
+    """One ``NAME=VALUES`` of ``--vary``, a number of the machine.
 
     Raises:
         SweepError: It cannot be read, or the machine has no such number in this unit; one line.
     """
+    try:
+        return _axis(text, machine)
+    except (ValueError, ActuatorError) as error:
+        raise SweepError(f"--vary {one_line(text)}: {error}") from None
+
+
+def _axis(text: str, machine: Machine) -> Axis:
     name, _, written = (part.strip() for part in text.partition("="))
-    place = f"--vary {one_line(text)}"
     if not name or not written:
-        raise SweepError(f"{place}: expected NAME=VALUES, such as 'speed=0.1:0.4:7 m/s'")
+        raise ValueError("expected NAME=VALUES, such as 'speed=0.1:0.4:7 m/s'")
     key = WORDS.get(name, name)
     key = f"{GAIT}{key}" if f"{GAIT}{key}" in gait_keys() else key
-    if "." not in key and key not in machine.ready.robot.spec.parameters:
-        known = [*WORDS, *(k.removeprefix(GAIT) for k in gait_keys())]
-        known += [*machine.ready.robot.spec.parameters]
+    numbers = machine.ready.robot.spec.parameters
+    if "." not in key and key not in numbers:
+        known = [*WORDS, *(k.removeprefix(GAIT) for k in gait_keys()), *numbers]
         hint = closest(name, known)
         listed = hint if hint.startswith("did") else "parameters.csv of any run lists all names"
-        raise SweepError(f"{place}: there is no such number; {listed}")
-    body, unit = _without_unit(written, place)
-    own = _unit_of(machine, key)
-    axis = Axis(key, unit, *_values(body, place))
-    if own and unit and unit != own:
-        try:
-            if dimension(unit) != dimension(own):
-                raise SweepError(f"{place}: its unit is {own}, not {unit}")
-            numbers = tuple(from_si(to_si(float(v), unit), own) for v in axis.values)
-        except ValueError:
-            raise SweepError(f"{place}: a word has no unit") from None
-        axis = Axis(key, own, numbers, axis.ranged)
-    elif own:
-        axis = Axis(key, "" if own == "1" else own, axis.values, axis.ranged)
-    _refuse_impossible(axis, machine, place)
-    return axis
-
-
-def _without_unit(written: str, place: str) -> tuple[str, str]:
-    """Values and the unit behind the last of them."""
+        raise ValueError(f"there is no such number; {listed}")
     match = _NUMBERS.fullmatch(written)
-    if match is None:
-        return written, ""
-    try:
-        dimension(match[2])
-    except ActuatorError as error:
-        raise SweepError(f"{place}: {error}") from None
-    return match[1], match[2]
+    body, unit = match.groups() if match else (written, "")
+    kind = dimension(unit) if unit else ""
+    own = _unit_of(machine, key)
+    values, ranged = _values(body)
+    if own and unit and unit != own:
+        if kind != dimension(own):
+            raise ValueError(f"its unit is {own}, not {unit}")
+        if any(isinstance(value, str) for value in values):
+            raise ValueError("a word has no unit")
+        values, unit = tuple(from_si(to_si(float(v), unit), own) for v in values), own
+    elif own:
+        unit = "" if own == "1" else own
+    axis = Axis(key, unit, values, ranged)
+    files = machine.files
+    assert files.spec is not None
+    for value in values:  # each by itself is one that ``--set`` takes; together they may not be
+        try:
+            changed(files.spec, files.catalog, {**machine.changes, key: axis.change(value)})
+        except (PipelineError, ActuatorError) as error:
+            raise ValueError(str(error).partition(": ")[2] or str(error)) from None
+    return axis
 
 
 def _unit_of(machine: Machine, key: str) -> str:
@@ -137,34 +134,32 @@ def _unit_of(machine: Machine, key: str) -> str:
         return ""
 
 
-def _values(body: str, place: str) -> tuple[tuple[Value, ...], bool]:
+def _values(body: str) -> tuple[tuple[Value, ...], bool]:
     """Values, and whether they are the ends of a range."""
     parts = [part.strip() for part in body.split(":")]
     if len(parts) == 1:
         values = tuple(_value(part.strip()) for part in body.split(","))
         if "" in values or len(set(values)) < len(values):
-            raise SweepError(f"{place}: a value is empty or stands twice")
+            raise ValueError("a value is empty or stands twice")
         for value in values:
             if isinstance(value, float) and not math.isfinite(value):
-                raise SweepError(f"{place}: {value:g} is no finite number")
+                raise ValueError(f"{value:g} is no finite number")
         return values, False
-    try:
-        low, high = float(parts[0]), float(parts[1])
-        count = int(parts[2]) if len(parts) == 3 else 2
-        if len(parts) > 3 or count < 2 or not (math.isfinite(low) and math.isfinite(high)):
-            raise ValueError
-        if count > MOST_CASES:
-            raise SweepError(f"{place}: {count} values: expected at most {MOST_CASES}")
-    except ValueError:
-        raise SweepError(
-            f"{place}: expected FIRST:LAST:COUNT, finite numbers and a count from 2, such as "
+    low, high = (_value(part) for part in parts[:2])
+    count = int(parts[2]) if len(parts) == 3 and parts[2].isdecimal() else 2 * (len(parts) == 2)
+    ends = isinstance(low, float) and isinstance(high, float) and math.isfinite(low + high)
+    if not ends or count < 2:
+        raise ValueError(
+            "expected FIRST:LAST:COUNT, finite numbers and a count from 2, such as "
             "'speed=0.1:0.4:7 m/s'"
-        ) from None
+        )
+    if count > MOST_CASES:
+        raise ValueError(f"{count} values: expected at most {MOST_CASES}")
     if low == high:
-        raise SweepError(f"{place}: first and last are the same")
+        raise ValueError("first and last are the same")
     if len(parts) == 2:
         return (low, high), True
-    return tuple(float(f"{v:.12g}") for v in np.linspace(low, high, count)), False
+    return tuple(float(f"{v:.12g}") for v in np.linspace(float(low), float(high), count)), False
 
 
 def _value(text: str) -> Value:
@@ -172,18 +167,6 @@ def _value(text: str) -> Value:
         return float(text)
     except ValueError:
         return text
-
-
-def _refuse_impossible(axis: Axis, machine: Machine, place: str) -> None:
-    """Each value by itself must be one that ``--set`` takes; together they may still be refused."""
-    files = machine.files
-    assert files.spec is not None
-    for value in axis.values:
-        try:
-            changed(files.spec, files.catalog, {**machine.changes, axis.key: axis.change(value)})
-        except (PipelineError, ActuatorError) as error:
-            reason = str(error).partition(": ")[2]
-            raise SweepError(f"{place}: {reason or error}") from None
 
 
 def read_plan(path: Path) -> list[str]:

@@ -3,7 +3,7 @@ import shutil
 
 import pytest
 
-from actuators.errors import ActuatorError, CatalogError, ParameterError, closest, one_line
+from actuators.errors import ActuatorError, CatalogError, ParameterError
 from actuators.loading.build import CATALOG, load_catalog
 from tests.actuators.motions import ALTERNATIVES
 
@@ -14,12 +14,6 @@ def test_shipped_catalogue_builds_four_alternatives_of_ratio_400():
     assert tuple(chains) == ALTERNATIVES
     for chain in chains.values():
         assert chain.ratio == pytest.approx(400.0, rel=1e-9)
-
-
-def test_every_parameter_names_basis_and_source():
-    for _, parameter in load_catalog().rows():
-        assert len(parameter.source) > 10
-        assert parameter.bounds is not None or parameter.basis in ("published", "datasheet")
 
 
 def test_motor_is_consistent_with_its_data_sheet():
@@ -44,12 +38,7 @@ def copy(tmp_path):
 @pytest.mark.parametrize(
     ("file", "old", "new", "message"),
     [
-        (
-            "alternatives.toml",
-            '"hypoid.ratio"',
-            '"hypod.ratio"',
-            "'irreversible': no component 'hypod'",
-        ),
+        ("alternatives.toml", '"hypoid.ratio"', '"hypod.ratio"', "'irreversible': no component"),
         ("alternatives.toml", '"hypoid.ratio"', '"hypoid.rato"', "did you mean 'ratio'"),
         ("alternatives.toml", '"hypoid.ratio"', '"hypoid"', "expected component.parameter"),
         ("alternatives.toml", 'law = "hypoid"', 'law = "hipoid"', "unknown law 'hipoid'"),
@@ -59,53 +48,14 @@ def copy(tmp_path):
         ("alternatives.toml", 'stage = "ph"', 'stage = "mp"', "named twice"),
         ("alternatives.toml", 'viscous = "pinion.viscous"\n', "", "used by no alternative"),
         ("alternatives.toml", 'stage = "ph"\n', "", "name the stage, too"),
-        (
-            "alternatives.toml",
-            'stage = "m"\n',
-            "",
-            r"'element' must have the key 'stage' in its last entry \(transmission\)",
-        ),
-        ("pinion.toml", r"\[parameters.viscous\](.|\n)*?\n\n", "", "no parameter 'viscous'"),
-        ("alternatives.toml", "shaft = ", "shfat = ", "no argument 'shfat'"),
-        (
-            "alternatives.toml",
-            'title = "Alternative 1: ideal actuator"\n',
-            "",
-            "missing key 'title'",
-        ),
-        (
-            "alternatives.toml",
-            r"\[\[ideal\.element\]\]",
-            "[[ideal.elements]]",
-            "did you mean 'element'",
-        ),
+        ("alternatives.toml", 'stage = "m"\n', "", r"'stage' in its last entry \(transmission\)"),
+        ("alternatives.toml", r"\[\[ideal\.element\]\]", "[[ideal.elements]]", "mean 'element'"),
         ("alternatives.toml", 'law = "hypoid"\n', "", r"'element 2 \(hypoid\)': missing key 'law'"),
-        ("alternatives.toml", 'name = "hypoid"\n', "", r"'element 2': missing key 'name'"),
-        ("alternatives.toml", r'name = "hypoid"', "name = 3", r"'element 2\.name' must be text"),
-        ("planetary.toml", r'kind = "planetary"\n', "", "missing key 'kind'"),
+        ("alternatives.toml", '"rotor_re40.inertia"', '"rotor_re40.coulomb"', "expected inertia"),
+        ("alternatives.toml", r"(\nratio = )\"req.*", r'\1"hypoid.wheel_radius"', "expected ratio"),
         ("planetary.toml", 'kind = "planetary"', 'kind = "planetry"', "did you mean 'planetary'"),
         ("planetary.toml", r"value = [\d.]+\n", "value = 13\n", "ratios multiply to"),
-        ("planetary.toml", "title =", "titel =", "did you mean 'title'"),
-        (
-            "alternatives.toml",
-            '"rotor_re40.inertia"',
-            '"rotor_re40.coulomb"',
-            r"\[rotor\]: element 'rotor_inertia': inertia = 'rotor_re40.coulomb' is in 'mN\*m', a "
-            r"unit of torque; expected inertia such as 'kg\*m\^2'",
-        ),
-        (
-            "alternatives.toml",
-            '\nratio = "requirement.ratio"',
-            '\nratio = "hypoid.wheel_radius"',
-            r"\[ideal\]: ratio = .* is in 'mm', a unit of length; expected ratio",
-        ),
-        (
-            "motor_re40_24v.toml",
-            "value = 75.7",
-            "value = 5.7",
-            "peak_current must not be below continuous_current",
-        ),
-        ("hypoid.toml", r"(parameters.friction\]\nvalue = )", r"\1-", "backwards|outside its"),
+        ("motor_re40_24v.toml", "value = 75.7", "value = 5.7", "peak_current must not be below"),
     ],
 )
 def test_typos_give_one_clear_line(copy, file, old, new, message):
@@ -119,34 +69,12 @@ def test_typos_give_one_clear_line(copy, file, old, new, message):
     assert "\n" not in str(caught.value)
 
 
-def test_a_message_is_one_line_of_at_most_200_characters():
-    assert one_line("a\n  b\tc") == "a b c"
-    for length in (199, 200):
-        assert one_line("x" * length) == "x" * length
-    assert one_line("x" * 201) == "x" * 197 + "..."
-    assert closest("bete", ["alpha", "beta"]) == "did you mean 'beta'?"
-    assert closest("qqqq", ["beta", "alpha"]) == "known: alpha, beta"
-    assert closest("qqqq", []) == "known: none"
-
-
 def test_missing_component_and_missing_catalogue(copy, tmp_path):
     (copy / "hypoid.toml").unlink()
     with pytest.raises(CatalogError, match="no component 'hypoid'"):
         load_catalog(copy)
     with pytest.raises(ParameterError, match=r"nowhere/alternatives\.toml: no such file"):
         load_catalog(tmp_path / "nowhere")
-
-
-def test_a_component_that_no_alternative_names_is_left_out(copy):
-    shutil.copy(copy / "output_bearing.toml", copy / "spare.toml")
-    assert "spare" not in load_catalog(copy).components
-    assert load_catalog(copy).components.keys() == load_catalog().components.keys()
-
-
-def test_a_component_that_no_alternative_names_is_read_all_the_same(copy):
-    (copy / "spare.toml").write_text("title = 3\n")
-    with pytest.raises(ActuatorError, match=r"spare\.toml"):
-        load_catalog(copy)
 
 
 def test_an_alternative_can_be_taken_out_by_itself(copy):
@@ -185,24 +113,6 @@ def test_an_alternative_after_which_no_file_can_be_called_is_refused(copy, name)
     path.write_text(re.sub(r"^(\[+)rotor\b", rf'\1"{name}"', text, flags=re.M))
     with pytest.raises(CatalogError, match=r"expected a name of letters a to z, digits"):
         load_catalog(copy)
-
-
-def test_a_catalogue_without_an_alternative_is_refused(copy):
-    (copy / "alternatives.toml").write_text("# none yet\n")
-    with pytest.raises(CatalogError, match=r"alternatives\.toml: no alternative, expected one"):
-        load_catalog(copy)
-
-
-def test_some_alternatives_come_with_what_they_use():
-    only = load_catalog().only(["reversible", "no_such"])
-    assert list(only.alternatives) == ["reversible"]
-    assert list(only.components) == [
-        "harmonic_drive",
-        "motor_re40_24v",
-        "requirement",
-        "rotor_re40",
-        "timing_belt",
-    ]
 
 
 def test_a_stage_without_words_is_named_after_its_element(copy):

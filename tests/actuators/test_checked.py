@@ -7,7 +7,7 @@ import tomllib
 from typing import Annotated, Literal
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import AfterValidator, Field
 
@@ -53,14 +53,9 @@ def said(text: str) -> str:
         ("kind = 3", "'kind' = 3: expected 'arm' or 'leg'"),
         ("", "missing key 'kind'"),
         ("kind = 'arm'\nrigit = true", "unknown key 'rigit': did you mean 'rigid'?"),
-        ("kind = 'arm'\nass = 3", "unknown key 'ass': did you mean 'as'?"),
         ("kind = 'arm'\nrigid = 1", "'rigid' must be true or false"),
-        ("kind = 'arm'\nas = true", "'as' must be a number, not True"),
         ("kind = 'arm'\nas = nan", "'as' must be a finite number"),
-        ("kind = 'arm'\njoints = 'a'", "'joints' must be a list"),
         ("kind = 'arm'\njoints = [1]", "'joints 1' must be text in quotation marks"),
-        ("kind = 'arm'\nspring = 3", "'spring' must be a list"),
-        ("kind = 'arm'\nsprings = 3", "'springs' must be a table"),
         (
             "kind = 'arm'\nsprings.knee = 3",
             "'springs.knee' must be a table, expected {stiffness, range}",
@@ -104,15 +99,6 @@ def test_more_errors_than_one_reads_are_counted() -> None:
     assert len(message) < 450
 
 
-def test_what_is_right_is_read_and_cannot_be_changed() -> None:
-    text = "kind = 'arm'\njoints = ['a']\nas = 2\n[springs.a]\nstiffness = 3\nrange = [0, 1]"
-    robot = checked(Robot, tomllib.loads(text), "robot.toml", KeyError)
-    assert (robot.kind, robot.joints, robot.as_) == ("arm", ("a",), 2.0)
-    assert robot.springs["a"].range == (0.0, 1.0)
-    with pytest.raises(ValueError, match="frozen"):
-        robot.kind = "leg"
-
-
 LEAVES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=6)
 KEYS = st.sampled_from(["kind", "rigid", "joints", "springs", "spring", "as", "stiffness", "x"])
 TABLES = st.recursive(
@@ -122,6 +108,7 @@ TABLES = st.recursive(
 )
 
 
+@settings(max_examples=25)
 @given(TABLES)
 def test_any_table_is_read_or_refused_in_one_line(table: object) -> None:
     message = ""

@@ -7,11 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from actuators.chain import ChainResult
 from actuators.elements.motor import DCMotor
 from actuators.energy.envelope import operating_region
-from actuators.energy.limits import limit_rows
-from actuators.shaft import ShaftSeries
 
 RE40 = DCMotor("m", 0.0302, 0.316, 858.7, 24.0, 5.77, 75.7)
 
@@ -55,21 +52,3 @@ def test_constants_may_differ_by_joint() -> None:
     for joint, constant in enumerate((0.03, 0.06)):
         corners = operating_region(motor, joint=joint, reach=(1e6, 1e-9))
         assert corners[:, 0].max() == pytest.approx(24.0 / constant)
-
-
-def test_limit_rows_breach_exactly_where_the_motion_leaves_the_region() -> None:
-    time = np.linspace(0.0, 1.0, 200)
-    zero = np.zeros((200, 1))
-    for top in (300.0, 700.0, 1000.0):
-        speed = top * np.sin(2 * np.pi * time)[:, None]
-        torque = 0.2 * np.cos(2 * np.pi * time)[:, None]
-        shaft = ShaftSeries.at_joint(("a",), time, zero, speed, zero, torque)
-        current = RE40.current(torque)
-        voltage = RE40.voltage(current, speed)
-        result = ChainResult(
-            "c", {"out": shaft, "m": shaft}, {}, {}, current, voltage, current * voltage, (RE40,)
-        )
-        breach = any(r.breach for r in limit_rows(result) if r.quantity != "rms_current")
-        corners = operating_region(RE40, reach=(2e3, 5.0))
-        points = np.column_stack([speed[:, 0], torque[:, 0]])
-        assert breach == (not inside(corners, points).all())

@@ -30,11 +30,6 @@ def test_sign_of_zero(time, velocity, expected):
     assert direction(time, velocity) == expected
 
 
-def test_rest_has_exactly_no_velocity():
-    v = np.array([1e-10, -1e-10])
-    assert not series([0, 1], v, v, v, v).velocity.any()
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from actuators.loading.build import load_catalog
 from pipeline.paper.published import load_published
 from tests.actuators.motions import ALTERNATIVES, CHAINS
 
@@ -29,17 +28,3 @@ def test_irreversible_stands_for_nothing():
     held = CHAINS["irreversible"].holding(JOINT_TORQUES)
     for values in (held.motor_torque, held.current, held.voltage, held.power):
         assert not values.any()
-
-
-@pytest.mark.parametrize("alternative", CHAINS)
-def test_joint_1_needs_nothing(alternative):
-    assert CHAINS[alternative].holding(JOINT_TORQUES).power[0] == 0.0
-
-
-def test_belt_friction_follows_its_stated_formula():
-    p = load_catalog().parameter
-    x = (30.71 * (1 - p("harmonic_drive.load").value) - p("harmonic_drive.coulomb").value) / p(
-        "harmonic_drive.ratio"
-    ).value
-    coulomb = x * (1 - p("timing_belt.load").value) - 49.98e-3 * p("timing_belt.ratio").value
-    assert p("timing_belt.coulomb").value == pytest.approx(coulomb, abs=1e-7)

@@ -16,8 +16,8 @@ from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Mask
 from actuators.energy.regeneration import supply
 from actuators.errors import CatalogError, closest
 from pipeline.choice.answer.full import through
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from pipeline.api.machine import Machine
     from pipeline.choice.choose import Chosen
 
-Array = NDArray[np.float64]
 #: The candidate that the search chose, among the names of alternatives.
 ANSWER: Final = "answer"
 SHARES: Final = tuple(round(0.05 * k, 2) for k in range(21))
@@ -55,18 +54,13 @@ class Cost:
 def break_even(first: tuple[Cost, Cost], second: tuple[Cost, Cost], idle: float) -> float | None:
     """Share of standing at which two candidates take the same; None where there is none.
 
-    Args:
-        first: Walking and standing.
-        second: Likewise.
-        idle: Of a driver that is on [W].
+    Each has its cost of walking and standing; a driver that is on takes `idle` [W].
     """
     walk, stand = (
         b.power - a.power + idle * (b.drivers - a.drivers)
         for a, b in zip(first, second, strict=True)
     )
-    if walk * stand >= 0.0:
-        return None
-    return walk / (walk - stand)
+    return walk / (walk - stand) if walk * stand < 0.0 else None
 
 
 def rows(
@@ -96,7 +90,7 @@ def rows(
     one, two = names
     stand = Mode("stand", 1.0, True, None, {}, "motor", False, "standing")
     walk = Mode("walk", 1.0, False, None, {}, "motor", True, "walking")
-    spring = chosen.spring if chosen else None
+    spring = chosen.asked.spring if chosen else None
     (still, own) = loads_of(machine, [stand, walk], samples=samples, spring=spring)
     counted = [k for k, j in enumerate(own.series.joints) if fnmatchcase(j, joints)]
     if not counted:
@@ -132,30 +126,20 @@ def _rows(
 def cost(
     machine: Machine, name: str, load: Load, counted: Sequence[int], chosen: Chosen | None
 ) -> Cost:
-    """One candidate in one mode, through its full chain.
-
-    Args:
-        machine: From `load`.
-        name: Of an alternative, or `ANSWER`.
-        load: The mode.
-        counted: Columns of the joints that count.
-        chosen: The search, for `ANSWER`.
+    """One candidate, by name, in one mode, through its full chain; see `rows`.
 
     Raises:
         CatalogError: No such alternative.
     """
     if name == ANSWER and chosen is not None:
         # As alternatives have none of a driver's conduction and switching, here neither has it.
-        built = {
-            g: (
-                f.demanded.joints,
-                replace(chosen.designs(g), driver_resistance=np.zeros(1), switching=np.zeros(1)),
-            )
-            for g, f in chosen.found.items()
-        }
+        none, built = np.zeros(1), {}
+        for g, joints in chosen.asked.groups.items():
+            bare = replace(chosen.designs(g), driver_resistance=none, switching=none)
+            built[g] = joints, bare
         full = through(load, built, Account())
-        bare = full.power - full.idle
-        return Cost(float(bare[counted].sum()), float(full.on[counted].sum()))
+        power = (full.power - full.idle)[counted].sum()
+        return Cost(float(power), float(full.on[counted].sum()))
     known_candidate(machine, name)
     chain = machine.ready.chain(name)
     result = chain.inverse(load.series)
@@ -175,7 +159,7 @@ def known_candidate(machine: Machine, name: str) -> None:
         raise CatalogError(f"--compare: no alternative '{name}': {closest(name, known)}")
 
 
-def _locks(chain: Actuators, load: Load) -> NDArray[np.bool_]:
+def _locks(chain: Actuators, load: Load) -> Mask:
     """Whether joints hold any load without current, (J,)."""
     position = load.series.position[0]
     ends = [chain.holding(sign * _GREAT + 0.0 * position, position).current for sign in (-1, 1)]

@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.chain import ChainResult
 from actuators.energy.energy import integral
 from actuators.energy.regeneration import BUS, supply_of
@@ -22,7 +22,6 @@ from pipeline.choice.track import Account
 from pipeline.machine.drivetrains import Drivetrains
 from pipeline.machine.joint import JointModel, joints_of
 
-Array = NDArray[np.float64]
 #: Joints of each group, and their one design.
 Built = Mapping[str, tuple[tuple[str, ...], Designs]]
 
@@ -44,17 +43,11 @@ class Full:
 
 
 def through(load: Load, built: Built, account: Account) -> Full:
-    """One mode through full chains.
-
-    Args:
-        load: The mode.
-        built: What is at the joints.
-        account: What is counted.
-    """
-    mode, names = load.mode, load.series.joints
+    """One mode through full chains, with what is built at the joints."""
+    mode, names, time = load.mode, load.series.joints, load.series.time
     models: dict[str, JointModel] = {}
     for joints, design in built.values():
-        chain = design.chain(0, engaged=not mode.stands or mode.hold == "brake")
+        chain = design.chain(0, engaged=mode.engaged)
         models |= {model.name: model for model in joints_of(chain, joints)}
     result = Drivetrains("answer", tuple(models[j] for j in names)).inverse(load.series)
     driver, idle, on = np.zeros(result.current.shape), np.zeros(len(names)), np.ones(len(names))
@@ -62,10 +55,10 @@ def through(load: Load, built: Built, account: Account) -> Full:
         at = [names.index(joint) for joint in joints]
         driver[:, at] = design.driver.loss(result.current[:, at], design.bus) - design.idle
         idle[at] = design.idle
-        if not mode.drivers and design.locks(not mode.stands or mode.hold == "brake")[0]:
+        if not mode.drivers and design.locks(mode.engaged)[0]:
             on[at] = (result.current[:, at] != 0.0).any(axis=0)
     idle *= on
-    flow, time = result.electrical_power + driver, load.series.time
+    flow = result.electrical_power + driver
     own = supply_of(flow, time, names, "fraction", account.recovered)
     power = own.supplied_energy / load.duration + idle
     dumped = own.dumped_energy / load.duration
@@ -73,23 +66,18 @@ def through(load: Load, built: Built, account: Account) -> Full:
     total, lost = float(power.sum()) + account.hotel, float(dumped.sum())
     if account.policy == BUS:
         each = np.column_stack([flow + idle, np.full(len(time), account.hotel)])
-        all_ = supply_of(each, time, (*names, "hotel"), BUS)
-        total, lost = (
-            float(x.sum()) / load.duration for x in (all_.supplied_energy, all_.dumped_energy)
-        )
-        drawn = all_.supplied.sum(axis=1)
+        bus = supply_of(each, time, (*names, "hotel"), BUS)
+        total = float(bus.supplied_energy.sum()) / load.duration
+        lost = float(bus.dumped_energy.sum()) / load.duration
+        drawn = bus.supplied.sum(axis=1)
     mean = integral(time, driver) / load.duration
-    peak = float(drawn.max())
-    return Full(load, result, mean, idle, on, power, dumped, total, lost, peak)
+    return Full(load, result, mean, idle, on, power, dumped, total, lost, float(drawn.max()))
 
 
 def lasting(battery: Battery, day: Sequence[Full], least: float) -> float:
-    """How long a battery lasts in the modes of a day [h].
+    """How long a full battery lasts in the modes of a day [h].
 
-    Args:
-        battery: When full.
-        day: Every mode.
-        least: Voltage below which a driver gives a motor less than it needs [V].
+    Below the least voltage [V] a driver gives a motor less than it needs.
     """
     shares = np.array([full.load.mode.hours for full in day])
     power = np.array([full.total for full in day])

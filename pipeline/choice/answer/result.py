@@ -39,7 +39,7 @@ class Choice(Result):
         super()._write(out, decimal)
         parts = load_parts(self.chosen.wanted.parts)
         sources = {n: PartSource(p.title, p.basis, p.source, p.note) for n, p in parts.items()}
-        title = f"Which actuators for a day of {self.chosen.machine.ready.robot.spec.name}"
+        title = f"Which actuators for a day of {self.chosen.asked.machine.ready.robot.spec.name}"
         write_choice_page(self.tables, sources, self.lines, out, title=title)
 
     @property
@@ -51,7 +51,7 @@ class Choice(Result):
         battery = self.chosen.battery
         lasts = f"{robot['battery_h']:.3g} h on {battery.energy / HOUR:.4g} Wh of {battery.name}"
         first = (
-            f"{self.chosen.machine.ready.robot.spec.name}: {robot['power_W']:.4g} W "
+            f"{self.chosen.asked.machine.ready.robot.spec.name}: {robot['power_W']:.4g} W "
             f"({robot['power_low_W']:.3g} to {robot['power_high_W']:.3g}), "
             f"{robot['energy_Wh_per_day']:.4g} Wh a day, {lasts}, "
             f"{robot['actuator_mass_kg']:.3g} kg of actuators; {len(found.designs)} designs a group"

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.choice.answer.break_even import Cost, break_even
 from pipeline.choice.answer.tables import words
 from pipeline.choice.choose import Chosen
-from pipeline.choice.search import Demanded
 from reports.tables.choice import SideRow
 
 
@@ -22,37 +23,29 @@ def side_rows(chosen: Chosen) -> list[SideRow]:
     (one, _), (two, _) = chosen.sides.values()
     if stands.all() or not stands.any() or one == two:
         return []
-    costs: list[tuple[Cost, Cost]] = []
-    for robot, loads in chosen.sides.values():
+    share = float(hours[stands].sum() / hours.sum())
+    rows, costs = [], []
+    for name, (robot, loads) in chosen.sides.items():
         power = np.array([full.total for full in chosen.through(robot, loads)])
         moving, standing = (
             Cost(float(power[at] @ hours[at] / hours[at].sum()), 0.0) for at in (~stands, stands)
         )
         costs.append((moving, standing))
-    even = break_even(costs[0], costs[1], 0.0)
-    share = float(hours[stands].sum() / hours.sum())
-    joints = {g: len(f.demanded.joints) for g, f in chosen.found.items()}
-    return [
-        SideRow(
+        demanded = chosen.asked.demanded(loads)
+        designs = {g: chosen.shelf.designs([design]) for g, design in robot.items()}
+        limits = [demanded[g].limits(design) for g, design in designs.items()]
+        mass = sum(float(d.mass[0]) * len(demanded[g].joints) for g, d in designs.items())
+        row = SideRow(
             candidate=name,
             moving_W=moving.power,
             standing_W=standing.power,
             power_W=(1.0 - share) * moving.power + share * standing.power,
-            actuator_mass_kg=sum(
-                float(chosen.shelf.designs([robot[g]]).mass[0]) * n for g, n in joints.items()
-            ),
-            limit_use=max(
-                float(x[0])
-                for g, f in chosen.found.items()
-                for x in Demanded.of(g, f.demanded.joints, loads)
-                .limits(chosen.shelf.designs([robot[g]]))
-                .values()
-            ),
+            actuator_mass_kg=mass,
+            limit_use=max(float(use[0]) for own in limits for use in own.values()),
             standing_share=share,
-            break_even=even,
-            design="; ".join(f"{g}: {words(robot[g])}" for g in joints),
+            break_even=None,
+            design="; ".join(f"{g}: {words(robot[g])}" for g in designs),
         )
-        for (name, (robot, loads)), (moving, standing) in zip(
-            chosen.sides.items(), costs, strict=True
-        )
-    ]
+        rows.append(row)
+    even = break_even(costs[0], costs[1], 0.0)
+    return [replace(row, break_even=even) for row in rows]

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from actuators.energy.energy import integral
 from actuators.loading.build import WINDING
 from actuators.units import from_si, known_units
-from pipeline.choice import heat
 from pipeline.choice.answer.full import Full, lasting
 from pipeline.choice.choose import Chosen
 from pipeline.choice.loads import Load
@@ -28,7 +27,6 @@ from reports.tables.choice import (
     UnknownRow,
 )
 
-Array = NDArray[np.float64]
 ROBOT = "robot"
 ZERO_CELSIUS = 273.15  # [K]
 _WARM = ("warming_W", "winding_degC", "winding_peak_degC", "winding_limit_degC")
@@ -85,35 +83,25 @@ def answer_rows(chosen: Chosen, day: list[DayRow]) -> list[AnswerRow]:
 
 
 def _robot_row(chosen: Chosen, rows: Sequence[AnswerRow], day: Sequence[DayRow]) -> AnswerRow:
+    def total(name: str) -> Any:
+        return sum(getattr(row, name) for row in rows)
+
     # A bus dumps what all joints return at once; by itself a group's counts as used.
     whole = sum(row.energy_Wh for row in day if row.group == ROBOT) / chosen.hours
-    more = whole - sum(row.power_W for row in rows)
-    totals = {
-        name: sum(getattr(row, name) for row in rows)
-        for name in ("joints", "actuator_mass_kg", "regret_W")
-    }
-    powers = {
-        name: more + sum(getattr(row, name) for row in rows)
-        for name in ("power_W", "power_low_W", "power_high_W", "searched_power_W")
-    }
-    energy = powers["power_W"] * chosen.hours
-    hours = lasting(chosen.battery, chosen.day, chosen.least_voltage)
+    more = whole - total("power_W")
+    powers = ("power_W", "power_low_W", "power_high_W", "searched_power_W")
+    nothing: Any = dict.fromkeys(("motor", "gear", "brake", "spring", "driver", "not_printed"), "")
     return AnswerRow(
         group=ROBOT,
-        motor="",
-        gear="",
         ratio=None,
-        brake="",
-        spring="",
-        driver="",
         battery=chosen.battery.name,
-        energy_Wh_per_day=energy,
-        battery_h=hours,
+        energy_Wh_per_day=(more + total("power_W")) * chosen.hours,
+        battery_h=lasting(chosen.battery, chosen.day, chosen.least_voltage),
         battery_kg=chosen.battery.mass,
         chance_best=float(np.prod([row.chance_best for row in rows])),
-        not_printed="",
-        **totals,
-        **powers,
+        **{name: total(name) for name in ("joints", "actuator_mass_kg", "regret_W")},
+        **{name: more + total(name) for name in powers},
+        **nothing,
     )
 
 
@@ -152,15 +140,13 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
         nominal = found.demanded.power(designs, chosen.wanted.account)
         losses = _losses(found.demanded, designs, nominal)
         limits = found.demanded.limits(designs)
-        best = doubt.order[0]
+        best, carried = doubt.order[0], doubt.score - doubt.power
         for rank, k in enumerate(doubt.order[:10], start=1):
             motor, gear, brake = designs.parts[k]
             use = {name: float(share[k]) for name, share in limits.items()}
             limit = max(use, key=lambda name: use[name])
             more = {n: each[k] - each[best] for n, each in losses.items()}
-            more["mass"] = float(
-                np.mean((doubt.score - doubt.power)[:, k] - (doubt.score - doubt.power)[:, best])
-            )
+            more["mass"] = float(np.mean(carried[:, k] - carried[:, best]))
             worst = max(more, key=lambda name: more[name])
             yield BestRow(
                 group=group,
@@ -184,28 +170,23 @@ def best_rows(chosen: Chosen) -> Iterator[BestRow]:
 
 def _losses(demanded: Demanded, designs: Designs, power: Array) -> dict[str, Array]:
     """Where the power of designs goes, mean over the mission, by kind (D,) [W]."""
-    kinds = ("windings", "drivers", "brakes", "friction and returns")
-    out = {name: np.zeros(len(designs)) for name in kinds}
+    out = {name: np.zeros(len(designs)) for name in ("windings", "drivers", "brakes")}
     for track in demanded.tracks:
         torque = track.torque(designs)
         current = torque / designs.torque_constant[:, None, None]
         square = np.einsum("dnj,n->d", current**2, track.weight)
         mean = np.einsum("dnj,n->d", np.abs(current), track.weight)
-        copper = track.share * designs.resistance * square
         driver = designs.driver_resistance * square + designs.switching * designs.bus * mean
-        driver = track.share * (driver + designs.idle * track.drivers(designs, torque))
+        driver = driver + designs.idle * track.drivers(designs, torque)
         held = np.einsum("nj,n->", (~track.rest | (not track.engaged)) * 1.0, track.weight)
-        brakes = track.share * designs.brake_power * held
-        out["windings"] += copper
-        out["drivers"] += driver
-        out["brakes"] += brakes
-        out["friction and returns"] -= copper + driver + brakes
-    out["friction and returns"] += power
-    return out
+        out["windings"] += track.share * designs.resistance * square
+        out["drivers"] += track.share * driver
+        out["brakes"] += track.share * designs.brake_power * held
+    return out | {"friction and returns": power - sum(out.values())}
 
 
 def excluded_rows(chosen: Chosen) -> Iterator[ExcludedRow]:
-    """Which limit removed how many."""
+    """Mask limit removed how many."""
     for group, found in chosen.found.items():
         over = {name: share > 1.0 for name, share in found.use.items()}
         count = np.sum(list(over.values()), axis=0)
@@ -224,116 +205,78 @@ def day_rows(chosen: Chosen) -> Iterator[DayRow]:
     """Every mode at every group through the full chains, and the robot's."""
     total = sum(full.load.mode.hours * full.total for full in chosen.day)
     warm = {group: _warm(chosen, group) for group in chosen.found}
+    nothing = dict.fromkeys([c for columns in _LIMITS.values() for c in columns] + [*_WARM])
+
+    def row(load: Load, group: str, power: float, **others: Any) -> DayRow:
+        energy = power * load.mode.hours
+        share = energy / total if total else 0.0
+        head = (load.mode.name, group, load.mode.hours, power, energy, share)
+        return DayRow(*head, **{"cost_of_transport": None, **nothing, **others})
+
     for k, full in enumerate(chosen.day):
-        load, result = full.load, full.result
-        joints, time = load.series.joints, load.series.time
-        means: dict[str, Array] = {
-            "mechanical_W": integral(time, result.joint.power) / load.duration,
-            "winding_W": integral(time, result.losses[WINDING]) / load.duration,
-            "friction_W": np.zeros(len(joints)),
-            "brakes_W": np.zeros(len(joints)),
-            "driver_W": full.driver,
-            "returned_W": full.dumped,
-            "idle_W": full.idle,
-        }
-        for name, loss in result.losses.items():
-            if name != WINDING:
-                key = "brakes_W" if name == "brake" else "friction_W"
-                means[key] = means[key] + integral(time, loss) / load.duration
+        load, means = full.load, _means(full)
         for group, found in chosen.found.items():
-            at = [joints.index(joint) for joint in found.demanded.joints]
+            at = [load.series.joints.index(joint) for joint in found.demanded.joints]
             sums = {name: float(mean[at].sum()) for name, mean in means.items()}
-            limits = _limits(chosen, load, group) | warm[group][k]
-            yield _day_row(load, group, float(full.power[at].sum()), total, sums, None, limits)
+            limits = _limits(chosen, load, group)
+            yield row(load, group, float(full.power[at].sum()), **sums, **limits, **warm[group][k])
         sums = {name: float(mean.sum()) for name, mean in means.items()}
         sums["idle_W"] += chosen.wanted.account.hotel
         sums["returned_W"] = full.lost
-        transport = full.total / (load.weight * load.speed) if load.speed else None
-        yield _day_row(load, ROBOT, full.total, total, sums, transport, {})
+        if load.speed:
+            sums["cost_of_transport"] = full.total / (load.weight * load.speed)
+        yield row(load, ROBOT, full.total, **sums)
 
 
-def _warm(chosen: Chosen, group: str) -> list[dict[str, float | None]]:
+def _means(full: Full) -> dict[str, Array]:
+    """Where the power of one mode goes, mean of every joint, by column (J,) [W]."""
+    time, result = full.load.series.time, full.result
+    out = {
+        "mechanical_W": integral(time, result.joint.power) / full.load.duration,
+        "driver_W": full.driver,
+        "returned_W": full.dumped,
+        "idle_W": full.idle,
+    }
+    out |= {name: np.zeros(len(full.idle)) for name in ("friction_W", "brakes_W")}
+    for name, loss in result.losses.items():
+        column = {WINDING: "winding_W", "brake": "brakes_W"}.get(name, "friction_W")
+        out[column] = out.get(column, 0.0) + integral(time, loss) / full.load.duration
+    return out
+
+
+def _warm(chosen: Chosen, group: str) -> list[dict[str, float]]:
     """Temperature of a group's windings in every mode, through the full chains."""
     day: list[Full] = chosen.day
     at = [day[0].load.series.joints.index(j) for j in chosen.found[group].demanded.joints]
-    copper = np.stack(
-        [
-            integral(full.load.series.time, full.result.losses[WINDING])[at] / full.load.duration
-            for full in day
-        ],
-        axis=1,
-    )
+    copper = np.stack([_means(full)["winding_W"][at] for full in day], axis=1)
     design = chosen.designs(group)
-    found = heat.day(design, [full.load.mode.hours for full in day], copper)
+    found = design.day([full.load.mode.hours for full in day], copper)
     more = (copper * (found.resistance - 1.0)).sum(axis=0)
-    peak, limit = (x - ZERO_CELSIUS for x in (found.peak.max(), design.winding_limit[0]))
-    return [
-        {
-            "warming_W": float(more[k]),
-            "winding_degC": float(found.winding[:, k].max() - ZERO_CELSIUS),
-            "winding_peak_degC": float(peak),
-            "winding_limit_degC": float(limit),
-        }
-        for k in range(len(day))
-    ]
+    peak, limit = (float(x - ZERO_CELSIUS) for x in (found.peak.max(), design.winding_limit[0]))
+    warmest = found.winding.max(axis=0) - ZERO_CELSIUS
+    each = zip(more.tolist(), warmest.tolist(), strict=True)
+    return [dict(zip(_WARM, (*mode, peak, limit), strict=True)) for mode in each]
 
 
-def _day_row(
-    load: Load,
-    group: str,
-    power: float,
-    total: float,
-    sums: Mapping[str, float],
-    transport: float | None,
-    limits: Mapping[str, float | None],
-) -> DayRow:
-    energy, none = power * load.mode.hours, dict.fromkeys((*_LIMITS, *_WARM))
-    more: dict[str, Any] = {**none, **limits}
-    return DayRow(
-        mode=load.mode.name,
-        group=group,
-        hours=load.mode.hours,
-        power_W=power,
-        energy_Wh=energy,
-        share_of_day=energy / total if total else 0.0,
-        cost_of_transport=transport,
-        **sums,
-        **more,
-    )
-
-
-#: Column to the limit of a search, and column of the limit to the number of the design.
+#: Limit of a search and number of the design to the columns of what is used and of the limit.
 _LIMITS = {
-    "rms_current_A": ("continuous current", ""),
-    "continuous_current_A": ("", "continuous_current"),
-    "peak_current_A": ("peak current", ""),
-    "most_current_A": ("", "peak_current"),
-    "speed_rad_s": ("motor's speed", ""),
-    "most_speed_rad_s": ("", "max_speed"),
-    "voltage_V": ("voltage", ""),
-    "most_voltage_V": ("", "voltage"),
-    "gear_rms_Nm": ("gear's continuous torque", ""),
-    "gear_continuous_Nm": ("", "gear_continuous"),
-    "gear_peak_Nm": ("gear's peak torque", ""),
-    "gear_most_Nm": ("", "gear_peak"),
+    ("continuous current", "continuous_current"): ("rms_current_A", "continuous_current_A"),
+    ("peak current", "peak_current"): ("peak_current_A", "most_current_A"),
+    ("motor's speed", "max_speed"): ("speed_rad_s", "most_speed_rad_s"),
+    ("voltage", "voltage"): ("voltage_V", "most_voltage_V"),
+    ("gear's continuous torque", "gear_continuous"): ("gear_rms_Nm", "gear_continuous_Nm"),
+    ("gear's peak torque", "gear_peak"): ("gear_peak_Nm", "gear_most_Nm"),
 }
 
 
-def _limits(chosen: Chosen, load: Load, group: str) -> dict[str, float | None]:
+def _limits(chosen: Chosen, load: Load, group: str) -> dict[str, float]:
     """What the worst joint uses of every limit in one mode."""
     design = chosen.designs(group)
-    finite = {
-        name: float(getattr(design, key)[0])
-        for name, (_, key) in _LIMITS.items()
-        if key and np.isfinite(getattr(design, key)[0])
-    }
     use = Demanded.of(group, chosen.found[group].demanded.joints, [load]).limits(design)
-    out: dict[str, float | None] = {}
-    names = list(_LIMITS)
-    for name, limit in zip(names[::2], names[1::2], strict=True):
-        if limit in finite:
-            share = float(use[_LIMITS[name][0]][0])
-            out |= {name: share * finite[limit], limit: finite[limit]}
+    out: dict[str, float] = {}
+    for (limit, number), (used, most) in _LIMITS.items():
+        if np.isfinite(bound := float(getattr(design, number)[0])):
+            out |= {used: float(use[limit][0]) * bound, most: bound}
     return out
 
 

@@ -62,13 +62,14 @@ class Mode:
     drivers: bool  #: Whether drivers stay on where a joint locks and needs no current.
     where: str  #: File and row, for messages.
 
+    @property
+    def engaged(self) -> bool:
+        """Whether brakes hold at rest."""
+        return not self.stands or self.hold == "brake"
+
 
 def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:
-    """The modes of a mission's file.
-
-    Args:
-        path: CSV; see the module for its columns.
-        hours: In a day, where shares are stated.
+    """The modes of a mission's file, where shares are stated of so many hours a day.
 
     Raises:
         MissionError: It cannot be read; a column, word or number is unknown or cannot be; shares
@@ -119,14 +120,24 @@ def _mode(row: Mapping[str, str], path: Path, line: int, time: str, day: float) 
             raise MissionError(f"{where}: no {key} '{one_line(words[key])}': {hint}")
     gait, motion = row.get("gait", ""), row.get("motion", "")
     stands = gait == STAND
-    if motion and gait:
-        raise MissionError(f"{where}: gait and motion are both stated; leave one empty")
-    if stands and row.get("speed"):
-        raise MissionError(f"{where}: standing has no speed; leave it empty")
-    if not stands and words["hold"] != "motor":
-        raise MissionError(f"{where}: hold is of standing; leave it empty, or write gait {STAND}")
-    if not stands and words["drivers"] == "off":
-        raise MissionError(f"{where}: a motion needs its drivers; leave drivers empty")
+    for wrong, why in (
+        (motion and gait, "gait and motion are both stated; leave one empty"),
+        (stands and row.get("speed"), "standing has no speed; leave it empty"),
+        (
+            not stands and words["hold"] != "motor",
+            f"hold is of standing; leave it empty, or write gait {STAND}",
+        ),
+        (
+            not stands and words["drivers"] == "off",
+            "a motion needs its drivers; leave drivers empty",
+        ),
+        (
+            not stands and row.get("standing"),
+            f"column standing is of gait {STAND}; leave it empty",
+        ),
+    ):
+        if wrong:
+            raise MissionError(f"{where}: {why}")
     changes: dict[str, object] = {
         key: row[column] for column, key in _CHANGES.items() if row.get(column)
     }
@@ -134,8 +145,6 @@ def _mode(row: Mapping[str, str], path: Path, line: int, time: str, day: float) 
     if gait and not stands:
         changes["gait.name"] = gait
     if row.get("standing"):
-        if not stands:
-            raise MissionError(f"{where}: column standing is of gait {STAND}; leave it empty")
         changes["standing.feet"] = ",".join(row["standing"].split())
     return Mode(
         name=name,

@@ -13,8 +13,8 @@ from dataclasses import dataclass, fields
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Index, Mask
 from actuators.chain import Chain
 from actuators.elements.element import Element
 from actuators.elements.friction import Friction
@@ -23,10 +23,10 @@ from actuators.elements.hypoid import Hypoid
 from actuators.elements.inertia import Inertia
 from actuators.elements.motor import DCMotor
 from actuators.elements.ratio import Ratio
+from actuators.elements.two_body import REFERENCE_K, Temperatures, TwoBody
 from actuators.loading.build import WINDING
+from actuators.supply.battery import HOUR
 from actuators.supply.driver import Driver
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Designs:
     def __len__(self) -> int:
         return len(self.parts)
 
-    def taken(self, which: NDArray[np.intp]) -> Designs:
+    def taken(self, which: Index) -> Designs:
         """Those of these numbers."""
         arrays = {f.name: getattr(self, f.name)[which] for f in fields(self)[1:]}
         return Designs(tuple(self.parts[i] for i in which), **arrays)
@@ -101,50 +101,49 @@ class Designs:
         columns = (1 / n, self.load / n, self.coulomb, self.viscous * n, self.inertia * n)
         return np.stack(columns, axis=1)
 
-    def locks(self, engaged: bool) -> NDArray[np.bool_]:
-        """Whether gear or brake hold what pushes from outside, (D,); then a driver may be off.
-
-        Args:
-            engaged: Whether brakes are closed.
-        """
+    def locks(self, engaged: bool) -> Mask:
+        """Whether gear, or brake if engaged, hold what pushes from outside, (D,)."""
         return np.asarray((self.load >= 1.0) | ((self.brake_torque > 0.0) & engaged))
 
+    def day(self, hours: Sequence[float], copper: Array) -> Temperatures:
+        """Winding temperature over the day, the modes in their order, day after day.
+
+        Surroundings are at the sheets' 25 degC; heat of friction is left in gears and bearings.
+
+        Args:
+            hours: Of each mode, (M,) [h].
+            copper: Mean of R I^2 with the sheet's R in each mode, (D, M), or (J, M) of one [W].
+        """
+        two = (self.winding_to_housing, self.housing_to_ambient)
+        body = TwoBody(*two, self.winding_time, self.housing_time)
+        with np.errstate(over="ignore", invalid="ignore"):  # where it runs away
+            return body.day(HOUR * np.asarray(hours), copper)
+
+    def heat_use(self, hours: Sequence[float], copper: Array) -> Array:
+        """Share of the permitted rise above 25 degC, (D,); infinite if running away; see `day`."""
+        peak = np.nan_to_num(self.day(hours, copper).peak, nan=np.inf, posinf=np.inf)
+        return np.asarray((peak - REFERENCE_K) / (self.winding_limit - REFERENCE_K))
+
     def chain(self, i: int, *, engaged: bool = True) -> Chain:
-        """One design as a chain.
+        """One design as a chain; an open brake draws its power at standstill, too.
 
         Args:
             i: Its number.
-            engaged: Whether its brake holds at standstill; open it draws its power there, too.
+            engaged: Whether its brake holds at standstill.
         """
         ratio, load = float(self.ratio[i]), float(self.load[i])
-        gear: tuple[Element, ...] = (Ratio(name="transmission", ratio=ratio),)
+        gear: Element = Ratio("transmission", ratio)
         if load >= 1.0:
-            gear = (
-                Hypoid(name="transmission", ratio=ratio, pinion_angle=np.pi / 4, friction=load),
-            )
+            gear = Hypoid("transmission", ratio, pinion_angle=np.pi / 4, friction=load)
             load = 0.0
-        elements: tuple[Element, ...] = (
-            *gear,
-            Friction(
-                name="friction",
-                coulomb=self.coulomb[i],
-                load=load,
-                viscous=self.viscous[i],
-            ),
-        )
-        if self.brake_power[i]:
-            power = float(self.brake_power[i])
+        dry, viscous = self.coulomb[i], self.viscous[i]
+        elements = [gear, Friction("friction", coulomb=dry, load=load, viscous=viscous)]
+        if power := float(self.brake_power[i]):
             held = (float(self.brake_torque[i]), power, 0.0) if engaged else (0.0, power, power)
-            elements += (HoldingBrake("brake", *held),)
-        elements += (Inertia(name="rotor", inertia=self.inertia[i]),)
-        motor = DCMotor(
-            WINDING,
-            self.torque_constant[i],
-            self.resistance[i],
-            self.max_speed[i],
-            self.voltage[i],
-            self.continuous_current[i],
-            self.peak_current[i],
-        )
+            elements.append(HoldingBrake("brake", *held))
+        elements.append(Inertia("rotor", self.inertia[i]))
+        constants = (self.torque_constant, self.resistance, self.max_speed, self.voltage)
+        limits = (self.continuous_current, self.peak_current)
+        motor = DCMotor(WINDING, *(number[i] for number in (*constants, *limits)))
         name = " + ".join(part for part in self.parts[i] if part)
-        return Chain(name, elements, motor, MappingProxyType({"m": "rotor"}))
+        return Chain(name, tuple(elements), motor, MappingProxyType({"m": "rotor"}))

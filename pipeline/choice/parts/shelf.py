@@ -35,10 +35,6 @@ _OF_GEARS: Final = {
     "gear_inertia": ("kg*m^2", 5 / 3),
     "gear_max_speed": ("rad/s", -1 / 3),
 }
-_OF_BRAKES: Final = {
-    "inertia": ("kg*m^2", 5 / 3),
-    "release_power": ("W", 2 / 3),
-}
 #: Heat leaves through a surface and is stored in a volume.
 _OF_MOTORS: Final = {
     "winding_to_housing": ("K/W", -2 / 3),
@@ -47,6 +43,14 @@ _OF_MOTORS: Final = {
     "housing_time": ("s", 1 / 3),
     "winding_limit": ("K", 0.0),
 }
+_OF_CLASS: Final = {
+    "motor": _OF_MOTORS,
+    "brake": {"inertia": ("kg*m^2", 5 / 3), "release_power": ("W", 2 / 3)},
+}
+#: Without which no part of a kind is comparable.
+_NEEDED: Final = {"motor": "mass", "brake": "holding_torque"}
+#: Of `Designs`, of which the least holds.
+_LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak")
 #: Motor by which a gear's sheet is converted: none of the gear's numbers depends on it.
 _ANY: Final = {
     **dict.fromkeys(("current_of", "resistance_of", "torque_constant", "resistance"), 1.0),
@@ -115,53 +119,24 @@ class Shelf:
     def designs(
         self, combinations: Sequence[tuple[str, str, str]], drawn: Drawn | None = None
     ) -> Designs:
-        """Their numbers.
+        """Numbers of motor, gear and brake of each, empty for none.
 
-        Args:
-            combinations: Motor, gear and brake of each; empty for none.
-            drawn: Entries that differ from the middle of their range, by part and entry.
+        What is drawn differs from the middle of its range, by part and entry.
         """
         names = {name for row in combinations for name in row if name}
         known = {name: self._converted(name, drawn or {}) for name in names}
-        none = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0)
-        none |= {"gear_speed": np.inf, "gear_continuous": np.inf, "gear_peak": np.inf}
-        none |= {"ratio": 1.0}
-        columns = [[known.get(row[k], none) for row in combinations] for k in range(3)]
-        motor, gear, brake = (
-            {key: np.array([x[key] for x in rows], dtype=np.float64) for key in none}
-            for rows in columns
-        )
-        own = motor["ratio"] * gear["ratio"]
-        return Designs(
-            tuple(combinations),
-            ratio=own,
-            load=motor["load"] + gear["load"],
-            coulomb=motor["coulomb"] + gear["coulomb"],
-            viscous=motor["viscous"] + gear["viscous"],
-            inertia=motor["inertia"] + gear["inertia"] + brake["inertia"],
-            gear_speed=gear["gear_speed"],
-            gear_continuous=np.minimum(gear["gear_continuous"], motor["gear_continuous"]),
-            gear_peak=np.minimum(gear["gear_peak"], motor["gear_peak"]),
-            brake_torque=brake["brake_torque"],
-            brake_power=brake["brake_power"],
-            mass=motor["mass"] + gear["mass"] + brake["mass"],
-            **{
-                key: motor[key]
-                for key in (
-                    *("torque_constant", "resistance", "voltage", "continuous_current"),
-                    *("peak_current", "max_speed", *_OF_MOTORS),
-                    *("bus", "bus_use", "driver_resistance", "switching", "idle"),
-                )
-            },
-        )
+        nothing, arrays = _nothing(), {}
+        for key in nothing:
+            each = [[known.get(row[k], nothing)[key] for row in combinations] for k in range(3)]
+            together = np.prod if key == "ratio" else np.min if key in _LIMITS else np.sum
+            arrays[key] = np.asarray(together(np.array(each, dtype=np.float64), axis=0))
+        return Designs(tuple(combinations), **arrays)
 
     def _converted(self, name: str, drawn: Drawn) -> dict[str, float]:
         """One part's numbers by the names of `Designs`."""
         kind = self.parts[name].kind
         x = self._values(name, drawn)
-        out = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0) | {"ratio": 1.0}
-        out |= dict.fromkeys(("gear_speed", "gear_continuous", "gear_peak"), np.inf)
-        out["mass"] = x.get("mass", 0.0)
+        out = _nothing() | {"mass": x.get("mass", 0.0)}
         if kind == "brake":
             out |= {"brake_torque": x["holding_torque"], "brake_power": x["release_power"]}
             return out | {"inertia": x.get("inertia", 0.0)}
@@ -177,23 +152,23 @@ class Shelf:
             return out
         for law in ("coulomb", "viscous", "inertia"):
             out[law] += found.get(f"rotor.{law}", 0.0)
-        for key in ("torque_constant", "resistance", "continuous_current", "max_speed"):
-            out[key] = found[f"motor.{key}"]
-        out |= {entry: x[entry] for entry in _OF_MOTORS}
-        out["peak_current"] = max(found["motor.peak_current"], out["continuous_current"])
+        out |= {key: found[f"motor.{key}"] for key in ("torque_constant", "resistance")}
+        out |= {entry: x[entry] for entry in _OF_MOTORS} | {"max_speed": found["motor.max_speed"]}
         sheet = self._values(self.driver, drawn)
-        driver = driver_of(self.driver, sheet, current_of=x["current_of"])
-        out["mass"] += sheet["mass"]
-        bus = self.voltage or min(x["supply_voltage"], float(driver.most_voltage))
-        for limit in ("continuous_current", "peak_current"):
-            out[limit] = min(out[limit], float(getattr(driver, limit)))
-        for law in ("switching", "idle"):
-            out[law] = float(getattr(driver, law))
+        made = driver_of(self.driver, sheet, current_of=x["current_of"])
+        driver = {key: float(value) for key, value in vars(made).items() if key != "name"}
+        bus = self.voltage or min(x["supply_voltage"], driver["most_voltage"])
+        lasting = found["motor.continuous_current"]
         return out | {
-            "voltage": min(found["motor.supply_voltage"], float(driver.voltage_share) * bus),
-            "driver_resistance": float(driver.resistance),
+            "mass": out["mass"] + sheet["mass"],
+            "continuous_current": min(lasting, driver["continuous_current"]),
+            "peak_current": min(max(found["motor.peak_current"], lasting), driver["peak_current"]),
+            "voltage": min(found["motor.supply_voltage"], driver["voltage_share"] * bus),
+            "driver_resistance": driver["resistance"],
+            "switching": driver["switching"],
+            "idle": driver["idle"],
             "bus": bus,
-            "bus_use": max(bus / float(driver.most_voltage), float(driver.least_voltage) / bus),
+            "bus_use": max(bus / driver["most_voltage"], driver["least_voltage"] / bus),
         }
 
     def _values(self, name: str, drawn: Drawn) -> dict[str, float]:
@@ -204,9 +179,7 @@ class Shelf:
 def combinations(shelf: Shelf, *, brakes: bool = True) -> list[tuple[str, str, str]]:
     """Every compatible motor, gear and brake; no motor for less than the supply's voltage.
 
-    Args:
-        shelf: The parts.
-        brakes: Whether designs with a brake are among them; a gear that locks needs none.
+    A gear that locks needs no brake.
 
     Raises:
         ChoiceError: No motor is left.
@@ -247,38 +220,41 @@ def named(parts: Mapping[str, Part], kind: str, name: str) -> Part:
     return known[name]
 
 
+def _nothing() -> dict[str, float]:
+    """Numbers of no part at all."""
+    zeros = dict.fromkeys((f.name for f in fields(Designs)[1:]), 0.0)
+    return zeros | {"ratio": 1.0} | dict.fromkeys(_LIMITS, np.inf)
+
+
 def _filled(part: Part, known: Mapping[str, Part]) -> Sheet:
     """A part's entries, and ranges of its class for what it does not print."""
     own = dict(_sheet(part) if part.kind == "motor" else part.printed)
-    where = f"{part.kind}/{part.name}.toml"
-    if part.kind == "motor" and "mass" not in own:
-        raise ChoiceError(f"{where}: no mass; a motor's has to be stated")
-    if part.kind == "motor":
-        for entry in sorted(_OF_MOTORS.keys() - own.keys()):
-            own[entry] = _class(known, ("motor",), entry, _OF_MOTORS[entry], _torque(own))
-    if part.kind == "brake":
-        if "holding_torque" not in own:
-            raise ChoiceError(f"{where}: no holding_torque; it has to be stated")
-        size = own["holding_torque"].value
-        own.setdefault("mass", _range(BRAKE_MASS[0], BRAKE_MASS[1], size ** (2 / 3), "kg"))
-        for entry in sorted(_OF_BRAKES.keys() - own.keys()):
-            own[entry] = _class(known, ("brake",), entry, _OF_BRAKES[entry], size)
-    if part.kind not in GEARS or own.get("gear_ratio", _ONE).value == 1.0:
+    gear = part.kind in GEARS
+    if own.get("gear_ratio", _ONE).value == 1.0 if gear else part.kind not in _OF_CLASS:
         return own  # as in `combinations`
-    torque = own.get("gear_rated_torque", own.get("gear_continuous_torque"))
-    if torque is None:
-        raise ChoiceError(f"{where}: no gear_continuous_torque; it has to be stated")
-    own.setdefault("gear_rated_torque", torque)
-    own.setdefault("gear_continuous_torque", torque)
-    for entry in sorted(_OF_GEARS.keys() - own.keys()):
-        own[entry] = _class(known, GEARS, entry, _OF_GEARS[entry], torque.value)
+    if gear and "gear_rated_torque" in own:
+        own.setdefault("gear_continuous_torque", own["gear_rated_torque"])
+    needed = "gear_continuous_torque" if gear else _NEEDED[part.kind]
+    if needed not in own:
+        raise ChoiceError(f"{part.kind}/{part.name}.toml: no {needed}; it has to be stated")
+    if gear:
+        own.setdefault("gear_rated_torque", own["gear_continuous_torque"])
+    size = own["gear_rated_torque"].value if gear else _torque(own)
+    if part.kind == "brake":
+        own.setdefault("mass", _range(*BRAKE_MASS, size ** (2 / 3), "kg"))
+    growing = _OF_GEARS if gear else _OF_CLASS[part.kind]
+    kinds = GEARS if gear else (part.kind,)
+    for entry in sorted(growing.keys() - own.keys()):
+        own[entry] = _class(known, kinds, entry, growing[entry], size)
+    if not gear:
+        return own
     if not {"gear_efficiency", "gear_load"} & own.keys():
         entry = "gear_load" if part.kind == "strain_wave" else "gear_efficiency"
         own[entry] = _class(known, (part.kind,), entry, ("1", 0.0), 1.0)
     if "gear_starting_torque" not in own:
         load = own["gear_load"].value if "gear_load" in own else None
         load = 1.0 / own["gear_efficiency"].value - 1.0 if load is None else load
-        lost = load * torque.value / own["gear_ratio"].value  # [N*m]
+        lost = load * size / own["gear_ratio"].value  # [N*m]
         own["gear_starting_torque"] = _range(*IDLE_SHARE, lost, "N*m")
     return own
 
@@ -307,7 +283,10 @@ def _torque(x: Sheet) -> float:
             return x[name].value
     if {"torque_constant", "continuous_current"} <= x.keys():
         return x["torque_constant"].value * x["continuous_current"].value
-    return _motor_torque(x)
+    if "continuous_current" not in x and "continuous_torque" not in x:
+        return 0.0
+    found = {k: v for k, (v, _) in converted({n: v.value for n, v in x.items()}).items()}
+    return found["motor.torque_constant"] * found["motor.continuous_current"]
 
 
 @cache
@@ -322,14 +301,6 @@ def _range(low: float, high: float, size: float, unit: str) -> Number:
 
 
 _ONE: Final = Number(1.0, 1.0, 1.0, "1", "1")
-
-
-def _motor_torque(x: Sheet) -> float:
-    """Continuous torque of a motor whose sheet states it otherwise; 0 for other parts [N*m]."""
-    if "continuous_current" not in x and "continuous_torque" not in x:
-        return 0.0
-    found = {k: v for k, (v, _) in converted({n: v.value for n, v in x.items()}).items()}
-    return found["motor.torque_constant"] * found["motor.continuous_current"]
 
 
 def _sheet(part: Part) -> dict[str, Number]:

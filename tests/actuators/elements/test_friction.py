@@ -1,7 +1,6 @@
 """Friction by the closed form of each of its terms; the named laws are choices of them."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -56,17 +55,3 @@ def test_each_term_in_closed_form(law, velocity, torque, expected):
 )
 def test_at_rest_friction_holds_an_interval(law, load, interval):
     np.testing.assert_allclose(law.holding(np.array(load), np.array(load)), interval)
-
-
-@pytest.mark.parametrize("law", [STRIBECK, SIDED, QUADRANT, Friction("f", coulomb=1.0, load=0.1)])
-def test_a_softened_sense_near_rest_takes_that_share_of_its_own_level(law):
-    """Identification has directions between -1 and 1 where a joint turns back."""
-    side = constant([1.0, -1.0], [4.0, 4.0])
-    whole = law.added(side)
-    for share in (1.0, 0.5, 0.01):
-        soft = replace(side, direction=share * side.direction)
-        np.testing.assert_allclose(law.added(soft), share * whole, rtol=1e-12)
-
-
-def test_no_load_is_driven_without_load():
-    assert not QUADRANT.forward(constant([1.0, -1.0], 0.0)).torque.any()

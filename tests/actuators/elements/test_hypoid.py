@@ -32,13 +32,6 @@ def test_without_friction_it_is_its_ratio():
     assert not h.loss(s).any()
 
 
-@pytest.mark.parametrize("mu", [MU, LOCKING], ids=["reversible", "self-locking"])
-def test_without_a_load_it_needs_no_torque(mu):
-    s = constant([1.0, -1.0], 0.0)
-    assert not hypoid(mu).inverse(s).torque.any()
-    assert not hypoid(mu).forward(s).torque.any()
-
-
 def test_a_self_locking_gear_holds_any_load_and_jams_when_its_pinion_pushes_back():
     h = hypoid(LOCKING)
     assert h.driven_factor < 0.0

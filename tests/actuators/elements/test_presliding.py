@@ -5,7 +5,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from actuators.elements.friction import Friction
-from actuators.errors import UnphysicalElementError
 from actuators.presliding import presliding
 from tests.actuators.motions import series, split
 
@@ -41,17 +40,6 @@ def test_after_a_reversal_it_has_turned_over_in_a_closed_form():
     np.testing.assert_allclose(sense[49:], -1.0 + 2.0 * np.exp(-back / 0.1), atol=1e-12)
 
 
-def test_over_a_vanishing_travel_it_is_the_sign_of_the_motion():
-    t, q, v = swing()
-    sense = presliding(t, q, np.sign(v), 1e-9)
-    np.testing.assert_allclose(sense[1:], np.sign(np.diff(q)), atol=1e-6)
-
-
-def test_over_an_endless_travel_it_stays_what_it_was():
-    t, q, v = swing()
-    np.testing.assert_allclose(presliding(t, q, np.sign(v), 1e6), np.sign(v[0]), atol=1e-5)
-
-
 def test_a_standstill_keeps_the_value():
     q = np.concatenate([np.linspace(0, 1, 20), np.linspace(1, 0.95, 5), np.full(30, 0.95)])
     sense = presliding(np.arange(q.size) / 100.0, q, np.ones(q.size), 0.1)
@@ -72,19 +60,6 @@ def test_a_gap_in_time_forgets_what_was():
     np.testing.assert_allclose(parted[at:], alone, atol=1e-12)
 
 
-def test_a_series_of_one_sample_has_the_direction_told():
-    one = np.ones(1)
-    assert presliding(one, one, -one, 0.1) == [-1.0]
-
-
-def test_no_sense_leaves_its_bounds_and_none_depends_on_where_zero_is():
-    t, q, v = swing()
-    sense = presliding(t, q, np.sign(v), 0.002)
-    assert np.abs(sense).max() <= 1.0
-    np.testing.assert_allclose(presliding(t, q + 5.0, np.sign(v), 0.002), sense, atol=1e-9)
-    np.testing.assert_allclose(presliding(t, -q, -np.sign(v), 0.002), -sense, atol=1e-12)
-
-
 def friction(travel, **sizes):
     return Friction(name="dry", travel=travel, **sizes)
 
@@ -97,21 +72,6 @@ def test_dry_friction_over_a_travel_has_that_sense_and_what_is_viscous_has_not()
     np.testing.assert_allclose(law.added(side)[:, 0], expected, atol=1e-12)
 
 
-def test_friction_per_load_over_a_travel_is_undone_from_the_motors_side():
-    t, q, v = swing()
-    side = series(t, q, v, 0 * v, 5.0 * np.cos(t))
-    law = friction(0.003, coulomb=0.5, when_driving=0.2, when_driven=0.1)
-    np.testing.assert_allclose(law.forward(law.inverse(side)).torque, side.torque, atol=1e-12)
-
-
-def test_a_vanishing_travel_is_the_same_law_as_a_jump():
-    t, q, v = swing()
-    side = split(series(t, q, v, np.gradient(v, t), np.cos(t)))
-    steady = np.abs(side.velocity[:, 0]) > 1e-3
-    jump, slid = (friction(d, coulomb=2.0, when_driving=0.1).added(side) for d in (0.0, 1e-12))
-    np.testing.assert_allclose(slid[steady], jump[steady], atol=1e-3)
-
-
 def test_where_a_series_is_split_at_a_reversal_the_sense_goes_on():
     """A doubled sample has the same angle: friction that has not slid yet does not jump there."""
     t, q, v = swing()
@@ -121,17 +81,3 @@ def test_where_a_series_is_split_at_a_reversal_the_sense_goes_on():
     law = friction(0.01, coulomb=1.0)
     there = np.interp(t, side.time, law.added(side)[:, 0])
     np.testing.assert_allclose(there, law.added(whole)[:, 0], atol=0.01)
-
-
-def test_columns_of_several_joints_are_each_their_own():
-    t, q, v = swing()
-    side = series(t, *(np.column_stack([x, -2 * x]) for x in (q, v, 0 * v, 0 * v)))
-    law = friction(0.003, coulomb=1.0)
-    both = law.added(side)
-    for k in (0, 1):
-        np.testing.assert_array_equal(both[:, [k]], law.added(side.at(k)))
-
-
-def test_a_negative_travel_is_refused():
-    with pytest.raises(UnphysicalElementError, match="travel"):
-        friction(-0.1, coulomb=1.0)

@@ -1,7 +1,6 @@
 """A parallel spring, a holding brake and a second motor, in an alternative of its own."""
 
 import shutil
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +13,7 @@ from actuators.elements.ratio import Ratio
 from actuators.elements.second_motor import SecondMotor
 from actuators.energy.balance import balance_residual
 from actuators.energy.energy import integral
-from actuators.errors import ActuatorError, ChainError
+from actuators.errors import ChainError
 from actuators.loading.build import CATALOG, load_catalog
 from tests.actuators.motions import constant, harmonic, series, split
 
@@ -56,14 +55,6 @@ def test_a_spring_that_carries_the_load_holds_without_current():
         chain(spring).holding(torque)
 
 
-def test_a_spring_behind_a_gear_turns_with_its_own_shaft():
-    behind = Chain(
-        "c", (Ratio("gear", N), ParallelSpring("s", 1.0, 0.0)), DCMotor("w", K, R), {"m": "s"}
-    )
-    held = behind.holding(np.array([10.0]), np.array([0.02]))
-    np.testing.assert_allclose(held.motor_torque, 10.0 / N + 1.0 * 0.02 * N)
-
-
 @pytest.mark.parametrize(
     ("powers", "at_rest", "in_motion"),
     [({"released_power": 8.0}, 0.0, 8.0), ({"engaged_power": 5.0}, 5.0, 0.0)],
@@ -88,20 +79,6 @@ def test_a_brake_holds_without_current_and_costs_its_coil(powers, at_rest, in_mo
     assert np.abs(balance_residual(both)).max() < 1e-12
 
 
-def test_two_equal_motors_that_share_lose_half_the_copper():
-    s = split(harmonic(500, joints=2))
-    alone, shared = chain(), chain(SecondMotor("second", K * N, R, share=0.5))
-    one, two = alone.inverse(s), shared.inverse(s)
-    copper = two.losses["winding"] + two.losses["second"]
-    np.testing.assert_allclose(copper, 0.5 * one.losses["winding"], atol=1e-12)
-    gone = one.losses["winding"] - copper
-    np.testing.assert_allclose(two.electrical_power, one.electrical_power - gone, atol=1e-9)
-    assert np.abs(balance_residual(two)).max() < 1e-9
-    held, before = (c.holding(np.array([30.0, -4.0])) for c in (shared, alone))
-    np.testing.assert_allclose(held.current, 0.5 * before.current)
-    np.testing.assert_allclose(held.power, 0.5 * before.power)
-
-
 @pytest.mark.parametrize("share", [0.1, 0.3, 0.5, 0.9])
 def test_copper_is_least_where_shares_go_with_the_square_of_the_motor_constants(share):
     def copper(part):
@@ -110,77 +87,36 @@ def test_copper_is_least_where_shares_go_with_the_square_of_the_motor_constants(
     assert copper(4.0 / 5.0) < copper(share)
 
 
-NUMBERS = 'basis = "assumed"\nsource = "an example"\nreason = "an example"\ninterval = [{0}, {0}]\n'
+def test_two_equal_motors_that_share_lose_half_the_copper():
+    s = split(harmonic(300))
+    one, two = chain().inverse(s), chain(SecondMotor("second", K * N, R, share=0.5)).inverse(s)
+    copper = two.losses["winding"] + two.losses["second"]
+    np.testing.assert_allclose(copper, 0.5 * one.losses["winding"], atol=1e-12)
+    assert np.abs(balance_residual(two)).max() < 1e-9
 
 
-def component(kind, **numbers):
-    text = f'kind = "{kind}"\ntitle = "An example"\n'
-    for name, (value, unit) in numbers.items():
-        text += f'[parameters.{name}]\nvalue = {value}\nunit = "{unit}"\n' + NUMBERS.format(value)
-    return text
-
-
-def element(law, file, *arguments, stage=""):
-    text = f'[[balanced.element]]\nname = "{file}"\nlaw = "{law}"\n'
-    text += "".join(f'{a} = "{file}.{a}"\n' for a in arguments)
-    return text + (f'stage = "{stage}"\n' if stage else "")
-
-
-@pytest.fixture
-def balanced(tmp_path):
-    """A catalogue with an alternative that has all three."""
+def test_a_spring_and_a_brake_are_written_into_an_alternative(tmp_path):
     folder = shutil.copytree(CATALOG, tmp_path / "catalog")
-    spring = {"stiffness": (0.5, "N*m/deg"), "rest": (20, "deg")}
-    brake = {"static_torque": (40, "mN*m"), "released_power": (6, "W")}
-    motor = {"torque_constant": (30, "mN*m/A"), "resistance": (0.3, "ohm"), "share": (40, "%")}
-    for kind, file, numbers in (
-        ("spring", "knee_spring", spring),
-        ("brake", "rotor_brake", brake),
-        ("second_motor", "twin_motor", motor),
+    about = 'basis = "published"\nsource = "an example"\n'
+    text = '\n[own]\ntitle = "Own"\nmotor = "motor_re40_24v"\nratio = "requirement.ratio"\n'
+    for law, file, numbers in (
+        ("parallel_spring", "spring", {"stiffness": (0.5, "N*m/deg"), "rest": (20, "deg")}),
+        ("ratio", "requirement", {"ratio": None}),
+        ("holding_brake", "brake", {"static_torque": (40, "mN*m"), "released_power": (6, "W")}),
     ):
-        (folder / f"{file}.toml").write_text(component(kind, **numbers))
-    text = (
-        '\n[balanced]\ntitle = "With a spring"\nmotor = "motor_re40_24v"\n'
-        + 'ratio = "requirement.ratio"\n'
-        + element("parallel_spring", "knee_spring", *spring)
-        + element("ratio", "requirement", "ratio")
-        + element("holding_brake", "rotor_brake", *brake)
-        + element("second_motor", "twin_motor", *motor, stage="m")
-    )
+        text += f'[[own.element]]\nname = "{file}"\nlaw = "{law}"\n'
+        text += "".join(f'{name} = "{file}.{name}"\n' for name in numbers)
+        if file != "requirement":
+            own = (
+                f'[parameters.{name}]\nvalue = {value}\nunit = "{unit}"\n{about}'
+                for name, (value, unit) in numbers.items()
+            )
+            kind = f'kind = "{file}"\ntitle = "An example"\n'
+            (folder / f"{file}.toml").write_text(kind + "".join(own))
     with (folder / "alternatives.toml").open("a") as file:
-        file.write(text)
-    return folder
-
-
-def test_all_three_are_written_into_an_alternative(balanced):
-    made = load_catalog(balanced).chain("balanced")
-    assert [type(e) for e in made.elements] == [ParallelSpring, Ratio, HoldingBrake, SecondMotor]
-    stiffness, rest = 0.5 * 180 / np.pi, np.radians(20.0)
+        file.write(text + 'stage = "m"\n')
+    made = load_catalog(folder).chain("own")
+    rest = np.radians(20.0)
     held = made.holding(np.array([20.0, 20.0]), np.array([rest, rest + 0.1]))
-    # The brake carries 40 mN*m at the rotor; of the rest the second motor takes 40 %.
-    left = (20.0 + stiffness * 0.1) / 400.0 - 0.04
-    np.testing.assert_allclose(held.motor_torque, [0.01 * 0.6, left * 0.6])
-    result = made.inverse(split(harmonic(300)))
-    assert np.abs(balance_residual(result)).max() < 1e-9
-    np.testing.assert_allclose(result.losses["rotor_brake"], 6.0)
-
-
-def test_what_a_spring_lacks_is_said_with_its_place(balanced):
-    path = balanced / "alternatives.toml"
-    path.write_text(path.read_text().replace('rest = "knee_spring.rest"\n', ""))
-    with pytest.raises(ActuatorError, match=r"\(knee_spring\)'.*lacks its argument 'rest'"):
-        load_catalog(balanced)
-
-
-def test_standing_asks_where_a_spring_is(balanced, hexapod):
-    from pipeline.simulation.walk_stand import stand
-
-    made = load_catalog(balanced).chain("balanced")
-    spring = made.element("knee_spring")
-    standing = stand(hexapod, {"balanced": made})
-    demand = standing.demand
-    more = demand.torque[0] + spring.torque(demand.position[0])
-    plain = replace(made, elements=made.elements[1:])
-    np.testing.assert_allclose(
-        standing.holding["balanced"].motor_torque, plain.holding(more).motor_torque
-    )
+    more = np.array([0.0, 0.5 * 180 / np.pi * 0.1])  # of the spring; the brake carries 40 mN*m
+    np.testing.assert_allclose(held.motor_torque, (20.0 + more) / 400.0 - 0.04)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from actuators.elements.warming import ZERO_CELSIUS, Warming
-from actuators.errors import UnphysicalElementError
 
 
 def test_it_is_the_first_order_of_an_exponential_law() -> None:
@@ -19,16 +18,3 @@ def test_it_is_the_first_order_of_an_exponential_law() -> None:
     exact = friction * np.exp(-b * (kelvin - reference)) - friction
     told = Warming(b * c, b * d, reference).torque(kelvin - ZERO_CELSIUS, sense, v)
     assert told == pytest.approx(exact, abs=1e-3 * np.abs(exact).max())
-
-
-def test_a_warm_joint_needs_less_and_a_cold_one_more() -> None:
-    warm = Warming(0.02, 0.01, ZERO_CELSIUS + 25.0)
-    v = np.array([1.0, -1.0])
-    hot = warm.torque(np.array([45.0, 45.0]), np.sign(v), v)
-    assert hot == pytest.approx([-0.6, 0.6])
-    assert (warm.torque(np.array([5.0, 5.0]), np.sign(v), v) * v > 0.0).all()
-
-
-def test_friction_that_grows_is_none() -> None:
-    with pytest.raises(UnphysicalElementError):
-        Warming(-0.1)

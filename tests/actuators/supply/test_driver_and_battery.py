@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.integrate import quad, solve_ivp
+from scipy.integrate import solve_ivp
 
-from actuators.energy.regeneration import supply_of
 from actuators.errors import UnphysicalElementError
 from actuators.supply.battery import Battery
 from actuators.supply.driver import Driver
@@ -35,13 +34,6 @@ def test_the_battery_s_current_keeps_its_energy_balance(power, charged):
     assert PACK.voltage(np.array(power), charged) * current == pytest.approx(power, abs=1e-6)
 
 
-def test_no_battery_gives_more_than_its_greatest_power():
-    most = PACK.full**2 / (4 * PACK.resistance)
-    assert PACK.voltage(np.array(most * (1 - 1e-12)), 1.0) == pytest.approx(27.0, rel=1e-5)
-    assert np.isnan(PACK.current(np.array(1.001 * most), np.array(1.0)))
-    assert PACK.hours(np.array([1.001 * most]), np.array([1.0])) == 0.0
-
-
 def closed_form(b: Battery, power: float, last: float) -> float:
     """Hours at constant power: the integral of 1/I = (E + sqrt(E^2 - 4RP)) / 2P over E."""
     a = 4 * b.resistance * power
@@ -64,15 +56,6 @@ def test_life_at_constant_power_is_the_closed_form(power, cut_off):
         assert PACK.voltage(np.array(power), last) == pytest.approx(cut_off)
 
 
-def test_without_resistance_the_life_is_energy_over_mean_power():
-    ideal = Battery("b", energy=3.6e6, full=50.0, empty=40.0)
-    hours = ideal.hours(np.array([[100.0, 300.0], [0.0, 0.0]]), np.array([0.75, 0.25]))
-    assert hours[0] == pytest.approx(1000.0 / 150.0)
-    assert hours[1] == math.inf
-    flat = Battery("b", energy=3.6e6, full=45.0, empty=45.0)
-    assert flat.hours(np.array([100.0, 300.0]), np.array([0.75, 0.25])) == hours[0]
-
-
 def test_life_in_modes_with_return_is_that_of_a_general_integrator():
     b = Battery("b", 9e5, full=29.0, empty=20.0, resistance=0.1, returned=0.8)
     power, shares = np.array([900.0, 30.0, -150.0]), np.array([0.2, 0.5, 0.3])
@@ -86,25 +69,6 @@ def test_life_in_modes_with_return_is_that_of_a_general_integrator():
     ends.terminal = True
     solved = solve_ivp(rate, (0, 1e6), [1.0], events=ends, rtol=1e-10, atol=1e-12)
     assert b.hours(power, shares, cut_off=15.0) == pytest.approx(solved.t[-1] / 3600, rel=1e-6)
-
-
-def test_energy_drawn_and_heat_are_the_energy_of_the_open_circuit():
-    """Over the whole discharge at constant power, nothing is lost but the heat."""
-    power = 1500.0
-    life = 3600 * PACK.hours(np.array([power]), np.array([1.0]))
-    heat = quad(lambda s: PACK.resistance * PACK.charge * PACK.current(power, s), 0, 1)[0]
-    assert power * life + heat == pytest.approx(PACK.energy, rel=1e-9)
-
-
-def test_drivers_take_part_in_the_bus():
-    """Driver losses and one joint's return meet on the bus; alone, the return is lost."""
-    time = np.linspace(0.0, 1.0, 11)
-    motor = np.stack([np.full(11, 10.0), np.full(11, -6.0)], axis=1)
-    power = motor + Driver("d", idle=1.0).loss(np.zeros((11, 2)), 24.0)
-    assert supply_of(power, time, ("a", "b"), "bus").supplied_energy == pytest.approx([6.0])
-    alone = supply_of(power, time, ("a", "b"))
-    assert alone.supplied_energy == pytest.approx([11.0, 0.0])
-    assert alone.dumped_energy == pytest.approx([0.0, 5.0])
 
 
 @pytest.mark.parametrize(

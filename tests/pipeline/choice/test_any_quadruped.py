@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from itertools import cycle, product
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +18,9 @@ from pipeline.choice.asked import Asked
 from pipeline.choice.group import groups_of
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import read_mission
-from pipeline.choice.parts.shelf import Shelf, combinations
-from pipeline.choice.search import Demanded, Feedback, shared
+from pipeline.choice.parts.shelf import Shelf
+from pipeline.choice.search import Demanded, shared
 from pipeline.choice.track import Account
-from tests.pipeline.choice.brute import in_full
 from tests.pipeline.robot.walkers import robot_text, urdf_text
 
 LEG = (("revolute", "1 0 0"), ("revolute", "0 1 0"), ("revolute", "0 1 0"))
@@ -68,28 +67,7 @@ def asked(folder: Path, seed: int, policy: str = "none") -> Asked:
     return Asked(machine, modes, groups, shelf, account, 0.0, known[PACK])
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.slow)])
-def test_search_and_robot_are_those_of_brute_force(tmp_path: Path, seed: int) -> None:
-    own = asked(tmp_path, seed)
-    robots = own.robots(dict.fromkeys(own.groups, 0.5))
-    every = combinations(own.shelf)
-    designs = own.shelf.designs(every)
-    found = own.searched(designs, robots.loads, dict.fromkeys(own.groups, Feedback()))
-    pool = {}
-    for g, f in found.items():
-        full = [in_full(designs, i, f.demanded) for i in range(len(designs))]
-        power = np.array([p if ok else np.inf for p, ok in full])
-        order = np.argsort(power, kind="stable")[: np.isfinite(power).sum()]
-        assert list(f.looked[f.finalists]) == list(order)[: len(f.finalists)]
-        assert np.allclose(f.power[f.finalists], power[order][: len(f.finalists)], rtol=1e-9)
-        pool[g] = [every[i] for i in order[:5]]
-    answer = robots.settled({g: designs[-1] for g, designs in pool.items()}, pool)
-    robot = [dict(zip(pool, each, strict=True)) for each in product(*pool.values())]
-    assert len(robot) >= 27
-    assert robots.cost(answer) == min(map(robots.cost, robot))
-
-
-@pytest.mark.parametrize("policy", ["none", "fraction", "bus"])
+@pytest.mark.parametrize("policy", ["fraction", "bus"])
 def test_answer_is_that_of_its_full_chains(tmp_path: Path, policy: str) -> None:
     """Power of a robot by the algebra of the search, and by chains, drivers and supply."""
     own = asked(tmp_path, 4, policy)

@@ -60,9 +60,3 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_value(machine: Mach
         power = asked(again).power(shelf.designs(DESIGNS, sheet), Account())
         assert np.allclose(found.power[s], power, rtol=1e-9)
     assert found.moves()[k] > 0.0
-
-
-def test_without_a_model_file_nothing_is_drawn_of_the_robot() -> None:
-    bare = lw.load("urdf/hexapod.toml")
-    assert effects_of(bare) == ()
-    assert not list(drawn_machines(bare))

@@ -8,7 +8,6 @@ import pytest
 import pipeline as lw
 from actuators.elements.two_body import REFERENCE_K
 from actuators.loading.parts import PACK, load_parts
-from pipeline.choice import heat
 from pipeline.choice.asked import Asked
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.group import groups_of
@@ -38,14 +37,14 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Asked:
 
 @pytest.fixture(scope="module")
 def robots(asked: Asked) -> Robots:
-    return asked.robots(dict.fromkeys(asked.groups, 0.3))
+    return Robots.about(asked, dict.fromkeys(asked.groups, 0.3))
 
 
 def test_demand_of_any_masses_is_that_computed_anew(asked: Asked, robots: Robots) -> None:
     mass = {g: 0.1 + 0.2 * k for k, g in enumerate(asked.groups)}
     added = {joint: mass[g] for g, joints in asked.groups.items() for joint in joints}
     anew = loads_of(asked.machine, asked.modes, added, along=robots.loads)
-    for g, demanded in robots.demanded(mass).items():
+    for g, demanded in asked.demanded(robots.at(mass)).items():
         own = Demanded.of(g, asked.groups[g], anew)
         for one, other in zip(demanded.tracks, own.tracks, strict=True):
             scale = np.abs(other.series.torque).max()
@@ -56,7 +55,7 @@ def test_settled_robot_is_the_best_of_all_that_differ_in_one_group(
     asked: Asked, robots: Robots
 ) -> None:
     every = combinations(asked.shelf, brakes=False)
-    pool = dict.fromkeys(asked.groups, [d for d in every if d[1]][:12])
+    pool = dict.fromkeys(asked.groups, [d for d in every if d[1]][:4])
     answer = robots.settled({g: every[0] for g in asked.groups}, pool)
     best = robots.cost(answer)
     for g, designs in pool.items():
@@ -67,9 +66,9 @@ def test_settled_robot_is_the_best_of_all_that_differ_in_one_group(
 
 def test_what_exceeds_a_limit_with_its_own_mass_is_one_line(asked: Asked, robots: Robots) -> None:
     weak = ("maxon_402687", "maxon_gp_22_hp_84", "")
-    heavy = asked.robots(dict.fromkeys(asked.groups, 10.0))
+    heavy = Robots.about(asked, dict.fromkeys(asked.groups, 10.0))
     with pytest.raises(ChoiceError, match=r"own actuators' mass: group .* 10 kg a joint") as caught:
-        asked.check(dict.fromkeys(asked.groups, weak), heavy)
+        heavy.check(dict.fromkeys(asked.groups, weak))
     assert "\n" not in str(caught.value)
 
 
@@ -79,12 +78,12 @@ def test_winding_temperature_is_that_of_the_closed_form_and_runs_away_beyond() -
     design = shelf.designs([("maxon_148867", "", "")])
     current = np.array([2.0, 3.0, 12.0])
     copper = design.resistance * current**2
-    found = heat.day(design, [24.0], copper[:, None])
+    found = design.day([24.0], copper[:, None])
     cold = (1.93 + 4.65) * copper[:2]
     assert found.peak[:2] - REFERENCE_K == pytest.approx(cold / (1 - 0.00393 * cold), rel=1e-3)
-    use = heat.share(design, [24.0], copper[:, None])
+    use = design.heat_use([24.0], copper[:, None])
     assert use[:2] == pytest.approx((found.peak[:2] - REFERENCE_K) / (155.0 - 25.0), rel=1e-9)
     assert np.isinf(use[2])
     # One minute of it in an hour is borne.
     spent = np.stack([copper[2:], 0.0 * copper[2:]], axis=1)
-    assert np.isfinite(heat.share(design, [1 / 60, 1.0], spent)).all()
+    assert np.isfinite(design.heat_use([1 / 60, 1.0], spent)).all()

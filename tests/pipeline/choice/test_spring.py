@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.elements.position_torque import ParallelSpring
 from actuators.loading.parts import load_parts
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.loads import Load, loads_of, with_spring
@@ -53,40 +52,6 @@ def test_power_beside_a_spring_is_that_of_chains_that_hold_the_spring(shelf: She
             assert np.allclose(torque, own, atol=1e-9)
 
 
-def test_a_spring_that_carries_the_posture_leaves_nothing_to_the_windings(shelf: Shelf) -> None:
-    """Rest angle q - |tau| / k past the joint: k (q - q0) = -tau, no current, no copper loss."""
-    machine = lw.load("urdf/hexapod.toml")
-    (load,) = loads_of(machine, [STAND])
-    series, k = load.series, 5.0
-    rest = [
-        f"{joint}={k} N*m/rad@{q + tau / k!r} rad"
-        for joint, q, tau in zip(
-            series.joints, series.position[0].tolist(), series.torque[0].tolist(), strict=True
-        )
-    ]
-    spring = springs_of(machine.ready.robot.joints, rest)
-    (carried,) = loads_of(machine, [STAND], spring=spring)
-    # A motor alone, so that no friction holds: copper R (tau / k)^2 without the spring, 0 with it.
-    design = shelf.designs([(DESIGN[0], "", "")])
-    design = replace(design, coulomb=np.zeros(1), switching=np.zeros(1), idle=np.zeros(1))
-    before, after = (
-        Demanded.of("all", series.joints, [one]).power(design, Account())[0]
-        for one in (load, carried)
-    )
-    assert before == pytest.approx(float(design.ohmic[0] * (series.torque[0] ** 2).sum()))
-    assert after == pytest.approx(0.0, abs=1e-12 * before)
-
-
-def test_battery_on_the_base_asks_as_a_payload_there() -> None:
-    machine = lw.load("urdf/solo12.toml")
-    base = machine.ready.robot.model.names[1]
-    (own,) = loads_of(machine, [STAND], {base: 0.7})
-    (payload,) = loads_of(machine, [replace(STAND, changes={"gait.payload_mass": "0.7 kg"})])
-    (without,) = loads_of(machine, [STAND])
-    assert np.allclose(own.series.torque, payload.series.torque, atol=1e-9)
-    assert not np.allclose(own.series.torque, without.series.torque, atol=1e-3)
-
-
 def test_a_driver_adds_its_mass_and_one_without_has_the_range_of_its_class() -> None:
     parts = load_parts()
     motor = {DESIGN[0]: parts[DESIGN[0]]}
@@ -100,10 +65,8 @@ def test_a_driver_adds_its_mass_and_one_without_has_the_range_of_its_class() -> 
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("*_2=", "expected PATTERN, or 'PATTERN=STIFFNESS@ANGLE'"),
         ("*_2=3 N*m/rad", "expected PATTERN, or 'PATTERN=STIFFNESS@ANGLE'"),
         ("*_2=3 N*m@4 deg", "N\\*m"),
-        ("*_2=3@4 deg", "N\\*m/rad"),
         ("*_2=-3 N*m/rad@4 deg", "above 0"),
         ("*_knee=3 N*m/rad@4 deg", "no joint '\\*_knee'"),
     ],
@@ -112,13 +75,6 @@ def test_springs_that_cannot_be_are_one_line(text: str, says: str) -> None:
     with pytest.raises(ChoiceError, match=says) as caught:
         springs_of(["lf_1", "lf_2"], [text])
     assert "\n" not in str(caught.value)
-
-
-def test_a_joint_has_one_spring() -> None:
-    with pytest.raises(ChoiceError, match="has a spring already"):
-        springs_of(["lf_1", "lf_2"], ["lf*=3 N*m/rad@4 deg", "lf_2=3 N*m/rad@4 deg"])
-    assert springs_of(["lf_1"], []) is None
-    assert isinstance(springs_of(["lf_1"], ["lf*=3 N*m/rad@-4 deg"]), ParallelSpring)
 
 
 def test_the_spring_that_is_found_is_the_best_of_a_grid_and_for_standing_carries_it() -> None:
@@ -137,6 +93,6 @@ def test_the_spring_that_is_found_is_the_best_of_a_grid_and_for_standing_carries
     (text,) = found_springs(joints, {"one": joints}, walked, design, Account())
     best, bare = power(text, walked), power(f"{joints[0]}=1e-9 N*m/rad@0 deg", walked)
     assert best < bare
-    for k in np.geomspace(0.3, 100.0, 12):
-        for angle in range(-180, 181, 20):
+    for k in np.geomspace(0.3, 100.0, 6):
+        for angle in range(-180, 181, 40):
             assert best <= 1.002 * power(f"{joints[0]}={k:.6f} N*m/rad@{angle} deg", walked)

@@ -9,10 +9,9 @@ import pytest
 
 import pipeline as lw
 from pipeline.errors import RobotFileError
-from pipeline.measured.evaluate import ROBOTS, Prediction, predicted
-from pipeline.measured.facts import FACTS, read_facts
-from pipeline.measured.page import tables_of, write_measured
-from pipeline.measured.tables import ratio_rows
+from pipeline.measured.evaluate import ROBOTS, predicted
+from pipeline.measured.facts import read_facts
+from pipeline.measured.page import write_measured
 
 #: Solo12 standing and two unknowns: 2 ways by 2 numbers.
 SMALL = """
@@ -79,28 +78,6 @@ def test_the_range_holds_what_the_plain_calls_give_at_every_choice(facts: Path) 
     assert [end for end, _ in found.ends(1)] == [1, 0, 2]  # watts with ohms
 
 
-def test_gravity_alone_is_squared_in_copper_loss(facts: Path) -> None:
-    """Where no friction helps to hold, standing power goes with gravity squared."""
-    text = SMALL.replace('actuator = "solo12"', 'actuator = "ideal"')
-    (facts / "small.toml").write_text(text, encoding="utf-8")
-    small = read_facts(facts)["small"]
-    found = {q.name: predicted(small, q) for q in small.quantity}
-    (row,) = ratio_rows(small, found)
-    expected = (1.62 / 9.81) ** 2
-    for value in (row.low, row.nominal, row.high):
-        assert value == pytest.approx(expected, rel=1e-6)
-
-
-def test_a_ratio_pairs_equal_choices() -> None:
-    (name, facts), *_ = read_facts().items()
-    assert name == "magnecko"
-    over = Prediction({(0,): 2.0, (1,): 8.0}, (0,))
-    under = Prediction({(0,): 1.0, (1,): 4.0, (2,): 100.0}, (0,))
-    found = {facts.ratio[0].over: over, facts.ratio[0].under: under}
-    (row,) = ratio_rows(facts, found)
-    assert (row.low, row.nominal, row.high) == (2.0, 2.0, 2.0)
-
-
 def test_tables_figure_and_page_are_written(facts: Path, tmp_path: Path, sketched: None) -> None:
     lines = write_measured(tmp_path / "out", folder=facts)
     assert lines[0].startswith("Solo12, standing: predicted ")
@@ -139,9 +116,3 @@ def test_facts_that_cannot_be_are_one_line(facts: Path, old: str, new: str, word
     (facts / "small.toml").write_text(SMALL.replace(old, new), encoding="utf-8")
     with pytest.raises(RobotFileError, match=words):
         read_facts(facts)
-
-
-def test_every_file_of_facts_says_who_measured() -> None:
-    assert len(list(FACTS.glob("*.toml"))) == len(read_facts())
-    assert all(facts.source for facts in read_facts().values())
-    assert tables_of({}, {}).keys() == {"measured", "unknowns", "measured_ratios"}

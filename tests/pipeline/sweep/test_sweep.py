@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas
-import pyarrow.parquet as pq
 import pytest
 
 import pipeline as lw
@@ -61,13 +60,6 @@ def test_every_case_is_there_once_and_a_refused_one_says_why(swept: Path) -> Non
     done = frame[frame.refusal == ""]
     assert done.groupby("case").alternative.nunique().eq(4).all()
     assert set(refused.body_pitch_deg) == {80.0}
-
-
-def test_columns_say_their_unit_and_meaning(swept: Path) -> None:
-    schema = pq.read_schema(swept)
-    assert schema.field("cost_of_transport").metadata[b"meaning"]
-    assert schema.field("average_power_W").metadata[b"unit"] == b"W"
-    assert schema.field("speed_m_s").metadata[b"unit"] == b"m/s"
 
 
 def test_the_same_bytes_whatever_the_number_of_workers(swept: Path, tmp_path: Path) -> None:
@@ -133,34 +125,22 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     ("arguments", "words"),
     [
         ([], "nothing is varied"),
-        (["--vary", ""], "expected NAME=VALUES"),
         (["--vary", "speed="], "expected NAME=VALUES"),
         (["--vary", "sped=0.1,0.2 m/s"], "did you mean 'speed'"),
-        (["--vary", "hips_spacing=1,2"], "did you mean 'hip_spacing'"),
         (["--vary", "harmonic_drive.lod=1,2"], "no such number"),
-        (["--vary", "speed=0.1:0.4:7"], "has no unit"),
         (["--vary", "speed=0.1:0.4:7 kg"], "expected a velocity"),
         (["--vary", "speed=0.1:0.4:7 furlong"], "unknown unit"),
         (["--vary", "speed=0.1,nan m/s"], "nan is no finite number"),
-        (["--vary", "payload=inf,5 kg"], "inf is no finite number"),
-        (["--vary", "payload=0,1e9 kg"], "below 1e5 kg"),
         (["--vary", "payload=0:5:1000000000 kg"], "1000000000 values"),
         (["--vary", "payload=0:5 kg", "--sample", "4", "--seed", "-1"], "--seed -1"),
-        (["--vary", "speed=nan:1:3 m/s"], "finite"),
         (["--vary", "speed=0.1:0.4:1 m/s"], "count from 2"),
         (["--vary", "speed=0.1:0.1:3 m/s"], "the same"),
         (["--vary", "speed=0.1,,0.2 m/s"], "empty or stands twice"),
-        (["--vary", "speed=0.1,-0.2 m/s"], "must not be negative"),
         (["--vary", "speed=0.1:0.4 m/s"], "needs --sample"),
         (["--vary", "speed=0.1,0.2 m/s", "--vary", "gait.speed=0.1,0.2 m/s"], "stands twice"),
-        (["--vary", "hip_spacing=1,2 kg"], "its unit is"),
         (["--vary", "duty=0.6,1.4"], "share above 0 and below 1"),
         (["--vary", "duty=0.6,0.7", "--sample", "0"], "0 cases"),
         (["--vary", "duty=0.6,0.7", "--sample", "5", "--method", "grid"], "--method grid"),
-        (["--vary", "duty=0.6,0.7", "--workers", "0"], "give a number from 1"),
-        (["--vary", "duty=0.6,0.7", "--samples", "5"], "at least 51"),
-        (["--vary", "duty=0.6,0.7", "--scheduler", "tcp://127.0.0.1:9"], "no scheduler answers"),
-        (["--plan", "no.toml"], "no.toml"),
     ],
 )
 def test_bad_input_is_one_line(
@@ -176,9 +156,7 @@ def test_bad_input_is_one_line(
     assert not out.exists()
 
 
-@pytest.mark.parametrize(
-    "text", ["", "[vary]\n", "[other]\nspeed = '1'\n", "[vary]\nspeed = 3\n", "[vary"]
-)
+@pytest.mark.parametrize("text", ["[other]\nspeed = '1'\n", "[vary]\nspeed = 3\n", "[vary"])
 def test_a_plan_that_cannot_be_read_is_one_line(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -199,22 +177,3 @@ def test_samples_fill_the_ranges_and_are_the_same_for_a_seed() -> None:
         assert 0.1 <= speed.min() < 0.12 < 0.38 < speed.max() <= 0.4
         assert all(8 <= (load == value).sum() <= 12 for value in (0, 5, 10))
         assert ((width > 200) & (width < 240)).all()
-
-
-def test_a_grid_is_every_combination_in_the_order_written() -> None:
-    machine = machine_of(None, None, None, None, ())
-    axes = read_axes(["speed=0.1:0.4:4 m/s", "transfer_path=harmonic,cycloid"], machine)
-    cases = cases_of(axes)
-    assert cases[:3] == [(0.1, "harmonic"), (0.1, "cycloid"), (0.2, "harmonic")]
-    assert [speed for speed, _ in cases[::2]] == [0.1, 0.2, 0.3, 0.4]
-
-
-def test_the_command_line_reads_a_plan_and_ends_with_one_where_no_case_walks(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    plan = tmp_path / "plan.toml"
-    plan.write_text('[vary]\nbody_pitch = "80, 85 deg"\n')
-    out = tmp_path / "out"
-    arguments = ["sweep", "--plan", str(plan), "--samples", "51", "--workers", "1"]
-    assert main([*arguments, "--out", str(out)]) == 1
-    assert "2 cases" in capsys.readouterr().out
