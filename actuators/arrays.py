@@ -18,7 +18,7 @@ Scalars: TypeAlias = float | Array  # one number for all joints, or one per join
 _RULES: Final[Mapping[str, tuple[Callable[[Any], Any], str]]] = {
     "": (lambda x: (x >= 0.0) & (x < math.inf), "must be finite and not negative"),
     "signed": (lambda x: (x > -math.inf) & (x < math.inf), "must be finite"),
-    "positive": (lambda x: (x > 0.0) & (x < math.inf), "must be > 0 and finite"),
+    "positive": (lambda x: (x > 0.0) & (x < math.inf), "must be positive and finite"),
     "limit": (lambda x: x > 0.0, "must be > 0"),
     "share": (lambda x: (x >= 0.0) & (x < 1.0), "must be 0 or more and below 1"),
 }

@@ -7,9 +7,8 @@ break: two samples at the same time that carry the left and the right limit.
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Index, Mask
 from actuators.shaft import REST_SPEED, ShaftSeries
 
 _SNAP: Final = 1e-9  # a zero nearer to a sample than this share of the interval is on the sample
@@ -76,79 +75,54 @@ def split_at_reversals(series: ShaftSeries) -> ShaftSeries:
     )
 
 
-def _instants(
-    interval: NDArray[np.intp], fraction: Array
-) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
-    """Zeros of several joints at one instant become one break.
-
-    Args:
-        interval: Of each zero, ascending, (Z,).
-        fraction: Of the interval, ascending within it, (Z,).
-
-    Returns:
-        Number of the instant of each zero (Z,), and whether a zero is the first of its instant.
-    """
+def _instants(interval: Index, fraction: Array) -> tuple[Index, Mask]:
+    """Number of the instant of each zero (Z,), ascending, and whether a zero is its first."""
     new = np.ones(interval.size, dtype=bool)
     new[1:] = (np.diff(interval) != 0) | (np.diff(fraction) > _SNAP)
     return np.cumsum(new) - 1, new
 
 
-def _crossings(
-    series: ShaftSeries, signs: Array
-) -> tuple[NDArray[np.intp], Array, NDArray[np.intp]]:
+def _crossings(series: ShaftSeries, signs: Array) -> tuple[Index, Array, Index]:
     """Return interval, fraction of it and joint of each sign change between two samples."""
     step = np.diff(series.time)
     interval, joint = np.nonzero((signs[:-1] * signs[1:] < 0.0) & (step > 0.0)[:, None])
     v, a = series.velocity, series.acceleration
     low, high = np.zeros(interval.size), np.ones(interval.size)
     first = signs[interval, joint]
+    ends = [x[k, joint] for x in (v, a) for k in (interval, interval + 1)]
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        value = _hermite(
-            v[interval, joint],
-            v[interval + 1, joint],
-            a[interval, joint],
-            a[interval + 1, joint],
-            step[interval],
-            middle,
-        )
+        value = _hermite(*ends, step[interval], middle)
         before = value * first > 0.0
         low, high = np.where(before, middle, low), np.where(before, high, middle)
     return interval, 0.5 * (low + high), joint
 
 
-def _zeros_on_samples(time: Array, signs: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _zeros_on_samples(time: Array, signs: Array) -> tuple[Index, Index]:
     """Return row and joint of zeros on samples where a sign changes or a stay at rest ends."""
-    rows: list[int] = []
-    columns: list[int] = []
+    found: list[tuple[int, int]] = []
     joined = np.diff(time) > 0.0  # sample i and i + 1 lie in one block
     for column in np.flatnonzero((signs == 0.0).any(axis=0)):
-        zero = np.concatenate(([False], signs[:, column] == 0.0, [False]))
-        for first, stop in zip(
-            np.flatnonzero(~zero[:-1] & zero[1:]),
-            np.flatnonzero(zero[:-1] & ~zero[1:]),
-            strict=True,
-        ):
+        zero = np.diff(np.concatenate(([0], signs[:, column] == 0.0, [0])).astype(int))
+        for first, stop in zip(np.flatnonzero(zero > 0), np.flatnonzero(zero < 0), strict=True):
             last = stop - 1
             before = signs[first - 1, column] if first > 0 and joined[first - 1] else 0.0
             after = signs[stop, column] if stop < time.size and joined[last] else 0.0
             if first == last and before * after >= 0.0:
                 continue  # touches, or at the edge of a block
-            ends = [i for i, side in ((first, before), (last, after)) if side != 0.0]
-            for end in dict.fromkeys(ends):
-                rows.append(int(end))
-                columns.append(int(column))
-    return np.array(rows, dtype=np.intp), np.array(columns, dtype=np.intp)
+            ends = [row for row, side in ((first, before), (last, after)) if side != 0.0]
+            found += [(row, column) for row in dict.fromkeys(ends)]
+    rows, columns = np.array(found, dtype=np.intp).reshape(-1, 2).T
+    return rows, columns
 
 
-def _inside_block(time: Array, rows: NDArray[np.intp]) -> NDArray[np.bool_]:
+def _inside_block(time: Array, rows: Index) -> Mask:
     """Return which samples have a neighbour of their own block on both sides."""
     joined = np.concatenate(([False], np.diff(time) > 0.0, [False]))
-    inside: NDArray[np.bool_] = joined[rows] & joined[rows + 1]
-    return inside
+    return np.asarray(joined[rows] & joined[rows + 1])
 
 
-def _interpolated(series: ShaftSeries, at: NDArray[np.intp], u: Array) -> dict[str, Array]:
+def _interpolated(series: ShaftSeries, at: Index, u: Array) -> dict[str, Array]:
     """Return time (K,) and the series' quantities (K, J) at fractions `u` of intervals `at`."""
     step = np.diff(series.time)[at]
     s, h = u[:, None], step[:, None]
@@ -166,14 +140,13 @@ def _keep_signs(
     velocity: Array,
     series: ShaftSeries,
     signs: Array,
-    zeros: tuple[NDArray[np.intp], Array, NDArray[np.intp]],
-    at: NDArray[np.intp],
+    zeros: tuple[Index, Array, Index],
+    at: Index,
     u: Array,
 ) -> None:
     """Set to zero, in place, velocities whose Hermite overshoots to the wrong side of zero.
 
-    Before its own zero a joint has the sign of the interval's first sample, after it that of the
-    second; an interval without a zero has one sign.
+    Before its own zero a joint has the sign of the interval's first sample, then of the second.
     """
     own_zero = np.full(velocity.shape, np.inf)
     interval, fraction, joint = zeros
@@ -189,7 +162,5 @@ def _keep_signs(
 def _hermite(f0: Array, f1: Array, d0: Array, d1: Array, h: Array, u: Array) -> Array:
     """Return the cubic with values f0, f1 and slopes d0, d1 over a step h at fraction u."""
     w = 1.0 - u
-    value: Array = (
-        w * w * (1.0 + 2.0 * u) * f0 + u * u * (3.0 - 2.0 * u) * f1 + u * w * h * (w * d0 - u * d1)
-    )
-    return value
+    ends = w * w * (1.0 + 2.0 * u) * f0 + u * u * (3.0 - 2.0 * u) * f1
+    return np.asarray(ends + u * w * h * (w * d0 - u * d1))

@@ -12,7 +12,7 @@ from actuators.elements.heating import COPPER
 from actuators.elements.two_body import REFERENCE_K, TwoBody
 from actuators.supply.battery import Battery
 from pipeline.api.tables import walked
-from pipeline.sweep.case import Order, machine_of
+from pipeline.sweep.case import Order
 from pipeline.sweep.sweep import sweep
 from tests.bench_timing import Call, ratio, spread, timed
 
@@ -22,7 +22,7 @@ SPEEDS = [0.02 + 0.02 * k for k in range(8)]  # [m/s]
 def sweep_ratio() -> None:
     """A sweep against the same walks without rows, parts and file."""
     order = Order(samples=51)
-    machine = machine_of(*order.source)
+    machine = order.machine
 
     def bare() -> None:
         for speed in SPEEDS:

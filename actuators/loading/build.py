@@ -111,31 +111,46 @@ class Catalog:
             )
         alternative, own = self.alternatives[name], values or {}
 
-        def value(reference: str) -> Scalars:
-            return own[reference] if reference in own else self.parameter(reference).value
+        def value(key: str, reference: str, expected: str) -> Scalars:
+            parameter = self.parameter(reference)
+            if (kind := dimension(parameter.unit)) != expected:
+                raise CatalogError(
+                    f"{key} = '{reference}' is in '{parameter.unit}', a unit of {kind}; expected "
+                    f"{expected} such as '{si_unit(expected)}'"
+                )
+            return own.get(reference, parameter.value)
 
         try:
-            elements = tuple(
-                LAWS[e.law].element(name=e.name, **{a: value(r) for a, r in e.arguments.items()})
-                for e in alternative.elements
-            )
-            constants = self.components[alternative.motor].parameters
-            numbers: dict[str, Any] = {n: value(f"{alternative.motor}.{n}") for n in constants}
-            for n in ("torque_constant", "resistance"):
-                numbers[f"{n}_spread"] = constants.parameter(n).spread
-            motor = DCMotor(name=WINDING, **numbers)
+            promised = value("ratio", alternative.ratio, "ratio")
+            elements = []
+            for e in alternative.elements:
+                law, where = LAWS[e.law], f"element '{one_line(e.name)}'"
+                each = e.arguments.items()
+                given = {a: value(f"{where}: {a}", r, law.arguments[a]) for a, r in each}
+                elements.append(law.element(name=e.name, **given))
+            motor = self._motor(alternative.motor, own)
             stages = {e.stage: e.name for e in alternative.elements if e.stage}
-            chain = Chain(name, elements, motor, MappingProxyType(stages))
+            chain = Chain(name, tuple(elements), motor, MappingProxyType(stages))
         except ActuatorError as error:
             raise CatalogError(f"alternative '{name}': {error}") from None
         total = np.asarray(chain.ratio, dtype=float)
-        promised = value(alternative.ratio)
         if np.any(np.abs(total / promised - 1.0) > _RATIO_TOLERANCE):
             raise CatalogError(
                 f"alternative '{name}': its ratios multiply to {total.flat[0]:.10g}, "
                 f"'{alternative.ratio}' asks for {promised:.10g}: change them together"
             )
         return chain
+
+    def _motor(self, name: str, own: Mapping[str, Scalars]) -> DCMotor:
+        motors = {c.name: c for c in self.components.values() if c.kind == MOTOR_KIND}
+        if name not in motors:
+            raise CatalogError(f"no motor '{one_line(name)}': {closest(name, list(motors))}")
+        numbers: dict[str, Any] = {}
+        for p in motors[name].parameters.rows():
+            numbers[p.name] = own.get(f"{name}.{p.name}", p.value)
+            if p.name in ("torque_constant", "resistance"):
+                numbers[f"{p.name}_spread"] = p.spread
+        return DCMotor(name=WINDING, **numbers)
 
     def chains(self) -> dict[str, Chain]:
         """Return the chain of every alternative, in order."""
@@ -184,7 +199,6 @@ def load_catalog(directory: str | Path = CATALOG) -> Catalog:
     alternatives = {name: _alternative(name, entry) for name, entry in contents.items()}
     catalog = Catalog(MappingProxyType(components), MappingProxyType(alternatives))
     for name in alternatives:
-        _check_references(name, catalog)
         catalog.chain(name)
     catalog = catalog.only(alternatives)
     _refuse_unused(catalog)
@@ -223,28 +237,3 @@ def _refuse_unused(catalog: Catalog) -> None:
             if reference in taken:
                 raise CatalogError(f"{said}: name it in {ALTERNATIVES_FILE} or remove it")
             _logger.warning("%s", said)
-
-
-def _check_references(name: str, catalog: Catalog) -> None:
-    """Raise unless the motor is one and every argument names a parameter of its own dimension."""
-    alternative = catalog.alternatives[name]
-    motors = [c.name for c in catalog.components.values() if c.kind == MOTOR_KIND]
-    if alternative.motor not in motors:
-        raise CatalogError(
-            f"alternative '{name}': no motor '{one_line(alternative.motor)}': "
-            f"{closest(alternative.motor, motors)}"
-        )
-    wanted = [("ratio", alternative.ratio, "ratio")]
-    for e in alternative.elements:
-        kinds, where = LAWS[e.law].arguments, f"element '{one_line(e.name)}'"
-        wanted += [(f"{where}: {a}", r, kinds[a]) for a, r in e.arguments.items()]
-    for key, reference, expected in wanted:
-        try:
-            unit = catalog.parameter(reference).unit
-        except ActuatorError as error:
-            raise CatalogError(f"alternative '{name}': {error}") from None
-        if dimension(unit) != expected:
-            raise CatalogError(
-                f"{ALTERNATIVES_FILE} [{name}]: {key} = '{reference}' is in '{unit}', "
-                f"a unit of {dimension(unit)}; expected {expected} such as '{si_unit(expected)}'"
-            )

@@ -54,11 +54,7 @@ class Battery(Numbers):
         return self.energy / (0.5 * (self.full + self.empty))
 
     def open_voltage(self, charged: Array) -> Array:
-        """Return the voltage without current, (...) [V].
-
-        Args:
-            charged: Share of the charge that is left, (...) in [0, 1].
-        """
+        """Return the voltage without current at a share of charge (...) that is left, (...) [V]."""
         return self.empty + (self.full - self.empty) * np.asarray(charged)
 
     def current(self, power: Array, charged: Array) -> Array:
@@ -74,10 +70,7 @@ class Battery(Numbers):
         return np.asarray(2.0 * power / (voltage + root))
 
     def voltage(self, power: Array, charged: Array) -> Array:
-        """Return the voltage at the terminals, (...) [V]; NaN where it cannot give the power.
-
-        Arguments as for `current`.
-        """
+        """Return the voltage at the terminals, (...) [V]; see `current`."""
         drop = self.resistance * self.current(power, charged)
         return np.asarray(self.open_voltage(charged) - drop)
 

@@ -69,20 +69,19 @@ class Order:
         )
 
     @property
-    def source(self) -> tuple[object, ...]:
-        """What names the machine, for `machine_of`."""
-        return self.robot, self.model, self.gait, self.actuators, self.changes
+    def machine(self) -> Machine:
+        """Before anything is varied, loaded once in a process."""
+        return _loaded(self.robot, self.model, self.gait, self.actuators, self.changes)
 
 
 @cache
-def machine_of(
+def _loaded(
     robot: Path | None,
     model: Path | None,
     gait: Path | None,
     actuators: Path | None,
     changes: tuple[tuple[str, object], ...],
 ) -> Machine:
-    """The machine before anything is varied, loaded once in a process."""
     return load(robot, model=model, gait=gait, actuators=actuators, changes=dict(changes))
 
 
@@ -101,7 +100,7 @@ def _checked(order: Order) -> Machine:
     Raises:
         SweepError: It is not.
     """
-    machine = machine_of(*order.source)
+    machine = order.machine
     if digest_of(order.walking(machine)) != order.digest:
         raise SweepError(
             "a worker reads other robot or actuator files, or is of another version, than the "

@@ -13,7 +13,7 @@ from typing import Final
 import pyarrow.parquet as pq
 
 from pipeline.spread import spread
-from pipeline.sweep.case import Order, digest_of, machine_of, rows_of_block
+from pipeline.sweep.case import Order, digest_of, rows_of_block
 from pipeline.sweep.plan import cases_of, read_axes
 from pipeline.sweep.store import Store
 
@@ -59,7 +59,7 @@ def sweep(
         order: The machine and how it walks; its axes and digest are filled in here.
         vary: Axes as ``--vary`` writes them.
         out: Folder, which the caller holds.
-        sample: Number of cases drawn; every combination by default.
+        sample: See `cases_of`, as are method and seed.
         method: ``sobol`` or ``lhs``.
         seed: Of the draw.
         workers: Processes.
@@ -70,7 +70,7 @@ def sweep(
             gone; what was finished stays.
         ActuatorError: An actuator file cannot be used.
     """
-    machine = machine_of(*order.source)
+    machine = order.machine
     digest = digest_of(order.walking(machine))
     axes = read_axes(vary, machine)
     cases = cases_of(axes, sample, method, seed)

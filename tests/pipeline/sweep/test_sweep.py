@@ -12,7 +12,7 @@ import pipeline as lw
 from pipeline.cli.main import main
 from pipeline.spread import SpreadError
 from pipeline.sweep import sweep as module
-from pipeline.sweep.case import Order, machine_of, rows_of_block
+from pipeline.sweep.case import Order, rows_of_block
 from pipeline.sweep.plan import cases_of, read_axes
 from pipeline.sweep.sweep import sweep
 
@@ -166,7 +166,7 @@ def test_a_plan_that_cannot_be_read_is_one_line(
 
 
 def test_samples_fill_the_ranges_and_are_the_same_for_a_seed() -> None:
-    machine = machine_of(None, None, None, None, ())
+    machine = ORDER.machine
     axes = read_axes(["speed=0.1:0.4 m/s", "payload=0, 5, 10 kg", "hip_spacing=200:240mm"], machine)
     for method in ("sobol", "lhs"):
         cases = cases_of(axes, 30, method, seed=3)
