@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pipeline.paper.calibration.store import Calibrated, calibrated_numbers
-from pipeline.paper.judgement.basis import Basis, Judged
-from pipeline.paper.judgement.judge import judge
+from pipeline.paper.judgement.basis import Basis
+from pipeline.paper.judgement.judge import Judgement, judge
 from pipeline.paper.judgement.leave_one_out import Prediction
 from pipeline.paper.judgement.readings import ReadingRow, reading_rows
 from pipeline.paper.judgement.sensitivity import Sensitivity, sensitivities
@@ -14,11 +14,9 @@ from reports.table import Table, table_of
 from reports.tables import judgement as tables
 
 
-def judged(given: Settings, by: Basis) -> tuple[Judged, list[Table]]:
+def judged(given: Settings, by: Basis) -> tuple[Judgement, list[Table]]:
     """Everything held against the paper."""
-    judgement = judge(
-        given.robot, by.catalog, by.published, by.prior, by.results, samples=given.samples
-    )
+    judgement = judge(given.robot, by, samples=given.samples)
     out = [
         table_of(tables.ReproductionRow, judgement.reproduction),
         table_of(tables.ConclusionRow, judgement.conclusions),
@@ -34,4 +32,4 @@ def judged(given: Settings, by: Basis) -> tuple[Judged, list[Table]]:
             table_of(Calibrated, calibrated_numbers(by.results, by.prior)),
             table_of(Sensitivity, sensitivities(by.results)),
         ]
-    return Judged(judgement, by), out
+    return judgement, out

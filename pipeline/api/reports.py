@@ -29,7 +29,7 @@ from reports.typeset import plain
 from reports.writer import write_table
 
 if TYPE_CHECKING:
-    from pipeline.paper.judgement.basis import Judged
+    from pipeline.paper.judgement.judge import Judgement
 
 logger = logging.getLogger("legwatt")
 
@@ -142,7 +142,7 @@ def _remarks(given: Settings) -> tuple[str, ...]:
 
 
 def _first_lines(
-    given: Settings, tables: Sequence[Table], judged: Judged | None
+    given: Settings, tables: Sequence[Table], judged: Judgement | None
 ) -> tuple[str, ...]:
     """Whose motors were assumed, but for the paper's, and what they and the ground cannot give."""
     named = {t.name: t for t in tables}
@@ -151,13 +151,15 @@ def _first_lines(
     return tuple(plain(line) for line in (*motors, *limits))
 
 
-def _held_against_the_paper(given: Settings, said: list[str]) -> tuple[Judged | None, list[Table]]:
+def _held_against_the_paper(
+    given: Settings, said: list[str]
+) -> tuple[Judgement | None, list[Table]]:
     """The judgement of the paper's robot, of no other; what there is to say is added to `said`."""
     from pipeline.api.judgement import judged
     from pipeline.api.pictures.scene import Scene
     from pipeline.paper.judgement.basis import basis
 
-    result: Judged | None = None
+    result: Judgement | None = None
     tables: list[Table] = []
     by = basis(given)
     if isinstance(by, str):
@@ -174,7 +176,7 @@ def _held_against_the_paper(given: Settings, said: list[str]) -> tuple[Judged | 
 def _pictures(
     given: Settings,
     results: tuple[Standing, Walking],
-    judged: Judged | None,
+    judged: Judgement | None,
     tables: list[Table],
     out: Path,
     said: list[str],
@@ -189,5 +191,5 @@ def _pictures(
     if judged is None:
         return files + write_robot_page(given, tables, out, [*said, *_remarks(given)])
     titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
-    files += write_fig_21(judged.judgement, titles, out)
+    files += write_fig_21(judged, titles, out)
     return files + write_summary(given, judged, tables, out)

@@ -13,7 +13,7 @@ entries that contradict one another: those that the best rotor friction leaves u
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -40,13 +40,14 @@ _DATA_SHEET = {
     "no_load_speed": "angular velocity",
 }
 _LOADED = ("2", "3")  # joints of Tables IV to VI
+_ENERGY = "leg_energy_3s"
 #: Of each kind of entry: the torque's power, and those of u and w.
 _POWERS = {
     "motor_torque": (1, 0, 0),
     "current": (1, 1, 0),
     "voltage": (1, 0, 1),
     "power": (2, 1, 1),
-    "leg_energy_3s": (2, 1, 1),
+    _ENERGY: (2, 1, 1),
 }
 _SLACK = 1e-9  # as `Published.reproduced` has it
 #: Frictions tried around what Table V asks for: this far [N*m], in these steps.
@@ -87,18 +88,13 @@ def joint_torques(published: Mapping[str, Published]) -> tuple[float, float]:
 class Entries:
     """E electrical entries of Tables IV to VI as bounds on the motor's constants."""
 
-    ids: NDArray[np.str_]  #: Of the printed values, (E,).
+    ids: tuple[str, ...]  #: Of the printed values.
     powers: NDArray[np.intp]  #: Of the torque, u and w, (E, 3).
     #: How often each of six torques counts: joints 2 and 3 of the three tables, (E, 6).
     weights: Array
     low: Array  #: Least magnitudes that round to the printed ones, SI, (E,).
     high: Array  #: Greatest.
     ideal: tuple[float, float]  #: Motor torque of the ideal actuator at joints 2 and 3 [N*m].
-
-    def chosen(self, which: NDArray[np.bool_]) -> Entries:
-        """Some of them, (E,)."""
-        arrays = (self.ids, self.powers, self.weights, self.low, self.high)
-        return Entries(*(a[which] for a in arrays), self.ideal)
 
     def factors(self, friction: Array | float, held: Array | float) -> Array:
         """What stands before u and w, (E, ...).
@@ -141,24 +137,24 @@ class Entries:
         return np.stack([self.low[own], self.high[own]], axis=1) / factor[own, None]
 
 
-def entries(published: Mapping[str, Published]) -> Entries:
-    """Every electrical entry of Tables IV to VI and the energies made of them."""
-    tables = ALTERNATIVES[:3]
-    ids, powers, weights = [], [], []
-    for (k, table), (kind, own) in itertools.product(enumerate(tables), _POWERS.items()):
-        for joints in (_LOADED,) if kind == "leg_energy_3s" else _LOADED:
-            ids.append(f"{table}_{kind}" + (f"_{joints}" if joints in _LOADED else ""))
-            powers.append(own)
-            count = CYCLE if kind == "leg_energy_3s" else 1.0
-            row = np.zeros((len(tables), len(_LOADED)))
-            row[k] = [count * (joint in joints) for joint in _LOADED]
-            weights.append(row.ravel())
+def entries(published: Mapping[str, Published], without: Collection[str] = ()) -> Entries:
+    """Every electrical entry of Tables IV to VI and the energies made of them, but for some."""
+    rows = []
+    for k, table in enumerate(ALTERNATIVES[:3]):
+        for kind, powers in _POWERS.items():
+            # Of joints 2 and 3: the leg's energy has both, everything else one of them.
+            both = {"": (CYCLE, CYCLE)} if kind == _ENERGY else {"_2": (1, 0), "_3": (0, 1)}
+            for joint, weights in both.items():
+                of_tables = np.zeros((3, 2))
+                of_tables[k] = weights
+                rows.append((f"{table}_{kind}{joint}", powers, of_tables.ravel()))
+    ids, powers_of, counts = zip(*(row for row in rows if row[0] not in without), strict=True)
     # All signs of a table are those of the joint's torque, so magnitudes are compared.
     value = np.array([abs(published[name].si) for name in ids])
     half = np.array([published[name].half_width_si for name in ids])
     half += _SLACK * np.maximum(1.0, value)
-    arrays = (np.array(ids), np.array(powers), np.array(weights), value - half, value + half)
-    return Entries(*arrays, joint_torques(published))
+    ideal = joint_torques(published)
+    return Entries(ids, np.array(powers_of), np.array(counts), value - half, value + half, ideal)
 
 
 @dataclass(frozen=True)
@@ -220,7 +216,7 @@ def _least_unmet(listed: Entries, friction: float, held: float) -> tuple[str, ..
     # These points lie on the bounds: rounding must not decide.
     good = listed.meets(friction, held, u, w, _ROUNDING)
     best = good[:, int(np.argmax(good.sum(axis=0)))]
-    return tuple(map(str, listed.ids[~best]))
+    return tuple(name for name, met in zip(listed.ids, best, strict=True) if not met)
 
 
 def best_frictions(ranges: Sequence[Frictions], published: Mapping[str, Published]) -> Frictions:
@@ -283,8 +279,7 @@ def feasible_set(published: Mapping[str, Published]) -> FeasibleSet:
 def _feasible_set(rows: tuple[Published, ...]) -> FeasibleSet:
     published = {row.id: row for row in rows}
     frictions = best_frictions(friction_ranges(published), published)
-    every = entries(published)
-    listed = every.chosen(~np.isin(every.ids, frictions.unmet))
+    listed = entries(published, frictions.unmet)
     row = published[HELD]
     held = (abs(row.si) - row.half_width_si, abs(row.si) + row.half_width_si)
     corners = list(itertools.product((frictions.low, frictions.high), held))
@@ -296,6 +291,6 @@ def _feasible_set(rows: tuple[Published, ...]) -> FeasibleSet:
         if low >= high:
             raise CalibrationError(_EMPTY)
         ends.append((float(low), float(high)))
-    found = FeasibleSet(listed, frictions, held, *ends)
+    found = FeasibleSet(listed, frictions, held, ends[0], ends[1])
     means = found.draws(np.random.default_rng(0), 4000)[:, :3].mean(axis=0)
     return replace(found, middle=dict(zip(KEYS, map(float, means), strict=True)))

@@ -16,7 +16,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from scipy.optimize import brentq
@@ -62,7 +62,7 @@ _JOINTS = JOINTS_PER_LEG * len(MIDDLE_LEGS)
 _MORE = "by how much it is more than in the first row"
 
 
-def _ratio(name: str) -> str:
+def _ratio(name: str) -> Any:
     return column(f"walking energy of the middle right leg, {name} over ideal actuator", "1")
 
 
@@ -199,15 +199,27 @@ def omissions(
         *_brakes(base),
         *_sliding(found[_IRREVERSIBLE].chain, torque, catalog, costs),
     )
-    rows = []
-    for name, assumption, number, own, note in changes:
-        said = ("", "", "") if number is None else (number.unit, number.basis, number.source)
-        value = None if number is None else number.value_as_written
-        even, *ratios = map(float, own.figures)
-        even_change, *ratio_changes = map(float, own.figures - base.figures)
-        figures = (even, even_change, *ratios, *ratio_changes)
-        rows.append(Omission(name, assumption, value, *said, *figures, note))
-    return tuple(rows)
+    return tuple(_row(*change, base) for change in changes)
+
+
+def _row(
+    name: str, assumption: str, number: Parameter | None, costs: Costs, note: str, base: Costs
+) -> Omission:
+    even, *ratios = map(float, costs.figures)
+    even_change, *changes = map(float, costs.figures - base.figures)
+    return Omission(
+        name,
+        assumption,
+        number.value_as_written if number else None,
+        number.unit if number else "",
+        number.basis if number else "",
+        number.source if number else "",
+        even,
+        even_change,
+        *(ratios[0], ratios[1], ratios[2]),
+        *(changes[0], changes[1], changes[2]),
+        note,
+    )
 
 
 def _drivers(base: Costs, published: Mapping[str, Published]) -> Iterator[_Change]:

@@ -12,7 +12,7 @@ from actuators.checked import Table, checked, finite
 from actuators.errors import UnitError, closest
 from actuators.text_file import UnreadableTextError, read_file, utf8
 from actuators.units import dimension, to_si
-from pipeline.paper.errors import TargetError
+from pipeline.paper.errors import CalibrationError
 
 PUBLISHED_FILE = Path(__file__).parent / "published_values.csv"
 _LARGEST = 2**20  # [bytes]
@@ -79,27 +79,16 @@ _Number = Annotated[float, BeforeValidator(_number)]
 
 
 class Published(Table):
-    """One printed number.
-
-    Attributes:
-        id: Short name, one of `DIMENSIONS`.
-        where: Table or section.
-        quantity: In words.
-        joint: Number of the joint, or empty.
-        unit: As printed.
-        value: As printed.
-        half_width: Half of the last printed digit, or of the range the words leave.
-        role: One of `ROLES`.
-        note: Remark.
-    """
+    """One printed number."""
 
     noun = "column"
-    id: Annotated[str, AfterValidator(_computed)]
-    where: str
-    quantity: str
-    joint: str
-    unit: str
-    value: _Number
+    id: Annotated[str, AfterValidator(_computed)]  #: Short name, one of `DIMENSIONS`.
+    where: str  #: Table or section.
+    quantity: str  #: In words.
+    joint: str  #: Number of the joint, or empty.
+    unit: str  #: As printed.
+    value: _Number  #: As printed.
+    #: Half of the last printed digit, or of the range the words leave.
     half_width: Annotated[_Number, AfterValidator(_not_negative)]
     role: Literal["input", "target", "consequence", "symmetry", "prediction", "contradicted"]
     note: str = Field(repr=False)
@@ -145,24 +134,24 @@ def load_published(path: Path = PUBLISHED_FILE) -> dict[str, Published]:
         path: The file; every id of `DIMENSIONS` must be there exactly once.
 
     Raises:
-        TargetError: Missing or doubled id, unknown column or role, a unit that does not fit, or a
-            number that is none.
+        CalibrationError: Missing or doubled id, unknown column or role, a unit that does not fit,
+            or a number that is none.
     """
     try:
         lines = utf8(read_file(path, _LARGEST)).splitlines()
     except UnreadableTextError as error:
-        raise TargetError(f"{path.name}: cannot be read ({error})") from None
+        raise CalibrationError(f"{path.name}: cannot be read ({error})") from None
     found: dict[str, Published] = {}
     columns, *rows = list(csv.reader(lines)) or [[]]
     for number, row in enumerate(rows, start=2):
         where = f"{path.name}, line {number}"
         if len(row) != len(columns):
-            raise TargetError(f"{where}: the number of columns differs from the header's")
-        entry = checked(Published, dict(zip(columns, row, strict=True)), where, TargetError)
+            raise CalibrationError(f"{where}: the number of columns differs from the header's")
+        entry = checked(Published, dict(zip(columns, row, strict=True)), where, CalibrationError)
         if entry.id in found:
-            raise TargetError(f"{where}: id '{entry.id}' is there twice")
+            raise CalibrationError(f"{where}: id '{entry.id}' is there twice")
         found[entry.id] = entry
     for name in DIMENSIONS:
         if name not in found:
-            raise TargetError(f"{path.name}: id '{name}' is missing")
+            raise CalibrationError(f"{path.name}: id '{name}' is missing")
     return found

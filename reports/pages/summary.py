@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.motion.gait import gait_table
 from pipeline.paper.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
-from pipeline.paper.judgement.basis import Judged
+from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.judgement.readings import CalibratedReading, readings, verdict
 from pipeline.paper.judgement.sensitivity import ranking
 from pipeline.simulation.settings import Settings
@@ -64,7 +64,7 @@ _BESIDE = {
 }
 
 
-def write_summary(given: Settings, judged: Judged, tables: Sequence[Table], out: Path) -> int:
+def write_summary(given: Settings, judged: Judgement, tables: Sequence[Table], out: Path) -> int:
     """Write ``summary.md`` and ``index.html``.
 
     Args:
@@ -82,7 +82,7 @@ def write_summary(given: Settings, judged: Judged, tables: Sequence[Table], out:
     return 2
 
 
-def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: Path) -> Page:
+def summary(given: Settings, judged: Judgement, tables: Mapping[str, Table], out: Path) -> Page:
     """The page; see `write_summary`."""
     run = Run(given, tables)
     limits = limits_text(tables, short_titles(given.catalog), given.forces.friction_coefficient)
@@ -98,7 +98,7 @@ def summary(given: Settings, judged: Judged, tables: Mapping[str, Table], out: P
     )
 
 
-def _facts(given: Settings, judged: Judged, tables: Mapping[str, Table]) -> dict[str, Any]:
+def _facts(given: Settings, judged: Judgement, tables: Mapping[str, Table]) -> dict[str, Any]:
     """What the sections of `templates/run.jinja` say of the paper."""
     results, conclusions = judged.by.results, dict.fromkeys(("sentence", "unit"), "")
     conclusions |= {"printed": "paper", "computed": "ours", "holds": ""}
@@ -110,7 +110,7 @@ def _facts(given: Settings, judged: Judged, tables: Mapping[str, Table]) -> dict
         "calibrated": results is not None,
         "of_v": [where == "Section V" for where in tables["conclusions"].columns["where"]],
         "conclusions": conclusions,
-        "notes": [f"{r.id.replace('_', ' ')}: {r.remark}" for r in judged.judgement.break_even],
+        "notes": [f"{r.id.replace('_', ' ')}: {r.remark}" for r in judged.break_even],
         "sentences": sentences(tables["conclusions"]),
         "omissions": None,
         "path": gait_table(given.robot.spec).transfer_path,

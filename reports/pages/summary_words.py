@@ -9,9 +9,8 @@ import math
 from collections.abc import Mapping, Sequence
 
 from pipeline.paper.hexapod import PUBLISHED_LEG
-from pipeline.paper.judgement.basis import Judged
 from pipeline.paper.judgement.evidence import Interval
-from pipeline.paper.judgement.judge import NOTABLE
+from pipeline.paper.judgement.judge import NOTABLE, Judgement
 from pipeline.paper.judgement.rows import REPRODUCED, Row, headline
 from pipeline.paper.judgement.sensitivity import Sensitivity, leading
 from pipeline.paper.motor_constants import asked_frictions
@@ -26,9 +25,9 @@ _REAL = ("rotor", "reversible", "irreversible")
 _FIRST = ("walking_ratio_reversible", "walking_ratio_irreversible", EVEN)
 
 
-def numbers_first(judged: Judged) -> tuple[Number, ...]:
+def numbers_first(judged: Judgement) -> tuple[Number, ...]:
     """What the paper's main sentences come to here, and how many of its numbers are predicted."""
-    said = {c.id: c for c in judged.judgement.conclusions}
+    said = {c.id: c for c in judged.conclusions}
     out = []
     for row in (said[name] for name in _FIRST if name in said):
         share = row.id == EVEN
@@ -36,7 +35,7 @@ def numbers_first(judged: Judged) -> tuple[Number, ...]:
         part = "computed anew" if judged.by.results is None else row.role
         tone = "quiet" if row.holds else "bad"
         out.append(Number(value, f"*{part}:* {row.sentence}", tone))
-    met, of = headline(judged.judgement.reproduction)["prediction"]
+    met, of = headline(judged.reproduction)["prediction"]
     if of and judged.by.results is not None:
         label = (
             "*predicted:* printed numbers that nothing put in or fitted decides, and that come out"
@@ -45,7 +44,7 @@ def numbers_first(judged: Judged) -> tuple[Number, ...]:
     return tuple(out)
 
 
-def first_sentences(judged: Judged) -> tuple[str, ...]:
+def first_sentences(judged: Judgement) -> tuple[str, ...]:
     """What it is about, what was fitted, what is predicted, and what is known without the fit."""
     rows = _rows(judged)
     mass = rows["robot_mass"].published if "robot_mass" in rows else None
@@ -55,7 +54,7 @@ def first_sentences(judged: Judged) -> tuple[str, ...]:
     count, total = _count(judged)
     predicted = [row for row in rows.values() if row.role == "prediction"]
     met = sum(row.verdict == REPRODUCED for row in predicted)
-    ratios = [c for c in judged.judgement.conclusions if c.id in _FIRST and c.id != EVEN]
+    ratios = [c for c in judged.conclusions if c.id in _FIRST and c.id != EVEN]
     said = (
         about,
         WORDS("fitted_short", count, total),
@@ -66,7 +65,7 @@ def first_sentences(judged: Judged) -> tuple[str, ...]:
     return tuple(filter(None, said))
 
 
-def answer(judged: Judged, tables: Mapping[str, Table]) -> tuple[str, ...]:
+def answer(judged: Judgement, tables: Mapping[str, Table]) -> tuple[str, ...]:
     """The paragraphs a reader in a hurry reads."""
     if judged.by.results is None:
         return (changed(judged), _energies(judged, tables), _counted(judged))
@@ -74,7 +73,7 @@ def answer(judged: Judged, tables: Mapping[str, Table]) -> tuple[str, ...]:
     return (first_paragraph(judged), _energies(judged, tables), _posterior(judged), *others)
 
 
-def first_paragraph(judged: Judged) -> str:
+def first_paragraph(judged: Judgement) -> str:
     """What is fitted, predicted and contradicted, and what the fit costs, for a cold reader.
 
     Args:
@@ -83,27 +82,27 @@ def first_paragraph(judged: Judged) -> str:
     rows = _rows(judged)
     ratios = [f"{rows[f'walking_ratio_{name}'].computed:.1f}" for name in _REAL]
     fitted = WORDS("fitted", rows["robot_mass"].published, ratios, rows[EVEN].computed)
-    assert judged.judgement.price is not None  # asked for with all the paper's actuators alone
-    return f"{fitted} {_counted(judged)} {WORDS('price', judged.judgement.price)}"
+    assert judged.price is not None  # asked for with all the paper's actuators alone
+    return f"{fitted} {_counted(judged)} {WORDS('price', judged.price)}"
 
 
-def _rows(judged: Judged) -> dict[str, Row]:
-    return {row.id: row for row in judged.judgement.reproduction}
+def _rows(judged: Judgement) -> dict[str, Row]:
+    return {row.id: row for row in judged.reproduction}
 
 
-def _count(judged: Judged) -> tuple[Mapping[str, tuple[int, int]], int]:
+def _count(judged: Judgement) -> tuple[Mapping[str, tuple[int, int]], int]:
     """By role, how many printed numbers are met of how many; and how many there are."""
-    count = headline(judged.judgement.reproduction)
+    count = headline(judged.reproduction)
     return count, sum(of for _, of in count.values())
 
 
-def _counted(judged: Judged) -> str:
+def _counted(judged: Judgement) -> str:
     """How many printed numbers play which part; what is predicted, contradicted, missed."""
-    judgement, (count, total) = judged.judgement, _count(judged)
-    if judgement.missing:
+    count, total = _count(judged)
+    if judged.missing:
         met = sum(reproduced for reproduced, _ in count.values())
-        return WORDS("reproduced", met, total, len(judgement.missing))
-    rows = judgement.reproduction
+        return WORDS("reproduced", met, total, len(judged.missing))
+    rows = judged.reproduction
     predicted = [row for row in rows if row.role == "prediction"]
     missed = [row for row in rows if row.verdict != REPRODUCED]
     unmet = [_beside(row) for row in missed if row.role == "contradicted"]
@@ -126,30 +125,30 @@ def _beside(row: Row) -> str:
     return f"{row.quantity}{joint}, {ours} where {published} {unit} is printed"
 
 
-def _energies(judged: Judged, tables: Mapping[str, Table]) -> str:
+def _energies(judged: Judgement, tables: Mapping[str, Table]) -> str:
     """What a leg draws, and when the irreversible drive pays."""
     c = tables["walking_energy"].columns
     every = zip(c["alternative"], c["leg"], c["electrical_J"], strict=True)
     legs = {name: joules for name, leg, joules in every if leg == PUBLISHED_LEG}
-    if judged.judgement.missing:
+    if judged.missing:
         return WORDS("cost_some", legs)
     rows, known = _rows(judged), None
     power = {name: rows[f"{name}_leg_energy_3s"].computed / CYCLE for name in _REAL[1:]}  # [W]
     if judged.by.results is not None:
-        conclusions = {row.id: row for row in judged.judgement.conclusions}
+        conclusions = {row.id: row for row in judged.conclusions}
         known = (rows["walking_ratio_irreversible"], conclusions[EVEN], conclusions[EXTRA])
     return WORDS("cost", legs, power, rows[EVEN].computed, known)
 
 
-def _posterior(judged: Judged) -> str:
+def _posterior(judged: Judgement) -> str:
     """What is known of the numbers behind, and how well it was computed."""
     results, (count, _) = judged.by.results, _count(judged)
     assert results is not None
-    unmet = [_rows(judged)[name] for name in judged.judgement.best.unmet]
+    unmet = [_rows(judged)[name] for name in judged.best.unmet]
     return WORDS("posterior", count, len(results["nearest"]["z"]), results["posterior"], unmet)
 
 
-def changed(judged: Judged) -> str:
+def changed(judged: Judgement) -> str:
     """What of the run is not the paper's."""
     return f"**Not the paper's:** {judged.by.word}."
 

@@ -17,7 +17,7 @@ from actuators.checked import Number, Pair, Table, checked
 from actuators.errors import UnitError, one_line
 from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import dimension, to_si
-from pipeline.paper.errors import PriorError
+from pipeline.paper.errors import CalibrationError
 
 PRIOR_FILE = Path(__file__).parent / "prior.toml"
 
@@ -137,15 +137,16 @@ def load_prior(path: Path = PRIOR_FILE) -> Prior:
     """Read the prior.
 
     Raises:
-        PriorError: Missing or malformed, an unknown key or unit, or bounds that exclude the value.
+        CalibrationError: Missing or malformed, an unknown key or unit, or bounds that exclude
+            the value.
     """
     try:
         table = read_toml_file(path)
     except UnreadableTextError as error:
-        raise PriorError(f"{path.name}: cannot be read ({error})") from None
+        raise CalibrationError(f"{path.name}: cannot be read ({error})") from None
     free = []
     for key, entry in table.items():
-        w = checked(_Written, entry, f"{path.name}: '{one_line(key)}'", PriorError)
+        w = checked(_Written, entry, f"{path.name}: '{one_line(key)}'", CalibrationError)
         logarithmic = w.scale == "log"
         deviation = math.log(w.deviation) if logarithmic else to_si(w.deviation, w.unit)
         centre, low, high = (to_si(x, w.unit) for x in (w.value, *w.bounds))

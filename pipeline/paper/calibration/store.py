@@ -6,7 +6,7 @@ import json
 import shutil
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -101,34 +101,29 @@ class Calibrated:
         return "lower" if self.at_lower_share > self.at_upper_share else "upper"
 
 
+_COLUMNS = [own.name for own in fields(Calibrated)]
+
+
 def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibrated]:
     """What the calibration says of every free number and of the motor's constants."""
-    known, nearest = results["posterior"]["numbers"], results["nearest"]
-
-    def row(
-        key: str, unit: str, before: tuple[float, ...], after: tuple[float, ...], verdict: str
-    ) -> Calibrated:
-        """Before: centre and 95 %; after: nearest, low and high, SI."""
-        own, value = known[key], after[0]
-        ends = (value, min(after), max(after))
-        moved = (own["mean"], own["spread"], own["at_lower"], own["at_upper"])
-        return Calibrated(
-            *(key, unit),
-            *((from_si(x, unit) for x in before) if before else (None, None, None)),
-            *(from_si(x, unit) for x in ends),
-            *(moved if before else (None, None, 0.0, 0.0)),
-            *(verdict, own["r_hat"], own["effective"]),
-        )
-
+    nearest = results["nearest"]
+    after = dict(zip(prior.keys, nearest["z"], strict=True)) | nearest["constants"]
+    free = {f.key: f for f in prior.free}
     out = []
-    for free, coordinate in zip(prior.free, nearest["z"], strict=True):
-        own = known[free.key]
-        after = [free.value(q) for q in (coordinate, own["low"], own["high"])]
-        verdict = number_verdict(own["mean"], own["spread"], free.spread)
-        out.append(row(free.key, free.unit, (free.centre, *free.interval), (*after,), verdict))
-    for key, unit in UNITS.items():
-        after = [nearest["constants"][key], known[key]["low"], known[key]["high"]]
-        out.append(row(key, unit, (), (*after,), FIXED))
+    for key, own in results["posterior"]["numbers"].items():
+        numbers = [after[key], own["low"], own["high"]]
+        if key in free:
+            unit, before = free[key].unit, (free[key].centre, *free[key].interval)
+            numbers = [free[key].value(z) for z in numbers]
+            moved = (own["mean"], own["spread"], own["at_lower"], own["at_upper"])
+            verdict = number_verdict(own["mean"], own["spread"], free[key].spread)
+        else:
+            unit, before, moved, verdict = UNITS[key], (), (None, None, 0.0, 0.0), FIXED
+        ends = (numbers[0], min(numbers), max(numbers))
+        shown = [from_si(x, unit) for x in (*before, *ends)]
+        cells = [*[None] * (6 - len(shown)), *shown, *moved]
+        row = (key, unit, *cells, verdict, own["r_hat"], own["effective"])
+        out.append(Calibrated(**dict(zip(_COLUMNS, row, strict=True))))
     return out
 
 

@@ -10,7 +10,6 @@ from actuators.loading.build import Catalog
 from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior, load_prior
 from pipeline.paper.calibration.store import RESULTS_FILE, load_results
-from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.published import Published, load_published
 from pipeline.simulation.settings import PAPER_FORCES, Settings
 
@@ -24,26 +23,18 @@ _SHOWN = 3
 
 @dataclass(frozen=True)
 class Basis:
-    """What a run may be judged by.
+    """What a run may be judged by."""
 
-    Attributes:
-        published: The printed values.
-        prior: What was known before.
-        stored: The stored calibration.
-        changed: Numbers of the run that differ from those the calibration was made with; its
-            sets, intervals and verdicts then belong to other numbers and are left out.
-        catalog: The paper's own alternatives among the run's.
-        missing: Alternatives of the paper that the run does not have, or has built otherwise.
-        others: Alternatives of the run of which the paper says nothing.
-    """
-
-    published: Mapping[str, Published]
-    prior: Prior
-    stored: Mapping[str, Any]
+    published: Mapping[str, Published]  #: The printed values.
+    prior: Prior  #: What was known before.
+    stored: Mapping[str, Any]  #: The stored calibration.
+    #: Numbers of the run that differ from those the calibration was made with; its sets, intervals
+    #: and verdicts then belong to other numbers and are left out.
     changed: tuple[str, ...]
-    catalog: Catalog
+    catalog: Catalog  #: The paper's own alternatives among the run's.
+    #: Alternatives of the paper that the run does not have, or has built otherwise.
     missing: tuple[str, ...] = ()
-    others: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()  #: Alternatives of the run of which the paper says nothing.
 
     @property
     def results(self) -> Mapping[str, Any] | None:
@@ -74,14 +65,6 @@ class Basis:
                 "calibration's sets (intervals, predictions, readings, sensitivities) is left out"
             )
         return "; ".join(parts)
-
-
-@dataclass(frozen=True)
-class Judged:
-    """A judgement and what it rests on."""
-
-    judgement: Judgement
-    by: Basis
 
 
 def basis(given: Settings) -> Basis | str | None:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from actuators.energy.energy import loss_energies
-from actuators.loading.build import Catalog
 from actuators.units import from_si
-from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.hexapod import (
     PUBLISHED_LEG,
     Outcome,
@@ -21,6 +17,7 @@ from pipeline.paper.hexapod import (
     robot_part,
     totals,
 )
+from pipeline.paper.judgement.basis import Basis
 from pipeline.paper.judgement.evidence import NONE, Interval, compared, evidence
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute, per_minute
 from pipeline.paper.judgement.leave_one_out import Prediction, leave_one_out
@@ -42,7 +39,7 @@ from pipeline.paper.motor_constants import (
     no_load_current,
 )
 from pipeline.paper.omissions import Omission, omissions
-from pipeline.paper.published import ALTERNATIVES, Published
+from pipeline.paper.published import ALTERNATIVES
 from pipeline.paper.quantities import computed
 from pipeline.robot.robot import Robot
 
@@ -71,6 +68,7 @@ class Price:
 class Judgement:
     """Ours against the paper's."""
 
+    by: Basis  #: What it was judged by.
     #: Every printed number and sentence of sections V and IV.A that can be computed.
     rows: tuple[Row, ...]
     break_even: tuple[Row, ...]  #: Where the lines of Fig. 21 cross, by whose energy is meant.
@@ -93,26 +91,15 @@ class Judgement:
         return tuple(row for row in self.rows if row.sentence)
 
 
-def judge(
-    robot: Robot,
-    catalog: Catalog,
-    published: Mapping[str, Published],
-    prior: Prior,
-    results: Mapping[str, Any] | None,
-    *,
-    samples: int = 751,
-) -> Judgement:
-    """Judge the robot and the catalogue as they stand.
+def judge(robot: Robot, by: Basis, *, samples: int = 751) -> Judgement:
+    """Judge the robot and its actuators as they stand.
 
     Args:
         robot: With a floating base.
-        catalog: Actuators: the paper's, or some of them; what the others print is left out.
-        published: The printed values.
-        prior: What was known before.
-        results: The stored calibration, if it was made with these very numbers; else None, and
-            everything that needs its sets is left out.
+        by: What it may be judged by.
         samples: Per half period.
     """
+    catalog, published, results = by.catalog, by.published, by.results
     part = robot_part(robot.spec, samples)
     found = outcomes(part.demand, catalog)
     ours = computed(part, found)
@@ -126,8 +113,9 @@ def judge(
     best = best_frictions(ranges, published)
     price = None
     if {"rotor", "irreversible"} <= found.keys():
-        price = _price(found["irreversible"], catalog, prior, results)
+        price = _price(found["irreversible"], by)
     return Judgement(
+        by,
         printed_numbers(published, ours, best.unmet, sets)
         + judged(sentences(), compared(ours) | stage_ratios(found), sets),
         break_evens(whole, sets),
@@ -141,31 +129,30 @@ def judge(
     )
 
 
-def _price(
-    irreversible: Outcome, catalog: Catalog, prior: Prior, results: Mapping[str, Any] | None
-) -> Price:
+def _price(irreversible: Outcome, by: Basis) -> Price:
     """The price of the fit at the numbers as they stand."""
-    gear = next(free for free in prior.free if free.key == GEAR_FRICTION)
+    gear = next(free for free in by.prior.free if free.key == GEAR_FRICTION)
 
     def shown(low: float, high: float) -> Interval:
         return from_si(low, gear.unit), from_si(high, gear.unit)
 
     heat, sheet = loss_energies(irreversible.walking), data_sheet()["no_load_current"]
     known, share = NONE, math.nan
-    if results is not None:
-        own = results["posterior"]["numbers"][GEAR_FRICTION]
+    if by.results is not None:
+        own = by.results["posterior"]["numbers"][GEAR_FRICTION]
         known = shown(gear.value(own["low"]), gear.value(own["high"]))
-        at = prior.keys.index(ROTOR_VISCOUS)
+        at = by.prior.keys.index(ROTOR_VISCOUS)
         currents = [
             no_load_current(
-                *(one["constants"][key] for key in (TORQUE_CONSTANT, ROTOR_FRICTION)),
-                prior.free[at].value(one["z"][at]),
+                one["constants"][TORQUE_CONSTANT],
+                one["constants"][ROTOR_FRICTION],
+                by.prior.free[at].value(one["z"][at]),
             )
-            for one in results["sets"]
+            for one in by.results["sets"]
         ]
         share = float(np.mean(np.array(currents) > NOTABLE * sheet))
     return Price(
-        from_si(catalog.parameter(GEAR_FRICTION).value, gear.unit),
+        from_si(by.catalog.parameter(GEAR_FRICTION).value, gear.unit),
         from_si(gear.centre, gear.unit),
         shown(*gear.interval),
         float(printed_leg(heat[GEAR_ELEMENT]).sum()) if GEAR_ELEMENT in heat else 0.0,

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from actuators.arrays import Array
 from actuators.elements.inertia import Inertia
 from actuators.energy.energy import integral, stage_energies
 from actuators.loading.build import WINDING
@@ -94,14 +95,15 @@ def judged(
         value = from_si(ours[row.id], row.unit)
         missed = CONTRADICTED if row.id in unmet else MISSED
         verdict = REPRODUCED if row.true_of(value) else missed
-        prior, prior_share = _of_sets(row, sets, "prior")
-        left_out, left_out_share = _of_sets(row, sets, LEFT_OUT_BY.get(row.id, ""))
-        asked_for = row.role in (PUT_IN, FITTED)
-        posterior = math.nan if asked_for else _of_sets(row, sets, "posterior")[1]
-        known = (prior, prior_share, left_out, left_out_share, posterior)
-        names = ("prior", "prior_share", "left_out", "left_out_share", "posterior_share")
-        changes = dict(zip(names, known, strict=True))
-        out.append(replace(row, computed=value, verdict=verdict, **changes))
+        prior, left_out, posterior = (
+            _of_sets(row, sets, name)
+            for name in ("prior", LEFT_OUT_BY.get(row.id, ""), "posterior")
+        )
+        row = replace(row, computed=value, verdict=verdict, prior=prior[0], prior_share=prior[1])
+        row = replace(row, left_out=left_out[0], left_out_share=left_out[1])
+        if row.role not in (PUT_IN, FITTED):
+            row = replace(row, posterior_share=posterior[1])
+        out.append(row)
     return tuple(out)
 
 
@@ -185,7 +187,7 @@ def stage_ratios(outcomes: Mapping[str, Outcome]) -> dict[str, float]:
         assert isinstance(rotor, Inertia)
         light = chain.replaced(replace(rotor, inertia=0.0))
         walks["rotor without inertia"] = light.inverse(walks["rotor"].joint)
-    energy = {}
+    energy: dict[str, Array] = {}
     for name, walk in walks.items():
         for e in stage_energies(walk):
             energy |= {f"{name}:{e.stage}+": e.forward, f"{name}:{e.stage}-": e.reverse}

@@ -15,7 +15,8 @@ from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior
-from pipeline.paper.judgement.basis import Basis, Judged, basis
+from pipeline.paper.judgement.basis import Basis, basis
+from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.judgement.sensitivity import Sensitivity
 from pipeline.paper.omissions import Omission
 from pipeline.paper.published import Published
@@ -51,13 +52,13 @@ def other_belt(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def shipped(root: Path) -> Judged:
+def shipped(root: Path) -> Judgement:
     run = given(root)
     return judging.judged(run, based(run))[0]
 
 
 def test_the_shipped_files_hold_the_numbers_the_calibration_was_made_with(
-    shipped: Judged,
+    shipped: Judgement,
 ) -> None:
     assert shipped.by.changed == ()
     assert shipped.by.word == ""
@@ -70,7 +71,7 @@ def test_after_a_change_the_comparison_is_computed_anew_and_the_rest_left_out(ro
     assert by.word.startswith("harmonic_drive.load differs")
     judged, found = judging.judged(run, by)
     assert not OF_THE_SETS & {table.name for table in found}
-    rows = {row.id: row for row in judged.judgement.reproduction}
+    rows = {row.id: row for row in judged.reproduction}
     assert rows["reversible_motor_torque_2"].verdict == "not reproduced"
     assert rows["ideal_current_2"].verdict == "reproduced"
     for table in found:
@@ -142,12 +143,12 @@ def test_another_robot_is_not_held_against_the_paper(root: Path, tmp_path: Path)
 
 
 def test_the_first_paragraph_names_what_is_fitted_predicted_contradicted_and_what_it_costs(
-    shipped: Judged,
+    shipped: Judgement,
 ) -> None:
     text = first_paragraph(shipped)
     for word in ("Fitted", "Predicted", "Contradicted", "price of the fit"):
         assert f"**{word}" in text or f"**The {word}" in text
-    price = shipped.judgement.price
+    price = shipped.price
     assert price is not None
     assert f"{price.gear_friction:.1f} mN·m" in text
     assert f"{100 * price.no_load_share:.1f} % of the posterior" in text
@@ -155,15 +156,14 @@ def test_the_first_paragraph_names_what_is_fitted_predicted_contradicted_and_wha
     assert "reproduced" not in text  # nothing outside printed precision is called so
 
 
-def test_the_page_lays_out_section_iv_a_and_what_is_left_out(shipped: Judged) -> None:
-    judgement = shipped.judgement
-    rows = paper_sections.sentences(table_of(tables.ConclusionRow, judgement.conclusions))
+def test_the_page_lays_out_section_iv_a_and_what_is_left_out(shipped: Judgement) -> None:
+    rows = paper_sections.sentences(table_of(tables.ConclusionRow, shipped.conclusions))
     assert rows.headers == ("sentence: ratio", "joint 1", "joint 2", "joint 3", "holds", "paper")
     assert len(rows.rows) == 10
     assert [row[4] for row in rows.rows].count("no") == 2
-    rows, said = paper_sections.omissions(table_of(Omission, judgement.omissions))
+    rows, said = paper_sections.omissions(table_of(Omission, shipped.omissions))
     assert rows.rows[0][1:3] == (pytest.approx(0.94, abs=1e-4), 0.0)
-    assert len(rows.rows) == len(said) == len(judgement.omissions)
+    assert len(rows.rows) == len(said) == len(shipped.omissions)
     assert any(str(row[0]).endswith("0.672 W") for row in rows.rows)
 
 
@@ -174,9 +174,9 @@ def test_without_one_of_the_papers_actuators_what_needs_it_is_left_out(
     by = based(run)
     assert by.missing == ("reversible",)
     judged, found = judging.judged(run, by)
-    assert judged.judgement.omissions == ()
+    assert judged.omissions == ()
     assert "omissions" not in {table.name for table in found}
-    spoken = {row.where for row in judged.judgement.conclusions}
+    spoken = {row.where for row in judged.conclusions}
     assert {"Section IV.A.1", "Section IV.A.2"} <= spoken
     assert not {"Section IV.A.3", "Section IV.A.4"} & spoken
 

@@ -12,7 +12,7 @@ import pytest
 
 from actuators.loading.build import Catalog
 from pipeline.paper.calibration.prior import PRIOR_FILE, Free, Prior, load_prior
-from pipeline.paper.errors import PriorError, TargetError
+from pipeline.paper.errors import CalibrationError
 from pipeline.paper.published import DIMENSIONS, PUBLISHED_FILE, ROLES, Published, load_published
 from pipeline.robot.robot_file import RobotSpec
 
@@ -70,7 +70,7 @@ def test_the_printed_values_are_the_shared_ones() -> None:
 def test_bad_published_values_are_one_line(tmp_path: Path, lines: list[str], message: str) -> None:
     path = tmp_path / "published.csv"
     path.write_text("\n".join([HEADER, *lines]) + "\n", encoding="utf-8")
-    with pytest.raises(TargetError, match=message) as caught:
+    with pytest.raises(CalibrationError, match=message) as caught:
         load_published(path)
     assert "\n" not in str(caught.value)
 
@@ -90,7 +90,7 @@ def test_a_missing_file_or_column_is_one_line(
     path = tmp_path / "published.csv"
     if content is not None:
         path.write_bytes(content)
-    with pytest.raises(TargetError, match=message):
+    with pytest.raises(CalibrationError, match=message):
         load_published(path)
 
 
@@ -111,7 +111,7 @@ def test_a_missing_file_or_column_is_one_line(
 def test_bad_priors_are_one_line(tmp_path: Path, old: str, new: str, message: str) -> None:
     path = tmp_path / "prior.toml"
     path.write_text(PRIOR_FILE.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
-    with pytest.raises(PriorError, match=message) as caught:
+    with pytest.raises(CalibrationError, match=message) as caught:
         load_prior(path)
     assert "\n" not in str(caught.value)
 

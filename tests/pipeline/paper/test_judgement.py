@@ -14,6 +14,7 @@ from actuators.loading.build import Catalog
 from actuators.units import to_si
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.calibration.problem import EXACT
+from pipeline.paper.judgement.basis import Basis
 from pipeline.paper.judgement.evidence import LEAST, compared, evidence, quantiles
 from pipeline.paper.judgement.judge import Judgement, judge
 from pipeline.paper.judgement.leave_one_out import leave_one_out
@@ -49,7 +50,7 @@ def judgement(
     prior: Prior,
     results: dict[str, Any],
 ) -> Judgement:
-    return judge(hexapod, catalog, published, prior, results)
+    return judge(hexapod, Basis(published, prior, results, (), catalog))
 
 
 @pytest.fixture(scope="module")
