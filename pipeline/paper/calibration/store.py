@@ -111,6 +111,8 @@ def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibra
     free = {f.key: f for f in prior.free}
     out = []
     for key, own in results["posterior"]["numbers"].items():
+        before: tuple[float, ...] = ()
+        moved: tuple[float | None, ...] = (None, None, 0.0, 0.0)
         numbers = [after[key], own["low"], own["high"]]
         if key in free:
             unit, before = free[key].unit, (free[key].centre, *free[key].interval)
@@ -118,7 +120,7 @@ def calibrated_numbers(results: Mapping[str, Any], prior: Prior) -> list[Calibra
             moved = (own["mean"], own["spread"], own["at_lower"], own["at_upper"])
             verdict = number_verdict(own["mean"], own["spread"], free[key].spread)
         else:
-            unit, before, moved, verdict = UNITS[key], (), (None, None, 0.0, 0.0), FIXED
+            unit, verdict = UNITS[key], FIXED
         ends = (numbers[0], min(numbers), max(numbers))
         shown = [from_si(x, unit) for x in (*before, *ends)]
         cells = [*[None] * (6 - len(shown)), *shown, *moved]

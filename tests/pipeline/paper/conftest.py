@@ -11,7 +11,10 @@ from actuators.loading.build import Catalog, load_catalog
 from pipeline.paper.calibration.prior import Prior, load_prior
 from pipeline.paper.calibration.store import load_results
 from pipeline.paper.hexapod import RobotPart, robot_part
+from pipeline.paper.judgement.basis import Basis
+from pipeline.paper.judgement.judge import Judgement, judge
 from pipeline.paper.published import Published, load_published
+from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file
 
 
@@ -48,3 +51,15 @@ def prior() -> Prior:
 @pytest.fixture(scope="session")
 def results() -> dict[str, Any]:
     return load_results()
+
+
+@pytest.fixture(scope="session")
+def judgement(
+    hexapod: Robot,
+    catalog: Catalog,
+    published: dict[str, Published],
+    prior: Prior,
+    results: dict[str, Any],
+) -> Judgement:
+    """Of the files as they are."""
+    return judge(hexapod, Basis(published, prior, results, (), catalog), samples=151)

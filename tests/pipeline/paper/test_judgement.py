@@ -10,13 +10,10 @@ import numpy as np
 import pytest
 from pandas import DataFrame
 
-from actuators.loading.build import Catalog
 from actuators.units import to_si
-from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.calibration.problem import EXACT
-from pipeline.paper.judgement.basis import Basis
 from pipeline.paper.judgement.evidence import LEAST, compared, evidence, quantiles
-from pipeline.paper.judgement.judge import Judgement, judge
+from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.judgement.leave_one_out import leave_one_out
 from pipeline.paper.judgement.readings import (
     CalibratedReading,
@@ -35,22 +32,10 @@ from pipeline.paper.judgement.rows import (
     judged,
     sentences,
 )
-from pipeline.paper.judgement.sensitivity import Sensitivity, leading, ranking, sensitivities
+from pipeline.paper.judgement.sensitivity import ranking, sensitivities
 from pipeline.paper.published import DIMENSIONS, EVEN, EXTRA, HELD, ROLES, Published
-from pipeline.robot.robot import Robot
 
 CONTRADICTED = ("rotor_motor_torque_2", "rotor_leg_energy_3s")
-
-
-@pytest.fixture(scope="module")
-def judgement(
-    hexapod: Robot,
-    catalog: Catalog,
-    published: dict[str, Published],
-    prior: Prior,
-    results: dict[str, Any],
-) -> Judgement:
-    return judge(hexapod, Basis(published, prior, results, (), catalog))
 
 
 @pytest.fixture(scope="module")
@@ -58,17 +43,15 @@ def rows(judgement: Judgement) -> dict[str, Row]:
     return {row.id: row for row in judgement.reproduction}
 
 
-@pytest.mark.parametrize("name", DIMENSIONS)
-def test_every_printed_value_is_reproduced_or_contradicted(rows: dict[str, Row], name: str) -> None:
-    row = rows[name]
-    inside = abs(row.computed - row.published) <= row.half_width * (1 + 1e-9) + 1e-12
-    assert inside == (name not in CONTRADICTED), f"{row.computed} for {row.published}"
-    assert row.verdict == ("contradicted" if name in CONTRADICTED else "reproduced")
-    if row.role == "contradicted":
-        assert row.remark
-
-
-def test_the_headline_counts_by_role(judgement: Judgement) -> None:
+def test_every_printed_value_is_reproduced_or_contradicted(
+    judgement: Judgement, rows: dict[str, Row]
+) -> None:
+    assert set(rows) == set(DIMENSIONS)
+    for name, row in rows.items():
+        inside = abs(row.computed - row.published) <= row.half_width * (1 + 1e-9) + 1e-12
+        assert inside == (name not in CONTRADICTED), f"{row.computed} for {row.published}"
+        assert row.verdict == ("contradicted" if name in CONTRADICTED else "reproduced"), name
+        assert row.remark or row.role != "contradicted"
     counts = [(11, 11), (11, 11), (19, 19), (1, 1), (1, 1), (1, 3)]
     assert headline(judgement.rows) == dict(zip(ROLES, counts, strict=True))
 
@@ -102,9 +85,9 @@ def test_verdicts_and_shares_of_a_row() -> None:
     assert full.left_out == (3.0, 3.0)
     without = one(small_row("target"), 3.0, {"prior": DataFrame({"other": [1.0]})})
     assert np.isnan([*without.prior, *without.left_out, without.posterior_share]).all()
-    asked_for = [math.isnan(one(small_row(r), 3.0).posterior_share) for r in (PUT_IN, FITTED)]
-    assert asked_for == [True, True]
-    assert not math.isnan(one(small_row(FOLLOWS), 3.0).posterior_share)
+    roles = (PUT_IN, FITTED, FOLLOWS)
+    unknown = [math.isnan(one(small_row(role), 3.0).posterior_share) for role in roles]
+    assert unknown == [True, True, False]  # what was asked for proves nothing
 
 
 def test_quantiles_ask_for_enough_known_values() -> None:
@@ -113,7 +96,9 @@ def test_quantiles_ask_for_enough_known_values() -> None:
     assert np.isnan(quantiles(values[1:])).all()
 
 
-def test_what_is_fitted_shows_no_interval_of_the_fit(rows: dict[str, Row]) -> None:
+def test_what_is_fitted_shows_no_interval_of_the_fit(
+    rows: dict[str, Row], judgement: Judgement
+) -> None:
     """What is shown of a target is the prior and what the rest says, wider than the fit allows."""
     for name in ("walking_ratio_rotor", "walking_ratio_reversible", "walking_ratio_irreversible"):
         low, high = rows[name].prior
@@ -125,11 +110,6 @@ def test_what_is_fitted_shows_no_interval_of_the_fit(rows: dict[str, Row]) -> No
     assert rows["walking_ratio_irreversible"].prior[1] < rows["walking_ratio_irreversible"].computed
     for name in EXACT:  # put in exactly: nothing else knows them
         assert np.isnan(rows[name].prior).all()
-
-
-def test_lines_of_fig_21_come_with_the_prior_and_without_their_own_figure(
-    judgement: Judgement,
-) -> None:
     for line in judgement.per_minute:
         assert line.prior is not None
         assert (line.prior[0] <= line.prior[1]).all()
@@ -178,50 +158,37 @@ def test_sentences_of_section_iv_a_hold_but_two(judgement: Judgement) -> None:
 
 
 @pytest.mark.parametrize(
-    ("sentence", "verdicts"),
-    [
-        ("the same", [False, True, False, False]),
-        ("higher", [False, False, True, True]),
-        ("much", [False, False, False, True]),
-    ],
+    ("words", "verdicts"),
+    [("the same", (0, 1, 0, 0)), ("higher", (0, 0, 1, 1)), ("much", (0, 0, 0, 1))],
 )
-def test_a_sentence_of_section_iv_a_can_hold_and_fail(sentence: str, verdicts: list[bool]) -> None:
-    rows = [r for r in sentences() if r.joint and r.words.startswith(sentence)]
+def test_a_sentence_of_section_iv_a_can_hold_and_fail(
+    words: str, verdicts: tuple[int, ...]
+) -> None:
+    rows = [r for r in sentences() if r.joint and r.words.startswith(words)]
     assert rows
     for row in rows:
-        assert [row.true_of(v) for v in (0.99, 1.0, 1.002, 2.0)] == verdicts
-        assert not row.true_of(math.nan)
+        assert tuple(row.true_of(v) for v in (0.99, 1.0, 1.002, 2.0)) == verdicts
 
 
-@pytest.mark.parametrize("row", [r for r in sentences() if not r.joint], ids=lambda r: r.sentence)
-def test_every_sentence_of_section_v_can_fail(
-    judgement: Judgement, rows: dict[str, Row], row: Row
-) -> None:
+def test_every_sentence_of_section_v_can_fail(judgement: Judgement, rows: dict[str, Row]) -> None:
     """Holds for ours, and does not where one number is turned the other way."""
     ours = {name: to_si(r.computed, r.unit) for name, r in rows.items()} | {EXTRA: 20.0}
-    (found,) = (r for r in judgement.conclusions if r.sentence == row.sentence)
-    assert found.holds
-    broken = {
-        "walking_ratio_rotor": 5.0,
-        "walking_ratio_reversible": 10.0,
-        "walking_ratio_irreversible": 11.0,
-        EXTRA: 0.0,
-        EVEN: 0.8,
-        "ideal_leg_energy_3s": 5.0,
-        "irreversible_leg_energy_3s": 0.1,
-        "reversible_leg_energy_3s": 5.9,
+    turned = {
+        "walking_ratio_rotor": ("walking_ratio_rotor", 5.0),
+        "walking_ratio_reversible": ("walking_ratio_reversible", 10.0),
+        "walking_ratio_irreversible": ("walking_ratio_irreversible", 15.1),
+        EXTRA: (EXTRA, 0.0),
+        EVEN: (EVEN, 0.8),
+        "ideal_most": ("ideal_leg_energy_3s", 5.0),
+        "irreversible_leg_energy_3s": ("irreversible_leg_energy_3s", 0.1),
+        "ordered": ("reversible_leg_energy_3s", 5.9),
     }
-    assert row.true_of(compared(ours)[row.id])
-    assert not all(row.true_of(compared(ours | {name: v})[row.id]) for name, v in broken.items())
-
-
-def test_the_price_of_the_fit(judgement: Judgement) -> None:
-    price = judgement.price
-    assert price is not None
-    assert price.gear_known[0] > price.gear_prior
-    assert price.gear_known[0] < price.gear_friction < price.gear_known[1]
-    assert price.gear_heat > 0.2 * price.leg_energy
-    assert price.no_load_share < 0.2  # data sheets are not overruled without need
+    said = {row.id: row for row in judgement.conclusions if not row.joint}
+    assert said.keys() == turned.keys()
+    for name, (number, value) in turned.items():
+        assert said[name].holds
+        assert said[name].true_of(compared(ours)[name])
+        assert not said[name].true_of(compared(ours | {number: value})[name]), name
 
 
 def test_readings_name_what_they_miss(
@@ -243,8 +210,6 @@ def test_readings_name_what_they_miss(
     net = {n: point["drawn"][n]["rm"] - point["returned"][n]["rm"] for n in point["drawn"]}
     for name in ("rotor", "reversible", "irreversible"):
         assert same[f"walking_ratio_{name}"] == pytest.approx(net[name] / net["ideal"])
-    assert same["walking_ratio_rotor"] < 3.5  # returned energy is most of what the rotor draws
-    assert same["walking_ratio_irreversible"] > 18
 
 
 def test_the_reading_supported_meets_everything_and_asks_least_of_the_prior(
@@ -262,7 +227,6 @@ def test_the_reading_supported_meets_everything_and_asks_least_of_the_prior(
     assert "Out of reach: an axis at 90° with only the middle right leg loaded" in text
     text, net = verdict([off, none, replace(near, net=True)], point)
     assert text.startswith("No reading meets every printed figure")
-    assert "with a off by 1.03 half widths" in text
     assert "the numbers do not rule it out" in net
     assert "out of reach: an axis at 0°" in verdict([near, replace(off, net=True)], point)[1]
 
@@ -287,6 +251,19 @@ def test_leave_one_out_is_complete_and_names_what_predicts(
     assert sheet["ideal_voltage_2"].predicted == pytest.approx(-0.317 * 2.54)
 
 
+@pytest.mark.parametrize(
+    ("value", "inside"), [(3.4, False), (3.6, True), (4.4, True), (4.6, False)]
+)
+def test_a_prediction_overlaps_with_what_is_printed(
+    published: dict[str, Published], value: float, inside: bool
+) -> None:
+    name = "walking_ratio_rotor"  # 4 within 0.5
+    (row,) = (
+        r for r in leave_one_out(published, {name: DataFrame({name: [value] * LEAST})}) if r.sets
+    )
+    assert (row.predicted, row.inside) == (value, inside)
+
+
 def test_sensitivities_are_complete(results: dict[str, Any]) -> None:
     assert {row.output for row in sensitivities(results)} > {EXTRA, EVEN}
     for row in sensitivities(results):
@@ -294,13 +271,3 @@ def test_sensitivities_are_complete(results: dict[str, Any]) -> None:
         assert row.first_order <= row.total + row.first_order_95 + row.total_95 + 0.02
     ranked = ranking(results, EXTRA)
     assert [r.total for r in ranked] == sorted((r.total for r in ranked), reverse=True)
-    assert all(row.total_95 > 0 for row in ranked[:3])
-
-
-@pytest.mark.parametrize(("first", "second", "names"), [(0.1, 0.1, ["a"]), (0.2, 0.1, ["a", "b"])])
-def test_one_number_stands_out_only_where_intervals_do_not_overlap(
-    first: float, second: float, names: list[str]
-) -> None:
-    numbers = (("a", 0.6, first), ("b", 0.35, second), ("c", 0.1, 0.1))
-    ranked = [Sensitivity("", name, 0.0, 0.0, *own) for name, *own in numbers]
-    assert [row.parameter for row in leading(ranked)] == names

@@ -95,7 +95,7 @@ def test_among_equals_what_is_contradicted_may_stay_unmet_then_the_widest_wins(
     assert best_frictions([wide, Frictions(5.0, 5.1, UNMET[:1])], published).unmet == UNMET[:1]
 
 
-@pytest.mark.parametrize("friction", [3.50, 3.56, 3.575, 3.605, 3.62, 3.64])
+@pytest.mark.parametrize("friction", [3.50, 3.575, 3.62])
 def test_no_torque_constant_and_resistance_on_a_fine_grid_do_better(
     published: dict[str, Published], ranges: tuple[Frictions, ...], friction: float
 ) -> None:
@@ -113,21 +113,12 @@ def test_no_torque_constant_and_resistance_on_a_fine_grid_do_better(
 def test_every_draw_gives_every_entry_but_the_contradicted(
     published: dict[str, Published],
 ) -> None:
+    """What they make of the contradicted ones are the numbers that ERRATA.md quotes."""
     found = feasible_set(published)
-    for k, r, friction, held in found.draws(np.random.default_rng(7), 300):
-        assert unmet(published, standing(k, r, friction, held)) == set(UNMET)
     k, r, friction = (found.middle[key] for key in KEYS)
     assert unmet(published, standing(k, r, friction, 0.04998)) == set(UNMET)
-
-
-def test_what_the_other_entries_make_of_the_contradicted_ones(
-    published: dict[str, Published],
-) -> None:
-    """The numbers that ERRATA.md quotes."""
-    rows = [
-        standing(k, r, friction, held)
-        for k, r, friction, held in feasible_set(published).draws(np.random.default_rng(7), 4000)
-    ]
+    rows = [standing(*own) for own in found.draws(np.random.default_rng(7), 1000)]
+    assert all(unmet(published, row) == set(UNMET) for row in rows)
     torque = [1e3 * row["rotor_motor_torque_2"] for row in rows]
     energy = [row["rotor_leg_energy_3s"] for row in rows]
     assert 73.15 <= min(torque) <= max(torque) <= 73.16

@@ -48,19 +48,15 @@ def test_the_first_row_is_what_the_rest_of_the_judgement_says(
         assert getattr(rows[0], f"ratio_{name}_change") == 0.0
 
 
-@pytest.mark.parametrize(("watts", "share"), [(0.67, 0.735), (2.0, 0.513)])
-def test_idle_drivers_in_closed_form_from_printed_numbers(watts: float, share: float) -> None:
-    """The paper's 94 % and 0.866 W alone: what walking costs more follows from them."""
-    extra = 0.94 / 0.06 * HELD  # [W]
-    f = idle_break_even(0.94, HELD, 6 * watts)
-    assert f == pytest.approx(share, abs=1e-3)
-    assert (1 - f) * extra == pytest.approx(f * (HELD + 6 * watts), rel=1e-12)
-    assert idle_break_even(0.94, HELD, 0.0) == pytest.approx(0.94, rel=1e-12)
-
-
-def test_idle_drivers_through_the_costs_agree_with_the_closed_form(
+def test_idle_drivers_agree_with_the_closed_form(
     rows: tuple[Omission, ...], part: RobotPart, catalog: Catalog
 ) -> None:
+    """The paper's 94 % and 0.866 W alone say what walking costs more, so the rest follows."""
+    extra = 0.94 / 0.06 * HELD  # [W]
+    for watts, share in ((0.0, 0.94), (0.67, 0.735), (2.0, 0.513)):
+        f = idle_break_even(0.94, HELD, 6 * watts)
+        assert f == pytest.approx(share, abs=1e-3)
+        assert (1 - f) * extra == pytest.approx(f * (HELD + 6 * watts), rel=1e-12)
     held = costs_of(outcomes(part.demand, catalog)).stand["reversible"]
     found = of(rows, "drivers")
     assert len(found) == 2

@@ -19,7 +19,7 @@ from pipeline.paper.published import EXTRA, HELD
 
 @pytest.fixture(scope="module")
 def own(robot_file: str) -> tasks.Robots:
-    return tasks.robots(robot_file, 3, 12)
+    return tasks.robots(robot_file, 3, 6)
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +42,7 @@ def test_many_sets_at_once_are_each_set_by_itself(
 ) -> None:
     """What walkers ask for comes out of the exact machine: solved targets, all others, limits."""
     density = Posterior(task, own.demand)
-    walkers = drawn(density, 6)
+    walkers = drawn(density, 3)
     for x, found in zip(walkers, tasks.sets_of(density, own, walkers), strict=True):
         alone = replace(tasks.problem(robot_file, found["path"]), constants=found["constants"])
         point = alone.evaluate(np.array(found["z"]))
@@ -63,7 +63,7 @@ def test_a_target_rises_or_falls_with_the_number_that_is_solved_for(
 ) -> None:
     """Else two sets would give one target, and the density would miss one of them."""
     density = Posterior(task, own.demand)
-    x = density.start(np.random.default_rng(2), 40)
+    x = density.start(np.random.default_rng(2), 20)
     sets = density.as_sets(x)
     for name, free in density.solved.items():
         numbers = (free.at(np.full(len(x), z)) for z in np.linspace(*free.ends, 9))
@@ -77,9 +77,8 @@ def test_targets_left_out_are_not_asked_for(own: tasks.Robots, robot_file: str) 
     density = Posterior(task, own.demand)
     assert not {HELD, EXTRA} & density.targets.keys()
     assert HELD not in density.solved
-    found = tasks.sets_of(density, own, drawn(density, 8))
-    held = [task.prior.values(np.array(f["z"]))["harmonic_drive.coulomb"] for f in found]
-    assert np.std(held) > 0.1  # [N*m]: as wide as the prior leaves it
+    assert EXTRA not in density.solved
+    assert "harmonic_drive.coulomb" in {free.key for free in density.free}
 
 
 def test_agreement_of_walkers_is_measured(prior: Prior) -> None:
@@ -94,7 +93,7 @@ def test_agreement_of_walkers_is_measured(prior: Prior) -> None:
                     "constants": dict.fromkeys(KEYS, float(rng.normal())),
                     "path": "cubic" if rng.uniform() < 0.25 else "harmonic",
                 }
-                for _ in range(60)
+                for _ in range(40)
             ]
             for k in range(16)
         ]

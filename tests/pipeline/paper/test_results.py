@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -56,11 +57,8 @@ def test_the_walkers_of_the_stored_posterior_agree(results: dict[str, Any]) -> N
     assert max(n["at_lower"] + n["at_upper"] for n in known["numbers"].values()) < 0.1
 
 
-@pytest.mark.parametrize("index", [0, 57, 133])
-def test_stored_members_come_out_again(
-    results: dict[str, Any], robot_file: str, index: int
-) -> None:
-    member = results["sets"][index]
+def test_stored_members_come_out_again(results: dict[str, Any], robot_file: str) -> None:
+    member = results["sets"][57]
     again = tasks.point_of(robot_file, member["path"], member["z"], member["constants"])
     for name, value in member["values"].items():
         if value is not None:
@@ -83,20 +81,14 @@ def test_the_files_hold_the_nearest_point(
     assert spec.gait["transfer_path"] == nearest["path"]
 
 
-def test_every_start_of_a_path_ends_in_the_same_point(results: dict[str, Any]) -> None:
+def test_every_search_ends_in_the_stored_point(results: dict[str, Any], robot_file: str) -> None:
     """Several random starts, one optimum: the nearest point is not a local accident."""
     best = results["nearest"]
     distance = [s["prior_distance"] for s in results["starts"] if s["path"] == best["path"]]
     assert len(distance) >= 4
     assert max(distance) - min(distance) < 0.05 * min(distance)
     assert best["prior_distance"] == min(distance)
-
-
-def test_the_search_comes_back_to_the_stored_point(
-    results: dict[str, Any], robot_file: str
-) -> None:
-    best = results["nearest"]
-    found = tasks.nearest(robot_file, best["path"], tasks.READ, best["z"], 2)
+    found = tasks.nearest(robot_file, best["path"], tasks.READ, best["z"], 1)
     assert found["admissible"]
     assert found["prior_distance"] == pytest.approx(best["prior_distance"], rel=1e-3)
 
@@ -152,45 +144,27 @@ def test_a_number_driven_from_the_prior_is_not_called_undetermined(
     assert number_verdict(shift, spread, 1.0) == verdict
 
 
-def copies(folder: Path, robot_file: str) -> tuple[Path, Path]:
-    """Copies of the robot file and of the catalogue."""
-    robot, catalog = folder / "hexapod.toml", folder / "catalog"
-    robot.write_bytes(Path(robot_file).read_bytes())
-    catalog.mkdir()
-    for path in CATALOG.glob("*.toml"):
-        (catalog / path.name).write_bytes(path.read_bytes())
-    return robot, catalog
-
-
-def test_an_interrupted_save_leaves_the_old_files(
-    results: dict[str, Any], tmp_path: Path, robot_file: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    robot, catalog = copies(tmp_path, robot_file)
-    monkeypatch.setattr("pipeline.paper.calibration.store.RESULTS_FILE", tmp_path / "results.json")
-    moved = {**results, "nearest": {**results["nearest"], "path": "cubic"}}
-    before = {p: p.read_bytes() for p in [robot, *catalog.iterdir()]}
-    with monkeypatch.context() as patch:
-        patch.setattr("pipeline.paper.calibration.store.fingerprint", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            save(moved, robot, catalog)
-    assert {p: p.read_bytes() for p in [robot, *catalog.iterdir()]} == before
-    assert not list(tmp_path.rglob("*.tmp"))
-    assert robot in save(moved, robot, catalog)
-    assert load_robot_file(robot).gait["transfer_path"] == "cubic"
-    load_catalog(catalog)
-
-
 def interrupted(*arguments: object) -> None:
     raise KeyboardInterrupt
 
 
-def test_saving_the_stored_results_changes_no_file(
+def test_a_save_is_whole_or_leaves_the_old_files(
     results: dict[str, Any], tmp_path: Path, robot_file: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot, catalog = copies(tmp_path, robot_file)
+    """Saving what is stored changes no number."""
+    robot, catalog = tmp_path / "hexapod.toml", tmp_path / "catalog"
+    shutil.copyfile(robot_file, robot)
+    shutil.copytree(CATALOG, catalog)
     stored = tmp_path / "results.json"
     monkeypatch.setattr("pipeline.paper.calibration.store.RESULTS_FILE", stored)
-    save(dict(results), robot, catalog)
+    before = {p: p.read_bytes() for p in [robot, *catalog.iterdir()]}
+    with monkeypatch.context() as patch:
+        patch.setattr("pipeline.paper.calibration.store.fingerprint", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            save(dict(results), robot, catalog)
+    assert {p: p.read_bytes() for p in [robot, *catalog.iterdir()]} == before
+    assert not list(tmp_path.rglob("*.tmp"))
+    assert robot in save(dict(results), robot, catalog)
     assert load_results(stored) == results
     assert load_robot_file(robot).parameters == load_robot_file(Path(robot_file)).parameters
     assert load_catalog(catalog) == load_catalog()
