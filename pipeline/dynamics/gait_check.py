@@ -9,7 +9,7 @@ from pipeline.errors import PipelineError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.support import stability_margins
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.check import check_file
+from pipeline.robot.check import check_file, check_robot
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_check import Finding
@@ -46,7 +46,7 @@ def check_with_gait(path: Path) -> list[Finding]:
     Raises:
         PipelineError: The file cannot be read at all.
     """
-    findings = check_file(path)
-    if path.suffix.lower() == ".toml":
-        findings += check_gait(load_robot(load_robot_file(path)))
-    return findings
+    if path.suffix.lower() != ".toml":
+        return check_file(path)
+    robot = load_robot(load_robot_file(path))
+    return [*check_robot(robot), *check_gait(robot)]

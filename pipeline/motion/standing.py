@@ -10,7 +10,7 @@ from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import body_rotation, gait_table, lifts, neutral_feet
 from pipeline.motion.ground import Ground
 from pipeline.motion.motion import Segment
-from pipeline.motion.postures import refuse_beyond_limits, start_postures
+from pipeline.robot.inverse.start_posture import refuse_beyond_limits, start_postures
 from pipeline.robot.inverse_kinematics import solve_positions
 from pipeline.robot.robot import Robot
 

@@ -75,32 +75,12 @@ class Sway:
         return Sway(self.coefficients + by, self.period)
 
 
-@dataclass(frozen=True)
-class _Points:
-    """What has to stay inside the support, over all samples of a motion."""
+def _points(robot: Robot, segment: Segment) -> tuple[Array, Array, Array, Array]:
+    """What has to stay inside the support, and the standing feet, in the world.
 
-    centre: Array  #: Of mass, seen from above in the world [m], shape (N, 2).
-    zero_moment: Array  #: Point without tipping moment, likewise.
-    height: Array  #: Of the centre of mass over the feet's plane [m], shape (N,).
-    feet: tuple[Array, ...]  #: By segment: standing feet in the world [m], shape (N_s, F, 3).
-    share: Array  #: Of the period, shape (N,).
-
-
-def _points(robot: Robot, motion: Motion) -> _Points:
-    assert motion.period is not None
-    parts = [_points_of(robot, segment) for segment in motion.segments]
-    centre, zero, height, feet = zip(*parts, strict=True)
-    time = np.concatenate([segment.time for segment in motion.segments])
-    return _Points(
-        np.concatenate(centre),
-        np.concatenate(zero),
-        np.concatenate(height),
-        feet,
-        time / motion.period,
-    )
-
-
-def _points_of(robot: Robot, segment: Segment) -> tuple[Array, Array, Array, Array]:
+    Centre of mass and point without tipping moment seen from above, (N, 2) each, height of the
+    first over the feet's plane (N,), feet (N, F, 3) [m].
+    """
     q, v, a = segment.configuration, segment.velocity, segment.acceleration
     place, rotation = q[:, :3], robot.base_rotation(q)
     turn = np.broadcast_to(np.eye(3), (q.shape[0], 3, 3)) if rotation is None else rotation
@@ -181,32 +161,26 @@ def _cost(knots: int) -> Array:
 
 def _constraints(robot: Robot, sway: Sway, walked: Callable[[Sway], Motion]) -> tuple[Array, Array]:
     """Rows of `matrix @ coefficients - bound`: distances inside the support's edges [m]."""
-    here = _points(robot, walked(sway))
-    rates = []
-    for axis in np.eye(2):
-        there = _points(robot, walked(sway.moved(_STEP * axis)))
-        rates.append((there.centre - here.centre) / _STEP)
-    rate = np.stack(rates, axis=-1)  # (N, 2 world, 2 body)
-    knots = len(sway.coefficients)
-    place = _rows(knots, here.share, 0)
-    # How long a pendulum of the centre's height falls: acceleration moves the point back by it.
+    knots, coefficients = len(sway.coefficients), sway.coefficients.ravel()
     gravity = float(np.linalg.norm(robot.model.gravity.linear))
-    fall = (here.height / gravity / sway.period**2)[:, None]
-    matrices, bounds = [], []
-    for point, basis in (
-        (here.centre, place),
-        (here.zero_moment, place - fall * _rows(knots, here.share, 2)),
-    ):
-        moves = np.einsum("nij,nk->nikj", rate, basis).reshape(point.shape[0], 2, -1)
-        start = 0
-        for feet in here.feet:
-            rows = slice(start, start + feet.shape[0])
-            start = rows.stop
-            edges = support_edges(feet)
-            row = np.einsum("nek,nkc->nec", edges.inward, moves[rows])[edges.used]
-            matrices.append(row)
-            inside = edges.distance(point[rows])[edges.used]
-            bounds.append(row @ sway.coefficients.ravel() - inside)
+    paths = [sway, *(sway.moved(_STEP * axis) for axis in np.eye(2))]
+    still: list[tuple[Array, Array]] = []
+    moving: list[tuple[Array, Array]] = []
+    for segment, *others in zip(*(walked(path).segments for path in paths), strict=True):
+        centre, zero, height, feet = _points(robot, segment)
+        rates = [(_points(robot, other)[0] - centre) / _STEP for other in others]
+        rate = np.stack(rates, axis=-1)  # (N, 2 world, 2 body)
+        share = segment.time / sway.period
+        place = _rows(knots, share, 0)
+        # How long a pendulum of the centre's height falls: acceleration moves the point back by it.
+        fall = (height / gravity / sway.period**2)[:, None]
+        ahead = place - fall * _rows(knots, share, 2)
+        edges = support_edges(feet)
+        for found, point, basis in ((still, centre, place), (moving, zero, ahead)):
+            moves = np.einsum("nij,nk->nikj", rate, basis).reshape(point.shape[0], 2, -1)
+            row = np.einsum("nek,nkc->nec", edges.inward, moves)[edges.used]
+            found.append((row, row @ coefficients - edges.distance(point)[edges.used]))
+    matrices, bounds = zip(*still, *moving, strict=True)
     return np.concatenate(matrices), np.concatenate(bounds)
 
 

@@ -14,8 +14,8 @@ from pipeline.motion.feet import Course, support_course, transfer_course
 from pipeline.motion.footfall import LEAST_FEET
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.postures import refuse_beyond_limits, start_postures
 from pipeline.motion.sway import Sway, burdens, least_sway
+from pipeline.robot.inverse.start_posture import refuse_beyond_limits, start_postures
 from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.robot import Robot
 

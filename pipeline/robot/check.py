@@ -40,7 +40,7 @@ def check_file(path: Path) -> list[Finding]:
     if path.suffix.lower() == ".toml":
         return check_robot(load_robot(load_robot_file(path)))
     known = named_robot(str(path))
-    return check_urdf(read_urdf(known.urdf if known else path), str(path))
+    return check_urdf(known.text if known else read_urdf(path), str(path))
 
 
 def check_robot(robot: Robot) -> list[Finding]:

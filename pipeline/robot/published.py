@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any, Final
 
 from actuators.errors import closest, one_line
 from pipeline.errors import UrdfError
+from pipeline.robot.urdf_source import read_urdf
 
 #: How a robot file writes such a URDF: ``example-robot-data:solo12``.
 SCHEME: Final = "example-robot-data:"
@@ -16,13 +18,25 @@ _SHOWN: Final = 12  # names in one line
 
 
 @dataclass(frozen=True)
-class PublishedRobot:
-    """One robot of the package."""
+class RobotSource:
+    """A URDF and what lies beside it."""
 
-    name: str  #: By which the package calls it.
-    urdf: Path  #: Its file.
-    srdf: Path | None  #: Poses with names; None where the package has none.
-    pose: str  #: Name of its reference pose; empty where it names none.
+    name: str  #: Of the robot; by which the package calls it where it is published.
+    urdf: Path
+    srdf: Path | None = None  #: Poses with names; None without.
+    pose: str = ""  #: Name of the pose that the publisher refers to; empty where there is none.
+    published: bool = True  #: Whether it is known by name and not by its place.
+
+    @cached_property
+    def text(self) -> str:
+        """The URDF."""
+        return read_urdf(self.urdf)
+
+    def reference(self, out: Path) -> str:
+        """How a robot file at `out` names the URDF."""
+        if self.published:
+            return SCHEME + self.name
+        return Path(os.path.relpath(self.urdf.absolute(), out.absolute().parent)).as_posix()
 
 
 @cache
@@ -37,7 +51,7 @@ def published_names() -> list[str]:
     return sorted(_loaders())
 
 
-def published_robot(name: str) -> PublishedRobot:
+def published_robot(name: str) -> RobotSource:
     """Look a robot of the package up.
 
     Raises:
@@ -62,10 +76,10 @@ def published_robot(name: str) -> PublishedRobot:
     urdf = folder / loader.urdf_subpath / loader.urdf_filename
     srdf = folder / loader.srdf_subpath / loader.srdf_filename
     has_srdf = bool(loader.srdf_filename) and srdf.is_file()
-    return PublishedRobot(name, urdf, srdf if has_srdf else None, loader.ref_posture or "")
+    return RobotSource(name, urdf, srdf if has_srdf else None, loader.ref_posture or "")
 
 
-def named_robot(given: str) -> PublishedRobot | None:
+def named_robot(given: str) -> RobotSource | None:
     """The robot of the package that a command names, with or without `SCHEME`.
 
     Returns None where a file is meant: one that is there, or that is written like one.

@@ -33,7 +33,7 @@ from pipeline.motion.base_motion import base_quaternions, one_sign
 from pipeline.motion.gait import body_rotation, gait_table
 from pipeline.motion.ground import Ground
 from pipeline.motion.motion import Motion, Segment, level_ground
-from pipeline.motion.postures import refuse_beyond_limits
+from pipeline.robot.inverse.start_posture import refuse_beyond_limits
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 

@@ -16,10 +16,11 @@ from pipeline.robot.guess.frame import refuse_turned
 from pipeline.robot.guess.limbs import Limb, find_limbs
 from pipeline.robot.guess.motors import KnownMotors, known_motors, names_of
 from pipeline.robot.guess.pace import Pace, find_pace
-from pipeline.robot.guess.source import Source, source_of, standing_pose
+from pipeline.robot.guess.source import source_of, standing_pose
 from pipeline.robot.guess.stance import Margin, Stance, Standing
 from pipeline.robot.leg_chains import leg_chains
 from pipeline.robot.leg_columns import leg_columns
+from pipeline.robot.published import RobotSource
 from pipeline.robot.robot import model_of_angles
 from pipeline.robot.urdf_check import check_urdf
 from pipeline.robot.urdf_source import read_elements
@@ -32,7 +33,7 @@ _STANCES, _STROKE = 60, 0.2
 class Guess:
     """A robot as found."""
 
-    source: Source  #: Its URDF.
+    source: RobotSource  #: Its URDF.
     base_link: str  #: The root.
     limbs: tuple[Limb, ...]  #: Legs.
     #: Joints outside the legs, where they are held [rad, m], and why.

@@ -2,39 +2,18 @@
 
 from __future__ import annotations
 
-import os
 import xml.etree.ElementTree as ET
-from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import RobotFileError
-from pipeline.robot.published import SCHEME, named_robot
-from pipeline.robot.urdf_source import number, read_urdf
+from pipeline.robot.published import RobotSource, named_robot
+from pipeline.robot.urdf_source import number
 
 #: Poses of an SRDF that are meant to stand, those before others.
 STANDING_POSES = ("standing", "stand", "half_sitting", "home", "default")
 
 
-@dataclass(frozen=True)
-class Source:
-    """A URDF and what lies beside it."""
-
-    name: str  #: Of the robot.
-    urdf: Path  #: The file.
-    text: str  #: Its content.
-    published: bool  #: Whether it is known by name and not by its place.
-    srdf: Path | None  #: Poses with names; None without.
-    pose: str  #: Name of the pose that the publisher refers to; empty where there is none.
-
-    def reference(self, out: Path) -> str:
-        """How a robot file at `out` names the URDF."""
-        if self.published:
-            return SCHEME + self.name
-        folder = out.absolute().parent
-        return Path(os.path.relpath(self.urdf.absolute(), folder)).as_posix()
-
-
-def source_of(given: str) -> Source:
+def source_of(given: str) -> RobotSource:
     """A URDF by path, or by its name in ``example-robot-data``.
 
     Raises:
@@ -45,15 +24,14 @@ def source_of(given: str) -> Source:
     if path.suffix.lower() == ".toml":
         raise RobotFileError(f"{given}: a robot file; init starts from a URDF or a robot's name")
     known = named_robot(given)
-    if known is None:
-        text = read_urdf(path)
-        beside = [path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf"]
-        srdf = next((p for p in beside if p.is_file()), None)
-        return Source(path.stem, path, text, False, srdf, "")
-    return Source(known.name, known.urdf, read_urdf(known.urdf), True, known.srdf, known.pose)
+    if known is not None:
+        return known
+    beside = [path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf"]
+    srdf = next((p for p in beside if p.is_file()), None)
+    return RobotSource(path.stem, path, srdf, published=False)
 
 
-def standing_pose(source: Source) -> tuple[str, dict[str, float]] | None:
+def standing_pose(source: RobotSource) -> tuple[str, dict[str, float]] | None:
     """The SRDF's pose for standing: its name, and joint positions [rad, m].
 
     Returns None where there is no SRDF, or no pose in it that is called as poses for standing are.
