@@ -82,10 +82,7 @@ def _slides(
 
 
 def _margin_and_remedy(robot: Robot, segment: Segment, sample: int, margin: float) -> str:
-    """How much margin there is, what takes it, and what to change so that the robot stands.
-
-    `margin`: of static stability then [m].
-    """
+    """How much margin there is, what takes it, and what to change so that the robot stands."""
     words = f"static margin {1e3 * margin:.1f} mm"
     if segment.foot_target is None:
         return f"{words}; check which feet stand, or shift the body towards them"

@@ -193,11 +193,7 @@ def _symmetry(robot: Robot) -> Iterator[Finding]:
 
 
 def _counterparts(robot: Robot, points: Array) -> dict[int, int | None]:
-    """Of every left leg the right leg whose point mirrors its own, if any does.
-
-    `points`: one of each leg in the base frame [m], shape (L, 3). Returns indices of legs; left out
-    are those in the middle plane, their own counterparts.
-    """
+    """Of every left leg the right leg whose point mirrors its own, if any does."""
     legs = robot.spec.legs
     right = [k for k, leg in enumerate(legs) if leg.side == "right"]
     out: dict[int, int | None] = {}

@@ -215,11 +215,7 @@ class Standing:
     def _best(
         self, drawn: _Drawn, near: NDArray[np.bool_], height: float
     ) -> tuple[float, Array, Array]:
-        """The postures of the best mark with feet at a height.
-
-        `near`: those whose feet are at the height, shape (M, L). `height`: of the feet in the base
-        frame [m]. Returns the mark, the feet, levelled (L, 3) [m], and the postures (L, K).
-        """
+        """The postures of the best mark with feet at a height."""
         pairs, n_legs, marks = self._pairs, near.shape[1], drawn.marks
         centre, usual = self._usual
         chosen = np.where(near, marks, -1.0).argmax(axis=0)

@@ -160,11 +160,7 @@ def _written(q: Array) -> str:
 
 
 def _branches(robot: Robot, leg: int, target: Array) -> tuple[list[Array], float]:
-    """Postures of one leg that reach a point, those nearest to the middle of the limits first.
-
-    Returns each with as many coordinates as the leg has joints [rad, m], and the least distance
-    that was left [m].
-    """
+    """Postures of one leg that reach a point, those nearest to the middle of the limits first."""
     count = len(robot.spec.legs[leg].joints)
     lower, upper = (limit[leg] for limit in _limits(robot))
     wide = ~np.isfinite(upper - lower) | (upper - lower > _UNLIMITED) | (upper <= lower)
