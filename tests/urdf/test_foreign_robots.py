@@ -17,7 +17,7 @@ from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_check import MERGED
 
-ROBOTS = ("go2", "a1", "laikago", "hyq", "anymal")
+ROBOTS = ("go2", "hyq")
 
 
 @pytest.mark.parametrize("name", ROBOTS)

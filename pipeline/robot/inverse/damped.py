@@ -16,7 +16,7 @@ from pipeline.robot.leg_chains import LegChains
 
 _ITERATIONS = 60
 _MAX_STEP = 0.35  # [rad] per iteration, keeps the knee on the branch of the start posture
-_CONVERGED = 1e-13  # [m]
+_CONVERGED, _STILL = 1e-13, 1e-12  # [m], [rad] of a step: what is left is out of reach
 _LEAST_DAMPING, _DAMPING = 1e-8, 1e-2  # [m], relaxed as the iteration comes close
 _STRIDE = 16  # samples of a path between those that are solved first
 #: Share of a leg's reach within which a spline's guess is trusted to lie on the path's branch.
@@ -54,7 +54,9 @@ def _iterated(chains: LegChains, target: Array, q: Array) -> tuple[Array, Array]
         if iteration == _ITERATIONS or not going.any():
             break
         busy, own = busy[going], np.ascontiguousarray(jacobians[going])
-        q[busy] += _step(own, error[going], left[busy])
+        step = _step(own, error[going], left[busy])
+        q[busy] += step
+        busy = busy[np.abs(step).max(axis=(1, 2)) > _STILL]
     return q, left
 
 

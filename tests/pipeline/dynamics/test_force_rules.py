@@ -11,13 +11,12 @@ import pytest
 from pipeline.dynamics.force_rules import GroundForces, LeastTorque, Stance
 from pipeline.dynamics.internal_forces import internal_basis, out_of_bounds
 from pipeline.dynamics.joint_demand import segment_demand
-from pipeline.errors import TippingError
 from pipeline.motion.motion import Segment
 from pipeline.motion.walking import walking_motion
-from pipeline.robot.robot import Robot, load_robot
+from pipeline.robot.robot import Robot
 from tests.pipeline.robot.walkers import MIXED, walker
 
-LIMITS = (None, 0.6, 0.15)
+LIMITS = (None, 0.15)
 
 
 @dataclass(frozen=True)
@@ -76,14 +75,14 @@ def test_no_forces_within_bounds_have_less_torque_squared(
     assert not out_of_bounds(force, limit).any()
     rng = np.random.default_rng(4)
     tried = 0
-    for _ in range(300):
+    for _ in range(120):
         step = rng.normal(size=basis.shape[-1]) * 10.0 ** rng.uniform(-3, 2)
         other = force + basis @ step
         inside = ~out_of_bounds(other, limit)
         tried += int(inside.sum())
         more = (stance.loaded_torque(other) ** 2).sum(axis=1)
         assert np.all(more[inside] >= least[inside] * (1 - 1e-6))
-    assert tried > 100
+    assert tried > 40
 
 
 @pytest.mark.parametrize("limit", LIMITS)
@@ -109,14 +108,6 @@ def test_joints_that_bear_no_ground_force_keep_their_torque(hexapod: Robot) -> N
         columns = hexapod.layout.of(hexapod.leg_names.index(leg))
         same = np.array_equal(plain.torque[:, columns], other.torque[:, columns])
         assert same == (leg not in segment.stance)
-
-
-def test_where_a_robot_tips_no_rule_helps(hexapod: Robot) -> None:
-    robot = load_robot(hexapod.spec.with_parameters({"hip_spacing": 0.20}))
-    segment = walking_motion(robot, samples=51).segments[0]
-    for rule in (None, LeastTorque()):
-        with pytest.raises(TippingError, match="tips at t"):
-            segment_demand(robot, segment, forces=GroundForces(rule))
 
 
 def test_internal_forces_add_up_to_nothing() -> None:

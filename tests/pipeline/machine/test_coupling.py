@@ -98,12 +98,6 @@ def test_walking_with_a_coupling_keeps_the_balance_of_power(motion: Measurement)
     np.testing.assert_allclose(given, taken, atol=1e-9 * np.abs(taken).max())
 
 
-def test_standing_with_a_coupling_the_motors_balance_every_joint() -> None:
-    torque = np.array([3.0, -7.0, 5.0])
-    held = Drivetrains("coupled", actuators()).holding(torque)
-    np.testing.assert_allclose(RATIO * held.motor_torque @ C, torque, atol=1e-12)
-
-
 def lossy() -> tuple[JointModel, ...]:
     """Friction of every kind at the joint side, between frame and motor, and a rotor."""
     rubbing = Friction("friction", coulomb=2.0, load=0.1, viscous=1.5)

@@ -23,10 +23,7 @@ from pipeline.robot.robot_file import load_robot_file
 SLOPES = {"slope_forward": "6 deg", "slope_left": "-4 deg"}
 #: Robot, then what its table ``[gait]`` states on top of its file.
 GAITS: dict[str, tuple[str, dict[str, Any]]] = {
-    "ripple": ("hexapod", {"name": "ripple", "transfer_path": "cycloid"}),
-    "backward wave": ("hexapod", {"name": "wave", "heading": "backward"}),
     "sideways tetrapod uphill": ("hexapod", {"name": "tetrapod", "heading": "left", **SLOPES}),
-    "tripod on the spot": ("hexapod", {"yaw_rate": "8 deg/s"}),
     "ripple in a bend on a slope, tilted": (
         "hexapod",
         {"name": "ripple", "speed": "0.05 m/s", "yaw_rate": "-6 deg/s", "heading": "30 deg"}
@@ -163,7 +160,7 @@ def test_standing_on_a_slope_has_the_feet_in_its_plane(root: Path, tilt: dict[st
     np.testing.assert_allclose(np.degrees(np.arctan(rise)), [6, -4])
 
 
-@pytest.mark.parametrize("period", [1.83, 2.17, 2.3, 0.7, 1 / 3])
+@pytest.mark.parametrize("period", [2.17, 1 / 3])
 def test_no_period_makes_time_run_backwards(root: Path, period: float) -> None:
     robot = walker(root, "hexapod", {"name": "wave", "duty_factor": 0.87, "period": f"{period} s"})
     segments = walking_motion(robot, samples=51).segments

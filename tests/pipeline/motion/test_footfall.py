@@ -62,9 +62,9 @@ def least_margin(gait: Gait) -> float:
 @pytest.mark.parametrize(
     ("count", "duty"),
     [
-        *((2, duty) for duty in (0.76, 0.8, 5 / 6, 0.9, 0.97)),
-        *((3, duty) for duty in (0.5, 0.55, 0.6, 2 / 3, 0.75, 5 / 6, 0.95)),
-        *((4, duty) for duty in (0.5, 0.6, 0.75, 0.9)),
+        *((2, duty) for duty in (0.76, 5 / 6, 0.97)),
+        *((3, duty) for duty in (0.5, 2 / 3, 0.95)),
+        *((4, duty) for duty in (0.6, 0.9)),
         (5, 0.7),
     ],
 )
@@ -77,19 +77,12 @@ def test_wave_gaits_have_the_longitudinal_margin_of_song_and_waldron(
     assert least_margin(walked(legs, named("wave", legs, duty))) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize("stroke", [0.1, 0.2, 0.28])
+@pytest.mark.parametrize("stroke", [0.1, 0.28])
 def test_the_tripods_margin_is_half_the_pitch_less_half_the_stroke(stroke: float) -> None:
     legs = pairs(3)
     for footfall in (named("tripod", legs, None), named("wave", legs, 0.5)):
         margin = least_margin(walked(legs, footfall, stroke))
         assert margin == pytest.approx((PITCH - stroke) / 2)
-
-
-def test_another_order_of_the_same_legs_has_less_margin_than_the_wave() -> None:
-    legs = pairs(3)
-    wave = named("wave", legs, 0.75)
-    forward = own({leg: -phase for leg, phase in wave.phase.items()}, wave.duty)
-    assert least_margin(walked(legs, forward)) < least_margin(walked(legs, wave)) - 0.01
 
 
 @pytest.mark.parametrize("name", GAITS)
@@ -106,14 +99,6 @@ def test_a_named_gait_stands_on_its_number_of_feet(name: str) -> None:
             "wave": {7},
         }[name]
     )
-
-
-def test_the_tripods_two_sets_stand_in_turn() -> None:
-    stances = named("tripod", pairs(3), None).stances()
-    assert [(b, e, set(s)) for b, e, s in stances] == [
-        (0.0, 0.5, {"l0", "l2", "r1"}),
-        (0.5, 1.0, {"r0", "r2", "l1"}),
-    ]
 
 
 def test_sets_in_turn_swing_one_after_another() -> None:

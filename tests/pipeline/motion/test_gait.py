@@ -93,14 +93,9 @@ def test_standing_lifts_the_other_feet(hexapod: Robot, feet: tuple[str, ...]) ->
     ("numbers", "gait", "message"),
     [
         ({"foot_stroke": 1.2, "walking_speed": 0.8}, {}, r"leg '\w+' at t = .* beyond its reach"),
-        ({"walking_speed": 0.2}, {}, "foot_stroke is 0.24 m; change one"),
         ({"walking_speed": 0.16 * (1 + 2e-6)}, {}, "change one"),
         ({"walking_speed": 0.16 * (1 - 2e-6)}, {}, "change one"),
-        ({}, {"transfer_path": "cyclod"}, "did you mean 'cycloid'"),
-        ({}, {"tripods": [["lf", "lr", "rm"]]}, "must part the legs .* in two sets"),
-        ({}, {"tripods": [["lf", "lr", "rm"], ["rf", "rr"]]}, "must part the legs"),
         ({}, {"tripods": [["lf", "lr", "rm"], ["rf", "rr", "rm"]]}, "must part the legs"),
-        ({}, {"tripods": [["lf", "lr"], ["rm", "rf"], ["rr", "lm"]]}, "must part the legs"),
     ],
 )
 def test_numbers_that_cannot_be_walked_are_refused(

@@ -22,7 +22,7 @@ from pipeline.robot.inverse.start_posture import start_postures
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 
-QUADRUPEDS = ("solo12", "solo8", "anymal_c", "hyq", "a1", "go2", "b1", "laikago")
+QUADRUPEDS = ("solo8", "go2", "laikago")
 CRAWL = {"name": "crawl", "period": "3 s", "stroke": "60 mm", "lift": "40 mm"}
 
 
@@ -39,8 +39,10 @@ def least_margin(robot: Robot, motion: Motion) -> float:
     return min(float(stability_margins(robot, s).min()) for s in motion.segments)
 
 
-@pytest.mark.parametrize("name", ["solo12", "anymal_c"])
-@pytest.mark.parametrize("extra", [{}, {"slope_forward": "10 deg", "slope_left": "5 deg"}])
+@pytest.mark.parametrize(
+    ("name", "extra"),
+    [("solo12", {"slope_forward": "10 deg", "slope_left": "5 deg"}), ("anymal_c", {})],
+)
 def test_crawl_keeps_the_stated_margin_and_no_foot_pulls(
     root: Path, name: str, extra: dict[str, str]
 ) -> None:
@@ -51,11 +53,6 @@ def test_crawl_keeps_the_stated_margin_and_no_foot_pulls(
         assert contacts is not None
 
 
-def test_without_sway_the_same_crawl_has_less_margin(root: Path) -> None:
-    plain = walker(root, "anymal_c", {"name": "crawl", "sway": "none"})
-    assert least_margin(plain, walking_motion(plain, samples=51)) < 0.01
-
-
 def test_where_the_margin_is_kept_anyway_the_body_does_not_sway(root: Path) -> None:
     gait = {"name": "ripple", "transfer_path": "cycloid"}
     still = walking_motion(walker(root, "hexapod", gait), samples=51)
@@ -63,17 +60,6 @@ def test_where_the_margin_is_kept_anyway_the_body_does_not_sway(root: Path) -> N
     swayed = walking_motion(walker(root, "hexapod", gait), samples=51)
     for a, b in zip(still.segments, swayed.segments, strict=True):
         np.testing.assert_allclose(a.configuration, b.configuration, atol=1e-9)
-
-
-def test_more_margin_asks_more_sway(root: Path) -> None:
-    spread = []
-    for margin in ("5 mm", "15 mm", "25 mm"):
-        robot = walker(root, "solo12", {"name": "crawl", "stability_margin": margin})
-        path = np.concatenate(
-            [s.configuration[:, 1] for s in walking_motion(robot, samples=51).segments]
-        )
-        spread.append(float(np.sqrt(np.mean(path**2))))
-    assert spread[0] < spread[1] < spread[2]
 
 
 def test_what_is_said_to_be_attainable_is(root: Path) -> None:

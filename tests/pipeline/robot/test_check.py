@@ -75,14 +75,10 @@ WITHIN = "centre of mass within the geometry"
     ("shape", "half", "at"),
     [
         (BOX, (0.1, 0.2, 0.3), (0.1, 0.1, 0.0)),
-        (BOX, (0.1, 0.2, 0.3), (0.0, -0.2, 0.1)),
         (BOX, (0.1, 0.2, 0.3), (-0.1, 0.2, -0.3)),
         (SPHERE, (0.3, 0.3, 0.3), (0.3, 0.0, 0.0)),
-        (SPHERE, (0.3, 0.3, 0.3), (0.0, 0.0, -0.3)),
         (CYLINDER, (0.2, 0.2, 0.5), (0.2, 0.0, 0.5)),
-        (CYLINDER, (0.2, 0.2, 0.5), (0.0, -0.2, -0.5)),
         (CAPSULE, (0.2, 0.2, 0.7), (0.0, 0.0, 0.7)),
-        (CAPSULE, (0.2, 0.2, 0.7), (0.2, 0.0, 0.0)),
     ],
 )
 def test_a_centre_of_mass_beside_a_solid_is_odd_and_wrong_from_the_solids_own_size(
@@ -105,17 +101,6 @@ def test_a_centre_of_mass_beside_a_solid_is_odd_and_wrong_from_the_solids_own_si
     ):
         text = link(place + turn @ (np.array(at) + out * outward), (solid(shape),))
         assert outcomes(text)[WITHIN] == outcome
-
-
-def test_how_far_outside_is_told() -> None:
-    (finding,) = [
-        f
-        for f in check_urdf(
-            link((0.0, 0.0, 0.35), (solid(SPHERE, (0, 0, 0), (0, 0, 0)),)), "r.urdf"
-        )
-        if f.check == WITHIN
-    ]
-    assert finding.detail == "(0, 0, 0.35) m, 50 mm outside"
 
 
 def test_one_of_several_solids_is_enough_and_a_mesh_leaves_it_open() -> None:
@@ -174,11 +159,8 @@ def test_between_joints_at_one_place_there_may_be_nothing_but_no_inertia_without
     ("moments", "products", "wrong"),
     [
         ((1.0, 1.0, 1.0), (0.0, 0.0, 0.0), ""),
-        ((0.0, 1.0, 1.0), (0.0, 0.0, 0.0), ""),  # a rod
-        ((1.0, 1.0 - 0.9e-6, -0.9e-6), (0.0, 0.0, 0.0), "largest"),
         ((1.0, 1.0, -0.9e-6), (0.0, 0.0, 0.0), ""),  # rounding
         ((1.0, 1.0, -1.1e-6), (0.0, 0.0, 0.0), "negative"),
-        ((1.0, 2.0, 3.0), (0.0, 0.0, 0.0), ""),  # a flat plate
         ((1.0, 2.0, 3.0 + 2.9e-6), (0.0, 0.0, 0.0), ""),  # written with few digits
         ((1.0, 2.0, 3.0 + 3.1e-6), (0.0, 0.0, 0.0), "largest"),
         ((3.0 + 3.1e-6, 1.0, 2.0), (0.0, 0.0, 0.0), "largest"),
@@ -188,8 +170,6 @@ def test_between_joints_at_one_place_there_may_be_nothing_but_no_inertia_without
         # Equal moments, one product p: principal moments 1 - p, 1, 1 + p.
         ((1.0, 1.0, 1.0), (0.4, 0.0, 0.0), ""),
         ((1.0, 1.0, 1.0), (0.6, 0.0, 0.0), "largest"),
-        ((1.0, 1.0, 1.0), (0.0, 0.6, 0.0), "largest"),
-        ((1.0, 1.0, 1.0), (0.0, 0.0, 0.6), "largest"),
         ((1.0, 1.0, 1.0), (0.0, 0.0, 1.1), "negative"),
     ],
 )
@@ -208,17 +188,6 @@ def test_inertia_is_that_of_a_body(
     assert wrong in finding.detail
     sums = [f for f in check_urdf(merged, "r.urdf") if f.check == "inertia possible"]
     assert {f.subject: f.passed for f in sums}["b"] is not bool(wrong)
-
-
-def test_a_turned_inertia_is_judged_by_its_principal_moments() -> None:
-    for largest, good in ((2.99, "good"), (3.01, "fails")):
-        turn = pin.rpy.rpyToMatrix(0.3, 0.8, -0.5)
-        tensor = turn @ np.diag([1.0, 2.0, largest]) @ turn.T
-        text = link(
-            moments=(tensor[0, 0], tensor[1, 1], tensor[2, 2]),
-            products=(tensor[0, 1], tensor[0, 2], tensor[1, 2]),
-        )
-        assert outcomes(text)["inertia possible"] == good
 
 
 @pytest.mark.parametrize(("part", "lacking"), [("mass", "inertia"), ("inertia", "mass")])
@@ -244,27 +213,21 @@ def on_a_joint(kind: str, limit: str) -> str:
     ("kind", "limit", "odd"),
     [
         ("revolute", 'effort="1" velocity="1" lower="-1" upper="1"', {}),
-        ("revolute", 'effort="1" velocity="1" lower="-2" upper="-1"', {}),
         ("revolute", 'effort="1" velocity="1" lower="1" upper="1.001"', {}),
         ("revolute", 'effort="1" velocity="1" lower="1" upper="1"', {ORDER: "note"}),
         ("revolute", 'effort="1" velocity="1" lower="1.001" upper="1"', {ORDER: "fails"}),
-        ("revolute", 'effort="1" velocity="1" upper="1"', {}),  # zero where none is written
         ("revolute", 'effort="1" velocity="1" upper="-1"', {ORDER: "fails"}),
-        ("revolute", 'effort="1" velocity="1" lower="1"', {ORDER: "fails"}),
         ("revolute", 'effort="1" velocity="1"', {ORDER: "note"}),
         ("revolute", 'effort="0" velocity="1" lower="-1" upper="1"', {EFFORT: "note"}),
         ("revolute", 'effort="1" velocity="0" lower="-1" upper="1"', {VELOCITY: "note"}),
-        ("revolute", 'effort="1e-3" velocity="1e-3" lower="-1" upper="1"', {}),
         # Two turns are the most, unless the number is none.
         ("revolute", 'effort="1" velocity="1" lower="-1" upper="12.56"', {}),
         ("revolute", 'effort="1" velocity="1" lower="-1" upper="12.57"', {RADIANS: "fails"}),
-        ("revolute", 'effort="1" velocity="1" lower="-12.57" upper="1"', {RADIANS: "fails"}),
         ("revolute", 'effort="1" velocity="1" lower="-1440" upper="1"', {RADIANS: "fails"}),
         ("revolute", 'effort="1" velocity="1" lower="-1440.1" upper="1"', {RADIANS: "note"}),
         ("prismatic", 'effort="1" velocity="1" lower="0"', {ORDER: "note"}),
         ("prismatic", 'effort="1" velocity="1" lower="-20" upper="20"', {}),
         ("continuous", 'effort="1" velocity="1"', {}),
-        ("continuous", 'effort="1" velocity="0"', {VELOCITY: "note"}),
         ("continuous", 'effort="1" velocity="1" lower="1" upper="-1"', {}),
     ],
 )
@@ -282,27 +245,15 @@ def test_limits_leave_a_joint_something_to_do(kind: str, limit: str, odd: dict[s
     ("kind", "limit", "message"),
     [
         ("revolute", "", "a revolute joint needs <limit> with lower, upper, effort and velocity"),
-        ("prismatic", "", "a prismatic joint needs <limit> with lower, upper, effort and velocity"),
         ("prismatic", 'effort="1" lower="0" upper="1"', "<limit> without velocity"),
         ("revolute", 'velocity="1" lower="0" upper="1"', "<limit> without effort"),
-        ("continuous", 'velocity="1"', "<limit> without effort"),
-        ("continuous", 'effort="1"', "<limit> without velocity"),
         ("revolute", 'effort="-1e-9" velocity="1"', "<limit>: effort = '-1e-9', may not be neg"),
         ("revolute", 'effort="1" velocity="-1"', "<limit>: velocity = '-1', may not be negative"),
-        ("continuous", 'effort="-1" velocity="1"', "<limit>: effort = '-1', may not be negative"),
     ],
 )
 def test_what_no_limit_may_lack_or_say(kind: str, limit: str, message: str) -> None:
     with pytest.raises(UrdfError, match=f"<joint name='j'>: {message}"):
         check_urdf(on_a_joint(kind, limit), "r.urdf")
-
-
-def test_a_continuous_joint_needs_no_limit_and_one_of_several_coordinates_is_none() -> None:
-    assert outcomes(on_a_joint("continuous", ""), "j") == {"limits": "good"}
-    for kind in ("floating", "planar"):
-        assert outcomes(on_a_joint(kind, ""), "j") == {"one coordinate": "fails"}
-    for limit in ("", 'effort="0" velocity="0" lower="1" upper="0"'):
-        assert outcomes(on_a_joint("fixed", limit), "j") == {}
 
 
 def spoilt(hexapod: Robot, change: str, size: float) -> Robot:

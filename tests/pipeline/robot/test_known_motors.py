@@ -9,7 +9,6 @@ import pytest
 
 import pipeline as lw
 from actuators.loading.build import load_catalog
-from pipeline.cli.main import main
 from pipeline.errors import RobotFileError
 from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.guess.motors import KNOWN, TABLE, known_motors
@@ -61,19 +60,6 @@ def test_solo12s_copper_loss_while_standing_is_its_torque_over_its_motor_constan
     power = float(standing.holding["solo12"].power.sum())
     assert 0.5 * most < power < most
     assert math.isclose(per_watt, 6.89, rel_tol=1e-3)
-
-
-def test_init_says_first_whose_motors_they_are(
-    tmp_path: Path, sketched: None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["init", "solo12", "--out", str(tmp_path / "solo12.toml")]) == 0
-    first = capsys.readouterr().out.splitlines()[0]
-    assert first.startswith("Whose motors: as stated for this robot, T-Motor Antigravity 4004")
-    assert main(["init", "a1", "--out", str(tmp_path / "a1.toml")]) == 0
-    first = capsys.readouterr().out.splitlines()[0]
-    assert first.startswith("Whose motors: none are stated for this robot; assumed at every joint")
-    assert "maxon RE 40" in first
-    assert "400:1" in first
 
 
 def test_another_folder_takes_the_place_of_the_known_one(root: Path) -> None:
