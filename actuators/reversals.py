@@ -89,10 +89,10 @@ def _crossings(series: ShaftSeries, signs: Array) -> tuple[Index, Array, Index]:
     v, a = series.velocity, series.acceleration
     low, high = np.zeros(interval.size), np.ones(interval.size)
     first = signs[interval, joint]
-    ends = [x[k, joint] for x in (v, a) for k in (interval, interval + 1)]
+    low_v, high_v, low_a, high_a = (x[k, joint] for x in (v, a) for k in (interval, interval + 1))
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
-        value = _hermite(*ends, step[interval], middle)
+        value = _hermite(low_v, high_v, low_a, high_a, step[interval], middle)
         before = value * first > 0.0
         low, high = np.where(before, middle, low), np.where(before, high, middle)
     return interval, 0.5 * (low + high), joint
@@ -100,7 +100,7 @@ def _crossings(series: ShaftSeries, signs: Array) -> tuple[Index, Array, Index]:
 
 def _zeros_on_samples(time: Array, signs: Array) -> tuple[Index, Index]:
     """Return row and joint of zeros on samples where a sign changes or a stay at rest ends."""
-    found: list[tuple[int, int]] = []
+    found: list[tuple[np.intp, np.intp]] = []
     joined = np.diff(time) > 0.0  # sample i and i + 1 lie in one block
     for column in np.flatnonzero((signs == 0.0).any(axis=0)):
         zero = np.diff(np.concatenate(([0], signs[:, column] == 0.0, [0])).astype(int))

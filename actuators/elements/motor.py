@@ -56,8 +56,3 @@ class DCMotor(Numbers):
     def copper_loss(self, current: Array) -> Array:
         """Return R I^2, (...) [W]."""
         return self.resistance * current * current
-
-    def torque(self, voltage: Array, velocity: Array) -> Array:
-        """Return the air-gap torque (...) [N*m] that a voltage gives at a speed (forward)."""
-        current = (voltage - self.torque_constant * velocity) / self.resistance  # [A]
-        return self.torque_constant * current

@@ -71,27 +71,6 @@ class TwoBody(Numbers):
     winding_time: Scalars  #: Time constant of the winding [s].
     housing_time: Scalars  #: Time constant of the housing [s].
 
-    def balance(
-        self, copper: Array, other: Scalars = 0.0, *, ambient: float = REFERENCE_K
-    ) -> tuple[Array, Array]:
-        """Return the temperatures of winding and housing in the end, (...) [K].
-
-        Args:
-            copper: R I^2 with the data sheet's R, (...) [W].
-            other: Heat in the housing, (...) [W].
-            ambient: [K].
-
-        Returns:
-            Both infinite where the winding runs away.
-        """
-        total = self.winding_to_housing + self.housing_to_ambient
-        left = 1.0 - COPPER * np.asarray(copper) * total
-        cold = copper * (1.0 + COPPER * (ambient - REFERENCE_K))
-        rise = cold * total + other * self.housing_to_ambient
-        winding = np.where(left > 0.0, rise / np.where(left > 0.0, left, 1.0), np.inf)
-        housing = self.housing_to_ambient * (cold + COPPER * copper * winding + other)
-        return ambient + winding, ambient + housing
-
     def day(
         self,
         seconds: Array,

@@ -47,7 +47,6 @@ class Component:
     name: str  #: The file's stem.
     kind: str  #: One of `KINDS`.
     title: str  #: What it is, in words.
-    note: str  #: What its values claim and what they do not; may be empty.
     parameters: ParameterSet
 
 
@@ -58,7 +57,7 @@ def _component(path: Path) -> Component:
     # What is needed, alternatives say: they name each number, and one that none names is refused.
     optional = frozenset({"mass"} if written.kind == MOTOR_KIND else kinds)
     parameters = parameters_from_table(written.parameters, kinds, file, optional)
-    return Component(path.stem, written.kind, written.title, written.note, parameters)
+    return Component(path.stem, written.kind, written.title, parameters)
 
 
 @dataclass(frozen=True)

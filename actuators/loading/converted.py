@@ -36,7 +36,7 @@ def converted(x: Mapping[str, float]) -> Found:
         "motor.supply_voltage": (math.sqrt(c) * x["supply_voltage"], f"sqrt(c) U, c = {c:g}"),
         "gear.ratio": (n, ""),
     }
-    out |= _gear(x)
+    out |= gear_friction(x)
     load = out.get("gear.load", (0.0, ""))[0]
     out |= _rotor(x, load, {name: value for name, (value, _) in out.items()})
     turns = n ** x["shaft"]
@@ -59,8 +59,8 @@ def converted(x: Mapping[str, float]) -> Found:
     return out
 
 
-def _gear(x: Mapping[str, float]) -> Found:
-    """Friction of the gear: drive 1 / (1 + load) of the power, driven back 1 - load of it."""
+def gear_friction(x: Mapping[str, float]) -> Found:
+    """Friction of a gear: drive 1 / (1 + load) of the power, driven back 1 - load of it."""
     out: Found = {}
     start = x.get("gear_starting_torque", 0.0)
     run = x.get("gear_running_torque", start)

@@ -1,15 +1,7 @@
-"""Parts that can be bought: what their data sheets print, one file each, by kind.
+"""Parts that can be bought: what their data sheets print, one TOML file each, by kind.
 
-    actuators/components/motor/maxon_148867.toml
-
-    title = "maxon RE 40, 150 W, 24 V"
-    basis = "datasheet"                 # or identified, assumed
-    source = "..."
-    [printed]
-    torque_constant = "0.0302 N*m/A"    # number and unit; LOW to HIGH UNIT where none is printed
-
-The folder says the kind. What a sheet does not print is a range, taken from parts of its class that
-print it, so that no part wins by saying less.
+The folder says the kind; `actuators/components/README.md` has the format. What a sheet does not
+print is a range, taken from parts of its class that print it, so that no part wins by saying less.
 """
 
 from collections.abc import Iterator, Mapping
@@ -107,7 +99,6 @@ class Part:
     name: str  #: Of its file.
     kind: str  #: One of `KINDS`.
     title: str  #: What it is.
-    part: str  #: The maker's number; may be empty.
     basis: str  #: Of its numbers.
     source: str  #: Where they were read.
     note: str  #: What is doubtful or filled in from its class.
@@ -150,7 +141,7 @@ def load_part(path: Path) -> Part:
         printed = {n: read_entry(n, text, KINDS[kind]) for n, text in w.printed.items()}
     except DataSheetError as error:
         raise DataSheetError(f"{file}: {error}") from None
-    return Part(path.stem, kind, w.title, w.part, w.basis, w.source, w.note, printed)
+    return Part(path.stem, kind, w.title, w.basis, w.source, w.note, printed)
 
 
 def odd(part: Part) -> Iterator[str]:

@@ -69,11 +69,6 @@ class Battery(Numbers):
         root = np.sqrt(np.where(left >= 0.0, left, np.nan))
         return np.asarray(2.0 * power / (voltage + root))
 
-    def voltage(self, power: Array, charged: Array) -> Array:
-        """Return the voltage at the terminals, (...) [V]; see `current`."""
-        drop = self.resistance * self.current(power, charged)
-        return np.asarray(self.open_voltage(charged) - drop)
-
     def charge_at_end(self, power: Array, cut_off: float = 0.0) -> Array:
         """Return the share of charge that stays, (...) in [0, 1]; 1 where it cannot even begin.
 

@@ -12,7 +12,7 @@ from actuators.supply.battery import Battery
 from pipeline.api.machine import Machine
 from pipeline.choice.answer.full import Full, through
 from pipeline.choice.asked import Asked, asked_of
-from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines, effects_of
+from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines
 from pipeline.choice.group import Found, merged
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.missions.mission import Mode
@@ -166,9 +166,9 @@ def _doubts(
     draws: int,
 ) -> dict[str, Doubt]:
     """Every group's candidates in draws of what is not printed, and of found effects."""
-    added, effects = asked.added(robots.mass), effects_of(asked.machine)
-    days = []
-    for values, own in drawn_machines(asked.machine):
+    added, days = asked.added(robots.mass), []
+    effects, machines = drawn_machines(asked.machine)
+    for values, own in machines:
         loads = loads_of(own, asked.modes, added, along=robots.loads, spring=asked.spring)
         days.append((values, asked.demanded(loads)))
     return {

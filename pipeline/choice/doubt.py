@@ -16,7 +16,7 @@ goes with the actuators that are replaced.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -143,45 +143,38 @@ def doubt(
     return Doubt(*arrays, unknowns, values)
 
 
-def effects_of(machine: Machine) -> tuple[Unknown, ...]:
-    """What a machine's model file says of bodies and ground, with an interval."""
-    return tuple(
-        (
-            f"{edit.effect} of {place_text(edit.place)}",
-            p.name,
-            Number(p.value, *p.interval, p.unit, ""),
-        )
-        for edit in (machine.model.edits if machine.model else ())
+def drawn_machines(machine: Machine) -> tuple[tuple[Unknown, ...], list[tuple[Array, Machine]]]:
+    """What a machine's model file says of bodies and ground with an interval, E of it.
+
+    Returns:
+        These, and for every draw their values (E,) and the machine with them; none without any.
+    """
+    file = machine.model
+    every = [
+        (k, edit, p)
+        for k, edit in enumerate(file.edits if file else ())
         if effect_named(edit.effect).place_kind in _BODIES
         for p in edit.parameters
         if p.interval[0] < p.interval[1]
+    ]
+    if file is None or not every:
+        return (), []
+    unknowns = tuple(
+        (f"{e.effect} of {place_text(e.place)}", p.name, Number(p.value, *p.interval, p.unit, ""))
+        for _, e, p in every
     )
-
-
-def drawn_machines(machine: Machine) -> Iterator[tuple[Array, Machine]]:
-    """Values of `effects_of` (E,), and the machine with them, draw by draw; none without any."""
-    if effects := effects_of(machine):
-        low, high = np.array([(number.low, number.high) for _, _, number in effects]).T
-        for shares in LatinHypercube(len(effects), rng=2).random(_EFFECTS):
-            yield low + shares * (high - low), with_effects(machine, shares.tolist())
-
-
-def with_effects(machine: Machine, shares: Sequence[float]) -> Machine:
-    """The machine with each of `effects_of` at a share of its interval, 0 for the lower end."""
-    if (file := machine.model) is None:
-        return machine
-    left, edits = iter(shares), []
-    for edit in file.edits:
-        effect, own = effect_named(edit.effect), []
-        bounds = {p.name: (p.low, p.high) for p in effect.parameters}
-        for p in edit.parameters:
-            low, high = p.interval
-            if effect.place_kind in _BODIES and low < high:
-                value = float(np.clip(low + next(left) * (high - low), *bounds[p.name]))
-                p = replace(p, value=value, interval=(value, value))
-            own.append(p)
-        edits.append(replace(edit, parameters=tuple(own)))
-    return machine.with_model(replace(file, edits=tuple(edits)))
+    low, high = np.array([p.interval for _, _, p in every]).T
+    draws = []
+    for shares in LatinHypercube(len(every), rng=2).random(_EFFECTS):
+        edits, values = list(file.edits), low + shares * (high - low)
+        for (k, edit, p), value in zip(every, values.tolist(), strict=True):
+            (bound,) = (x for x in effect_named(edit.effect).parameters if x.name == p.name)
+            own = float(np.clip(value, bound.low, bound.high))
+            new = replace(p, value=own, interval=(own, own))
+            parameters = tuple(new if x.name == p.name else x for x in edits[k].parameters)
+            edits[k] = replace(edits[k], parameters=parameters)
+        draws.append((values, machine.with_model(replace(file, edits=tuple(edits)))))
+    return unknowns, draws
 
 
 def drawn(

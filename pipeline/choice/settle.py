@@ -1,11 +1,8 @@
 """Mass fed back until it settles: no group's design can be replaced by a better one.
 
 Along a motion the joint torques are affine in the masses of the actuators: with one demand, and one
-more for each group with a nudge of mass at its joints, that of any masses follows. So a robot, a
-design for each group, is counted in full with its own masses, limits included. Of the designs that
-searches at some masses found, one group after the other takes the best, until none changes; then
-motions and demand are made anew with the answer's masses, and searched again. A robot is replaced
-only by a better one, so that this ends and cannot swing between two.
+more for each group with a nudge of mass at its joints, that of any masses follows. A robot is
+replaced only by a better one, so that this ends and cannot swing between two.
 """
 
 from __future__ import annotations

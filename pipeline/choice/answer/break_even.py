@@ -140,7 +140,6 @@ def cost(
         full = through(load, built, Account())
         power = (full.power - full.idle)[counted].sum()
         return Cost(float(power), float(full.on[counted].sum()))
-    known_candidate(machine, name)
     chain = machine.ready.chain(name)
     result = chain.inverse(load.series)
     power = supply(result).supplied_energy / load.duration

@@ -1,21 +1,6 @@
 """A robot's day: a CSV of modes, each with its share of time and what the robot does in it.
 
-Columns, of which `mode` and one of `share` and `hours` are needed; a word may be left empty:
-
-    mode      name
-    share     of the time, all together 1; or
-    hours     in a day
-    gait      stand, or a gait's name; the robot file's own where empty
-    motion    CSV of a motion of one's own, beside the mission's file, in place of a gait
-    speed     of walking, with its unit
-    slope     by which the ground rises ahead, with its unit
-    payload   on the body, with its unit
-    standing  legs that stand, with spaces between; all for all
-    hold      motor (default), brake (engaged where there is one) or none (no torque is asked)
-    drivers   on (default), or off: of joints that lock, by a gear or a closed brake, and hold
-              without current
-
-and any key of the table [gait] as ``gait.KEY``.
+`pipeline/choice/README.md` says what each column is; a word may be left empty.
 """
 
 from __future__ import annotations

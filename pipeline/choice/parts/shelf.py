@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 
 from actuators.errors import CatalogError, DataSheetError, closest, one_line
-from actuators.loading.converted import converted
+from actuators.loading.converted import converted, gear_friction
 from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
 from actuators.loading.parts import DRIVER, Part, load_parts
 from actuators.supply.from_parts import driver_of
@@ -51,12 +51,6 @@ _OF_CLASS: Final = {
 _NEEDED: Final = {"motor": "mass", "brake": "holding_torque"}
 #: Of `Designs`, of which the least holds.
 _LIMITS: Final = ("gear_speed", "gear_continuous", "gear_peak")
-#: Motor by which a gear's sheet is converted: none of the gear's numbers depends on it.
-_ANY: Final = {
-    **dict.fromkeys(("current_of", "resistance_of", "torque_constant", "resistance"), 1.0),
-    **dict.fromkeys(("supply_voltage", "continuous_current", "peak_current", "rotor_inertia"), 1.0),
-    **dict.fromkeys(("back_drive_torque", "shaft"), 0.0),
-}
 Drawn = Mapping[tuple[str, str], float]
 Sheet = Mapping[str, Number]
 
@@ -140,11 +134,10 @@ class Shelf:
         if kind == "brake":
             out |= {"brake_torque": x["holding_torque"], "brake_power": x["release_power"]}
             return out | {"inertia": x.get("inertia", 0.0)}
-        sheet = x if kind == "motor" else _ANY | x
-        found = {key: value for key, (value, _) in converted(sheet).items()}
-        for law in ("load", "coulomb", "viscous", "inertia"):
-            out[law] = found.get(f"gear.{law}", 0.0)
-        out["ratio"] = found["gear.ratio"]
+        said = converted(x) if kind == "motor" else gear_friction(x)
+        found = {key: value for key, (value, _) in said.items()}
+        out |= {law: found.get(f"gear.{law}", 0.0) for law in ("load", "coulomb", "viscous")}
+        out |= {"ratio": x["gear_ratio"], "inertia": x.get("gear_inertia", 0.0)}
         if kind != "motor":
             out["gear_speed"] = x.get("gear_max_speed", np.inf)
             out["gear_continuous"] = x.get("gear_continuous_torque", np.inf)

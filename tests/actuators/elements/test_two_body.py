@@ -10,25 +10,23 @@ from actuators.elements.two_body import REFERENCE_K, TwoBody
 RE40 = TwoBody(1.93, 4.65, 42.8, 809.0)
 
 
-def test_in_balance_the_warm_winding_s_own_loss_leaves_through_both_resistances():
-    """Fixed point of R(T), by iteration."""
-    copper, other, ambient = 7.0, 2.0, 310.0
-    rise = 0.0
+@pytest.mark.parametrize("copper", [0.0, 5.0, 20.0])
+def test_a_day_of_one_mode_is_the_balance_of_the_warm_winding(copper):
+    """Its loss leaves through both resistances: a fixed point of R(T), by iteration."""
+    other, ambient, rise = 2.0, 310.0, 0.0
     for _ in range(200):
         warm = copper * (1 + COPPER * (ambient + rise - REFERENCE_K))
         rise = warm * (1.93 + 4.65) + other * 4.65
-    winding, housing = RE40.balance(np.array(copper), other, ambient=ambient)
-    assert winding - ambient == pytest.approx(rise, rel=1e-9)
-    assert housing - ambient == pytest.approx(4.65 * (warm + other), rel=1e-9)
+    day = RE40.day(np.array([3600.0]), np.array([copper]), other, ambient=ambient)
+    assert (day.peak, day.winding[0]) == pytest.approx((ambient + rise, ambient + rise))
+    assert day.housing[0] == pytest.approx(ambient + 4.65 * (warm + other))
 
 
-def test_a_day_of_one_mode_is_its_balance():
-    for copper in (0.0, 5.0, 20.0):
-        day = RE40.day(np.array([3600.0]), np.array([copper]), 1.0)
-        winding, housing = RE40.balance(np.array(copper), 1.0)
-        assert day.peak == pytest.approx(winding)
-        assert day.winding[0] == pytest.approx(winding)
-        assert day.housing[0] == pytest.approx(housing)
+def test_it_runs_away_from_the_loss_on_at_which_nothing_balances_it():
+    losses = np.array([0.999, 1.001]) / (COPPER * (1.93 + 4.65))
+    day = RE40.day(np.array([100.0, 20.0]), np.stack([losses, losses], axis=1))
+    assert day.runs_away.tolist() == [False, True]
+    assert np.isinf(day.resistance[1]).all()
 
 
 def integrated(body, seconds, copper, other, ambient, rounds):

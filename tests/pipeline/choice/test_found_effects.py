@@ -10,7 +10,7 @@ import pytest
 import pipeline as lw
 from actuators.loading.parts import load_parts
 from pipeline.api.machine import Machine
-from pipeline.choice.doubt import doubt, drawn_machines, effects_of
+from pipeline.choice.doubt import doubt, drawn_machines
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf
@@ -39,10 +39,9 @@ def machine() -> Machine:
 def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_value(machine: Machine) -> None:
     parts = load_parts()
     shelf = Shelf.of({name: parts[name] for design in DESIGNS for name in design if name})
-    effects = effects_of(machine)
+    effects, own = drawn_machines(machine)
     assert [(part, entry) for part, entry, _ in effects] == [("link_mass of base_link", "mass")]
     assert (effects[0][2].low, effects[0][2].high) == (1.5, 4.5)
-    own = [(x, m) for x, m in drawn_machines(machine)]
     joints = [j for j in machine.ready.robot.joints if j.endswith("_2")]
 
     def asked(one: Machine) -> Demanded:
@@ -60,3 +59,4 @@ def test_power_in_a_draw_is_that_of_the_robot_with_the_drawn_value(machine: Mach
         power = asked(again).power(shelf.designs(DESIGNS, sheet), Account())
         assert np.allclose(found.power[s], power, rtol=1e-9)
     assert found.moves()[k] > 0.0
+    assert drawn_machines(lw.load("urdf/hexapod.toml")) == ((), [])
