@@ -190,26 +190,15 @@ def solve_posture(spec: RobotSpec, target: Array) -> RobotSpec:
 
 
 def with_splits(values: Mapping[str, Number], ratio: float) -> dict[str, Number]:
-    """Numbers of components, the second ratio of each pair following from the first.
-
-    Args:
-        values: By reference.
-        ratio: Total ratio of every alternative.
-    """
+    """Numbers of components, the second ratio of each pair following from the total ratio."""
     pairs = {first: second for first, second in SPLITS.items() if first in values}
     return dict(values) | {second: ratio / values[first] for first, second in pairs.items()}
 
 
-def chain_at(
-    demand: Demand, catalog: Catalog, name: str, values: Mapping[str, float | Array]
-) -> Chain:
-    """An alternative for a demand's columns.
+def chain_at(catalog: Catalog, name: str, values: Mapping[str, float | Array]) -> Chain:
+    """An alternative for the columns of a demand of W sets.
 
-    Args:
-        demand: Of W sets.
-        catalog: The alternatives.
-        name: Which.
-        values: Numbers that stand in for the catalogue's, SI by reference: one, or one per set.
+    `values` stand in for the catalogue's numbers, SI by reference: one, or one per set (W,).
     """
     own = {k: np.repeat(v, COLUMNS) if np.ndim(v) else v for k, v in values.items()}
     return catalog.chain(name, own)
@@ -245,7 +234,7 @@ def outcomes(
 ) -> dict[str, Outcome]:
     """What every alternative makes of a demand; see `chain_at`."""
     return {
-        name: outcome(demand, chain_at(demand, catalog, name, values or {}))
+        name: outcome(demand, chain_at(catalog, name, values or {}))
         for name in catalog.alternatives
     }
 

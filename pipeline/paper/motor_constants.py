@@ -69,10 +69,7 @@ def data_sheet() -> ParameterSet:
 def no_load_current(torque_constant: float, coulomb: float, viscous: float) -> float:
     """Current at the data sheet's no-load speed with a rotor of given friction [A].
 
-    Args:
-        torque_constant: [N*m/A].
-        coulomb: Coulomb friction [N*m].
-        viscous: Viscous friction [N*m*s/rad].
+    Arguments in N*m/A, N*m and N*m*s/rad.
     """
     return (coulomb + viscous * data_sheet()["no_load_speed"]) / torque_constant
 
@@ -97,11 +94,9 @@ class Entries:
     ideal: tuple[float, float]  #: Motor torque of the ideal actuator at joints 2 and 3 [N*m].
 
     def factors(self, friction: Array | float, held: Array | float) -> Array:
-        """What stands before u and w, (E, ...).
+        """What stands before u and w, (E, ...), with a rotor's friction [N*m].
 
-        Args:
-            friction: Of the rotor [N*m].
-            held: What the reversible actuator's motor holds at joint 2 [N*m].
+        `held` is what the reversible actuator's motor holds at joint 2 [N*m].
         """
         friction, held = np.broadcast_arrays(friction, held)
         ideal = [np.full(friction.shape, torque) for torque in self.ideal]
@@ -114,14 +109,9 @@ class Entries:
     def meets(
         self, friction: Array | float, held: Array | float, u: Array, w: Array, rounding: float = 0
     ) -> NDArray[np.bool_]:
-        """Whether each entry comes out as printed, (E, W).
+        """Whether each entry comes out as printed, (E, W), with u and w (W,); see `factors`.
 
-        Args:
-            friction: Of the rotor [N*m].
-            held: By the reversible actuator's motor at joint 2 [N*m].
-            u: 1 / k, (W,) [A/(N*m)].
-            w: R / k, (W,) [V/(N*m)].
-            rounding: By which a value may miss a bound, relative to the upper one.
+        A value may miss a bound by `rounding`, relative to the upper one.
         """
         friction, held = np.broadcast_to(friction, u.shape), np.broadcast_to(held, u.shape)
         of_u, of_w = (self.powers[:, k, None] for k in (1, 2))

@@ -135,12 +135,10 @@ def assumptions() -> ParameterSet:
 
 
 def idle_break_even(even: float, holding: float, idle: float) -> float:
-    """Break-even with drivers that idle, in closed form; see the module.
+    """Break-even with drivers that idle [W, all together], in closed form; see the module.
 
-    Args:
-        even: Without them, fraction of time standing.
-        holding: Power of the reversible actuators standing, both middle legs [W].
-        idle: Of all their drivers together [W].
+    `even` is the break-even without them, `holding` the power of the reversible actuators standing
+    on both middle legs [W].
     """
     return even * holding / (even * holding + (1 - even) * (holding + idle))
 
@@ -149,12 +147,7 @@ def holding_friction(chain: Chain, gear: Hypoid, torque: Array) -> float:
     """Least friction at a hypoid's teeth with which its actuator holds joints without current [1].
 
     Bearings, gears and rotor help to hold, so that it is less than the gear's `locking_friction`;
-    zero where they hold alone.
-
-    Args:
-        chain: The actuator.
-        gear: The hypoid gear in it.
-        torque: To hold (J,) [N*m].
+    zero where they hold the torque (J,) [N*m] alone.
     """
 
     def spare(friction: float) -> float:
@@ -176,13 +169,7 @@ def costs_of(found: Mapping[str, Outcome], *, net: bool = False) -> Costs:
 def omissions(
     demand: Demand, catalog: Catalog, published: Mapping[str, Published]
 ) -> tuple[Omission, ...]:
-    """Every row, the paper's own way first.
-
-    Args:
-        demand: What the robot asks of its middle legs.
-        catalog: With the paper's four alternatives.
-        published: The printed values, for the closed form.
-    """
+    """Every row, the paper's own way first; the catalogue has the paper's four alternatives."""
     found = outcomes(demand, catalog)
     base = costs_of(found)
 

@@ -153,7 +153,7 @@ class Posterior:
         values |= {f.key: np.full(len(x), f.centre) for f in self.solved.values()}
         robots = np.clip(x[:, 0], 0, self.robots.count - 1).astype(np.intp)
         demand = self.robots.taken(robots)
-        ideal = drawn(demand, self._chain(demand, "ideal", values))[PUBLISHED_LEG]
+        ideal = drawn(demand, self._chain("ideal", values))[PUBLISHED_LEG]
         return _Sets(demand, ideal, values)
 
     def _goal(self, name: str, x: Array) -> Array:
@@ -165,18 +165,18 @@ class Posterior:
         aim = x[:, self.aims.start + self.aimed.index(name)]
         return target.centre + target.half_width * aim
 
-    def _chain(self, demand: Demand, name: str, values: dict[str, Array]) -> Chain:
+    def _chain(self, name: str, values: dict[str, Array]) -> Chain:
         """An alternative with one number per set."""
-        return chain_at(demand, self.task.catalog, name, with_splits(values, self.task.ratio))
+        return chain_at(self.task.catalog, name, with_splits(values, self.task.ratio))
 
     def target(self, name: str, sets: _Sets) -> Array:
         """A solved target of each set, (W,)."""
         if name == HELD:
-            chain = self._chain(sets.demand, "reversible", sets.values)
+            chain = self._chain("reversible", sets.values)
             # The torque of joint 2 is negative: the upper end of what holds is the least.
             return printed_leg(chain.holding(sets.demand.standing).high)[:, 1]
         alternatives = PAIR if name == EXTRA else [name.removeprefix(_RATIO)]
-        chains = {a: self._chain(sets.demand, a, sets.values) for a in alternatives}
+        chains = {a: self._chain(a, sets.values) for a in alternatives}
         energy = {a: drawn(sets.demand, chain) for a, chain in chains.items()}
         return _energy_target(name, energy, sets)
 
@@ -204,7 +204,7 @@ class Posterior:
     def _met(self, sets: _Sets) -> NDArray[np.bool_]:
         """Whether the other targets are met and every limit is kept, (W,)."""
         found = {
-            name: outcome(sets.demand, self._chain(sets.demand, name, sets.values))
+            name: outcome(sets.demand, self._chain(name, sets.values))
             for name in self.task.catalog.alternatives
         }
         energy = {name: o.drawn for name, o in found.items()}
@@ -236,11 +236,8 @@ def _moves(
 ) -> list[tuple[emcee.moves.Move, float]]:
     """Steps in the continuous coordinates, to other constants and to robots near by.
 
-    Args:
-        posterior: The density.
-        rng: Of everything random.
-        centre: Mean of the Gaussian towards whose draws the continuous coordinates turn, (C,).
-        factor: Of its covariance, lower triangular, (C, C).
+    The continuous coordinates turn towards draws of a Gaussian with the mean `centre` (C,) and the
+    lower triangular factor of its covariance (C, C).
     """
     own = posterior.continuous
     reach = max(int(_REACH * posterior.robots.count), 1)
@@ -273,12 +270,6 @@ def sample(posterior: Posterior, seed: Sequence[int], steps: int, walkers: int =
 
     Steps turn towards draws of the prior at first, then towards those of a Gaussian with the
     walkers' mean and covariance, found anew after a while; from then on they are kept.
-
-    Args:
-        posterior: The density.
-        seed: Of everything random.
-        steps: Of every walker.
-        walkers: How many.
 
     Returns:
         Walkers over the kept steps, (S, W, D).

@@ -74,14 +74,7 @@ def base_problem(robot: str) -> Problem:
 def problem(
     robot: str, path: str, reading: Reading = READ, without: tuple[str, ...] = ()
 ) -> Problem:
-    """One reading of the paper as a problem of its own.
-
-    Args:
-        robot: Robot file.
-        path: Transfer path.
-        reading: Of the paper.
-        without: Targets left out.
-    """
+    """One reading of the paper, without some targets, as a problem of its own."""
     base = base_problem(robot)
     axis = {"joint_1_axis_angle": math.radians(reading.axis_deg)}
     spec = base.spec.with_gait(transfer_path=path).with_parameters(axis)
@@ -152,15 +145,10 @@ def robots(robot: str, seed: int, count: int) -> Robots:
     """Draw robots, each with a path, that stand and walk as printed.
 
     Those that turn the motor faster than it may turn are left out: no actuator mends that.
-
-    Args:
-        robot: Robot file.
-        seed: Of the run.
-        count: How many.
     """
     rng = np.random.default_rng([seed, 4000])
     tasks = {path: problem(robot, path) for path in PATHS}
-    ideal = tasks[PATHS[0]].catalog.chain("ideal")
+    ideal = base_problem(robot).catalog.chain("ideal")
     fastest = ideal.motor.max_speed / np.asarray(ideal.ratio)  # of a joint [rad/s]
     found: list[tuple[Demand, str, Array]] = []
     while len(found) < count:

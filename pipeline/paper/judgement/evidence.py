@@ -76,10 +76,7 @@ def compared(values: Mapping[str, Any]) -> dict[str, Any]:
 def crossing(whole: Totals, cycle: str, stand: str) -> float:
     """Fraction of time standing at which reversible and irreversible cost the same.
 
-    Args:
-        whole: Per alternative: energies per cycle [J] and powers standing [W].
-        cycle: Whose energy per cycle.
-        stand: Whose power standing.
+    `cycle` and `stand` are the keys of energy per cycle and of power standing.
     """
     reversible, irreversible = (whole[name] for name in PAIR)
     saved = (reversible[stand] - irreversible[stand]) * CYCLE

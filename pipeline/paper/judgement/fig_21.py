@@ -27,12 +27,7 @@ class EnergyPerMinute:
 
 
 def per_minute(whole: Totals, sets: Sets) -> tuple[EnergyPerMinute, ...]:
-    """The line of every subject and alternative, with what is known of it.
-
-    Args:
-        whole: Ours.
-        sets: The calibration's; empty where they belong to other numbers.
-    """
+    """The line of every subject and alternative, with what the sets say of it."""
     fraction = np.linspace(0.0, 1.0, 101)
 
     def energy(cycle: Array, stand: Array) -> Array:

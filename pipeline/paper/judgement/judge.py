@@ -92,13 +92,7 @@ class Judgement:
 
 
 def judge(robot: Robot, by: Basis, *, samples: int = 751) -> Judgement:
-    """Judge the robot and its actuators as they stand.
-
-    Args:
-        robot: With a floating base.
-        by: What it may be judged by.
-        samples: Per half period.
-    """
+    """Judge the robot and its actuators as they stand, with so many samples per half period."""
     catalog, published, results = by.catalog, by.published, by.results
     part = robot_part(robot.spec, samples)
     found = outcomes(part.demand, catalog)

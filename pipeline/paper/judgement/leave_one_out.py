@@ -44,12 +44,7 @@ class Prediction:
 
 
 def leave_one_out(published: Mapping[str, Published], sets: Sets) -> list[Prediction]:
-    """Every target, left out.
-
-    Args:
-        published: The printed values.
-        sets: The calibration's; none of those without some targets where it is empty.
-    """
+    """Every target, left out, as the calibration's sets without it have it."""
     nothing = (math.nan, *NONE)
     rows = [
         _predicted(published, name, name, nothing, f"nothing: it fixes {of}")

@@ -82,12 +82,7 @@ def _reading(
 
 
 def consumption(point: Mapping[str, Any], *, net: bool) -> dict[str, dict[str, float]]:
-    """Energy per cycle of a stored point by alternative and leg [J].
-
-    Args:
-        point: As the search keeps it.
-        net: Whether what flows back is taken off.
-    """
+    """Energy per cycle of a stored point by alternative and leg [J]."""
     return {
         name: {leg: e - (point["returned"][name][leg] if net else 0.0) for leg, e in legs.items()}
         for name, legs in point["drawn"].items()
@@ -109,9 +104,7 @@ def supported(found: Sequence[CalibratedReading]) -> CalibratedReading | None:
 def verdict(found: Sequence[CalibratedReading], point: Mapping[str, Any]) -> tuple[str, str]:
     """In words: which reading the numbers support, what speaks against it, what stays open.
 
-    Args:
-        found: Every reading.
-        point: The calibrated point, for what another reading makes of its numbers.
+    Of the calibrated point is said what another reading makes of its numbers.
     """
     net, drawn = (
         ", ".join(f"{ratio:.1f}" for ratio in walking_ratios(point, net=n).values())
@@ -200,12 +193,7 @@ class ReadingRow:
 def reading_rows(
     results: Mapping[str, Any], published: Mapping[str, Published]
 ) -> list[ReadingRow]:
-    """Every reading with every printed value, its constraints and the discriminators.
-
-    Args:
-        results: The stored calibration.
-        published: The printed values.
-    """
+    """Every reading with every printed value, its constraints and the discriminators."""
     out = []
     for entry in results["readings"]:
         words = "net" if entry["net"] else "drawn"

@@ -205,12 +205,7 @@ def stage_ratios(outcomes: Mapping[str, Outcome]) -> dict[str, float]:
 
 
 def break_evens(whole: Totals, sets: Sets) -> tuple[Row, ...]:
-    """Where the lines of Fig. 21 cross, for every subject.
-
-    Args:
-        whole: Ours.
-        sets: The calibration's; empty where they belong to other numbers.
-    """
+    """Where the lines of Fig. 21 cross, for every subject."""
     quantity = "fraction of time standing above which the irreversible actuator uses less"
     rows = [Row(subject, "Fig. 21", quantity, "1") for subject in SUBJECTS]
     found = judged(rows, crossings(whole), sets)

@@ -52,11 +52,11 @@ def test_many_sets_at_once_are_each_set_by_itself(part: RobotPart, catalog: Cata
     friction = {"harmonic_drive.coulomb": np.array([0.5, 0.8])}
     both = joined(demands)
     assert both.count == 2
-    together = outcome(both, chain_at(both, catalog, "reversible", friction))
+    together = outcome(both, chain_at(catalog, "reversible", friction))
     energy = drawn(both, together.chain)
     for k, demand in enumerate(demands):
         own = {key: float(values[k]) for key, values in friction.items()}
-        alone = outcome(demand, chain_at(demand, catalog, "reversible", own))
+        alone = outcome(demand, chain_at(catalog, "reversible", own))
         for name in MIDDLE_LEGS:
             assert together.drawn[name][k] == pytest.approx(alone.consumed(name), rel=1e-12)
             returned = alone.consumed(name) - alone.consumed(name, net=True)
