@@ -13,7 +13,7 @@ entries that contradict one another: those that the best rotor friction leaves u
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -41,13 +41,13 @@ _DATA_SHEET = {
 }
 _LOADED = ("2", "3")  # joints of Tables IV to VI
 _ENERGY = "leg_energy_3s"
-#: Of each kind of entry: the torque's power, and those of u and w.
+#: Powers of u and w in each kind of entry.
 _POWERS = {
-    "motor_torque": (1, 0, 0),
-    "current": (1, 1, 0),
-    "voltage": (1, 0, 1),
-    "power": (2, 1, 1),
-    _ENERGY: (2, 1, 1),
+    "motor_torque": (0, 0),
+    "current": (1, 0),
+    "voltage": (0, 1),
+    "power": (1, 1),
+    _ENERGY: (1, 1),
 }
 _SLACK = 1e-9  # as `Published.reproduced` has it
 #: Frictions tried around what Table V asks for: this far [N*m], in these steps.
@@ -81,70 +81,74 @@ def joint_torques(published: Mapping[str, Published]) -> tuple[float, float]:
     return two, three
 
 
-@dataclass(frozen=True)
-class Entries:
-    """E electrical entries of Tables IV to VI as bounds on the motor's constants."""
+def entries(
+    published: Mapping[str, Published], friction: Array | float, held: Array | float
+) -> dict[str, Array]:
+    """The electrical entries of Tables IV to VI, by id: what stands before u and w (...).
 
-    ids: tuple[str, ...]  #: Of the printed values.
-    powers: NDArray[np.intp]  #: Of the torque, u and w, (E, 3).
-    #: How often each of six torques counts: joints 2 and 3 of the three tables, (E, 6).
-    weights: Array
-    low: Array  #: Least magnitudes that round to the printed ones, SI, (E,).
-    high: Array  #: Greatest.
-    ideal: tuple[float, float]  #: Motor torque of the ideal actuator at joints 2 and 3 [N*m].
-
-    def factors(self, friction: Array | float, held: Array | float) -> Array:
-        """What stands before u and w, (E, ...), with a rotor's friction [N*m].
-
-        `held` is what the reversible actuator's motor holds at joint 2 [N*m].
-        """
-        friction, held = np.broadcast_arrays(friction, held)
-        ideal = [np.full(friction.shape, torque) for torque in self.ideal]
-        rotor = [np.maximum(torque - friction, 0.0) for torque in self.ideal]
-        torques = np.array([*ideal, *rotor, held, np.zeros(held.shape)])  # (6, ...)
-        squared = (self.powers[:, 0] == 2).reshape(-1, *[1] * friction.ndim)
-        once, twice = (np.tensordot(self.weights, t, 1) for t in (torques, torques**2))
-        return np.where(squared, twice, once)
-
-    def meets(
-        self, friction: Array | float, held: Array | float, u: Array, w: Array, rounding: float = 0
-    ) -> NDArray[np.bool_]:
-        """Whether each entry comes out as printed, (E, W), with u and w (W,); see `factors`.
-
-        A value may miss a bound by `rounding`, relative to the upper one.
-        """
-        friction, held = np.broadcast_to(friction, u.shape), np.broadcast_to(held, u.shape)
-        of_u, of_w = (self.powers[:, k, None] for k in (1, 2))
-        value = self.factors(friction, held) * u**of_u * w**of_w
-        low, high = self.low[:, None], self.high[:, None]
-        missed = (value < low - rounding * high) | (value > high * (1 + rounding))
-        return ~missed
-
-    def limits(self, friction: float, held: float, powers: tuple[int, int]) -> Array:
-        """Bounds that the entries with these powers put on u, w or u w, (..., 2)."""
-        factor = self.factors(friction, held)
-        own = (self.powers[:, 1:] == powers).all(axis=1) & (factor > 0)
-        return np.stack([self.low[own], self.high[own]], axis=1) / factor[own, None]
+    Args:
+        published: The printed values.
+        friction: Of the rotor [N*m].
+        held: What the reversible actuator's motor holds at joint 2 [N*m].
+    """
+    friction, held = (np.asarray(x, dtype=float) for x in np.broadcast_arrays(friction, held))
+    ideal = [np.full(friction.shape, torque) for torque in joint_torques(published)]
+    rotor = [np.maximum(torque - friction, 0.0) for torque in ideal]
+    torques = zip(ALTERNATIVES[:3], (ideal, rotor, [held, np.zeros(held.shape)]), strict=True)
+    out: dict[str, Array] = {}
+    for table, both in torques:
+        for kind in _POWERS:
+            if kind == _ENERGY:
+                out[f"{table}_{kind}"] = CYCLE * (both[0] ** 2 + both[1] ** 2)
+                continue
+            for joint, torque in zip(_LOADED, both, strict=True):
+                out[f"{table}_{kind}_{joint}"] = torque**2 if kind == "power" else torque
+    return out
 
 
-def entries(published: Mapping[str, Published], without: Collection[str] = ()) -> Entries:
-    """Every electrical entry of Tables IV to VI and the energies made of them, but for some."""
-    rows = []
-    for k, table in enumerate(ALTERNATIVES[:3]):
-        for kind, powers in _POWERS.items():
-            # Of joints 2 and 3: the leg's energy has both, everything else one of them.
-            both = {"": (CYCLE, CYCLE)} if kind == _ENERGY else {"_2": (1, 0), "_3": (0, 1)}
-            for joint, weights in both.items():
-                of_tables = np.zeros((3, 2))
-                of_tables[k] = weights
-                rows.append((f"{table}_{kind}{joint}", powers, of_tables.ravel()))
-    ids, powers_of, counts = zip(*(row for row in rows if row[0] not in without), strict=True)
+def _powers(name: str) -> tuple[int, int]:
+    """Of u and w in an entry."""
+    return next(powers for kind, powers in _POWERS.items() if f"_{kind}" in name)
+
+
+def _ends(row: Published) -> tuple[float, float]:
+    """Least and greatest magnitude that rounds to the printed one, SI."""
     # All signs of a table are those of the joint's torque, so magnitudes are compared.
-    value = np.array([abs(published[name].si) for name in ids])
-    half = np.array([published[name].half_width_si for name in ids])
-    half += _SLACK * np.maximum(1.0, value)
-    ideal = joint_torques(published)
-    return Entries(ids, np.array(powers_of), np.array(counts), value - half, value + half, ideal)
+    value = abs(row.si)
+    half = row.half_width_si + _SLACK * max(1.0, value)
+    return value - half, value + half
+
+
+def meets(
+    published: Mapping[str, Published],
+    friction: Array | float,
+    held: Array | float,
+    u: Array,
+    w: Array,
+    rounding: float = 0.0,
+) -> dict[str, NDArray[np.bool_]]:
+    """Whether each entry comes out as printed, by id, (W,), with u and w (W,); see `entries`.
+
+    A value may miss a bound by `rounding`, relative to the upper one.
+    """
+    out = {}
+    for name, factor in entries(published, friction, held).items():
+        (a, b), (low, high) = _powers(name), _ends(published[name])
+        value = np.broadcast_to(factor * u**a * w**b, u.shape)
+        out[name] = (value >= low - rounding * high) & (value <= high * (1 + rounding))
+    return out
+
+
+def limits(
+    published: Mapping[str, Published], friction: float, held: float, powers: tuple[int, int]
+) -> dict[str, tuple[float, float]]:
+    """Bounds that the entries with these powers put on u, w or u w, by id."""
+    out = {}
+    for name, factor in entries(published, friction, held).items():
+        if _powers(name) == powers and factor > 0:
+            low, high = _ends(published[name])
+            out[name] = (low / float(factor), high / float(factor))
+    return out
 
 
 @dataclass(frozen=True)
@@ -177,26 +181,30 @@ def friction_ranges(published: Mapping[str, Published]) -> tuple[Frictions, ...]
     Tried are frictions around those that Table V asks for, each with the torque constant and
     resistance that are best for it.
     """
-    listed, held = entries(published), abs(published[HELD].si)
+    held = abs(published[HELD].si)
     asked = [friction for friction, _ in asked_frictions(published).values()]
     first = int(np.floor((min(asked) - _REACH) / _STEP))
     last = int(np.ceil((max(asked) + _REACH) / _STEP))
     tried = [float(f) for f in np.arange(first, last + 1, dtype=np.float64) * _STEP]
     out = []
-    for unmet, group in itertools.groupby(tried, lambda f: _least_unmet(listed, f, held)):
+    for unmet, group in itertools.groupby(tried, lambda f: _least_unmet(published, f, held)):
         frictions = list(group)
         out.append(Frictions(frictions[0], frictions[-1], unmet))
     return tuple(out)
 
 
-def _least_unmet(listed: Entries, friction: float, held: float) -> tuple[str, ...]:
+def _least_unmet(
+    published: Mapping[str, Published], friction: float, held: float
+) -> tuple[str, ...]:
     """Ids of the entries unmet at the u and w that meet the most.
 
     In logarithms each bound is a straight line, so the greatest number of bounds that hold at once
     holds at a point where two of them cross.
     """
-    ends = [listed.limits(friction, held, p).ravel() for p in ((1, 0), (0, 1), (1, 1))]
-    us, ws, products = (end[end > 0] for end in ends)
+    bounds = (limits(published, friction, held, p).values() for p in ((1, 0), (0, 1), (1, 1)))
+    us, ws, products = (
+        np.array([end for pair in own for end in pair if end > 0]) for own in bounds
+    )
     pairs = [
         [a.ravel() for a in np.meshgrid(us, ws)],
         [(u := np.repeat(us, products.size)), np.tile(products, us.size) / u],
@@ -204,9 +212,9 @@ def _least_unmet(listed: Entries, friction: float, held: float) -> tuple[str, ..
     ]
     u, w = np.concatenate(pairs, axis=1)
     # These points lie on the bounds: rounding must not decide.
-    good = listed.meets(friction, held, u, w, _ROUNDING)
-    best = good[:, int(np.argmax(good.sum(axis=0)))]
-    return tuple(name for name, met in zip(listed.ids, best, strict=True) if not met)
+    good = meets(published, friction, held, u, w, _ROUNDING)
+    best = int(np.argmax(np.sum([*good.values()], axis=0)))
+    return tuple(name for name, met in good.items() if not met[best])
 
 
 def best_frictions(ranges: Sequence[Frictions], published: Mapping[str, Published]) -> Frictions:
@@ -227,7 +235,7 @@ def best_frictions(ranges: Sequence[Frictions], published: Mapping[str, Publishe
 class FeasibleSet:
     """All motor constants that give every entry as printed, but for those named."""
 
-    listed: Entries  #: The entries that hold.
+    published: Mapping[str, Published]  #: The printed values.
     frictions: Frictions  #: Range of the rotor's friction, and which entries stay unmet.
     held: tuple[float, float]  #: Range of the reversible motor's torque at joint 2 [N*m].
     u: tuple[float, float]  #: Range of 1 / k that any of them can have [A/(N*m)].
@@ -248,7 +256,8 @@ class FeasibleSet:
         for _ in range(1000):
             friction = rng.uniform(self.frictions.low, self.frictions.high, 1000)
             held, u, w = (rng.uniform(*ends, 1000) for ends in (self.held, self.u, self.w))
-            good = self.listed.meets(friction, held, u, w).all(axis=0)
+            met = meets(self.published, friction, held, u, w)
+            good = np.all([met[name] for name in met.keys() - {*self.frictions.unmet}], axis=0)
             sets = np.stack([1 / u, w / u, friction, held], axis=1)
             found = np.concatenate([found, sets[good]])
             if len(found) >= count:
@@ -269,18 +278,19 @@ def feasible_set(published: Mapping[str, Published]) -> FeasibleSet:
 def _feasible_set(rows: tuple[Published, ...]) -> FeasibleSet:
     published = {row.id: row for row in rows}
     frictions = best_frictions(friction_ranges(published), published)
-    listed = entries(published, frictions.unmet)
     row = published[HELD]
     held = (abs(row.si) - row.half_width_si, abs(row.si) + row.half_width_si)
     corners = list(itertools.product((frictions.low, frictions.high), held))
     ends: list[tuple[float, float]] = []
     for powers in ((1, 0), (0, 1)):
         # What an entry allows at any friction and torque in their ranges.
-        allowed = np.array([listed.limits(*corner, powers) for corner in corners])
-        low, high = allowed[..., 0].min(axis=0).max(), allowed[..., 1].max(axis=0).min()
+        allowed = [limits(published, *corner, powers) for corner in corners]
+        names = allowed[0].keys() - {*frictions.unmet}
+        low = max(min(own[name][0] for own in allowed) for name in names)
+        high = min(max(own[name][1] for own in allowed) for name in names)
         if low >= high:
             raise CalibrationError(_EMPTY)
-        ends.append((float(low), float(high)))
-    found = FeasibleSet(listed, frictions, held, ends[0], ends[1])
+        ends.append((low, high))
+    found = FeasibleSet(published, frictions, held, ends[0], ends[1])
     means = found.draws(np.random.default_rng(0), 4000)[:, :3].mean(axis=0)
     return replace(found, middle=dict(zip(KEYS, map(float, means), strict=True)))
