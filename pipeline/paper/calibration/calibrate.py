@@ -240,33 +240,35 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
     """
     from arviz_stats.base import array_stats
 
-    z = np.array([[p["z"] for p in own] for own in walkers])  # (walkers, steps, D)
-    constants = np.array([[[p["constants"][k] for k in KEYS] for p in own] for own in walkers])
+    keys = (*prior.keys, *KEYS)
+    sets = [[[*p["z"], *(p["constants"][k] for k in KEYS)] for p in own] for own in walkers]
+    every = np.array(sets)  # (walkers, steps, numbers)
     unbounded = np.outer([-1, 1], np.full(len(KEYS), np.inf))
     lower, upper = np.concatenate([prior.ends, unbounded], axis=1)
     axes = {"chain_axis": 0, "draw_axis": 1}
     groups = np.arange(len(walkers)) * _GROUPS // len(walkers)
-    of_robot = [key.startswith(f"{ROBOT}.") for key in prior.keys]
-    _, counts = np.unique(z[..., of_robot].reshape(-1, sum(of_robot)), axis=0, return_counts=True)
-    robots = float(counts.sum() ** 2 / (counts.astype(float) ** 2).sum())
+    of_robot = np.array([key.startswith(f"{ROBOT}.") for key in keys])
+    drawn = every[..., of_robot].reshape(-1, of_robot.sum())
+    counts = np.unique(drawn, axis=0, return_counts=True)[1].astype(float)
+    robots = float(counts.sum() ** 2 / (counts**2).sum())
 
     def effective(values: Any, *, of_robots: bool) -> float:
         draws = float(array_stats.ess(values, **axes))
         return 1 / (1 / draws + 1 / robots) if of_robots else draws
 
     numbers = {}
-    every = np.moveaxis(np.concatenate([z, constants], axis=-1), -1, 0)
-    for key, values, least, most in zip((*prior.keys, *KEYS), every, lower, upper, strict=True):
+    for k, key in enumerate(keys):
+        values = every[..., k]
         low, high = np.quantile(values, [0.025, 0.975])
         numbers[key] = {
             "low": float(low),
             "high": float(high),
             "mean": float(values.mean()),
             "spread": float(values.std()),
-            "at_lower": float(np.mean(values - least < AT_BOUND)),
-            "at_upper": float(np.mean(most - values < AT_BOUND)),
+            "at_lower": float(np.mean(values - lower[k] < AT_BOUND)),
+            "at_upper": float(np.mean(upper[k] - values < AT_BOUND)),
             "r_hat": float(array_stats.rhat_nested(values, superchain_ids=groups, **axes)),
-            "effective": effective(values, of_robots=key.startswith(f"{ROBOT}.")),
+            "effective": effective(values, of_robots=bool(of_robot[k])),
         }
     paths = {}
     for path in tasks.PATHS:
@@ -279,7 +281,7 @@ def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any
         "numbers": numbers,
         "paths": paths,
         "walkers": len(walkers),
-        "sets": int(z.shape[0] * z.shape[1]),
+        "sets": drawn.shape[0],
         "robots": robots,
     }
 

@@ -45,45 +45,39 @@ class Prediction:
 
 def leave_one_out(published: Mapping[str, Published], sets: Sets) -> list[Prediction]:
     """Every target, left out, as the calibration's sets without it have it."""
-    nothing = (math.nan, *NONE)
+
+    def predicted(
+        name: str, without: str, by: str, found: Sequence[float], sets: int
+    ) -> Prediction:
+        """A row; `found` is what is predicted, least and most, NaN where nothing predicts it."""
+        if name == EXTRA:
+            target = extra_target(published, 1)
+            unit, value, half = "J", target.centre, target.half_width
+        else:
+            row = published[name]
+            unit, value, half = row.unit, row.value, row.half_width
+        median, low, high = found
+        overlap = low <= value + half and high >= value - half
+        inside = None if math.isnan(median) else overlap
+        return Prediction(name, without, unit, value, half, median, low, high, inside, sets, by)
+
     rows = [
-        _predicted(published, name, name, nothing, f"nothing: it fixes {of}")
+        predicted(name, name, f"nothing: it fixes {of}", [math.nan] * 3, 0)
         for name, of in _FIXES.items()
     ]
     for name, edges in _from_data_sheet(published).items():
         low, middle, high = sorted(math.copysign(e, published[name].value) for e in edges)
-        found = (middle, low, high)
-        rows.append(_predicted(published, name, name, found, "the motor's data sheet"))
+        rows.append(predicted(name, name, "the motor's data sheet", (middle, low, high), 0))
     for without, frame in sets.items():
         targets = without.split("+") if without not in ("posterior", "prior") else []
         for name in [*targets, EVEN] if EXTRA in targets else targets:
-            unit = published[name].unit if name in published else "J"
+            unit = "J" if name == EXTRA else published[name].unit
             values = [from_si(value, unit) for value in frame[name].dropna()]
             median = float(np.median(values)) if len(values) >= LEAST else math.nan
             found = (median, *quantiles(values))
             by = "the other targets and the prior"
-            rows.append(_predicted(published, name, without, found, by, len(values)))
+            rows.append(predicted(name, without, by, found, len(values)))
     return rows
-
-
-def _predicted(
-    published: Mapping[str, Published],
-    name: str,
-    without: str,
-    found: tuple[float, float, float],
-    by: str,
-    sets: int = 0,
-) -> Prediction:
-    """A row; `found` is what is predicted, least and most, all NaN where nothing predicts it."""
-    if name == EXTRA:
-        target = extra_target(published, 1)
-        unit, value, half = "J", target.centre, target.half_width
-    else:
-        unit, value, half = (getattr(published[name], a) for a in ("unit", "value", "half_width"))
-    median, low, high = found
-    overlap = low <= value + half and high >= value - half
-    inside = None if math.isnan(median) else overlap
-    return Prediction(name, without, unit, value, half, median, low, high, inside, sets, by)
 
 
 def _from_data_sheet(published: Mapping[str, Published]) -> dict[str, Sequence[float]]:
