@@ -51,7 +51,8 @@ def run_mapping(given: argparse.Namespace) -> int:
     write_text(given.out, made.text)
     counted = f"{len(made.mapped)} columns, {len(made.open)} left for you"
     none = "nothing to map, the columns are those of the log format"
-    print(f"written to {given.out}: {counted if made.mapped or made.open else none}")
+    out = one_line(given.out)
+    print(f"written to {out}: {counted if made.mapped or made.open else none}")
     if made.open:
         print(f"look at: {one_line(', '.join(made.open))}")
     robot = f" --robot {shlex.quote(str(given.robot))}" if given.robot else ""
@@ -60,9 +61,9 @@ def run_mapping(given: argparse.Namespace) -> int:
         try:
             plan = plan_reading(given.log, expected, load_mapping(given.out))
         except GapError as error:
-            print(f"still missing: {error}")
+            print(f"still missing: {' '.join(str(error).split())}")
             if made.asks_gains:
-                print(f"gains: take the # off [pd_gains] at the end of {given.out}, put your own")
+                print(f"gains: take the # off [pd_gains] at the end of {out}, put your own")
             return 1
         steps = ["power "] if plan.supply_alone else ["", "power "] if plan.of_supply else [""]
     log, mapping = shlex.quote(str(given.log)), shlex.quote(str(given.out))

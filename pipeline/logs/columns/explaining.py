@@ -93,12 +93,7 @@ class Explaining:
     """Scores of efforts along one motion by one model."""
 
     def __init__(self, bodies: Bodies, mask: Mask) -> None:
-        """Begin.
-
-        Args:
-            bodies: By the model.
-            mask: Rows that count, shape (N, J).
-        """
+        """Begin with what a model says and the rows that count, shape (N, J)."""
         self.bodies, self.mask = bodies, mask
         self._rows = [np.flatnonzero(mask[:, j]) for j in range(mask.shape[1])]
         self.joints = [j for j, rows in enumerate(self._rows) if rows.size > _OWN]

@@ -75,9 +75,7 @@ def column_findings(log: Log, mended: Mended, ratio: Array | None) -> list[Findi
 def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Finding]:
     """Positions beyond their limits, those first whose column the motion explains.
 
-    Args:
-        beyond: Refused by limits.
-        named: From `column_findings`; of all joints together where they name no column.
+    Findings of `column_findings` are of all joints together where they name no column.
     """
     out = []
     for f in beyond:
@@ -88,16 +86,10 @@ def explained(beyond: Sequence[Finding], named: Sequence[Finding]) -> list[Findi
 
 
 def copies(log: Log, y: Array, bodies: Bodies, mask: NDArray[np.bool_]) -> list[Finding]:
-    """Efforts that are velocities under a wrong name.
+    """Efforts (N, J) that are velocities under a wrong name, by the rows that count (N, J).
 
     Viscous friction alone makes such an effort, too: it counts where bodies ask for more than what
     such friction leaves.
-
-    Args:
-        log: The log.
-        y: Efforts, shape (N, J).
-        bodies: By the model along its motion.
-        mask: Rows that count, shape (N, J).
     """
     out = []
     for j, joint in enumerate(log.joints):

@@ -50,15 +50,12 @@ class Along(Protocol):
 
     def effort(self, late: float, *, rough: bool) -> Array:
         """Efforts as logged, of columns taken to be late by some time [s], shape (N, J)."""
-        ...
 
     def mask(self, reading: Reading, *, rough: bool) -> Mask:
         """Rows that count, shape (N, J)."""
-        ...
 
     def bodies(self, reading: Reading, *, rough: bool) -> Bodies:
         """By the model."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)

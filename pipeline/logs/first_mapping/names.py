@@ -65,12 +65,7 @@ def words_of(name: str) -> list[str]:
 
 
 def read_name(column: str, unit: str) -> Named:
-    """Read a name.
-
-    Args:
-        column: The name.
-        unit: Of a row of units; empty where there is none.
-    """
+    """Read a name; `unit` is that of a row of units, empty where there is none."""
     bracket = re.search(r"[\[(]([^\[\]()]*[^\d\[\]()][^\[\]()]*)[\])]\s*$", column)
     spelt = unit_spelt(bracket[1]) if bracket else ""
     if bracket and spelt:

@@ -47,10 +47,7 @@ def clock_units(time: Array) -> list[str]:
 def angle_units(x: Array, lower: float, upper: float) -> list[str]:
     """Units in which a column may be a joint's angle, the likeliest first; none where none is.
 
-    Args:
-        x: The numbers.
-        lower: The joint's limits [rad]; infinite where they are not known.
-        upper: Likewise.
+    Limits are the joint's [rad], infinite where they are not known.
     """
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     if np.isfinite(lower) and np.isfinite(upper):
@@ -95,12 +92,7 @@ class Follows:
 
 
 def follows(x: Array, rates: Mapping[str, Array]) -> list[Follows]:
-    """How a column follows the derivatives of positions, the closest first.
-
-    Args:
-        x: The column, shape (N,).
-        rates: Name of a position to its derivative, shape (N,).
-    """
+    """How a column (N,) follows derivatives of positions, (N,) by name; the closest first."""
     out = []
     for name, rate in rates.items():
         good = np.isfinite(x) & np.isfinite(rate)
@@ -114,12 +106,7 @@ def follows(x: Array, rates: Mapping[str, Array]) -> list[Follows]:
 
 
 def mean_of(time: Array, x: Array) -> Array:
-    """A column averaged over as many rows as `rate_of` differentiates over, so that both agree.
-
-    Args:
-        time: Shape (N,) [s].
-        x: Shape (N,).
-    """
+    """A column averaged over as many rows as `rate_of` differentiates over, so that both agree."""
     whole = np.full(x.size, np.nan)
     good = np.isfinite(x) & np.isfinite(time)
     steps = 0.5 * (x[good][1:] + x[good][:-1]) * np.diff(time[good])
@@ -130,12 +117,7 @@ def mean_of(time: Array, x: Array) -> Array:
 def rate_of(time: Array, x: Array) -> Array:
     """Derivative of a column, over so many rows that the encoder's steps do not drown it.
 
-    Args:
-        time: Shape (N,) [s].
-        x: Shape (N,).
-
-    Returns:
-        Shape (N,), centred, NaN at both ends.
+    Shape (N,), centred, NaN at both ends.
     """
     out = np.full(x.size, np.nan)
     good = np.flatnonzero(np.isfinite(x) & np.isfinite(time))

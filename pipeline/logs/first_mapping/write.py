@@ -65,7 +65,7 @@ def first_mapping(path: Path, expected: Expected | None = None) -> FirstMapping:
     table, data = _numbers(path)
     own = {c for c in table.header if _known(c, expected, table.where)}
     clock, time, head = _clock(table, data, own)
-    units = table.head.units
+    units = table.units
     foreign = [c for c in table.header if c in data and c not in own | {clock} and "*" not in c]
     named = [read_name(c, units.get(c, "")) for c in foreign]
     found, ratios, by = guesses(named, data, time, expected)
@@ -182,7 +182,7 @@ def _clock(
     foreign = [c for c in data if c not in own]
     for column in names or sorted(foreign, key=lambda c: not {*words_of(c), c} & {*TIMES}):
         units = clock_units(data[column])
-        stated = table.head.units.get(column) or unit_spelt(column.rpartition("_")[2])
+        stated = table.units.get(column) or unit_spelt(column.rpartition("_")[2])
         if stated in _SECONDS:
             units = [stated, *(u for u in units if u != stated)]
         if not units:

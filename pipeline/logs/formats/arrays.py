@@ -20,15 +20,10 @@ TIMES: Final = ("time_s", "time", "t", "timestamp", "timestamps", "stamp", "time
 
 
 def read_arrays(path: Path, kind: str, out: Path) -> list[str]:
-    """Write the columns of a file of arrays as Parquet.
+    """Write the columns of a file of arrays (``".mat"``, ``".h5"`` or ``".npz"``) as Parquet.
 
     An array with one row, or one column, per instant gives a column for each of the others, called
     ``name[0]``, ``name[1]`` and so on, or by the names of a list of texts of that length.
-
-    Args:
-        path: The file.
-        kind: ``".mat"``, ``".h5"`` or ``".npz"``.
-        out: The Parquet file.
 
     Returns:
         What a reader should know of it.

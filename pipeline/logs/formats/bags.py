@@ -22,6 +22,8 @@ from pipeline.logs.errors import LogFormatError
 from pipeline.logs.formats.spool import Column, Spool
 
 Bytes = NDArray[np.uint8]
+#: Joint and quantity of every number, in the message's order.
+_Names = tuple[tuple[str, str], ...]
 JOINTS: Final = "sensor_msgs/msg/JointState"
 DYNAMIC: Final = "control_msgs/msg/DynamicJointState"
 SUFFIXES: Final = (".mcap", ".db3", ".bag")
@@ -37,15 +39,6 @@ NEEDS: Final = (
 )
 
 
-class Message(NamedTuple):
-    """One message's numbers."""
-
-    stamp: int  #: Of the header [ns].
-    #: Joint and quantity of every number, in the message's order.
-    columns: tuple[tuple[str, str], ...]
-    values: NDArray[np.float64]  #: The numbers.
-
-
 class _Layout(NamedTuple):
     """Where messages of one layout hold what changes, and what they hold everywhere else."""
 
@@ -53,7 +46,7 @@ class _Layout(NamedTuple):
     text: Bytes
     stamp: slice
     numbers: NDArray[np.intp]
-    columns: tuple[tuple[str, str], ...]
+    columns: _Names
 
 
 def read_bag(path: Path, spool: Spool, done: Callable[[float], None]) -> None:
@@ -132,11 +125,7 @@ class _Decoder:
         self._layouts: dict[tuple[str, int], list[_Layout]] = defaultdict(list)
 
     def refuse_other_definition(self, connection: Any) -> None:
-        """Refuse a type of the same name and another definition, where the bag has hashes.
-
-        Raises:
-            LogFormatError: Names the topic.
-        """
+        """Refuse a type of the same name and another definition, where the bag has hashes."""
         kind = connection.msgtype
         own = self._store.generate_msgdef(kind)[1] if self._ros1 else self._store.hash_rihs01(kind)
         if connection.digest and connection.digest != own:
@@ -164,21 +153,21 @@ class _Decoder:
         block = block.reshape(len(waiting), -1)
         waiting.clear()
         known = self._layouts[kind, block.shape[1]]
+        read = self._store.deserialize_ros1 if self._ros1 else self._store.deserialize_cdr
         left = np.arange(block.shape[0])
         for layout in known:
             left = self._matching(layout, topic, block, logged, left)
         while left.size:
-            message = self._deserialised(bytes(block[left[0]]), kind)
+            message = read(bytes(block[left[0]]), kind)
             own = self._layout(message, kind)
             if own is not None and (block[left[0], own.fixed] == own.text).all():
                 known.insert(0, own)
                 del known[16:]
                 left = self._matching(own, topic, block, logged, left)
                 continue
-            one = self._numbers(message, kind)  # e.g. of the other byte order
+            stamp, columns, values = self._numbers(message, kind)  # e.g. of the other byte order
             first, left = left[0], left[1:]
-            stamp = np.array([one.stamp])
-            self._add(topic, one.columns, stamp, logged[first : first + 1], one.values[None])
+            self._add(topic, columns, np.array([stamp]), logged[first : first + 1], values[None])
 
     def _matching(
         self, layout: _Layout, topic: str, block: Bytes, logged: NDArray[np.int64], left: Any
@@ -207,16 +196,8 @@ class _Decoder:
             named = tuple(Column(topic, joint, quantity) for joint, quantity in columns)
             self._spool.add(named, stamps, logged, values)
 
-    def _deserialised(self, raw: bytes, kind: str) -> Any:
-        read = self._store.deserialize_ros1 if self._ros1 else self._store.deserialize_cdr
-        return read(raw, kind)
-
-    def _numbers(self, message: Any, kind: str) -> Message:
-        """Names and numbers of a message, whatever its layout.
-
-        Raises:
-            LogFormatError: Not as many numbers as names.
-        """
+    def _numbers(self, message: Any, kind: str) -> tuple[int, _Names, NDArray[np.float64]]:
+        """Stamp [ns], names and numbers of a message, whatever its layout."""
         stamp = message.header.stamp
         columns: list[tuple[str, str]] = []
         blocks = [np.zeros(0)]
@@ -241,11 +222,11 @@ class _Decoder:
             columns += named
             blocks.append(values)
         nanoseconds = stamp.sec * 10**9 + stamp.nanosec
-        return Message(nanoseconds, tuple(columns), np.concatenate(blocks))
+        return nanoseconds, tuple(columns), np.concatenate(blocks)
 
     def _layout(self, message: Any, kind: str) -> _Layout | None:
         """Where messages like this one hold stamp and numbers; None where that is not plain."""
-        columns = self._numbers(message, kind).columns
+        columns = self._numbers(message, kind)[1]
         none, full = (self._filled(message, kind, bits) for bits in (0x00, 0xFF))
         changes = np.flatnonzero(none != full)
         seq = 4 if self._ros1 else 0  # ROS 1 counts its messages in the header

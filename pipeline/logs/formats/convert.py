@@ -77,7 +77,9 @@ def plain(path: Path, done: Done = lambda share: None) -> Plain:
     """
     files = _files(path)
     if not files:
-        raise LogFormatError(f"{one_line(path)}: a folder without files of a bag ({_known()})")
+        raise LogFormatError(
+            f"{one_line(path)}: a folder without files of a bag ({', '.join(SUFFIXES)})"
+        )
     ending = ".bag" if path.is_dir() else _ending(path)
     if not ending:
         return Plain(path)
@@ -86,10 +88,6 @@ def plain(path: Path, done: Done = lambda share: None) -> Plain:
     if key not in _MADE:
         _MADE[key] = _converted(path, ending, Path(mkdtemp(dir=_folder().name)), done)
     return _MADE[key]
-
-
-def _known() -> str:
-    return ", ".join(SUFFIXES)
 
 
 @cache
@@ -124,11 +122,6 @@ def _converted(path: Path, ending: str, target: Path, done: Done) -> Plain:
 
 
 def _unpack(path: Path, ending: str, target: Path) -> None:
-    """Decompress a file.
-
-    Raises:
-        LogFormatError: It is damaged, or what it takes is not installed.
-    """
     try:
         unpacker: Any = gzip
         if ending == ".zst":

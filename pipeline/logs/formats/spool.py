@@ -56,11 +56,7 @@ class Spool:
     """Blocks of numbers, kept in a file until all are there."""
 
     def __init__(self, folder: Path) -> None:
-        """Begin.
-
-        Args:
-            folder: For the file, which goes when the spool does.
-        """
+        """Begin, with a file in a folder that goes when the spool does."""
         self._file: Any = TemporaryFile(dir=folder)  # noqa: SIM115  # as long as the spool
         self._blocks: list[_Block] = []
         self._messages: Counter[str] = Counter()
@@ -72,13 +68,9 @@ class Spool:
         self._file.close()
 
     def add(self, columns: Sequence[Column], stamps: Stamps, logged: Stamps, values: Array) -> None:
-        """Keep numbers of messages with the same columns.
+        """Keep numbers (N, columns) of messages with the same columns.
 
-        Args:
-            columns: Of the numbers.
-            stamps: Of the headers, shape (N,) [ns].
-            logged: When the messages were recorded, shape (N,) [ns].
-            values: Shape (N, columns).
+        Stamps are those of the headers, `logged` the times of recording, each shape (N,) [ns].
         """
         order = sorted(range(len(columns)), key=lambda k: columns[k])
         named = tuple(columns[k] for k in order)

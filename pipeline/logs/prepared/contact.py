@@ -60,12 +60,7 @@ def _standing_by_force(normal: Array) -> Mask:
 
 
 def scheduled_contact(robot: Robot, time: Array, *, start: float) -> Contact:
-    """Contact by the robot file's gait.
-
-    Args:
-        robot: With a gait.
-        time: Shape (N,) [s].
-        start: Time at which a period begins [s].
+    """Contact by the robot file's gait, of which a period begins at `start` [s].
 
     Raises:
         PreparationError: The robot file has no gait.
@@ -108,10 +103,7 @@ def lowest_feet(robot: Robot, position: Array, roll: Array | None, pitch: Array 
 def find_contact(log: Log, robot: Robot, *, start: float | None = None) -> Contact:
     """Contact from forces, else contact columns, else the schedule, else the lowest feet.
 
-    Args:
-        log: The log.
-        robot: With legs on the ground.
-        start: Time at which a gait period begins [s]; None where it is not known.
+    `start` is the time at which a gait period begins [s]; None where it is not known.
 
     Raises:
         PreparationError: A start is given for a robot without a gait.

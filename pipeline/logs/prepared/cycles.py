@@ -58,17 +58,11 @@ def period(prepared: Prepared) -> float | None:
 
 
 def cycle_noise(prepared: Prepared, cycle: float) -> Array | None:
-    """Noise of the effort within the bandwidth from successive cycles.
+    """Noise of the effort within the bandwidth from successive cycles of a period [s].
 
     Half the mean square difference between a sample and the same phase one cycle later, where the
-    motion is the same to within `SAME_MOTION` of its spread.
-
-    Args:
-        prepared: With at least two cycles.
-        cycle: Period [s].
-
-    Returns:
-        Standard deviation, shape (J,), NaN where it is not known; None where nothing repeats.
+    motion is the same to within `SAME_MOTION` of its spread. Standard deviation, shape (J,), NaN
+    where it is not known; None where nothing repeats.
     """
     pairs = []
     for piece in prepared.pieces:

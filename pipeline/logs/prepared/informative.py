@@ -43,11 +43,7 @@ class Scan:
 
 
 def scan(pieces: Iterable[Log]) -> Scan:
-    """Describe the stretches of a log given piece by piece.
-
-    Args:
-        pieces: Consecutive rows; stretches end with them.
-    """
+    """Describe the stretches of a log given piece by piece; stretches end with pieces."""
     first: list[int] = []
     variances: list[Array] = []
     middle: list[float] = []
@@ -73,8 +69,7 @@ def scan(pieces: Iterable[Log]) -> Scan:
 def _information(piece: Log, part: slice) -> Array:
     """Variances of position, speed, change of speed and effort of every joint, (4 J,)."""
     q, effort = piece.position[part][::EVERY], piece.effort.values[part][::EVERY]
-    good = piece.valid[part][::EVERY].all(axis=1) & np.isfinite(effort).all(axis=1)
-    good &= np.isfinite(q).all(axis=1)
+    good = np.logical_and(*piece.rows(part).finite)[::EVERY].all(axis=1)
     if good.sum() < 10:
         return np.zeros(4 * q.shape[1])
     q, effort = q[good], effort[good]
@@ -83,13 +78,7 @@ def _information(piece: Log, part: slice) -> Array:
 
 
 def choose(found: Scan, count: int, among: NDArray[np.bool_] | None = None) -> NDArray[np.intp]:
-    """Numbers of the stretches that tell most together, in order of time.
-
-    Args:
-        found: From `scan`.
-        count: How many at most.
-        among: Those that may be taken, shape (B,); all by default.
-    """
+    """Numbers of at most `count` stretches, among those marked (B,), that tell most together."""
     open_ = found.information.sum(axis=1) > 0
     if among is not None:
         open_ &= among

@@ -28,7 +28,7 @@ SEEN: Final = 1.0
 def near_rest(
     v: Array, rest: Array, pieces: Sequence[slice], rate: float, bandwidth: float
 ) -> Mask:
-    """Rows whose filter sees a shaft stop or turn back.
+    """Rows (N, J) whose filter sees a shaft stop or turn back.
 
     There friction takes any value up to its level, and the filtered speed does not tell which: a
     law of friction says nothing about such rows, and no name may rest on them.
@@ -39,9 +39,6 @@ def near_rest(
         pieces: Stretches without a gap.
         rate: [Hz].
         bandwidth: Of the filter [Hz].
-
-    Returns:
-        Shape (N, J).
     """
     still = np.abs(v) < STANDING * rest
     # A fast joint turns back between two samples, neither of which is slow.

@@ -22,6 +22,8 @@ from pipeline.logs.signals.stamps import stamp_error
 TOLERATED_SHARE: Final = 0.05
 #: Rows from which the error of time stamps is estimated.
 _STAMPS: Final = slice(0, 50_000)
+#: Attributes of a log that act on the prediction.
+OUTSIDE: Final = ("foot_force", "base_roll", "base_pitch")
 #: Attributes of a log that are kept on the grid, where they are not compared.
 OTHER: Final = ("velocity", "motor_position", *EFFORTS, "goal_position", "temperature", "supply")
 
@@ -156,24 +158,20 @@ def prepare(
     origin: float | None = None,
     known: Prepared | None = None,
 ) -> Prepared:
-    """Bring a log to one grid and bandwidth.
+    """Bring a log to one grid and bandwidth; a PreparationError for one that does not move.
 
     Args:
         log: From `read_log`.
         settings: From `choose_settings`; chosen from this log alone by default.
-        usable: Which positions and which efforts are good, each shape (N, J); by default those
-            that are finite and valid.
-        contact: Which feet stand at the log's rows; from its forces or contact columns by default.
-        core: Rows of the log that count, for a chunk.
-        origin: A time on the uniform grid [s], for a chunk; the first by default.
-        known: What stands for the whole log, for a chunk: noises and fusion are taken over.
-
-    Raises:
-        PreparationError: No joint moves, or the log is too short for the filter.
+        usable: Which positions and which efforts are good, each (N, J); finite ones by default.
+        contact: Which feet stand at the log's rows; by the log itself by default.
+        core: Of a chunk the log's rows that count.
+        origin: Of a chunk a time on the uniform grid [s].
+        known: Of a chunk what stands for the whole log: noises and fusion are taken over.
     """
     usable = usable or log.finite
     settings = settings or choose_settings([log], [usable])
-    lowpass = settings.lowpass
+    lowpass, contact = settings.lowpass, contact or log_contact(log)
     grid = uniform_grid(log.time, settings.dt, origin, bridge=settings.bridged)
     q_raw, motion_ok = _on_grid(log, log.position, usable[0], grid, settings)
     effort_raw, effort_ok = _on_grid(log, log.effort.values, usable[1], grid, settings)
@@ -181,17 +179,14 @@ def prepare(
     effort = lowpass.smooth(effort_raw, grid.pieces)
     effort[grid.flags(long_runs(log.time, ~usable[1], settings.bridged))] = np.nan
     other = _other(log, grid)
-    column = other.get("velocity")
     if known is None:
-        raw = (q_raw, effort_raw)
-        noise, fusion = _noises(grid, raw, (v, a), (motion_ok, effort_ok), column, lowpass)
-        late, error = stamp_error(log.time[_STAMPS], log.position[_STAMPS], GAP * settings.dt)
-        stamps = late if late > 4 * error else 0.0
+        raw, ok = (q_raw, effort_raw), (motion_ok, effort_ok)
+        noise, fusion = _noises(grid, raw, (v, a), ok, other.get("velocity"), lowpass)
+        stamps = _stamps(log, settings.dt)
     else:
         noise, fusion, stamps = known.noise, known.fusion, known.stamp_error
-    if column is not None:
-        _fuse(v, a, grid, column, fusion, settings)
-    contact = contact or log_contact(log)
+    if "velocity" in other:
+        _fuse(v, a, grid, other["velocity"], fusion, settings)
     return Prepared(
         log=log,
         q=q,
@@ -204,9 +199,7 @@ def prepare(
         noise_basis="smoother",
         settings=settings,
         contact=contact.rows(grid.nearest) if contact is not None else None,
-        foot_force=_smoothed(log, log.foot_force, grid, lowpass),
-        base_roll=_smoothed(log, log.base_roll, grid, lowpass),
-        base_pitch=_smoothed(log, log.base_pitch, grid, lowpass),
+        **{name: _smoothed(log, name, grid, lowpass) for name in OUTSIDE},
         other=other,
         fusion=fusion,
         stamp_error=stamps,
@@ -215,6 +208,12 @@ def prepare(
         log_contact=contact,
         core=_core(grid, core),
     )
+
+
+def _stamps(log: Log, dt: float) -> float:
+    """Error of the time stamps [s], where it stands out."""
+    late, error = stamp_error(log.time[_STAMPS], log.position[_STAMPS], GAP * dt)
+    return late if late > 4 * error else 0.0
 
 
 def _on_grid(
@@ -226,8 +225,9 @@ def _on_grid(
     return grid.resample(fill_gaps(log.time, values, ok)), seen
 
 
-def _smoothed(log: Log, values: Array | None, grid: Grid, lowpass: LowPass) -> Array | None:
-    """What acts on the prediction and shares its bandwidth: foot forces and base angles."""
+def _smoothed(log: Log, name: str, grid: Grid, lowpass: LowPass) -> Array | None:
+    """What acts on the prediction and shares its bandwidth."""
+    values: Array | None = getattr(log, name)
     if values is None:
         return None
     flat = values.reshape(len(log), -1)

@@ -62,7 +62,7 @@ def choose_settings(
     Raises:
         PreparationError: The user's cut-off does not fit the rate or the length.
     """
-    steps = [float(np.median(np.diff(log.time))) for log in logs]
+    steps = [float(np.median(np.diff(log.clock))) for log in logs]
     # The slowest log decides: its band holds nothing above.
     dt = max(steps)
     rate = 1.0 / dt
@@ -106,12 +106,11 @@ def choose_settings(
 
 def _held(log: Log, usable: tuple[Mask, Mask]) -> float:
     """Highest frequency that the slowest channel of a log holds [Hz]."""
-    every = np.ones(len(log), dtype=np.bool_)
-    steps = [own_spacing(log.time, every)]
+    steps = [own_spacing(log.clock, np.ones(log.clock.size, dtype=np.bool_))]
     for good in usable:
         sparse = np.flatnonzero(good.any(axis=0) & ~good.all(axis=0))
         steps += [own_spacing(log.time, good[:, j]) for j in sparse]
-    usual = float(np.median(np.diff(log.time)))
+    usual = float(np.median(np.diff(log.clock)))
     slowest = max(step for step in steps if np.isfinite(step))
     # A step or two more than usual is what interpolation bridges anyway.
     return OWN_SHARE / slowest if slowest > 1.9 * usual else np.inf

@@ -52,19 +52,11 @@ class Stream:
 
     @cached_property
     def whole(self) -> Log:
-        """All of it.
-
-        Raises:
-            GapError: As for `read_log`.
-        """
+        """All of it; a GapError as for `read_log`."""
         return self.adjust(read_log(self.path, self.expected, self.mapping))
 
     def pieces(self, rows: int = CHUNK_ROWS) -> Iterator[Log]:
-        """Consecutive pieces of at most `rows` rows.
-
-        Raises:
-            GapError: As for `read_log`.
-        """
+        """Consecutive pieces of at most `rows` rows; a GapError as for `read_log`."""
         if self._table.parquet:
             read = stream_log(self.path, self.expected, self.mapping, rows=rows, digest=self.digest)
             for piece in read:
@@ -91,9 +83,7 @@ class Survey:
 def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:
     """Read the stretches of a long log that tell most.
 
-    Args:
-        stream: The log.
-        prove_last: Share at its end for the test only: a quarter of the stretches come from there.
+    Of a share at its end that is for the test only, a quarter of the stretches is taken.
 
     Raises:
         GapError: As for `read_log`.
@@ -150,11 +140,11 @@ def prepared_chunks(
     Every chunk carries the filter's reach of its neighbours at both ends; its `core` are the rows
     that count, and the cores together are the whole log, each row once. Held values and saturation
     are judged within each chunk; that a joint rests, or a drive is off, throughout a chunk is no
-    defect.
+    defect. Grid, cut-off, noises and fusion are those of `known`, the log's survey.
 
     Args:
         stream: The log.
-        known: Its survey: grid, cut-off, noises and fusion hold for the chunks.
+        known: Its survey.
         rows: Per chunk.
         largest: As for `judge`.
         contact: How to tell which feet stand; by the log's own forces or columns by default.

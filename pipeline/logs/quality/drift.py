@@ -56,12 +56,8 @@ class Drift:
 def friction_drift(courses: Sequence[Course]) -> Drift | None:
     """Friction of one joint over logs in the order they were recorded.
 
-    Args:
-        courses: One per log; several of them count as runs one after the other, whatever their
-            clocks say.
-
-    Returns:
-        None where a single log is too short for a machine to warm, or too little moves both ways.
+    Several logs count as runs one after the other, whatever their clocks say. None where a single
+    log is too short for a machine to warm, or too little moves both ways.
     """
     length = sum(float(np.ptp(c.time)) for c in courses if c.time.size)
     if len(courses) < 2 and length < _WARMING:
@@ -83,7 +79,6 @@ def friction_drift(courses: Sequence[Course]) -> Drift | None:
     if y.size < _LEAST_ROWS or min((x[:, 0] > 0).mean(), (x[:, 0] < 0).mean()) < 0.1:
         return None
     x = x / np.maximum(np.abs(x).max(axis=0), 1e-300)  # both signs of motion reach one
-    scale = 0.5
     solution, *_ = np.linalg.lstsq(x, y, rcond=None)
     inverse, left = np.linalg.pinv(x.T @ x), y - x @ solution
     scores = np.stack([x[block == b].T @ left[block == b] for b in np.unique(block)])
@@ -93,4 +88,4 @@ def friction_drift(courses: Sequence[Course]) -> Drift | None:
     change = float(solution[1]) / top
     error = float(np.sqrt(spread[1, 1] * grown)) / top
     level = float(solution[0])
-    return Drift(level - scale * change, level + scale * change, error)
+    return Drift(level - 0.5 * change, level + 0.5 * change, error)

@@ -34,14 +34,7 @@ class Quality:
     usable: tuple[Mask, Mask]  #: Positions and efforts that may be used, each shape (N, J).
 
     def refuse(self, *, overlooked: Collection[str] = ()) -> None:
-        """Refuse the log where a finding says so.
-
-        Args:
-            overlooked: Checks that do not lead to refusal.
-
-        Raises:
-            LogContentError: Names the first refused column and how many there are.
-        """
+        """Refuse the log where a finding says so, but for some checks; see `refuse`."""
         refuse([f for f in self.findings if f.check not in overlooked])
 
 

@@ -63,10 +63,9 @@ def judge(
     found = Findings(log.name)
     for remark in log.notes:  # what holds for all of it comes first
         found.note("", "file", 1, "1", "warning", remark)
-    verdict = "refused" if len(log) < FEWEST_ROWS else "ok"
-    detail = f"{len(log)} rows; at least {FEWEST_ROWS} are needed"
-    found.note("", "rows", len(log), "1", verdict, detail)
-    if verdict == "refused":
+    few, detail = len(log) < FEWEST_ROWS, f"{len(log)} rows; at least {FEWEST_ROWS} are needed"
+    found.note("", "rows", len(log), "1", "refused" if few else "ok", detail)
+    if few:
         return Quality(tuple(found), log.finite)
     dt = _rate(log, found)
     still = standstill(log.position, dt)
@@ -91,7 +90,7 @@ def judge(
 
 def _rate(log: Log, found: Findings) -> float:
     """Median step of the rows [s]; slow, uneven or broken clocks are noted."""
-    step = np.diff(log.time)
+    step = np.diff(log.clock)
     dt = float(np.median(step))
     rate, inside = 1.0 / dt, step <= GAP * dt
     slow = rate < SLOWEST

@@ -165,14 +165,9 @@ def glitches(x: Array) -> Mask:
 
 
 def standstill(position: Array, dt: float) -> Mask:
-    """Rows in which a joint moves at less than 1 % of its usual top speed.
+    """Rows (N, J) in which a joint moves at less than 1 % of its usual top speed.
 
-    Args:
-        position: Shape (N, J) [rad]; empty cells take the last value before them.
-        dt: [s].
-
-    Returns:
-        Shape (N, J).
+    Empty cells of positions [rad] take the last value before them.
     """
     known = np.where(np.isfinite(position), np.arange(position.shape[0])[:, None], 0)
     last = np.maximum.accumulate(known, axis=0)

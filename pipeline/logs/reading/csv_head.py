@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Final
 
 from actuators.errors import UnitError
@@ -40,18 +38,6 @@ _SPELT: Final = {
 }
 
 
-@dataclass(frozen=True)
-class CsvHead:
-    """What the first lines of a CSV file say."""
-
-    names: tuple[str, ...]  #: Columns, as written.
-    skip: int = 1  #: Lines above the first row of numbers.
-    #: Column to the unit of a row of units, where it states one.
-    units: Mapping[str, str] = field(default_factory=dict)
-    #: Columns of dates and times to the first of them, as written.
-    stamps: Mapping[str, str] = field(default_factory=dict)
-
-
 def unit_spelt(text: str) -> str:
     """The unit that a text means, as `actuators.units` writes it; empty where it is none."""
     plain = text.strip().strip("[]()").strip()
@@ -64,15 +50,16 @@ def unit_spelt(text: str) -> str:
     return ""
 
 
-def read_head(head: bytes, dialect: CsvTable, where: str) -> CsvHead:
-    """Understand the first lines of a file.
+def read_head(
+    head: bytes, dialect: CsvTable, where: str
+) -> tuple[tuple[str, ...], int, dict[str, str], dict[str, str]]:
+    """Understand a file's first bytes.
 
     Lines that begin with ``#`` are remarks, unless the last of them is the header of what follows.
 
-    Args:
-        head: The file's first bytes.
-        dialect: How it separates columns.
-        where: File, for messages.
+    Returns:
+        Columns as written, lines above the first row of numbers, the units that a row of units
+        states by column, and columns of dates and times with the first of them.
 
     Raises:
         LogFormatError: No text in UTF-8, no header of names.
@@ -106,7 +93,7 @@ def read_head(head: bytes, dialect: CsvTable, where: str) -> CsvHead:
         skip = following + 1
         row = _row(lines, skip, len(names), dialect, where)
     stamps = {n: c.strip() for n, c in zip(names, row, strict=True) if _ISO.fullmatch(c)}
-    return CsvHead(tuple(names), skip, units, stamps if row else {})
+    return tuple(names), skip, units, stamps
 
 
 def _row(lines: list[bytes], number: int, cells: int, dialect: CsvTable, where: str) -> list[str]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -45,8 +46,7 @@ def expected_of_model(
     *,
     joints: Sequence[str] | None = None,
     ratio: Array | None = None,
-    feet: Sequence[str] = (),
-    foot_alias: Mapping[str, str] | None = None,
+    **more: Any,
 ) -> Expected:
     """Names and limits of a Pinocchio model.
 
@@ -55,55 +55,46 @@ def expected_of_model(
         name: The robot's name, for messages.
         joints: Columns wanted, in order; all actuated joints of the model by default.
         ratio: Motor angle per joint angle, shape (J,).
-        feet: Names of legs.
-        foot_alias: Further names of feet.
+        **more: Further attributes.
 
     Raises:
         WrongRobotError: A joint is not in the model.
     """
-    actuated = [
-        str(n) for i, n in enumerate(model.names) if i > 0 and model.joints[i].nv == 1
-    ]  # the free flyer has six
+    # The free flyer has six.
+    actuated = [str(n) for i, n in enumerate(model.names) if i > 0 and model.joints[i].nv == 1]
     wanted = tuple(joints) if joints is not None else tuple(actuated)
     for joint in wanted:
         if joint not in actuated:
             raise WrongRobotError(
                 f"{name}: joint '{joint}' is not in the URDF; {closest(joint, actuated)}"
             )
-    indexes = [model.getJointId(joint) for joint in wanted]
-    lower, upper = np.full(len(wanted), -np.inf), np.full(len(wanted), np.inf)
-    for k, i in enumerate(indexes):
-        joint = model.joints[i]
-        if joint.nq == 1:  # a continuous joint is written as cosine and sine
-            lower[k] = model.lowerPositionLimit[joint.idx_q]
-            upper[k] = model.upperPositionLimit[joint.idx_q]
+    found = [model.joints[model.getJointId(joint)] for joint in wanted]
+    bounded = np.array([joint.nq == 1 for joint in found])  # a continuous one is cosine and sine
+    place, speed = [joint.idx_q for joint in found], [joint.idx_v for joint in found]
+    lower = np.where(bounded, model.lowerPositionLimit[place], -np.inf)
+    upper = np.where(bounded, model.upperPositionLimit[place], np.inf)
     none = lower >= upper
-    velocity = np.array([model.velocityLimit[model.joints[i].idx_v] for i in indexes])
-    effort = np.array([model.effortLimit[model.joints[i].idx_v] for i in indexes])
     return Expected(
         robot=name,
         joints=wanted,
         lower=np.where(none, -np.inf, _limits(lower, missing_at_zero=False)),
         upper=np.where(none, np.inf, _limits(upper, missing_at_zero=False)),
-        velocity_limit=_limits(velocity, missing_at_zero=True),
-        effort_limit=_limits(effort, missing_at_zero=True),
-        feet=tuple(feet),
-        foot_alias=dict(foot_alias or {}),
+        velocity_limit=_limits(model.velocityLimit[speed], missing_at_zero=True),
+        effort_limit=_limits(model.effortLimit[speed], missing_at_zero=True),
         ratio=None if ratio is None else np.asarray(ratio, dtype=np.float64),
+        **more,
     )
 
 
 def expected_of_robot(robot: Robot, *, ratio: Array | None = None) -> Expected:
     """Names and limits of a robot file; a foot goes by its leg's or its frame's name."""
-    expected = expected_of_model(
+    gravity = float(np.linalg.norm(robot.model.gravity.linear))
+    return expected_of_model(
         robot.model,
         robot.spec.name,
         joints=robot.joints,
         ratio=ratio,
         feet=robot.leg_names,
         foot_alias={leg.foot: leg.name for leg in robot.spec.legs},
+        weight=gravity * float(pin.computeTotalMass(robot.model)) if robot.floating else None,
     )
-    if not robot.floating:
-        return expected
-    gravity = float(np.linalg.norm(robot.model.gravity.linear))
-    return replace(expected, weight=gravity * float(pin.computeTotalMass(robot.model)))

@@ -69,8 +69,6 @@ class Log:
     contact: Mask | None = None  #: Shape (N, F).
     base_roll: Array | None = None  #: Shape (N,) [rad].
     base_pitch: Array | None = None  #: Shape (N,) [rad].
-    #: False where position or effort is unusable, shape (N, J).
-    valid: Mask = field(default_factory=lambda: np.ones((0, 0), dtype=np.bool_))
     torque_off: Mask | None = None  #: True where the drive was switched off, shape (N, J).
     supply: Array | None = None  #: Voltage of the supply of all drives, shape (N,) [V].
     supply_current: Array | None = None  #: Out of it, shape (N,) [A].
@@ -104,9 +102,7 @@ class Log:
 
     def __post_init__(self) -> None:
         n, j = self.position.shape
-        if self.valid.size == 0:
-            object.__setattr__(self, "valid", np.isfinite(self.position))
-        shapes = {"time": (n,), "valid": (n, j), "torque_off": (n, j)}
+        shapes = {"time": (n,), "torque_off": (n, j)}
         shapes |= dict.fromkeys(("base_roll", "base_pitch", *SUPPLY), (n,))
         shapes |= dict.fromkeys(
             ("velocity", *EFFORTS, *GOALS, "temperature", "motor_position"), (n, j)
@@ -123,9 +119,18 @@ class Log:
         return self.time.size
 
     @property
+    def clock(self) -> Array:
+        """Times of the rows that hold a position: others may come between, at their own [s]."""
+        told = np.isfinite(self.position).any(axis=1)
+        return self.time[told] if np.count_nonzero(told) > 1 else self.time
+
+    @property
     def finite(self) -> tuple[Mask, Mask]:
-        """Positions and efforts that are numbers, each shape (N, J)."""
-        return np.isfinite(self.position), self.valid & np.isfinite(self.effort.values)
+        """Positions and efforts that are numbers, of drives that are on, each shape (N, J)."""
+        effort = np.isfinite(self.effort.values)
+        return np.isfinite(self.position), effort if self.torque_off is None else (
+            effort & ~self.torque_off
+        )
 
     @property
     def supply_alone(self) -> bool:

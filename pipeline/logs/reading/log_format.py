@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Mapping
+from typing import Final, NamedTuple
 
 from actuators.errors import closest, one_line
 from actuators.units import known_units
@@ -57,8 +57,7 @@ _UNIT_SUFFIXES: Final = frozenset(
 _PLOTTED: Final = re.compile(r"/?(?:.*/)?joint_states/(.+)/(position|velocity|effort)")
 
 
-@dataclass(frozen=True)
-class Target:
+class Target(NamedTuple):
     """Where a column's numbers go."""
 
     kind: str  #: ``"time"``, ``"joint"``, ``"foot"``, ``"base"`` or ``"supply"``.
@@ -75,11 +74,6 @@ def column_name(owner: str, quantity: str) -> str:
 def parse_column(column: str, expected: Expected, where: str) -> Target | None:
     """What a column of the log format means; None for a column that means nothing to us.
 
-    Args:
-        column: Its header.
-        expected: The robot's names.
-        where: File, for messages.
-
     Raises:
         LogFormatError: A quantity of the format in another unit, or misspelt at a known joint.
     """
@@ -91,15 +85,7 @@ def parse_column(column: str, expected: Expected, where: str) -> Target | None:
             raise LogFormatError(_unit_message(column, TIME, where))
         return None
     owner = expected.foot_alias.get(owner, owner)
-    # A leg and a joint may share a name; the quantity tells them apart.
-    for kind, owners, table in (
-        ("joint", expected.joints, JOINT_COLUMNS),
-        ("foot", expected.feet, FOOT_COLUMNS),
-        ("base", ("base",), BASE_COLUMNS),
-        ("supply", ("supply",), SUPPLY_COLUMNS),
-    ):
-        if owner not in owners:
-            continue
+    for kind, table in _tables(owner, expected):
         if quantity in table:
             attribute, unit = table[quantity]
             return Target(kind, owner if kind in ("joint", "foot") else "", attribute, unit)
@@ -130,18 +116,27 @@ def misspelt(column: str, expected: Expected) -> str:
     owner = expected.foot_alias.get(owner, owner)
     if not separator:
         return TIME if _slips(column.lower(), TIME) <= 1 else ""
-    for owners, table in (
-        (expected.joints, JOINT_COLUMNS),
-        (expected.feet, FOOT_COLUMNS),
-        (("base",), BASE_COLUMNS),
-        (("supply",), SUPPLY_COLUMNS),
-    ):
-        if owner in owners and quantity not in table:
+    for _, table in _tables(owner, expected):
+        if quantity not in table:
             slips = {known: _slips(quantity.lower(), known.lower()) for known in table}
             best = min(slips, key=lambda known: slips[known])
             if slips[best] <= _SLIPS:
                 return f"{owner}__{best}"
     return ""
+
+
+def _tables(owner: str, expected: Expected) -> list[tuple[str, Mapping[str, tuple[str, str]]]]:
+    """Kinds of owners that go by a name, and what they may have.
+
+    A leg and a joint may share a name; the quantity tells them apart.
+    """
+    kinds = (
+        ("joint", expected.joints, JOINT_COLUMNS),
+        ("foot", expected.feet, FOOT_COLUMNS),
+        ("base", ("base",), BASE_COLUMNS),
+        ("supply", ("supply",), SUPPLY_COLUMNS),
+    )
+    return [(kind, table) for kind, owners, table in kinds if owner in owners]
 
 
 def _slips(a: str, b: str) -> int:
@@ -171,8 +166,5 @@ def _unit_message(column: str, known: str, where: str) -> str:
 def suggest_column(wanted: str, header: tuple[str, ...]) -> str:
     """A hint which column of the file may be the one that is missing."""
     hint = closest(wanted, header)
-    return (
-        hint
-        if hint.startswith("did")
-        else f"the file has {len(header)} columns: " + (one_line(", ".join(header)))
-    )
+    every = f"the file has {len(header)} columns: {one_line(', '.join(header))}"
+    return hint if hint.startswith("did") else every

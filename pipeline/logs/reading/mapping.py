@@ -1,79 +1,18 @@
 """The mapping file: how a foreign log's columns become those of the log format.
 
-All tables are optional::
-
-    effort = "voltage"                      # channel to compare
-    locked = ["joint_4"]                    # joints that stood still on purpose
-
-    [csv]
-    delimiter = ";"
-    decimal = ","
-
-    [time]
-    column = "t"                            # default time_s
-    unit = "ms"
-    sample_rate = {value = 500, unit = "Hz"}  # instead of a column
-
-    [columns."enc_*"]                       # a star stands for any text, the same on both sides
-    as = "*__position_rad"
-    unit = "deg"                            # of the file; default that of the log format
-    zero = 12.5                             # subtracted, in the file's unit
-    scale = 1.0                             # dimensionless; with unit = "1" it brings to SI
-    flip = true                             # the file's positive sense is the joint's negative
-    late = 0.05                             # by which the column comes late [s]
-
-    [joints]                                # the log's name of a joint = the robot's name
-    shoulder = "joint_1"
-
-    [gear_ratio]                            # motor turns per joint turn, signed
-    joint_1 = 100
-
-    [torque_enabled]                        # column that is zero where the drive is off
-    joint_1 = "torque_on"
-
-    [controller]
-    gain_per_rad = 0.29                     # duty per position error
-    law = "duty"                            # computes voltage where there is none
-    torque_off_bridge = "open"              # or "shorted"; what the bridge does with the drive off
-
-    [pd_gains]                              # torque by the servos' law where no effort is logged
-    kp = 50.0                               # [N*m/rad]; or {hip = 60.0, knee = 40.0}
-    kd = 1.0                                # [N*m*s/rad]
-    limit = 23.7                            # largest torque [N*m]
-
-    [supply]
-    voltage = {value = 24, unit = "V"}      # or column = "supply_voltage_V"
-
-    [constants.ambient]
-    value = 21
-    unit = "degC"
-
-    [keep]
-    columns = ["load_raw"]
-
-    [[logs]]                                # what holds for some of the logs only
-    match = "*_kp100_*"
-    gain_per_rad = 0.29
-    condition = {gain = 100}
+All tables are optional; the README of `pipeline/logs` shows every key.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from collections.abc import Mapping as MappingType
-from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import (
-    AfterValidator,
-    BeforeValidator,
-    Field,
-    PrivateAttr,
-    Strict,
-    model_validator,
-)
+from pydantic import AfterValidator, BeforeValidator, Field, PrivateAttr, Strict, model_validator
 
 from actuators.checked import Names, Number, Table, Text, checked, finite
 from actuators.errors import UnitError, closest, one_line
@@ -86,26 +25,22 @@ from pipeline.logs.reading.servo_law import PdGains
 
 #: Beyond these a number is a slip, and some product of it overflows.
 LARGEST = 1e12
+_TOO_LARGE = f"must be a finite number below {LARGEST:g}"
 
 
-def _small(value: float) -> float:
-    if abs(value) > LARGEST:
-        raise ValueError(f"must be a finite number below {LARGEST:g}")
-    return value
+def _must(holds: Callable[[Any], bool], words: str) -> AfterValidator:
+    """A rule for a value, and what is said where it does not hold."""
 
+    def check(value: Any) -> Any:
+        if not holds(value):
+            raise ValueError(words)
+        return value
 
-def _not_zero(value: float) -> float:
-    if value == 0.0:
-        raise ValueError("must not be zero")
-    return value
+    return AfterValidator(check)
 
 
 def _unit(expected: str | None, unit: str) -> str:
-    """A unit of the table, of one dimension where one is expected.
-
-    Raises:
-        ValueError: It is unknown or another's.
-    """
+    """A known unit, of one dimension where one is expected."""
     try:
         found = dimension(unit)
     except UnitError as error:
@@ -122,31 +57,20 @@ def _channel(name: str) -> str:
 
 
 def _text_or_number(value: object) -> str | float:
-    return value if isinstance(value, str) else _small(finite(value))
+    if not isinstance(value, str) and abs(finite(value)) > LARGEST:
+        raise ValueError(_TOO_LARGE)
+    return value if isinstance(value, str) else finite(value)
 
 
-def _one_star(name: str) -> str:
-    if name.count("*") > 1:
-        raise ValueError("at most one star in a pattern")
-    return name
-
-
-def _delimiter(text: str) -> str:
-    if text not in (",", ";", "\t", " ", "|"):
-        raise ValueError("must be one of , ; tab space |")
-    return text
-
-
-def _listed(value: object) -> object:
-    if not isinstance(value, list):
-        raise ValueError("must be written [[logs]] with two brackets")
-    return value
-
-
-Small = Annotated[Number, AfterValidator(_small)]
-Factor = Annotated[Small, AfterValidator(_not_zero)]
+Small = Annotated[Number, _must(lambda x: abs(x) <= LARGEST, _TOO_LARGE)]
+Factor = Annotated[Small, _must(lambda x: x != 0.0, "must not be zero")]
 AnyUnit = Annotated[str, AfterValidator(partial(_unit, None))]
-Pattern = Annotated[Text, AfterValidator(_one_star)]
+VoltageUnit = Annotated[str, AfterValidator(partial(_unit, "voltage"))]
+TimeUnit = Annotated[str, AfterValidator(partial(_unit, "time"))]
+Pattern = Annotated[Text, _must(lambda x: x.count("*") <= 1, "at most one star in a pattern")]
+Delimiter = Annotated[
+    str, _must(lambda x: x in (",", ";", "\t", " ", "|"), "must be one of , ; tab space |")
+]
 
 
 class QuantityTable(Table):
@@ -167,30 +91,22 @@ def _of(expected: str, quantity: QuantityTable) -> QuantityTable:
     return quantity
 
 
-def _positive(quantity: QuantityTable) -> QuantityTable:
-    if not quantity.si > 0:
-        raise ValueError("must be positive")
-    return quantity
-
-
-def _sampling(rate: QuantityTable) -> QuantityTable:
-    if not 0 < rate.si < 1e9:
-        raise ValueError("must be positive and below 1 GHz")
-    return rate
-
-
 Voltage = Annotated[
-    QuantityTable, AfterValidator(partial(_of, "voltage")), AfterValidator(_positive)
+    QuantityTable,
+    AfterValidator(partial(_of, "voltage")),
+    _must(lambda q: q.si > 0, "must be positive"),
 ]
 Rate = Annotated[
-    QuantityTable, AfterValidator(partial(_of, "frequency")), AfterValidator(_sampling)
+    QuantityTable,
+    AfterValidator(partial(_of, "frequency")),
+    _must(lambda q: 0 < q.si < 1e9, "must be positive and below 1 GHz"),
 ]
 
 
 class CsvTable(Table):
     """How the file separates its columns and its decimals."""
 
-    delimiter: Annotated[str, AfterValidator(_delimiter)] = ","
+    delimiter: Delimiter = ","
     decimal: Literal[".", ","] = "."
 
     @model_validator(mode="after")
@@ -204,7 +120,7 @@ class TimeTable(Table):
     """Where time comes from."""
 
     column: str | None = None
-    unit: Annotated[str, AfterValidator(partial(_unit, "time"))] = "s"
+    unit: TimeUnit = "s"
     sample_rate: Rate | None = None
 
     @model_validator(mode="after")
@@ -259,7 +175,7 @@ class SupplyTable(Table):
 
     voltage: Voltage | None = None
     column: str | None = None
-    unit: Annotated[str, AfterValidator(partial(_unit, "voltage"))] = "V"
+    unit: VoltageUnit = "V"
 
 
 class KeepTable(Table):
@@ -301,6 +217,11 @@ class LogTable(Table):
         return any(fnmatchcase(name, self.match) for name in (path.stem, path.name))
 
 
+_LISTED = BeforeValidator(
+    _must(lambda x: isinstance(x, list), "must be written [[logs]] with two brackets").func
+)
+
+
 class Mapping(Table):
     """The whole file."""
 
@@ -317,13 +238,14 @@ class Mapping(Table):
     supply: SupplyTable = SupplyTable()
     constants: dict[str, QuantityTable] = Field(default_factory=dict)
     keep: KeepTable = KeepTable()
-    logs: Annotated[tuple[LogTable, ...], Strict(False), BeforeValidator(_listed)] = ()
+    logs: Annotated[tuple[LogTable, ...], Strict(False), _LISTED] = ()
     _where: str = PrivateAttr("mapping")
 
     @model_validator(mode="after")
     def _stars(self) -> Self:
         for name, column in self.columns.items():
-            _one_star(name)
+            if name.count("*") > 1:
+                raise ValueError("at most one star in a pattern")
             if column.target is not None and "*" in column.target and "*" not in name:
                 raise ValueError(f"columns.{name}: as = '{column.target}' has a star, it has none")
         _constants(self.constants)
@@ -350,8 +272,7 @@ class Mapping(Table):
     def refuse_unknown_logs(self, paths: Sequence[Path]) -> None:
         """Refuse a `[[logs]]` that names no log where one of the logs is named by none.
 
-        Args:
-            paths: Of the logs that are read together; files beside them count as known, too.
+        Files beside the logs count as known, too.
 
         Raises:
             MappingError: Names the entry, and the closest log.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -43,10 +42,14 @@ class ReadingPlan:
     misspelt: dict[str, str]  #: Those among them that are nearly one of it, and that one.
 
     @property
+    def quantities(self) -> set[str]:
+        """Quantities that the file has of anything."""
+        return {t.quantity for t in self.sources}
+
+    @property
     def channel(self) -> str:
         """The effort channel that is compared, as far as mapping and header say."""
-        have = {t.quantity for t in self.sources}
-        return self.mapping.effort or next((c for c in EFFORTS if c in have), "voltage")
+        return self.mapping.effort or next((c for c in EFFORTS if c in self.quantities), "voltage")
 
     @property
     def columns(self) -> list[str]:
@@ -70,30 +73,30 @@ class ReadingPlan:
     @property
     def derives_torque(self) -> bool:
         """Whether torque follows from the servos' law, targets and gains."""
-        efforts = [q for q in EFFORTS if any(t.quantity == q for t in self.sources)]
+        efforts = self.quantities & {*EFFORTS}
         return (
             self.mapping.pd_gains is not None
             and "torque" not in efforts
             and (not efforts or self.mapping.effort == "torque")
-            and any(t.quantity == "goal_position" for t in self.sources)
+            and "goal_position" in self.quantities
         )
 
     @property
     def of_supply(self) -> bool:
         """Whether the file tells the supply's power or current."""
-        return bool({t.quantity for t in self.sources} & {"supply_power", "supply_current"})
+        return bool(self.quantities & {"supply_power", "supply_current"})
 
     @property
     def supply_alone(self) -> bool:
         """Whether that is all that it tells of effort."""
-        told = {t.quantity for t in self.sources} & {*EFFORTS}
-        return self.of_supply and not (told or self.derives_torque or self.derives_voltage)
+        told = self.quantities & {*EFFORTS} or self.derives_torque or self.derives_voltage
+        return self.of_supply and not told
 
-    def has(self, owner: str, quantity: str) -> bool:
-        """Whether the file has a quantity of a joint."""
-        return any(t.owner == owner and t.quantity == quantity for t in self.sources)
+    def has(self, owner: str, *quantities: str) -> bool:
+        """Whether the file has one of some quantities of a joint."""
+        return any(t.owner == owner and t.quantity in quantities for t in self.sources)
 
-    def strangers(self, quantities: Sequence[str]) -> bool:
+    def strangers(self, *quantities: str) -> bool:
         """Whether unused columns say one of these quantities of something that is no joint."""
         suffixes = {s for s, (q, _) in JOINT_COLUMNS.items() if q in quantities}
         return any(c.rpartition("__")[2] in suffixes for c in self.ignored)
@@ -102,8 +105,7 @@ class ReadingPlan:
 def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None) -> ReadingPlan:
     """Decide from the header which column goes where.
 
-    Raises:
-        GapError: Columns are missing, occur twice after mapping, or belong to another robot.
+    A GapError where columns are missing, occur twice after mapping, or belong to another robot.
     """
     mapping = mapping or Mapping()
     table = open_table(path, mapping.csv)
@@ -115,7 +117,8 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
         pattern, rule, own = _rule(column, mapping)
         if not pattern and own == column and plotted(column) not in table.header:
             own = plotted(column)
-        name = _robots(own, mapping)
+        owner, separator, quantity = own.rpartition("__")
+        name = f"{mapping.joints.get(owner, owner)}{separator}{quantity}"
         first.setdefault(pattern, (column, name))
         target = parse_column(name, expected, table.where)
         if target is None:
@@ -129,7 +132,13 @@ def plan_reading(path: Path, expected: Expected, mapping: Mapping | None = None)
                 "both give the same channel; keep one"
             )
         rule = _in_unit(rule, table, column, own, target)
-        _check_unit(pattern, rule, target, mapping.where)
+        if rule.unit not in (None, "1", target.unit):
+            found, wanted = dimension(str(rule.unit)), dimension(target.unit)
+            if found != wanted:
+                raise GapError(
+                    f"{mapping.where}: columns '{one_line(pattern)}': '{rule.unit}' is a unit of "
+                    f"{found}, {target.quantity} needs one of {wanted}"
+                )
         sources[target] = column, rule
         useful.add(pattern)
     for pattern in mapping.columns:
@@ -174,12 +183,8 @@ def _rule(column: str, mapping: Mapping) -> tuple[str, ColumnTable, str]:
 def _in_unit(
     rule: ColumnTable, table: TableFile, column: str, name: str, target: Target
 ) -> ColumnTable:
-    """The rule with the unit that the file's own row of units states, where the rule has none.
-
-    Raises:
-        LogFormatError: The column's name says another unit than the row.
-    """
-    stated = table.head.units.get(column)
+    """The rule with the unit that the file's own row of units states, where the rule has none."""
+    stated = table.units.get(column)
     if stated is None or rule.unit is not None or dimension(stated) != dimension(target.unit):
         return rule
     if column == name and stated != target.unit:
@@ -190,29 +195,12 @@ def _in_unit(
     return rule.model_copy(update={"unit": stated})
 
 
-def _robots(name: str, mapping: Mapping) -> str:
-    """A column of the log format, its joint called as the robot calls it."""
-    owner, separator, quantity = name.rpartition("__")
-    return f"{mapping.joints.get(owner, owner)}{separator}{quantity}"
-
-
 def _unknown(column: str, name: str, expected: Expected, mapping: Mapping) -> GapError:
     known = [TIME, *(f"{j}__{suffix}" for j in expected.joints for suffix in JOINT_COLUMNS)]
     return GapError(
         f"{mapping.where}: column '{one_line(column)}' becomes '{one_line(name)}', which the log "
         f"format does not know; {closest(name, known)}"
     )
-
-
-def _check_unit(pattern: str, rule: ColumnTable, target: Target, where: str) -> None:
-    if rule.unit in (None, "1"):
-        return
-    found, wanted = dimension(str(rule.unit)), dimension(target.unit)
-    if found != wanted:
-        raise GapError(
-            f"{where}: columns '{one_line(pattern)}': '{rule.unit}' is a unit of {found}, "
-            f"{target.quantity} needs one of {wanted}"
-        )
 
 
 def _check_misspelt(plan: ReadingPlan) -> None:
@@ -237,9 +225,8 @@ def _check_names(plan: ReadingPlan) -> None:
                 f"{closest(name, sorted(owners))}"
             )
     for name in plan.rule.constants:
-        constant = parse_column(name, expected, f"{mapping.where}: constants")
-        meant = "" if constant else misspelt(name, expected)
-        if meant:
+        known = parse_column(name, expected, f"{mapping.where}: constants")
+        if not known and (meant := misspelt(name, expected)):
             raise GapError(
                 f"{mapping.where}: constants: '{one_line(name)}' is none of the log format; did "
                 f"you mean '{meant}'?"
@@ -255,12 +242,12 @@ def _check_names(plan: ReadingPlan) -> None:
                 f"{mapping.where}: {what}: column '{one_line(column)}' is not in {table.where}; "
                 f"{suggest_column(column, table.header)}"
             )
-    named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values())
     if mapping.pd_gains is not None:
         try:
             mapping.pd_gains.refuse_unknown(expected.joints)
         except ValueError as error:
             raise GapError(f"{mapping.where}: {error}") from None
+    named = (*mapping.torque_enabled, *mapping.locked, *mapping.joints.values())
     for joint in (*named, *mapping.gear_ratio):
         if joint not in expected.joints:
             raise GapError(
@@ -286,7 +273,7 @@ def _check_time(plan: ReadingPlan) -> None:
 def _check_positions(plan: ReadingPlan) -> None:
     """At least one joint with a position, and none whose columns may hide under another name."""
     table, expected, where = plan.table, plan.expected, plan.table.where
-    without = [j for j in expected.joints if not any(plan.has(j, q) for q in POSITIONS)]
+    without = [j for j in expected.joints if not plan.has(j, *POSITIONS)]
     if len(without) == len(expected.joints):
         owners = {c.rpartition("__")[0] for c in table.header if "__position" in c}
         seen = one_line(", ".join(sorted(owners)) or ", ".join(table.header))
@@ -297,9 +284,8 @@ def _check_positions(plan: ReadingPlan) -> None:
         )
     for joint in without:
         wanted = column_name(joint, "position")
-        if wanted in plan.rule.constants:
-            continue
-        if any(plan.has(joint, c) for c in EFFORTS) or plan.strangers(POSITIONS):
+        hidden = plan.has(joint, *EFFORTS) or plan.strangers(*POSITIONS)
+        if hidden and wanted not in plan.rule.constants:
             raise WrongRobotError(
                 f"{where}: joint '{joint}' has no column '{wanted}'; "
                 f"{suggest_column(wanted, table.header)}"
@@ -311,10 +297,9 @@ def _check_efforts(plan: ReadingPlan) -> None:
     where, mapping = plan.table.where, plan.mapping
     open_ = [j for j in plan.expected.joints if j not in mapping.locked]
     found = [c for c in EFFORTS if any(plan.has(j, c) for j in open_)]
-    for channel in found:
+    for channel in (c for c in found if plan.strangers(c)):
         for joint in open_:
-            moves = any(plan.has(joint, q) for q in POSITIONS)
-            if moves and not plan.has(joint, channel) and plan.strangers((channel,)):
+            if plan.has(joint, *POSITIONS) and not plan.has(joint, channel):
                 column = column_name(joint, channel)
                 raise WrongRobotError(
                     f"{where}: joint '{joint}' has no {channel} '{column}', other joints have; "
@@ -329,7 +314,7 @@ def _check_efforts(plan: ReadingPlan) -> None:
         return
     if not found:
         columns = ", ".join(column_name(plan.expected.joints[0], c) for c in EFFORTS)
-        goals = any(t.quantity == "goal_position" for t in plan.sources)
+        goals = "goal_position" in plan.quantities
         hint = "; or give the servos' gains under [pd_gains] in a mapping file" if goals else ""
         raise LogFormatError(
             f"{where}: no effort channel; at least one of {columns} must be there{hint}"

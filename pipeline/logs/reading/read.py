@@ -28,12 +28,7 @@ _TIME: Final = Target("time", "", "time", "s")
 
 
 def read_log(path: Path, expected: Expected, mapping: Mapping | None = None) -> Log:
-    """Read one log whole.
-
-    Args:
-        path: CSV or Parquet.
-        expected: Names, limits and ratios of the robot.
-        mapping: For foreign columns.
+    """Read one log whole: a file of the robot that is expected, with a mapping of its columns.
 
     Raises:
         GapError: The file is unreadable, is not this robot's, or holds no usable measurement.
@@ -50,14 +45,7 @@ def stream_log(
     rows: int = 200_000,
     digest: str = "",
 ) -> Iterator[Log]:
-    """Read a Parquet log in consecutive pieces of at most `rows` rows.
-
-    Args:
-        path: Parquet.
-        expected: Names, limits and ratios of the robot.
-        mapping: For foreign columns.
-        rows: Of a piece.
-        digest: SHA-256 of the file, where it is known.
+    """Read a Parquet log in consecutive pieces of at most `rows` rows; `digest` is its SHA-256.
 
     Raises:
         GapError: As for `read_log`; time is checked across pieces, too.
@@ -84,21 +72,17 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
     base: dict[str, Any] = {
         t.quantity: x for t, x in columns.items() if t.kind in ("base", "supply")
     }
-    joints = {
-        quantity: _side_by_side(columns, quantity, expected.joints, time.size)
-        for quantity in {t.quantity for t in columns if t.kind == "joint"}
-    }
+    joints: dict[str, Array] = {}  # quantity to shape (N, J); NaN where it was not measured
+    for target, values in columns.items():
+        if target.kind == "joint":
+            empty = np.full((time.size, len(expected.joints)), np.nan)
+            block = joints.setdefault(target.quantity, empty)
+            block[:, expected.joints.index(target.owner)] = values
     warm = joints.pop("temperature", None), base.pop("base_temperature", None)
-    temperature = _warm(*warm, time, len(expected.joints))
     own, motor = joints.pop("position", None), joints.pop("motor_position", None)
     sides = sides_of(own, motor, expected, mapping.gear_ratio, where)
-    derived = "goal_position" in joints and (
-        mapping.controller.law == "duty" or plan.derives_torque
-    )
-    efforts = [joints[c] for c in EFFORTS if c in joints]
-    position, left_out = _stand_still(sides.position, efforts, derived, plan)
+    position, left_out = _stand_still(sides.position, joints, plan)
     feet, unused = _feet(columns, expected.feet, time.size)
-    drive = _drive(plan, data, joints | {"position": position}, time)
     log = Log(
         name=plan.table.path.stem,
         time=time,
@@ -120,19 +104,19 @@ def _assemble(plan: ReadingPlan, data: dict[str, Array], first_row: int, digest:
         chosen_effort=mapping.effort,
         sha256=digest,
         source=plan.table.path,
-        temperature=temperature,
+        temperature=_warm(*warm, time, len(expected.joints)),
         rules={(t.owner, t.quantity): source for t, source in plan.sources.items()},
-        **base | joints | feet | {"notes": plan.table.remarks} | drive,
+        **base
+        | joints
+        | feet
+        | {"notes": plan.table.remarks}
+        | _drive(plan, data, joints | {"position": position}, time),
     )
     return log if fresh.all() else log.rows(fresh)
 
 
 def _in_si(plan: ReadingPlan, data: dict[str, Array], first_row: int) -> dict[Target, Array]:
-    """Every quantity of the file, and constants that stand for one, each (N,), in the log's unit.
-
-    Raises:
-        LogContentError: Values that no robot measures.
-    """
+    """Every quantity of the file, and constants that stand for one, (N,) in the log's unit."""
     where, mapping = plan.table.where, plan.mapping
     out: dict[Target, Array] = {}
     n = next(iter(data.values())).size
@@ -158,17 +142,6 @@ def _in_si(plan: ReadingPlan, data: dict[str, Array], first_row: int) -> dict[Ta
     return out
 
 
-def _side_by_side(
-    columns: dict[Target, Array], quantity: str, joints: tuple[str, ...], n: int
-) -> Array:
-    """One quantity of all joints, shape (N, J); NaN where it was not measured."""
-    block = np.full((n, len(joints)), np.nan)
-    for target, values in columns.items():
-        if target.kind == "joint" and target.quantity == quantity:
-            block[:, joints.index(target.owner)] = values
-    return block
-
-
 def _warm(own: Array | None, common: Array | None, time: Array, joints: int) -> Array | None:
     """Temperatures (N, J), the machine's own where a joint has none.
 
@@ -187,12 +160,16 @@ def _warm(own: Array | None, common: Array | None, time: Array, joints: int) -> 
 
 
 def _stand_still(
-    position: Array, efforts: list[Array], derived: bool, plan: ReadingPlan
+    position: Array, joints: dict[str, Array], plan: ReadingPlan
 ) -> tuple[Array, dict[str, str]]:
     """Positions (N, J), joints that the log does not know at a place; and what is left out, why."""
     expected, out, why = plan.expected, position.copy(), {}
+    duty = plan.mapping.controller.law == "duty"
+    if "goal_position" in joints and (duty or plan.derives_torque):
+        return out, why
+    efforts = [joints[c] for c in EFFORTS if c in joints]
     for k, joint in enumerate(expected.joints):
-        if derived or any(np.isfinite(e[:, k]).any() for e in efforts):
+        if any(np.isfinite(e[:, k]).any() for e in efforts):
             continue
         if not np.isfinite(position[:, k]).any():
             out[:, k] = np.clip(0.0, expected.lower[k], expected.upper[k])
@@ -263,40 +240,30 @@ def _feet(
 def _drive(
     plan: ReadingPlan, data: dict[str, Array], joints: dict[str, Array], time: Array
 ) -> dict[str, Any]:
-    """Supply, switched-off rows, the voltage of the servo's own law, and rows that are valid."""
+    """Supply, switched-off rows, and the effort of the servos' own law."""
     mapping, position, out = plan.mapping, joints["position"], dict[str, Any]()
-    supply, gain = mapping.supply, plan.rule.gain_per_rad or 0.0
+    supply, gains = mapping.supply, mapping.pd_gains
     if supply.column:
         factor, offset = ColumnTable(unit=supply.unit).affine("V")
         out["supply"] = factor * data[supply.column] + offset
     elif supply.voltage is not None:
         out["supply"] = np.full(position.shape[0], supply.voltage.si)
-    valid = np.isfinite(position)
+    off = np.zeros(position.shape, dtype=np.bool_)
     if mapping.torque_enabled:
-        off = np.zeros(position.shape, dtype=np.bool_)
         for joint, column in mapping.torque_enabled.items():
             off[:, plan.expected.joints.index(joint)] = ~(data[column] > 0.5)
         out["torque_off"] = off
-        valid &= ~off
     if "voltage" not in joints and plan.derives_voltage:
         # U = U_supply * clip(k (goal - position), -1, 1): the servo's duty, averaged over its PWM.
+        gain = plan.rule.gain_per_rad or 0.0
         duty = np.clip(gain * (joints["goal_position"] - position), -1.0, 1.0)
-        out["voltage"] = out["supply"][:, None] * duty
-        if "torque_off" in out:
-            out["voltage"][out["torque_off"]] = np.nan
+        out["voltage"] = np.where(off, np.nan, out["supply"][:, None] * duty)
         out["derived"] = {"voltage": "supply x clip(gain x (goal - position), -1, 1)"}
-    gains = mapping.pd_gains
     if gains is not None and plan.derives_torque:
-        out["torque"] = gains.torque(plan.expected.joints, joints, time)
-        if "torque_off" in out:
-            out["torque"][out["torque_off"]] = 0.0
+        torque = gains.torque(plan.expected.joints, joints, time)
+        out["torque"] = np.where(off, 0.0, torque)
         out["derived"] = {"torque": gains.formula(joints)}
         out["notes"] = (*plan.table.remarks, f"the torque {CANNOT}")
     if plan.supply_alone:
         out["torque"], out["derived"] = np.full(position.shape, np.nan), {"torque": BY_MODEL}
-        return out | {"valid": valid}
-    channels = joints | out
-    effort = mapping.effort or next((c for c in EFFORTS if c in channels), None)
-    if effort is not None:
-        valid &= np.isfinite(channels[effort])
-    return out | {"valid": valid}
+    return out

@@ -68,11 +68,7 @@ class PdGains(Table):
         return self
 
     def refuse_unknown(self, joints: Sequence[str]) -> None:
-        """Refuse a table that names other joints, or not all of them.
-
-        Raises:
-            ValueError: Names the joint.
-        """
+        """Refuse a table that names other joints, or not all of them, by a ValueError."""
         for key in ("kp", "kd", "limit"):
             table = getattr(self, key)
             if not isinstance(table, dict):
@@ -86,16 +82,12 @@ class PdGains(Table):
                 raise ValueError(f"pd_gains.{key}: nothing for joint '{missing[0]}'")
 
     def torque(self, joints: Sequence[str], channels: Mapping[str, Array], time: Array) -> Array:
-        """Torque by the law.
+        """Torque by the law, (N, J) [N*m]; NaN where position or target are not known.
 
         Args:
             joints: Of the columns.
-            channels: ``position``, ``goal_position``, and where the log has them ``velocity``,
-                ``goal_velocity`` and ``goal_torque``, each shape (N, J), SI units.
+            channels: Position, goals and, where it is logged, velocity, each (N, J), SI units.
             time: Shape (N,) [s].
-
-        Returns:
-            Shape (N, J) [N*m]; NaN where position or target are not known.
         """
         kp, kd = self._of(self.kp, joints), self._of(self.kd, joints)
         position = channels["position"]
@@ -120,11 +112,7 @@ class PdGains(Table):
         return law if self.limit is None else f"{law}, clipped at the limit"
 
     def by_joint(self, joints: Sequence[str]) -> dict[str, tuple[float, float]]:
-        """Stiffness and damping of every joint.
-
-        Raises:
-            ValueError: The gains are those of other joints.
-        """
+        """Stiffness and damping of every joint; a ValueError for gains of other joints."""
         self.refuse_unknown(joints)
         kp, kd = self._of(self.kp, joints), self._of(self.kd, joints)
         return {j: (float(p), float(d)) for j, p, d in zip(joints, kp, kd, strict=True)}

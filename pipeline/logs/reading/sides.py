@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -24,8 +23,7 @@ _ALONE: Final = (
 )
 
 
-@dataclass(frozen=True, eq=False)
-class Sides:
+class Sides(NamedTuple):
     """Positions brought to the joint's side."""
 
     #: Of the joint where that was measured, else of the motor over the ratio, (N, J).
@@ -34,8 +32,7 @@ class Sides:
     #: position; None where the log has one kind of position.
     motor: Array | None
     source: str  #: ``"motor"`` where every position is the motor's, else ``"joint"``.
-    #: Joint to what a reader should know about its positions.
-    remarks: Mapping[str, str] = field(default_factory=dict)
+    remarks: Mapping[str, str]  #: Joint to what a reader should know about its positions.
 
 
 def sides_of(
@@ -63,7 +60,7 @@ def sides_of(
     """
     if motor is None:
         assert joint is not None
-        return Sides(joint, None, "joint")
+        return Sides(joint, None, "joint", {})
     own = np.full_like(motor, np.nan) if joint is None else joint
     has_own = np.asarray(np.isfinite(own).any(axis=0))
     has_motor = np.asarray(np.isfinite(motor).any(axis=0))

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,7 +15,7 @@ from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.formats.convert import plain
-from pipeline.logs.reading.csv_head import CsvHead, read_head
+from pipeline.logs.reading.csv_head import read_head
 from pipeline.logs.reading.mapping import CsvTable
 
 _HEADER_BYTES: Final = 1 << 20
@@ -27,13 +27,16 @@ class TableFile:
     """A file of columns whose header has been read."""
 
     path: Path  #: The file, or the folder of a bag.
-    header: tuple[str, ...]  #: Column names, unique.
-    head: CsvHead  #: What else stands above the numbers of a CSV file.
-    parquet: bool  #: Whether its data are Parquet; else CSV.
-    dialect: CsvTable  #: Of a CSV file.
     #: What is read: the file, or what was made of it where it is neither CSV nor Parquet.
     data: Path
-    remarks: tuple[str, ...] = ()  #: What a reader should know of how that was made.
+    parquet: bool  #: Whether its data are Parquet; else CSV.
+    dialect: CsvTable  #: Of a CSV file.
+    header: tuple[str, ...]  #: Column names, unique.
+    skip: int = 1  #: Lines above the first row of numbers.
+    units: Mapping[str, str] = field(default_factory=dict)  #: By column, of a row of units.
+    #: Columns of dates and times to the first of them, as written.
+    stamps: Mapping[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()  #: What a reader should know of how the data were made.
 
     @property
     def where(self) -> str:
@@ -42,11 +45,7 @@ class TableFile:
 
 
 def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
-    """Open a file of columns and read its header.
-
-    Args:
-        path: CSV, Parquet, or what becomes such a table; kinds are recognised by their first bytes.
-        dialect: Of a CSV file; the log format's own by default.
+    """Open a file of columns and read its header; its kind is told by its first bytes.
 
     Raises:
         LogFormatError: No such file, empty, wrong bytes, no header, names that occur twice.
@@ -69,28 +68,23 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
     parquet = head.startswith(b"PAR1")
     if parquet:
         try:
-            names = [str(name) for name in pq.read_schema(made.path).names]
-            csv_head = CsvHead(tuple(names))
+            head_of_csv = ((*map(str, pq.read_schema(made.path).names),), 1, {}, {})
         except (pa.ArrowException, OSError, ValueError) as error:
             reason = f"not a readable Parquet file ({one_line(error)})"
             raise LogFormatError(f"{where}: {reason}") from None
     else:
-        csv_head = read_head(head, dialect, where)
-        names = list(csv_head.names)
+        head_of_csv = read_head(head, dialect, where)
+    names = head_of_csv[0]
     for k, name in enumerate(names, start=1):
         if name in names[: k - 1]:
             raise LogFormatError(f"{where}: column '{one_line(name)}' occurs twice; rename one")
         if not name:
             raise LogFormatError(f"{where}: column {k} has no name; give it one in line 1")
-    return TableFile(path, tuple(names), csv_head, parquet, dialect, made.path, made.remarks)
+    return TableFile(path, made.path, parquet, dialect, *head_of_csv, made.remarks)
 
 
 def read_columns(table: TableFile, columns: Sequence[str]) -> dict[str, Array]:
-    """Read some columns whole.
-
-    Args:
-        table: The open file.
-        columns: Names from its header.
+    """Read some columns of the header whole.
 
     Returns:
         Name to numbers, shape (N,); empty cells are NaN, true and false 1 and 0.
@@ -150,7 +144,7 @@ def row_count(table: TableFile) -> int:
             return int(pq.read_metadata(table.data).num_rows)
     with table.data.open("rb") as stream:
         blocks = iter(lambda: stream.read(1 << 22), b"")
-        return max(0, sum(block.count(b"\n") for block in blocks) - table.head.skip)
+        return max(0, sum(block.count(b"\n") for block in blocks) - table.skip)
 
 
 def _troubles() -> tuple[type[Exception], ...]:
@@ -175,12 +169,12 @@ def _read_csv(
     import pyarrow.csv as pc
 
     kinds = {n: pa.string() if n.endswith("__contact") else pa.float64() for n in columns}
-    for name, first in table.head.stamps.items():
+    for name, first in table.stamps.items():
         kinds[name] = pa.timestamp("ns", None if _without_zone(first) else "UTC")
     return pc.read_csv(
         table.data,
         read_options=pc.ReadOptions(
-            column_names=list(table.header), skip_rows=table.head.skip, use_threads=threads
+            column_names=list(table.header), skip_rows=table.skip, use_threads=threads
         ),
         parse_options=pc.ParseOptions(
             delimiter=table.dialect.delimiter,
@@ -216,17 +210,16 @@ def _numbers(column: Any, name: str, where: str) -> Array:
             lower = pc.if_else(pc.equal(lower, "true"), "1", lower)
             lower = pc.if_else(pc.equal(lower, "false"), "0", lower)
             column = pc.cast(lower, pa.float64())
-        elif pa.types.is_null(kind):
-            return np.full(len(column), np.nan)
         elif pa.types.is_timestamp(kind):
             return _seconds(column)
-        elif pa.types.is_boolean(kind) or pa.types.is_integer(kind) or pa.types.is_floating(kind):
-            column = pc.cast(column, pa.float64(), safe=False)
-        else:
+        elif not (pa.types.is_null(kind) or pa.types.is_boolean(kind)) and not (
+            pa.types.is_integer(kind) or pa.types.is_floating(kind)
+        ):
             raise LogFormatError(
                 f"{where}: column '{one_line(name)}' holds {one_line(kind)}; expected numbers"
             )
-        return np.array(column.to_numpy(), dtype=np.float64)
+        numbers = pc.cast(column, pa.float64(), safe=False).to_numpy()
+        return np.array(numbers, dtype=np.float64)
     except pa.ArrowException as error:
         raise LogFormatError(
             f"{where}: column '{one_line(name)}': {one_line(error)}; expected numbers"
@@ -250,24 +243,21 @@ def _seconds(column: Any) -> Array:
 
 def _reason(error: Exception, table: TableFile) -> str:
     """Say in one line what the reader met."""
-    text = one_line(error)
-    where = table.where
+    text, where = one_line(error), table.where
     row = re.search(r"Row #(\d+)", text)
-    place = f"row {row[1]}" if row else "a row"
-    ragged = re.search(r"Expected (\d+) columns, got (\d+)", text)
-    if ragged:
+    if ragged := re.search(r"Expected (\d+) columns, got (\d+)", text):
         want, got = int(ragged[1]), int(ragged[2])
         hint = "a row is cut off or has a cell too many"
         if got == 2 * want or (got == 2 * want - 1 and want > 2):
             hint = "decimal commas? export the log with decimal dots"
+        place = f"row {row[1]}" if row else "a row"
         return f"{where}: {place} has {got} cells, the header {want}; {hint}"
-    cell = re.search(r"column #(\d+): .*invalid value '(.*)'", text)
-    if cell:
+    if cell := re.search(r"column #(\d+): .*invalid value '(.*)'", text):
         number = int(cell[1])
         name = table.header[number] if number < len(table.header) else f"#{number}"
         hint = "expected a number"
         if _DECIMAL_COMMA.match(cell[2]):
             hint = "a decimal comma; export the log with decimal dots"
-        place = f"{place}, " if row else ""
+        place = f"row {row[1]}, " if row else ""
         return f"{where}: {place}column '{one_line(name)}' holds '{cell[2][:40]}', {hint}"
     return f"{where}: cannot be read: {text}"

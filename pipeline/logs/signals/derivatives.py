@@ -97,9 +97,7 @@ class LowPass:
     def smooth(self, x: Array, pieces: Sequence[slice] = WHOLE) -> Array:
         """Low-passed values, shape as `x` (samples first); ends are continued by point symmetry.
 
-        Args:
-            x: Shape (N, ...).
-            pieces: Stretches that follow one another and share no sample; all of it by default.
+        Pieces are stretches that follow one another and share no sample; all of it by default.
         """
         return np.concatenate([self._apply(x[piece], (0,))[0] for piece in pieces])
 

@@ -62,17 +62,10 @@ def split_at_gaps(time: Array, dt: float, bridge: float = 0.0) -> list[slice]:
 def uniform_grid(
     time: Array, dt: float, origin: float | None = None, *, bridge: float = 0.0
 ) -> Grid:
-    """Lay a uniform grid under a log.
+    """Lay a uniform grid of steps `dt` [s] under a log.
 
-    Args:
-        time: Strictly increasing, shape (N,) [s].
-        dt: Step [s].
-        origin: A time on the grid; the log's first by default.
-        bridge: Steps up to this long are interpolated across [s].
-
-    Returns:
-        The log's own rows where each piece is uniform to within `JITTER_IGNORED` steps, else a grid
-        to interpolate on.
+    The log's own rows where each piece is uniform to within `JITTER_IGNORED` steps, else a grid to
+    interpolate on, through `origin` or the first time [s]; steps up to `bridge` [s] are no gaps.
     """
     pieces = split_at_gaps(time, dt, bridge)
     if all(_is_uniform(time[piece], dt) for piece in pieces):
@@ -118,15 +111,9 @@ def fill_gaps(time: Array, values: Array, ok: Mask) -> Array:
 
 
 def busiest(x: Array, pieces: Sequence[slice]) -> list[slice]:
-    """Stretches in which a long log changes most: enough to know its spectrum and noise.
+    """Stretches in which a long log (N, C) changes most: enough to know its spectrum and noise.
 
-    Args:
-        x: Shape (N, C).
-        pieces: Stretches without a gap.
-
-    Returns:
-        The pieces themselves where they are short, else up to `STRETCHES` of `STRETCH_ROWS` rows,
-        in order of time.
+    The pieces themselves where they are short, else up to `STRETCHES` of `STRETCH_ROWS` rows.
     """
     if sum(p.stop - p.start for p in pieces) <= STRETCHES * STRETCH_ROWS:
         return list(pieces)
@@ -151,13 +138,7 @@ def runs_of(flag: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def long_runs(time: Array, bad: Mask, longest: float) -> Mask:
-    """Bad samples except short runs that interpolation bridges, such as held repeats.
-
-    Args:
-        time: Shape (N,) [s].
-        bad: Shape (N, C).
-        longest: Time between good samples up to which a run is bridged [s].
-    """
+    """Bad samples (N, C) except runs between good ones up to `longest` [s], as held repeats are."""
     out = np.zeros_like(bad)
     for c in np.flatnonzero(bad.any(axis=0)):
         for start, stop in zip(*runs_of(bad[:, c]), strict=True):

@@ -27,15 +27,7 @@ _ON_LINE: Final = 1e-4
 
 
 def own_spacing(time: Array, ok: Mask) -> float:
-    """Step between good samples [s] that all but `_IN_GAPS` of the time keeps to.
-
-    Args:
-        time: Strictly increasing, shape (N,) [s].
-        ok: Good samples, shape (N,).
-
-    Returns:
-        Infinite where fewer than two are good.
-    """
+    """Step between good samples [s] that all but `_IN_GAPS` of the time keeps to; inf for none."""
     step = np.sort(np.diff(time[ok]))
     if step.size == 0:
         return np.inf
@@ -45,14 +37,9 @@ def own_spacing(time: Array, ok: Mask) -> float:
 
 
 def interpolated(time: Array, x: Array) -> Mask:
-    """Rows that lie on the straight line between their neighbours; none in a sensor's own log.
+    """Rows (N,) that lie on the straight line between their neighbours; none in a sensor's own log.
 
-    Args:
-        time: Strictly increasing, shape (N,) [s].
-        x: Shape (N,).
-
-    Returns:
-        Shape (N,); all false where fewer rows than `_STRAIGHT` of the moving ones do.
+    All false where fewer rows than `_STRAIGHT` of the moving ones do.
     """
     out = np.zeros(x.size, dtype=np.bool_)
     if x.size < 10:

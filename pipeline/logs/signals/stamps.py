@@ -21,16 +21,12 @@ _LEAST_ROWS: Final = 200
 
 
 def stamp_error(time: Array, q: Array, gap: float) -> tuple[float, float]:
-    """Standard deviation of the stamps' errors.
+    """Standard deviation of the stamps' errors and its standard error [s]; zeros if none tells.
 
     Args:
         time: Strictly increasing, shape (N,) [s].
         q: Positions, shape (N, J) [rad].
         gap: Steps longer than this are none to compare across [s].
-
-    Returns:
-        The error and its standard error [s], each joint by its own certainty; zeros where no joint
-        tells.
     """
     if time.size < _LEAST_ROWS:
         return 0.0, 0.0

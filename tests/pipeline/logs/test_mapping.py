@@ -109,7 +109,7 @@ def test_voltage_by_the_servos_law(columns: dict[str, Array], read: Read) -> Non
     assert np.isnan(log.voltage[-1, 0])
     assert log.torque_off is not None
     assert log.torque_off[-1].tolist() == [True, False]
-    assert not log.valid[-1, 0]
+    assert not log.finite[1][-1, 0]
     assert log.gain == 3.0
     assert log.condition == {"gain": 3.0, "load": "none"}
     assert "voltage" in log.derived

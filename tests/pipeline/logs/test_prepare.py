@@ -21,6 +21,7 @@ from pipeline.logs.prepared.prepare import prepare
 from pipeline.logs.prepared.settings import Settings, choose_settings
 from pipeline.logs.reading.expected import Expected, expected_of_robot
 from pipeline.logs.reading.read import read_log
+from pipeline.logs.signals.derivatives import LowPass
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
@@ -87,6 +88,20 @@ def test_short_holes_are_bridged() -> None:
     ready = prepare(made_log(q, effort, RATE), Settings(1 / RATE, 20.0, "test"))
     assert ready.mask[100:-100].all()
     assert np.sqrt(np.mean((ready.v - v)[300:-300] ** 2)) < 0.02 * v.std()
+
+
+@pytest.mark.parametrize("apart", [2e-4, 7e-4])
+def test_efforts_with_stamps_of_their_own_are_brought_to_the_positions(apart: float) -> None:
+    t, q, _, _, effort = noisy()
+    time = np.stack([t, t + apart], axis=1).ravel()
+    none = np.full_like(q, np.nan)
+    rows = np.stack([q, none], axis=1).reshape(-1, 2), np.stack([none, effort], axis=1)
+    log = made_log(rows[0], rows[1].reshape(-1, 2), time=time)
+    ready = prepare(log, Settings(choose_settings([log]).dt, 20.0, "test"))
+    assert ready.rate == pytest.approx(RATE)
+    assert ready.mask[100:-100].all()
+    late = np.interp(ready.time, t + apart, LowPass(RATE, 20.0).smooth(effort)[:, 0])
+    assert np.abs(ready.effort[:, 0] - late)[300:-300].max() < 0.05
 
 
 def test_gaps_split_the_log_and_nothing_runs_across() -> None:

@@ -43,7 +43,7 @@ def test_a_good_log_round_trips_in_the_robots_order(columns: Columns, read: Read
     assert np.array_equal(log.position[:, 1], columns["b__position_rad"])
     assert (log.effort.channel, log.effort.unit) == ("torque", "N*m")
     assert log.position_source == "joint"
-    assert log.valid.all()
+    assert log.finite[1].all()
     assert len(log.sha256) == 64
 
 
@@ -109,8 +109,8 @@ def test_forces_of_some_feet_alone_are_not_used(
 def test_empty_effort_cells_are_masked_not_invented(columns: Columns, read: Read) -> None:
     columns["b__torque_Nm"][100:200] = np.nan
     log = read(columns)
-    assert not log.valid[100:200, 1].any()
-    assert log.valid[:, 0].all()
+    assert not log.finite[1][100:200, 1].any()
+    assert log.finite[1][:, 0].all()
 
 
 def renamed(old: str, new: str) -> Callable[[Columns], Columns]:
@@ -173,7 +173,7 @@ def test_a_joint_without_an_effort_keeps_its_motion(columns: Columns, read: Read
     del columns["b__torque_Nm"]
     log = read(columns)
     assert np.array_equal(log.position[:, 1], columns["b__position_rad"])
-    assert not log.valid[:, 1].any()
+    assert not log.finite[1][:, 1].any()
     assert "not compared" in log.left_out["b"]
 
 
