@@ -226,17 +226,15 @@ def _sensitivity(run: _Run, best: Point, prior: Prior, effort: Effort) -> dict[s
 def posterior_summary(walkers: list[list[Point]], prior: Prior) -> dict[str, Any]:
     """What the walkers say of every number, and whether they agree.
 
+    Of the prior's coordinates, or SI for the motor's constants: quantiles, mean, standard
+    deviation, shares at bounds, nested R-hat, which is made for many short chains (Margossian et
+    al., Bayesian Analysis 2024), of eight groups of walkers, and effective sample size (Vehtari et
+    al., Bayesian Analysis 16, 667, 2021); of each path its share with a standard error. Of robots
+    the bank holds no more than it does: where they matter, their effective number counts as well.
+
     Args:
         walkers: Sets of each walker of every ensemble, in order.
         prior: Whose coordinates the sets hold.
-
-    Returns:
-        Per number, coordinates of the prior or SI for the motor's constants: quantiles, mean,
-        standard deviation, shares at bounds, nested R-hat, which is made for many short chains
-        (Margossian et al., Bayesian Analysis 2024), of eight groups of walkers, and effective
-        sample size (Vehtari et al., Bayesian Analysis 16, 667, 2021); the share of each path with
-        its standard error. Of robots the bank holds no more than it does: where they matter, their
-        effective number counts as well.
     """
     from arviz_stats.base import array_stats
 
