@@ -19,9 +19,9 @@ from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.evidence import State
 from pipeline.identification.selection.pool import make_pool
 from pipeline.identification.selection.search import Search
-from pipeline.identification.workflow.locate import Whereabouts, find_where
+from pipeline.identification.workflow.compared import Compared, compare_logs
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import Setup, setup, take_in
+from pipeline.identification.workflow.setup import Setup, load_logs, setup
 from tests.leg_log import leg_logs
 
 ROOT = Path(__file__).parents[1]
@@ -51,7 +51,7 @@ def _rows(log: dict[str, np.ndarray], path: Path) -> None:
             start = time.process_time()
             given, where = _where(path)
             models = [("as it was", given.model), ("again", given.model)]
-            stages(models, where.measurements, where.intake.long)
+            stages(models, where.measurements, where.loaded.long)
             spent = time.process_time() - start
             if repeats == 1:
                 continue  # to warm up
@@ -98,7 +98,7 @@ def _write(log: dict[str, np.ndarray], path: Path, repeats: int) -> int:
     return int(table["time_s"].size)
 
 
-def _where(path: Path) -> tuple[Setup, Whereabouts]:
+def _where(path: Path) -> tuple[Setup, Compared]:
     options = Options((path,), robot=ROOT / "urdf" / "leg.toml")
     given = setup(options)
-    return given, find_where(given, given.model, *take_in(given, options))
+    return given, compare_logs(given, given.model, *load_logs(given, options))

@@ -13,7 +13,7 @@ from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
 from pipeline.identification.compare.stages import Stage, overall
-from pipeline.identification.workflow.story import Told, signature_name
+from pipeline.identification.workflow.outcome import Outcome, signature_name
 from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.logs.signals.grid import runs_of
 from pipeline.simulation.found_bodies import FoundBodies
@@ -231,21 +231,24 @@ def signature_variable(
 
 
 def write_pictures_and_page(
-    told: Told, bodies: FoundBodies, tables: Sequence[Table], folder: Path
+    outcome: Outcome, bodies: FoundBodies, tables: Sequence[Table], folder: Path
 ) -> None:
     """Every figure, then the page that shows them."""
-    story, where = told.story, told.story.where
-    model, weighed = story.given.model, told.story.weighed
-    write_where_map(where.rows, model.joints, model.name, folder)
-    write_waterfall(weighed.stages, story.noise, story.naming.unit, model.name, folder)
-    write_in_time(where.measurements, weighed.stages[0], weighed.stages[-1], told.shown, folder)
-    for found, pair, joint in zip(story.naming.found, weighed.pairs, weighed.joints, strict=True):
+    compared, model, validated = outcome.compared, outcome.given.model, outcome.validated
+    write_where_map(compared.rows, model.joints, model.name, folder)
+    write_waterfall(validated.stages, outcome.noise, outcome.naming.unit, model.name, folder)
+    write_in_time(
+        compared.measurements, validated.stages[0], validated.stages[-1], outcome.shown, folder
+    )
+    for found, pair, joint in zip(
+        outcome.naming.found, validated.pairs, validated.joints, strict=True
+    ):
         name = signature_name(found)
-        if name in story.signatures:
+        if name in outcome.signatures:
             stem, place = Path(name).stem, found.place
-            write_signature(where.measurements, *pair, joint, found.effect, place, stem, folder)
+            write_signature(compared.measurements, *pair, joint, found.effect, place, stem, folder)
     footer = (
         f"legwatt {version('legwatt')}. Every CSV has a .meta.json beside it: meanings, units, "
         "input hashes, versions."
     )
-    write_report(story, bodies, tables, folder, footer)
+    write_report(outcome, bodies, tables, folder, footer)

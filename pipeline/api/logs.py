@@ -19,12 +19,12 @@ from pipeline.api.machine import Machine
 from pipeline.api.result import Result, by_name
 from pipeline.effects.model_file import ModelFile, edits_in
 from pipeline.identification.compare.stages import overall
+from pipeline.identification.workflow.compared import Compared, compare_logs, judged
 from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
-from pipeline.identification.workflow.locate import Whereabouts, find_where, judged
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import Setup, check_options, setup, take_in
-from pipeline.identification.workflow.story import Story, Told, tell
+from pipeline.identification.workflow.outcome import Outcome, identified
+from pipeline.identification.workflow.setup import Setup, check_options, load_logs, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.formats.convert import plain
 from pipeline.logs.quality.finding import Finding
@@ -69,7 +69,7 @@ class MeasuredLog(LogResult):
 class Comparison(LogResult):
     """Where model and machine disagree."""
 
-    residuals: Whereabouts  #: By joint and circumstance, with the predictions they rest on.
+    residuals: Compared  #: By joint and circumstance, with the predictions they rest on.
 
     @property
     def where(self) -> Table:
@@ -88,7 +88,7 @@ class Comparison(LogResult):
 class Identified(LogResult):
     """What the model lacks, and what it leaves once that is written into it."""
 
-    told: Told  #: Everything that the files say.
+    outcome: Outcome  #: Everything that the files say.
     bodies: FoundBodies  #: Those found to be others, and the corrected URDF.
     #: ``name`` saves tables, ``add`` the model file with them, others pictures and a page.
     step: str
@@ -96,15 +96,10 @@ class Identified(LogResult):
     machine: Machine | None = field(default=None, repr=False)
 
     @property
-    def story(self) -> Story:
-        """What the page says."""
-        return self.told.story
-
-    @property
     def model(self) -> Machine:
         """The machine with what was found and written."""
         assert self.machine is not None
-        text = self.told.model_file
+        text = self.outcome.validated.text
         if not text or self.step == "shrink":
             return self.machine
         return self.machine.with_model(replace(self.given.file, edits=edits_in(text)))
@@ -122,22 +117,22 @@ class Identified(LogResult):
     @property
     def gap(self) -> tuple[float, float]:
         """Root mean square gap on held-out rows, before and with the model as written."""
-        stages = self.story.weighed.stages
+        stages = self.outcome.validated.stages
         return overall(stages[0].gap), overall(stages[-1].gap)
 
     @property
     def unexplained(self) -> bool:
         """Whether more than noise is left, or the log may not say what it seems to."""
-        return self.story.unexplained
+        return self.outcome.unexplained
 
     def _write(self, out: Path, decimal: str) -> None:
         super()._write(out, decimal)
         if self.step != "name":
-            write_model(out, self.told.model_file, self.bodies)
+            write_model(out, self.outcome.validated.text, self.bodies)
         if self.step in ("all", "shrink"):
             from pipeline.api.gap_figures import write_pictures_and_page
 
-            write_pictures_and_page(self.told, self.bodies, list(self.tables.values()), out)
+            write_pictures_and_page(self.outcome, self.bodies, list(self.tables.values()), out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,42 +289,46 @@ def analyse(
         return verb, by_name(tables), lambda: metadata(options, given), inputs, given, findings
 
     progress.step("reading and judging the logs")
-    intake, parts, fitted = take_in(given, options)
+    loaded, parts, fitted = load_logs(given, options)
     if step == "read":
-        findings = judged(intake).findings
+        findings = judged(loaded).findings
         read = common([table_of(QualityRow, findings)], findings)
         return MeasuredLog(*read, options.logs[0], options.mapping)
     if step == "power":
         from pipeline.api.supply.power import added_up
 
-        return added_up(given, intake, options, progress, common)
+        return added_up(given, loaded, options, progress, common)
     progress.step("simulating the logs' motion")
-    where = find_where(given, given.model, intake, parts, fitted)
-    findings, joints = where.intake.findings, given.model.joints
-    tables = [table_of(QualityRow, findings), table_of(WhereRow, where.rows)]
+    compared = compare_logs(given, given.model, loaded, parts, fitted)
+    findings, joints = compared.loaded.findings, given.model.joints
+    tables = [table_of(QualityRow, findings), table_of(WhereRow, compared.rows)]
     if step == "where":
-        return Comparison(*common(tables, findings), where)
+        return Comparison(*common(tables, findings), compared)
     if step == "forward":
         progress.step("driving the model by its servos")
-        drives = drive_forward(given, where, options)
+        drives = drive_forward(given, compared, options)
         driven = [forward_table(drives, joints), *rollout_tables(drives, joints)]
         return Driven(*common(driven, findings), drives)
     if step == "shrink":
-        progress.step("weighing the model file's effects")
-        told = check(given, where)
+        progress.step("validating the model file's effects")
+        outcome = check(given, compared)
     else:
         progress.step("letting effects compete")
-        told = tell(given, where, options, progress)
-    found = bodies_of(given, told.model_file)
-    tables += _answer_tables(told, given, found)
-    return Identified(*common(tables, findings), told, found, step)
+        outcome = identified(given, compared, options, progress)
+    found = bodies_of(given, outcome.validated.text)
+    tables += _answer_tables(outcome, given, found)
+    return Identified(*common(tables, findings), outcome, found, step)
 
 
-def _answer_tables(told: Told, given: Setup, found: FoundBodies) -> list[Table]:
-    naming, motion = told.story.naming, told.deciding
+def _answer_tables(outcome: Outcome, given: Setup, found: FoundBodies) -> list[Table]:
+    naming, decided = outcome.naming, outcome.decided
     return [
         candidates_table(naming.candidates, naming.found, given.model),
         found_table(naming.found, given.model),
-        *([deciding_motion(motion.time, given.model.joints, motion.position)] if motion else []),
+        *(
+            [deciding_motion(decided[0].time, given.model.joints, decided[0].position)]
+            if decided
+            else []
+        ),
         *([bodies(found.bodies)] if found.bodies else []),
     ]

@@ -188,7 +188,7 @@ def _say_answer(result: Identified, out: Path) -> None:
     from reports.pages.gap_report import answer, whose_motors
     from reports.typeset import plain
 
-    for paragraph in (whose_motors(result.story), *answer(result.story, result.bodies)):
+    for paragraph in (whose_motors(result.outcome), *answer(result.outcome, result.bodies)):
         print(plain(paragraph))
     print(f"written to {out}")
 

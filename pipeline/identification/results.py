@@ -131,7 +131,7 @@ class Found:
 
 
 @dataclass(frozen=True)
-class Remainder:
+class Residual:
     """What a model leaves at one joint on test rows."""
 
     joint: str  #: Name.

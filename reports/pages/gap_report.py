@@ -15,11 +15,11 @@ from pipeline.identification.results import (
     ACCEPTED,
     REJECTED,
     UNEXPLAINED,
-    Remainder,
+    Residual,
     named,
 )
 from pipeline.identification.workflow.constants import voltage_remarks
-from pipeline.identification.workflow.story import Story
+from pipeline.identification.workflow.outcome import Outcome
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.html import write_html
 from reports.markdown import write_markdown
@@ -72,50 +72,50 @@ SHOWN_CANDIDATES = 15
 
 
 def write_report(
-    story: Story, bodies: FoundBodies, tables: Sequence[Table], folder: Path, footer: str
+    outcome: Outcome, bodies: FoundBodies, tables: Sequence[Table], folder: Path, footer: str
 ) -> None:
     """Write ``report.md`` and ``index.html``; the figures must be there already."""
-    page = report(story, bodies, {t.name: t for t in tables}, folder, footer)
+    page = report(outcome, bodies, {t.name: t for t in tables}, folder, footer)
     write_markdown(page, folder / "report.md")
     write_html(page, folder / "index.html")
 
 
 def report(
-    story: Story, bodies: FoundBodies, tables: dict[str, Table], folder: Path, footer: str
+    outcome: Outcome, bodies: FoundBodies, tables: dict[str, Table], folder: Path, footer: str
 ) -> Page:
     """The page; see `write_report`."""
-    names = ", ".join(m.name for m in story.where.measurements)
+    names = ", ".join(m.name for m in outcome.compared.measurements)
     files = {f"{t.name}.csv": t.description for t in tables.values()}
-    if story.weighed.text:
+    if outcome.validated.text:
         files["model.toml"] = "Model file with the effects found; give it to any command as --model"
     if bodies.urdf:
         files[URDF_FILE] = "The robot's URDF with the bodies found"
     own = bodies_blocks(bodies)
     return Page(
-        title=f"What the model of '{story.given.model.name}' lacks, by log '{names}'",
-        numbers=_numbers(story),
+        title=f"What the model of '{outcome.given.model.name}' lacks, by log '{names}'",
+        numbers=_numbers(outcome),
         picture=FigureBlock(folder / "waterfall_narrow.svg", alt="The gap, effect by effect."),
-        answer=_first(story, bodies),
+        answer=_first(outcome, bodies),
         sections=(
-            Section("The answer in full", tuple(map(Text, answer(story, bodies)))),
-            _where(story, tables, folder),
-            _what(story, tables, folder),
+            Section("The answer in full", tuple(map(Text, answer(outcome, bodies)))),
+            _where(outcome, tables, folder),
+            _what(outcome, tables, folder),
             *([Section("The bodies", own)] if own else []),
-            _smaller(story, folder),
-            *_energy(story),
-            _left(story),
-            _data(story, tables),
+            _smaller(outcome, folder),
+            *_energy(outcome),
+            _left(outcome),
+            _data(outcome, tables),
         ),
         files=files,
         footer=footer,
     )
 
 
-def _numbers(story: Story) -> tuple[Number, ...]:
+def _numbers(outcome: Outcome) -> tuple[Number, ...]:
     """The gap before and after, the noise, and how much was found."""
-    before, after = _whole(story)
-    unit, found = story.naming.unit, story.naming.found
-    ended = "bad" if story.weighed.unexplained else "good"
+    before, after = _whole(outcome)
+    unit, found = outcome.naming.unit, outcome.naming.found
+    ended = "bad" if outcome.validated.unexplained else "good"
     listed = f": {named(found[0])}{' and others' * (len(found) > 1)}" if found else ""
     effects = f"effect{'s' * (len(found) != 1)} found"
     return (
@@ -124,72 +124,72 @@ def _numbers(story: Story) -> tuple[Number, ...]:
             "gap, root mean square: measured minus predicted, model as it was",
         ),
         Number(f"{number(after)} {unit}", "the same with what was found, on held-out data", ended),
-        Number(f"{number(story.noise)} {unit}", "noise floor of the logs"),
+        Number(f"{number(outcome.noise)} {unit}", "noise floor of the logs"),
         Number(str(len(found)), effects + listed),
     )
 
 
-def _first(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
+def _first(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
     """One sentence each: where, what is fitted, what it predicts, what it costs, whose motors."""
-    naming, (before, after) = story.naming, _whole(story)
+    naming, (before, after) = outcome.naming, _whole(outcome)
     levels = Counter(f.level for f in naming.found)
     said = (
-        WORDS("where_short", whole_joints(story.where.rows)),
+        WORDS("where_short", whole_joints(outcome.compared.rows)),
         WORDS("fitted", naming.found, [f"{count} {level}" for level, count in levels.items()]),
         bodies_words(bodies),
         WORDS("predicted", before, after, naming.unit),
-        WORDS("cost_short", story.energy, priced(story.energy, story.given.alternative))
-        if story.energy
+        WORDS("cost_short", outcome.energy, priced(outcome.energy, outcome.given.alternative))
+        if outcome.energy
         else "",
-        left_words(story),
-        whose_motors(story),
+        left_words(outcome),
+        whose_motors(outcome),
     )
     return tuple(filter(None, said))
 
 
-def whose_motors(story: Story) -> str:
+def whose_motors(outcome: Outcome) -> str:
     """Which motors turn the log's currents into torque."""
-    motors = story.given.motors
+    motors = outcome.given.motors
     if motors is None:
-        laws = (one.log.derived.get("torque") for one in story.where.intake.prepared)
+        laws = (one.log.derived.get("torque") for one in outcome.compared.loaded.prepared)
         law = next(filter(None, laws), "")
         torque = f"torque by the servos' law ({law}), not measured," if law else "the log's torque"
         return f"**Whose motors:** none; {torque} is compared at the joints."
     return motors_text(motors)
 
 
-def answer(story: Story, bodies: FoundBodies) -> tuple[str, ...]:
+def answer(outcome: Outcome, bodies: FoundBodies) -> tuple[str, ...]:
     """The first lines: where, what, bodies, how much smaller, what it costs, what is left."""
-    weighed, found, decides = story.weighed, story.naming.found, bool(story.decides)
+    validated, found, decides = outcome.validated, outcome.naming.found, outcome.decided is not None
     excitations = list(dict.fromkeys(f.excitation for f in found if f.rivals))
-    joints = [story.given.model.joints[j] for j in weighed.joints]
+    joints = [outcome.given.model.joints[j] for j in validated.joints]
     said = (
         *(
             f"**Nothing below is an explanation while this stands:** {text}."
-            for text in story.suspected
+            for text in outcome.suspected
         ),
-        where_words(story.where.rows),
-        what_words(story),
+        where_words(outcome.compared.rows),
+        what_words(outcome),
         bodies_words(bodies),
-        smaller_words(found, joints, _whole(story), story.naming.unit, story.noise),
-        energy_words(story.energy, story.given.alternative) if story.energy else "",
+        smaller_words(found, joints, _whole(outcome), outcome.naming.unit, outcome.noise),
+        energy_words(outcome.energy, outcome.given.alternative) if outcome.energy else "",
         WORDS("undecided", low_confidence(found), excitations, decides),
-        left_words(story) if weighed.unexplained or not story.suspected else "",
+        left_words(outcome) if validated.unexplained or not outcome.suspected else "",
     )
     return tuple(filter(None, said))
 
 
-def _whole(story: Story) -> tuple[float, float]:
+def _whole(outcome: Outcome) -> tuple[float, float]:
     """Gap of all joints of the model as it was and as written."""
-    stages = story.weighed.stages
+    stages = outcome.validated.stages
     return overall(stages[0].gap), overall(stages[-1].gap)
 
 
-def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
+def _where(outcome: Outcome, tables: dict[str, Table], folder: Path) -> Section:
     by = tables["where"].columns["by"]
     whole = [value == WHOLE for value in by]
     shown = ("joint", "gap", "mean", "noise_floor", "unit", "share_of_total", "share_above_noise")
-    robot = story.given.robot
+    robot = outcome.given.robot
     named = () if robot is None or not robot.floating else (Text(legs_text(robot)),)
     return Section(
         "Where model and machine disagree",
@@ -213,9 +213,9 @@ def _where(story: Story, tables: dict[str, Table], folder: Path) -> Section:
     )
 
 
-def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
+def _what(outcome: Outcome, tables: dict[str, Table], folder: Path) -> Section:
     blocks: list[Block] = []
-    if story.naming.found:
+    if outcome.naming.found:
         blocks.append(
             table_block(
                 tables["found"],
@@ -226,17 +226,19 @@ def _what(story: Story, tables: dict[str, Table], folder: Path) -> Section:
                 digits=3,
             )
         )
-    told = voltage_remarks(story.given.model.actuators, story.naming, story.where.measurements)
+    told = voltage_remarks(
+        outcome.given.model.actuators, outcome.naming, outcome.compared.measurements
+    )
     blocks += [Text(sentence) for sentence in told]
-    blocks += [FigureBlock(folder / name, caption) for name, caption in story.signatures.items()]
-    if story.naming.candidates:
-        blocks.append(_candidates(story))
+    blocks += [FigureBlock(folder / name, caption) for name, caption in outcome.signatures.items()]
+    if outcome.naming.candidates:
+        blocks.append(_candidates(outcome))
     return Section("What is missing", tuple(blocks))
 
 
-def _candidates(story: Story) -> TableBlock:
+def _candidates(outcome: Outcome) -> TableBlock:
     every = sorted(
-        story.naming.candidates,
+        outcome.naming.candidates,
         key=lambda c: (c.verdict != ACCEPTED, c.verdict == REJECTED, -c.gain),
     )
     rows = tuple(
@@ -246,7 +248,7 @@ def _candidates(story: Story) -> TableBlock:
     return TableBlock(
         ("effect", "place", "validation without", "with", "unit", "verdict", "why"),
         rows,
-        f"The {len(rows)} candidates nearest to being named, of {story.naming.tried} tried. "
+        f"The {len(rows)} candidates nearest to being named, of {outcome.naming.tried} tried. "
         "Without and with: gap on validation rows, by estimates from others "
         "for either; a dash: it is not in the set of names that explains the log best.",
         "candidates.csv",
@@ -255,11 +257,11 @@ def _candidates(story: Story) -> TableBlock:
     )
 
 
-def _smaller(story: Story, folder: Path) -> Section:
-    first, last = story.weighed.stages[0], story.weighed.stages[-1]
-    floor = noise_floor(story.where.measurements)
-    joints = story.given.model.joints
-    unit = story.naming.unit
+def _smaller(outcome: Outcome, folder: Path) -> Section:
+    first, last = outcome.validated.stages[0], outcome.validated.stages[-1]
+    floor = noise_floor(outcome.compared.measurements)
+    joints = outcome.given.model.joints
+    unit = outcome.naming.unit
     order = np.argsort(-np.nan_to_num(first.gap - last.gap))
     rows = tuple(
         (
@@ -288,8 +290,8 @@ def _smaller(story: Story, folder: Path) -> Section:
     return Section("How much smaller the gap is", tuple(blocks))
 
 
-def _energy(story: Story) -> tuple[Section, ...]:
-    change = story.energy
+def _energy(outcome: Outcome) -> tuple[Section, ...]:
+    change = outcome.energy
     if change is None:
         return ()
     rows = tuple(
@@ -309,13 +311,13 @@ def _energy(story: Story) -> tuple[Section, ...]:
         "energy lost, and power to stand as the robot file says, without and with what the model "
         "file holds; a dash: it is not known.",
     )
-    catalog = story.given.catalog
+    catalog = outcome.given.catalog
     titles = [
         f"`{name}`: {catalog.alternatives[name].title.split(': ', 1)[-1]}"
         for name in change.before
         if name in catalog.alternatives
     ]
-    own = story.given.alternative
+    own = outcome.given.alternative
     against = f"`{own}`" if own else "no actuator: its torque is the joint's"
     told = Text(
         f"The log was compared with {against}. The actuators: "
@@ -323,11 +325,11 @@ def _energy(story: Story) -> tuple[Section, ...]:
         "in all of them; friction, inertia and coupling of a drivetrain in the one they were found "
         "against."
     )
-    return (Section("What it costs", (block, told, *map(Text, story.remarks))),)
+    return (Section("What it costs", (block, told, *map(Text, outcome.remarks))),)
 
 
-def _left(story: Story) -> Section:
-    every = sorted(story.weighed.left, key=_ratio, reverse=True)
+def _left(outcome: Outcome) -> Section:
+    every = sorted(outcome.validated.left, key=_ratio, reverse=True)
     shown = [r for r in every if r.significant] or every[:5]
     rows = tuple(
         (
@@ -352,25 +354,25 @@ def _left(story: Story) -> Section:
         3,
     )
     blocks: list[Block] = [block]
-    if story.decides:
-        blocks.append(Text(f"The motion that decides: {story.decides}."))
-    uncertain = low_confidence(story.naming.found)
+    if outcome.decided:
+        blocks.append(Text(f"The motion that decides: {outcome.decided[1]}."))
+    uncertain = low_confidence(outcome.naming.found)
     if len(uncertain) > MANY_EFFECTS:
         blocks += [Text("Names that are not certain:"), Points(tuple(uncertain))]
-    if story.naming.notes:
-        blocks.append(Points(story.naming.notes))
+    if outcome.naming.notes:
+        blocks.append(Points(outcome.naming.notes))
     return Section("What is left", tuple(blocks))
 
 
-def _ratio(r: Remainder) -> float:
+def _ratio(r: Residual) -> float:
     return r.error / r.noise_floor if r.noise_floor > 0 else 0.0
 
 
-def _data(story: Story, tables: dict[str, Table]) -> Section:
-    parts = story.where.parts
-    settings = story.where.intake.settings
-    shares = [float(m.mask.mean()) for m in story.where.measurements]
-    texts = [f"**Note:** {warning}." for warning in story.given.warnings]
+def _data(outcome: Outcome, tables: dict[str, Table]) -> Section:
+    parts = outcome.compared.parts
+    settings = outcome.compared.loaded.settings
+    shares = [float(m.mask.mean()) for m in outcome.compared.measurements]
+    texts = [f"**Note:** {warning}." for warning in outcome.given.warnings]
     texts += [
         f"Compared at a bandwidth of {settings.cutoff:.3g} Hz ({settings.reason}). "
         f"{percent(float(np.mean(shares)))} of the rows count, by joint: not those whose "
@@ -379,9 +381,9 @@ def _data(story: Story, tables: dict[str, Table]) -> Section:
         "Blocks of the log are for training, for validation between candidates or held out for the "
         f"test: {parts.rule}, "
         f"{parts.guard:.2g} s apart, so that none holds a trace of another. "
-        + held_out_words(story.where.measurements),
+        + held_out_words(outcome.compared.measurements),
     ]
-    texts += one_way_words(story.where.measurements, story.weighed.joints)
+    texts += one_way_words(outcome.compared.measurements, outcome.validated.joints)
     if parts.warning:
         texts.append(f"**Note:** {parts.warning}.")
     odd = [value != "ok" for value in tables["quality"].columns["verdict"]]

@@ -22,7 +22,7 @@ from pipeline.identification.results import (
     Member,
     named,
 )
-from pipeline.identification.workflow.story import Story
+from pipeline.identification.workflow.outcome import Outcome
 from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.logs.signals.grid import runs_of
@@ -76,26 +76,26 @@ def whole_joints(rows: Sequence[Where]) -> list[Where]:
     return [row for row in rows if row.by == WHOLE]
 
 
-def what_words(story: Story) -> str:
+def what_words(outcome: Outcome) -> str:
     """What is missing, and what to do about columns that read a multiple of what they should."""
-    naming, found = story.naming, story.naming.found
+    naming, found = outcome.naming, outcome.naming.found
     levels = [[f for f in found if f.level == x] for x in (CONFIRMED, APPROXIMATE, SUSPECTED)]
     hints = [(f.place[0], 1.0 / f.values["gain"]) for f in found if f.effect == EffortGain.name]
     columns, constants = bool(hints), []
-    if tuple(story.where.measurements[0].channels) == ("current",):
+    if tuple(outcome.compared.measurements[0].channels) == ("current",):
         constants = [f for f in found if f.effect == TorqueConstantError.name]
         own = CHANNEL_COLUMNS["current"]
         hints += [(f"{f.place[0]}__{own}", 1.0 + f.values["relative"]) for f in constants]
     listed = [f'[columns."{name}"] scale = {x:.3g}' for name, x in hints[:MANY_EFFECTS]]
     meaning = _effect_meaning(found[0].effect) if len(found) == 1 else ""
     return WORDS(
-        "what", naming, story.unexplained, *levels, meaning, columns, listed, bool(constants)
+        "what", naming, outcome.unexplained, *levels, meaning, columns, listed, bool(constants)
     )
 
 
-def left_words(story: Story) -> str:
+def left_words(outcome: Outcome) -> str:
     """What stays unexplained and what it looks like."""
-    left = story.weighed.left
+    left = outcome.validated.left
     significant = [r for r in left if r.significant]
     significant.sort(key=lambda r: -r.error / max(r.noise_floor, 1e-300))
     return WORDS("left", significant, list(dict.fromkeys(r.joint for r in left if not r.rows)))

@@ -9,9 +9,9 @@ from typing import Any
 
 from pipeline.api.logs import Common, LogResult, analysed
 from pipeline.api.machine import Machine
-from pipeline.identification.compare.intake import Intake
+from pipeline.identification.compare.loaded import LoadedLogs
 from pipeline.identification.supply.account import Account, account
-from pipeline.identification.workflow.locate import judged
+from pipeline.identification.workflow.compared import judged
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.quality.finding import Finding
@@ -45,15 +45,15 @@ class Powered(LogResult):
 
 def added_up(
     given: Setup,
-    intake: Intake,
+    loaded: LoadedLogs,
     options: Options,
     progress: Progress,
     common: Callable[[Sequence[Table], Sequence[Finding]], Common],
 ) -> Powered:
     """The account of all logs' supply; `common` makes what every result begins with."""
     progress.step("adding up the drives")
-    balance = account(given, intake.prepared, len(options.holdout), options.prove_last)
-    findings = judged(intake).findings
+    balance = account(given, loaded.prepared, len(options.holdout), options.prove_last)
+    findings = judged(loaded).findings
     own = common([table_of(QualityRow, findings), *power_tables(balance)], findings)
     return Powered(*own, balance)
 

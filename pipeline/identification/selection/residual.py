@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.compare.circumstances import gap_of
-from pipeline.identification.results import Remainder
+from pipeline.identification.results import Residual
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
 from pipeline.simulation.predict import Prediction
 
@@ -21,12 +21,12 @@ _BINS: Final = 12
 _TELLING: Final = 0.08
 
 
-def remainders(
+def residuals(
     measurements: Sequence[Measurement],
     predictions: Sequence[Prediction],
     floor: Array,
     proved: Array | None = None,
-) -> tuple[Remainder, ...]:
+) -> tuple[Residual, ...]:
     """What a model leaves on test rows, by joint and channel, described where it is significant.
 
     Of a joint without rows there it is what is left on training and validation rows.
@@ -54,7 +54,7 @@ def remainders(
             text = _describe(measurements, predictions, rests, j) if significant else ""
             unit = CHANNEL_UNITS[channel]
             out.append(
-                Remainder(joint, channel, error, level, unit, significant, text, int(held.size))
+                Residual(joint, channel, error, level, unit, significant, text, int(held.size))
             )
     return tuple(sorted(out, key=lambda r: first.joints.index(r.joint)))
 

@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.identification.results import Found, Naming
 from pipeline.identification.selection.identify import Identified, estimated_alone, identify
 from pipeline.identification.selection.two_positions import READ_OFF, read_off_two
-from pipeline.identification.workflow.locate import Whereabouts
+from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import with_found
 from pipeline.progress import Progress
@@ -21,7 +21,7 @@ class Explanation:
     """What the model lacks."""
 
     named: Identified  #: The names and what they rest on.
-    where: Whereabouts  #: Logs with the noise floor that the explanation found.
+    compared: Compared  #: Logs with the noise floor that the explanation found.
 
     @property
     def naming(self) -> Naming:
@@ -35,24 +35,24 @@ class Explanation:
         return tuple(alone.get(f.key, f) for f in found)
 
 
-def explain(given: Setup, where: Whereabouts, progress: Progress) -> Explanation:
+def explain(given: Setup, compared: Compared, progress: Progress) -> Explanation:
     """Find what the model lacks.
 
     Raises:
         GapError: Nothing can be compared.
     """
-    named = identify(given.model, where.measurements, progress)
+    named = identify(given.model, compared.measurements, progress)
     found = named.naming.found
     seen = read_off_two(
         reduce(with_found, [f for f in found if f.kept], given.model),
-        where.intake.prepared,
-        where.parts,
-        where.measurements,
+        compared.loaded.prepared,
+        compared.parts,
+        compared.measurements,
         len(found) + 1,
     )
     names = {f.key for f in seen}
     own = tuple(f for f in found if f.key not in names)
     named = replace(named, naming=replace(named.naming, found=(*own, *seen)))
     noise = named.noise
-    logs = tuple(replace(m, noise=np.maximum(m.noise, noise)) for m in where.measurements)
-    return Explanation(named, replace(where, measurements=logs))
+    logs = tuple(replace(m, noise=np.maximum(m.noise, noise)) for m in compared.measurements)
+    return Explanation(named, replace(compared, measurements=logs))

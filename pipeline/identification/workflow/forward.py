@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import apply_edits
-from pipeline.identification.workflow.locate import Whereabouts
+from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import AS_IT_WAS
@@ -38,12 +38,12 @@ class Drive:
         return self.log.position - self.rollout.position
 
 
-def forward(given: Setup, where: Whereabouts, options: Options) -> tuple[Drive, ...]:
+def forward(given: Setup, compared: Compared, options: Options) -> tuple[Drive, ...]:
     """Simulate every model along every log, the model as it was first.
 
     Args:
         given: Robot, actuators, effects of the model file.
-        where: Steps 1 and 2 with all logs.
+        compared: Steps 1 and 2 with all logs.
         options: Of the command.
 
     Raises:
@@ -51,7 +51,7 @@ def forward(given: Setup, where: Whereabouts, options: Options) -> tuple[Drive, 
             simulated forward.
     """
     start = len(options.logs) if options.holdout else 0
-    logs = [one.log for one in where.intake.prepared[start:]]
+    logs = [one.log for one in compared.loaded.prepared[start:]]
     servos = [servo_input(log) for log in logs]
     models = [(AS_IT_WAS, given.bare)]
     for edit in given.file.edits:

@@ -13,7 +13,7 @@ from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file, read_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.compare.bandwidth import lowered, naming_cutoff
-from pipeline.identification.compare.intake import Intake, prepare_logs
+from pipeline.identification.compare.loaded import LoadedLogs, prepare_logs
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
 from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.mimics import mimics_in, refuse_moved
@@ -307,7 +307,7 @@ def _adjusted(log: Log, given: Setup, options: Options) -> Log:
     return log
 
 
-def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
+def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
     """Step 1: read, check, prepare and split all logs.
 
     All scores are taken at one bandwidth: `--cutoff`, else where the encoders' noise is silent.
@@ -334,7 +334,7 @@ def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
         seen = observe_all(given.bare, prepared)
         return wrong_columns(given.bare, seen, logs[0], given.expected.ratio)
 
-    intake = prepare_logs(
+    loaded = prepare_logs(
         logs,
         given.expected,
         cutoff=options.cutoff,
@@ -344,17 +344,17 @@ def take_in(given: Setup, options: Options) -> tuple[Intake, Parts, int]:
     )
     if options.cutoff is None and options.step != "read":
         # By the machine as its files say: what a model file adds changes no bandwidth.
-        cutoff = naming_cutoff(given.bare, intake.prepared)
-        intake = intake.at(lowered(intake.prepared, cutoff))
-    refuse(intake.findings)
-    prepared = intake.prepared
+        cutoff = naming_cutoff(given.bare, loaded.prepared)
+        loaded = loaded.at(lowered(loaded.prepared, cutoff))
+    refuse(loaded.findings)
+    prepared = loaded.prepared
     last = None if surveys else options.prove_last
     parts = split(prepared[:count], holdout=prepared[count:], prove_last=last)
     if surveys:
         parts = parts_of_surveys(parts, prepared, surveys)
         long = LongLogs(tuple(streams), surveys, prepared, parts, largest, contact)
-        intake = replace(intake, long=long)
-    return intake, parts, count
+        loaded = replace(loaded, long=long)
+    return loaded, parts, count
 
 
 def _contact(given: Setup, start: float | None) -> Callable[[Log], Contact | None] | None:

@@ -17,25 +17,25 @@ from pipeline.identification.results import (
     Member,
     Naming,
 )
-from pipeline.identification.workflow.locate import Whereabouts
+from pipeline.identification.workflow.compared import Compared
+from pipeline.identification.workflow.outcome import Outcome, cost, gathered
 from pipeline.identification.workflow.setup import Setup
-from pipeline.identification.workflow.story import Told, cost, gathered
-from pipeline.identification.workflow.written import weigh_edits
+from pipeline.identification.workflow.written import validate_edits
 
 
-def check(given: Setup, where: Whereabouts) -> Told:
+def check(given: Setup, compared: Compared) -> Outcome:
     """Gap with and without the model file's effects, by the noise that the file states."""
-    where = replace(where, measurements=with_noise(where.measurements, given.file.noise))
-    channel = where.measurements[0].channels[0]
+    compared = replace(compared, measurements=with_noise(compared.measurements, given.file.noise))
+    channel = compared.measurements[0].channels[0]
     unit = CHANNEL_UNITS[channel]
     groups = together(given.file.edits)
     named = [_found(k, group, unit) for k, group in enumerate(groups, start=1)]
-    weighed = weigh_edits(given.bare, where, groups, named)
+    validated = validate_edits(given.bare, compared, groups, named)
     naming = Naming(
-        found=weighed.found, candidates=(), tolerances={}, tried=0, channel=channel, unit=unit
+        found=validated.found, candidates=(), tolerances={}, tried=0, channel=channel, unit=unit
     )
-    energy = cost(given, weighed.found, known=False)
-    return gathered(given, where, naming, weighed, energy, None)
+    energy = cost(given, validated.found, known=False)
+    return gathered(given, compared, naming, validated, energy, None)
 
 
 def together(edits: Sequence[Edit]) -> list[list[Edit]]:

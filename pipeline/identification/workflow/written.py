@@ -19,10 +19,10 @@ from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.stages import Stage, noise_floor, stages
 from pipeline.identification.regression.floor import floor_of
-from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Remainder, named
-from pipeline.identification.selection.residual import remainders
+from pipeline.identification.results import IDLE_NAME, SUSPECTED, Found, Residual, named
+from pipeline.identification.selection.residual import residuals
 from pipeline.identification.selection.two_positions import READ_OFF
-from pipeline.identification.workflow.locate import Whereabouts
+from pipeline.identification.workflow.compared import Compared
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.machine.machine import MachineModel
 
@@ -31,7 +31,7 @@ AS_IT_WAS = "model as it was"
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
+class Validated:
     """A model file against the logs."""
 
     #: Effects, with what each closes on test rows and whether the file holds it.
@@ -40,7 +40,7 @@ class Weighed:
     #: Per effect, the stage without it and the stage with it.
     pairs: tuple[tuple[Stage, Stage], ...]
     joints: tuple[int, ...]  #: Per effect, the column at which it shows.
-    left: tuple[Remainder, ...]  #: What the model as written leaves.
+    left: tuple[Residual, ...]  #: What the model as written leaves.
     text: str = ""  #: Of the file; empty where there is none.
 
     @property
@@ -49,17 +49,17 @@ class Weighed:
         return any(r.significant for r in self.left)
 
 
-def weigh_found(
+def validate_found(
     model: MachineModel,
-    where: Whereabouts,
+    compared: Compared,
     found: Sequence[Found],
     written: Callable[[Sequence[Found]], tuple[tuple[Found, ...], str, tuple[Edit, ...]]],
-) -> Weighed:
+) -> Validated:
     """Hold what was found against the logs, as far as it is written.
 
     Args:
         model: Before anything found.
-        where: Steps 1 and 2.
+        compared: Steps 1 and 2.
         found: From naming.
         written: From effects to the same with the values that the model file gives them, its text,
             and the edits in it that are theirs, read back.
@@ -68,7 +68,7 @@ def weigh_found(
         told, text, edits = written(found)
         kept = [f for f in told if f.kept]
         groups = list(_dealt(edits, [len(f.each) for f in kept]))
-        worse = _worst(model, where, kept, groups)
+        worse = _worst(model, compared, kept, groups)
         if worse is None:
             found = told
             break
@@ -79,37 +79,37 @@ def weigh_found(
     others = [f for f in found if not f.kept]
     beside = [(named(f), with_found(last, f)) for f in others]
     models = [*_models(model, kept, groups), *beside]
-    seen = stages(models, where.measurements, where.intake.long)
+    seen = stages(models, compared.measurements, compared.loaded.long)
     first = len(kept)
     pairs = {f.key: (seen[k], seen[k + 1]) for k, f in enumerate(kept)}
     pairs |= {f.key: (seen[first], seen[first + 1 + k]) for k, f in enumerate(others)}
-    return gathered(model, where, found, seen[: first + 1], pairs, text)
+    return gathered(model, compared, found, seen[: first + 1], pairs, text)
 
 
-def weigh_edits(
+def validate_edits(
     model: MachineModel,
-    where: Whereabouts,
+    compared: Compared,
     groups: Sequence[Sequence[Edit]],
     found: Sequence[Found],
-) -> Weighed:
+) -> Validated:
     """Hold the edits of a model file against the logs.
 
     Args:
         model: Before the edits.
-        where: Steps 1 and 2.
+        compared: Steps 1 and 2.
         groups: Edits of the file, those together that are reported as one.
         found: One per group.
     """
-    seen = stages(_models(model, found, groups), where.measurements, where.intake.long)
+    seen = stages(_models(model, found, groups), compared.measurements, compared.loaded.long)
     # A file may hold an effect twice: each edit has a pair of its own.
     pairs = [(seen[k], seen[k + 1]) for k in range(len(groups))]
     joints = [effect_column(model, f, *pair) for f, pair in zip(found, pairs, strict=True)]
-    floor = noise_floor(where.measurements)
+    floor = noise_floor(compared.measurements)
     told = tuple(
-        _told(f, pair, j, float(floor[j]), where, written=True)
+        _told(f, pair, j, float(floor[j]), compared, written=True)
         for f, pair, j in zip(found, pairs, joints, strict=True)
     )
-    return Weighed(told, seen, tuple(pairs), tuple(joints), _left(where, seen[-1]))
+    return Validated(told, seen, tuple(pairs), tuple(joints), _left(compared, seen[-1]))
 
 
 def _dealt(edits: Sequence[Edit], counts: Sequence[int]) -> Iterator[Sequence[Edit]]:
@@ -122,41 +122,41 @@ def _dealt(edits: Sequence[Edit], counts: Sequence[int]) -> Iterator[Sequence[Ed
 
 def gathered(
     model: MachineModel,
-    where: Whereabouts,
+    compared: Compared,
     found: Sequence[Found],
     seen: tuple[Stage, ...],
     pairs: dict[tuple[str, tuple[str, ...]], tuple[Stage, Stage]],
     text: str,
-) -> Weighed:
+) -> Validated:
     """Effects with their proofs, those of the file first to last."""
-    floor = noise_floor(where.measurements)
+    floor = noise_floor(compared.measurements)
     told, joints, own = [], [], []
     for f in found:
         pair = pairs[f.key]
         j = effect_column(model, f, *pair)
-        told.append(_told(f, pair, j, float(floor[j]), where, written=f.kept))
+        told.append(_told(f, pair, j, float(floor[j]), compared, written=f.kept))
         joints.append(j)
         own.append(pair)
-    left = _left(where, seen[-1])
-    return Weighed(tuple(told), seen, tuple(own), tuple(joints), left, text)
+    left = _left(compared, seen[-1])
+    return Validated(tuple(told), seen, tuple(own), tuple(joints), left, text)
 
 
 def _told(
-    f: Found, pair: tuple[Stage, Stage], j: int, floor: float, where: Whereabouts, *, written: bool
+    f: Found, pair: tuple[Stage, Stage], j: int, floor: float, compared: Compared, *, written: bool
 ) -> Found:
     return replace(
         f,
         gap_before=float(pair[0].gap[j]),
         gap_after=float(pair[1].gap[j]),
-        unit=CHANNEL_UNITS[where.measurements[0].channels[0]],
+        unit=CHANNEL_UNITS[compared.measurements[0].channels[0]],
         noise_floor=floor,
         written=written,
     )
 
 
-def _left(where: Whereabouts, last: Stage) -> tuple[Remainder, ...]:
-    floor = floor_of(where.measurements, TEST)
-    return remainders(where.measurements, last.predictions, floor, last.gaps)
+def _left(compared: Compared, last: Stage) -> tuple[Residual, ...]:
+    floor = floor_of(compared.measurements, TEST)
+    return residuals(compared.measurements, last.predictions, floor, last.gaps)
 
 
 def _models(
@@ -174,7 +174,7 @@ def _models(
 
 def _worst(
     model: MachineModel,
-    where: Whereabouts,
+    compared: Compared,
     found: Sequence[Found],
     groups: Sequence[Sequence[Edit]],
 ) -> tuple[str, tuple[str, ...]] | None:
@@ -188,7 +188,7 @@ def _worst(
     for k in judged:
         rest = [edit for i, group in enumerate(groups) if i != k for edit in group]
         models.append(("", apply_edits(model, rest)))
-    first, *others = stages(models, where.measurements)
+    first, *others = stages(models, compared.measurements)
     worst, least = None, 0.0
     for k, less in zip(judged, others, strict=True):
         change = np.nan_to_num(less.valid**2 - first.valid**2)

@@ -10,8 +10,8 @@ import numpy as np
 
 from actuators.loading.build import load_catalog
 from pipeline.identification.regression.floor import floor_of
-from pipeline.identification.results import Remainder
-from pipeline.identification.selection.residual import remainders
+from pipeline.identification.results import Residual
+from pipeline.identification.selection.residual import residuals
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement, near_rest
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.robot.robot import load_robot
@@ -99,7 +99,7 @@ def only(log: Measurement, channels: tuple[str, ...]) -> Measurement:
     return replace(log, channels=channels, effort=effort, noise=log.noise[:, keep])
 
 
-def left_by(model: MachineModel, logs: Sequence[Measurement]) -> tuple[Remainder, ...]:
+def left_by(model: MachineModel, logs: Sequence[Measurement]) -> tuple[Residual, ...]:
     """What a model leaves."""
     predictions = [Simulator(m).predict(model) for m in logs]
-    return remainders(logs, predictions, floor_of(logs, TEST))
+    return residuals(logs, predictions, floor_of(logs, TEST))

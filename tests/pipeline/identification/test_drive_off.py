@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
-from pipeline.identification.compare.intake import prepare_logs
+from pipeline.identification.compare.loaded import prepare_logs
 from pipeline.identification.compare.observe import observe
 from pipeline.identification.results import Naming
 from pipeline.identification.selection.identify import identify
@@ -90,9 +90,9 @@ def measurements(
     runs = [driven(k, bridge != "shorted", seconds) for k in seeds]
     logs = [replace(run, torque_off_bridge=bridge) for run in runs]
     expected = expected_of_model(model.rigid, model.name, joints=model.joints)
-    intake = prepare_logs(logs, expected, cutoff=12.0)
-    parts = split(intake.prepared[:train], holdout=intake.prepared[train:])
-    return observe(model, intake.prepared, parts)
+    loaded = prepare_logs(logs, expected, cutoff=12.0)
+    parts = split(loaded.prepared[:train], holdout=loaded.prepared[train:])
+    return observe(model, loaded.prepared, parts)
 
 
 @cache

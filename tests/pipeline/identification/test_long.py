@@ -17,8 +17,8 @@ import pipeline.identification.workflow.setup
 from pipeline.cli.gap import add_gap_options, options_of
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.selection.identify import identify
-from pipeline.identification.workflow.locate import Whereabouts, find_where
-from pipeline.identification.workflow.setup import Setup, setup, take_in
+from pipeline.identification.workflow.compared import Compared, compare_logs
+from pipeline.identification.workflow.setup import Setup, load_logs, setup
 from pipeline.logs.prepared.informative import STRETCH, choose, scan
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
 from pipeline.logs.prepared.parts import GUARD
@@ -51,7 +51,7 @@ def long_leg(path: Path, effects: list[str], logs: int, seed: int = 5, times: in
     return path
 
 
-def taken_in(root: Path, *arguments: str) -> tuple[Setup, Whereabouts]:
+def taken_in(root: Path, *arguments: str) -> tuple[Setup, Compared]:
     parser = argparse.ArgumentParser()
     add_gap_options(parser)
     options = options_of(
@@ -59,7 +59,7 @@ def taken_in(root: Path, *arguments: str) -> tuple[Setup, Whereabouts]:
     )
 
     given = setup(options)
-    return given, find_where(given, given.model, *take_in(given, options))
+    return given, compare_logs(given, given.model, *load_logs(given, options))
 
 
 @pytest.fixture
@@ -101,7 +101,7 @@ def test_chunks_hold_every_row_once_and_what_proves_had_no_say(
     root: Path, log: Path, chunked: pytest.MonkeyPatch
 ) -> None:
     given, where = taken_in(root, str(log), "--cutoff", "20")
-    long = where.intake.long
+    long = where.loaded.long
     assert long is not None
     long.rows = 7_000
     long._kept.clear()
@@ -116,7 +116,7 @@ def test_chunks_hold_every_row_once_and_what_proves_had_no_say(
     assert proves.size > 200
     index = np.clip(np.searchsorted(said, proves), 1, said.size - 1)
     nearest = np.minimum(np.abs(proves - said[index - 1]), np.abs(said[index] - proves))
-    assert nearest.min() > 0.99 * GUARD * where.intake.prepared[0].memory
+    assert nearest.min() > 0.99 * GUARD * where.loaded.prepared[0].memory
 
 
 def test_the_table_of_chunks_is_that_of_the_whole(
@@ -126,7 +126,7 @@ def test_the_table_of_chunks_is_that_of_the_whole(
     for rows in (5_000, 10**9):
         monkeypatch.setattr(pipeline.identification.workflow.setup, "LONG_ROWS", rows)
         _, where = taken_in(root, str(log), "--cutoff", "20")
-        assert (where.intake.long is None) == (rows == 10**9)
+        assert (where.loaded.long is None) == (rows == 10**9)
         tables.append({(r.joint, r.by, r.band): r for r in where.rows})
     chunks, whole = tables
     for joint in JOINTS:
@@ -143,7 +143,7 @@ def test_a_last_share_proves_and_says_nothing_else(
     root: Path, log: Path, chunked: pytest.MonkeyPatch
 ) -> None:
     given, where = taken_in(root, str(log), "--prove-last", "0.3", "--cutoff", "20")
-    long = where.intake.long
+    long = where.loaded.long
     assert long is not None
     (m,) = where.measurements
     border = long.surveys[0].proves_from
@@ -168,7 +168,7 @@ def test_naming_on_stretches_gives_the_verdict_of_all_rows(
         named = identify(given.model, where.measurements)
         verdicts.append(named.naming.found)
         models = [("before", given.model), ("after", named.model)]
-        gaps.append([s.gap for s in stages(models, where.measurements, where.intake.long)])
+        gaps.append([s.gap for s in stages(models, where.measurements, where.loaded.long)])
     few, all_ = verdicts
     assert {(f.effect, f.place) for f in few} == {(f.effect, f.place) for f in all_}
     assert all_

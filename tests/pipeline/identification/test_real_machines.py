@@ -19,12 +19,12 @@ from pipeline.cli.main import main, parser
 from pipeline.effects.model_file import apply_edits, base_model, read_model_file
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.results import SUSPECTED, Found
-from pipeline.identification.workflow.locate import Whereabouts, find_where
+from pipeline.identification.workflow.compared import Compared, compare_logs
 from pipeline.identification.workflow.model_writer import edits_of, model_text
-from pipeline.identification.workflow.setup import Setup, setup, take_in
-from pipeline.identification.workflow.story import tell
+from pipeline.identification.workflow.outcome import identified
+from pipeline.identification.workflow.setup import Setup, load_logs, setup
 from pipeline.identification.workflow.validate import check
-from pipeline.identification.workflow.written import Weighed
+from pipeline.identification.workflow.written import Validated
 from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.progress import Progress
 from pipeline.simulation.predict import Simulator
@@ -39,19 +39,19 @@ class Run:
     """What was found and written, and the gap that the file leaves, stage by stage."""
 
     given: Setup
-    where: Whereabouts
-    weighed: Weighed
+    where: Compared
+    validated: Validated
 
     def found(self, effect: str) -> list[Found]:
-        return [f for f in self.weighed.found if f.effect == effect]
+        return [f for f in self.validated.found if f.effect == effect]
 
 
 def run(arguments: Sequence[str]) -> Run:
     options = options_of(parser().parse_args(["gap", *arguments]))
 
     given = setup(options)
-    where = find_where(given, given.model, *take_in(given, options))
-    return Run(given, where, tell(given, where, options, Progress()).story.weighed)
+    where = compare_logs(given, given.model, *load_logs(given, options))
+    return Run(given, where, identified(given, where, options, Progress()).validated)
 
 
 def rms(values: Array) -> float:
@@ -61,7 +61,7 @@ def rms(values: Array) -> float:
 def written(machine: Run, folder: Path) -> Path:
     """The model file of a run."""
     path = folder / "model.toml"
-    text = machine.weighed.text
+    text = machine.validated.text
     # Its robot stands relative to the folder of a run.
     given = machine.given.path.resolve().as_posix()
     path.write_text(re.sub(r'^file = ".*"$', f'file = "{given}"', text, flags=re.M), "utf-8")
@@ -187,9 +187,9 @@ def test_shrink_gives_what_was_promised(
     }[machine]
     options = options_of(parser().parse_args(["gap", "shrink", *logs, "--model", model]))
     given = setup(options)
-    where = find_where(given, given.model, *take_in(given, options))
-    last = check(given, where).story.weighed.stages[-1]
-    assert overall(last.gap) == pytest.approx(overall(promised.weighed.stages[-1].gap), rel=0.01)
+    where = compare_logs(given, given.model, *load_logs(given, options))
+    last = check(given, where).validated.stages[-1]
+    assert overall(last.gap) == pytest.approx(overall(promised.validated.stages[-1].gap), rel=0.01)
 
 
 @pytest.mark.slow
@@ -203,11 +203,11 @@ def test_tx40_by_default_options_is_warned_of_and_goes_on(
 
 @pytest.mark.slow
 def test_tx40_says_what_is_left_in_joints_1_and_2(tx40: Run) -> None:
-    left = {r.joint: r for r in tx40.weighed.left}
+    left = {r.joint: r for r in tx40.validated.left}
     for joint in ("joint_1", "joint_2"):
         assert left[joint].significant
         assert left[joint].description
-    assert tx40.weighed.unexplained
+    assert tx40.validated.unexplained
 
 
 def xl330_arguments(folder: Path) -> list[str]:
@@ -230,7 +230,7 @@ def xl330(shared_data: Path) -> Run:
 def test_xl330_lacks_load_dependent_friction(friction: bool, xl330: Run, shared_data: Path) -> None:
     """Named first, with and without Coulomb and viscous friction in the model before."""
     one = xl330 if friction else run(xl330_arguments(shared_data))
-    first = one.weighed.found[0]
+    first = one.validated.found[0]
     assert first.effect == "load_dependent_friction"
     assert first.values["share"] == pytest.approx(0.42, abs=0.08)
     assert first.gap_after < 0.9 * first.gap_before
@@ -243,9 +243,9 @@ def test_xl330_lacks_load_dependent_friction(friction: bool, xl330: Run, shared_
 def test_xl330_voltage_of_a_gain_that_had_no_say(xl330: Run) -> None:
     proved = {m.name.split("_")[1] for m in xl330.where.measurements if (m.part == TEST).any()}
     assert proved == {"kp200"}
-    before = xl330.weighed.found[0].gap_before
+    before = xl330.validated.found[0].gap_before
     assert before > 0.4
-    assert xl330.weighed.stages[-1].gap[0] < 0.6 * before
+    assert xl330.validated.stages[-1].gap[0] < 0.6 * before
 
 
 @pytest.mark.slow
@@ -256,7 +256,7 @@ def test_xl330_moves_as_the_machine_does_under_its_servos_law(
 
     The aim, 28 mrad, is not reached.
     """
-    edits = edits_of(xl330.weighed.found, "logs of gains 100 and 800")
+    edits = edits_of(xl330.validated.found, "logs of gains 100 and 800")
     found = tmp_path / "found.toml"
     found.write_text(model_text(xl330.given.file.with_edits(edits), tmp_path), encoding="utf-8")
     out = tmp_path / "out"

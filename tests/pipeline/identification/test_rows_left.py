@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.identification.compare.model_check import rows_left
-from pipeline.identification.workflow.locate import find_where
+from pipeline.identification.workflow.compared import compare_logs
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup, take_in
+from pipeline.identification.workflow.setup import load_logs, setup
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.quality.finding import Finding
@@ -70,4 +70,4 @@ def test_a_joint_that_shivers_is_refused_for_its_reversals(tmp_path: Path) -> No
     options = Options((log,), robot=robot, step="where")
     given = setup(options)
     with pytest.raises(LogContentError, match=r"near zero rows left .* standstill or reversal"):
-        find_where(given, given.model, *take_in(given, options))
+        compare_logs(given, given.model, *load_logs(given, options))

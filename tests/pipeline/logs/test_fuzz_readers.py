@@ -11,10 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.errors import ActuatorError
-from pipeline.identification.compare.intake import take_in
+from pipeline.identification.compare.loaded import prepare_logs
 from pipeline.logs.errors import GapError
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.mapping import load_mapping
+from pipeline.logs.reading.read import read_log
 from tests.pipeline.logs.made import stream_prepared
 
 Array = NDArray[np.float64]
@@ -200,7 +201,7 @@ def check(path: Path, expected: Expected, mapping: Path | None) -> bool:
     """Read, judge and prepare. Returns whether the input was accepted."""
     try:
         rules = load_mapping(mapping) if mapping is not None else None
-        intake = take_in([path], expected, rules)
+        loaded = prepare_logs([read_log(path, expected, rules)], expected)
         if path.suffix == ".parquet":
             for _, chunk in stream_prepared(path, expected, rules, rows=150):
                 assert np.isfinite(chunk.a).all()
@@ -210,7 +211,7 @@ def check(path: Path, expected: Expected, mapping: Path | None) -> bool:
         assert "\n" not in message
         assert len(message) < 700, message
         return False
-    (ready,) = intake.prepared
+    (ready,) = loaded.prepared
     assert np.isfinite(ready.q).all()
     assert np.isfinite(ready.a).all()
     assert np.isfinite(ready.effort[ready.mask]).all()

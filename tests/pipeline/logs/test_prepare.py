@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.identification.compare.intake import prepare_logs
+from pipeline.identification.compare.loaded import prepare_logs
 from pipeline.logs.errors import GapError, PreparationError
 from pipeline.logs.prepared.contact import log_contact, lowest_feet, scheduled_contact
 from pipeline.logs.prepared.cycles import cycle_noise, period, repeat_noise
@@ -205,9 +205,9 @@ def test_period_and_noise_between_cycles() -> None:
     assert cycle is not None
     expected = 0.2 * ready.settings.lowpass.noise_gain
     assert cycle_noise(ready, cycle) == pytest.approx([expected, expected], rel=0.2)
-    intake = prepare_logs([log], _expected(2), cutoff=20.0)
-    assert intake.prepared[0].noise_basis == "repeats"
-    assert split(intake.prepared).warning.startswith("the log repeats one motion every 1.37 s")
+    loaded = prepare_logs([log], _expected(2), cutoff=20.0)
+    assert loaded.prepared[0].noise_basis == "repeats"
+    assert split(loaded.prepared).warning.startswith("the log repeats one motion every 1.37 s")
 
 
 def test_a_motion_that_never_repeats_has_no_period() -> None:

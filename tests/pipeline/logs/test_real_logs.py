@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.identification.compare.intake import take_in
+from pipeline.identification.compare.loaded import LoadedLogs, prepare_logs
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.prepared.parts import split
 from pipeline.logs.reading.expected import Expected, expected_of_model
-from pipeline.logs.reading.mapping import load_mapping
+from pipeline.logs.reading.mapping import Mapping, load_mapping
+from pipeline.logs.reading.read import read_log
 from pipeline.robot.robot import parse_urdf
 
 FILES = Path(__file__).parents[1] / "data_files"
@@ -23,16 +24,25 @@ def expected(urdf: Path) -> Expected:
     )
 
 
+def load_logs(
+    paths: list[Path],
+    robot: Expected,
+    mapping: Mapping | None = None,
+    cutoff: float | None = None,
+) -> LoadedLogs:
+    return prepare_logs([read_log(p, robot, mapping) for p in paths], robot, cutoff=cutoff)
+
+
 def test_tx40_is_accepted_as_it_is(shared_data: Path) -> None:
     folder = shared_data / "tx40"
-    intake = take_in([folder / "tx40_log.csv"], expected(folder / "tx40.urdf"), cutoff=100.0)
-    (ready,) = intake.prepared
+    loaded = load_logs([folder / "tx40_log.csv"], expected(folder / "tx40.urdf"), cutoff=100.0)
+    (ready,) = loaded.prepared
     assert ready.channel == "torque"
     assert ready.rate == pytest.approx(2500.0)
-    assert {f.verdict for f in intake.findings} == {"ok"}
-    still = [f.value for f in intake.findings if f.check == "standstill_share"]
+    assert {f.verdict for f in loaded.findings} == {"ok"}
+    still = [f.value for f in loaded.findings if f.check == "standstill_share"]
     assert np.all(np.array(still) > 0.2)  # at rest at both ends
-    parts = split(intake.prepared, prove_last=0.4)
+    parts = split(loaded.prepared, prove_last=0.4)
     assert np.flatnonzero(parts.part[0] == TEST)[[0, -1]].tolist() == [13_500, 22_499]
     # The motion stays within the velocities the maker states.
     limit = expected(folder / "tx40.urdf").velocity_limit
@@ -41,17 +51,17 @@ def test_tx40_is_accepted_as_it_is(shared_data: Path) -> None:
 
 def test_tx40_asks_for_about_the_bandwidth_its_users_take(shared_data: Path) -> None:
     folder = shared_data / "tx40"
-    intake = take_in([folder / "tx40_log.csv"], expected(folder / "tx40.urdf"))
-    assert 50.0 < intake.settings.cutoff < 250.0
+    loaded = load_logs([folder / "tx40_log.csv"], expected(folder / "tx40.urdf"))
+    assert 50.0 < loaded.settings.cutoff < 250.0
 
 
 def test_xl330_with_its_mapping(shared_data: Path) -> None:
     logs = sorted((shared_data / "xl330").glob("*.csv"))
     mapping = load_mapping(FILES / "xl330.toml")
-    intake = take_in(logs, expected(FILES / "xl330.urdf"), mapping)
-    assert {p.channel for p in intake.prepared} == {"voltage"}
-    assert {p.log.condition["gain"] for p in intake.prepared} == {100.0, 200.0, 800.0}
-    for ready in intake.prepared:
+    loaded = load_logs(logs, expected(FILES / "xl330.urdf"), mapping)
+    assert {p.channel for p in loaded.prepared} == {"voltage"}
+    assert {p.log.condition["gain"] for p in loaded.prepared} == {100.0, 200.0, 800.0}
+    for ready in loaded.prepared:
         log = ready.log
         # The stated gain is that of the voltage column.
         assert log.gain is not None
@@ -66,14 +76,14 @@ def test_xl330_with_its_mapping(shared_data: Path) -> None:
             assert np.array_equal(np.isnan(log.voltage), log.torque_off)
             assert not ready.mask[log.torque_off].any()
             assert ready.motion_ok[60:-60].all()
-    assert "gain = 200" in split(intake.prepared).rule
+    assert "gain = 200" in split(loaded.prepared).rule
 
 
 def test_xl330_velocity_is_found_late_and_position_quantised(shared_data: Path) -> None:
     logs = [shared_data / "xl330" / "xl330_kp200_sin_sin.csv"]
     mapping = load_mapping(FILES / "xl330.toml")
-    intake = take_in(logs, expected(FILES / "xl330.urdf"), mapping)
-    found = {(f.column, f.check): f.value for f in intake.findings}
+    loaded = load_logs(logs, expected(FILES / "xl330.urdf"), mapping)
+    found = {(f.column, f.check): f.value for f in loaded.findings}
     assert found["pendulum_joint__velocity_rad_s", "skew"] == pytest.approx(0.020, abs=0.002)
     quantum = found["pendulum_joint__position_rad", "quantum"]
     assert quantum == pytest.approx(2 * np.pi / 4096, rel=0.01)

@@ -16,9 +16,9 @@ import pinocchio as pin
 import pytest
 
 from pipeline.identification.compare.observe import observe_all
-from pipeline.identification.workflow.locate import find_where
+from pipeline.identification.workflow.compared import compare_logs
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup, take_in
+from pipeline.identification.workflow.setup import load_logs, setup
 from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.quality.finding import Finding
@@ -96,8 +96,8 @@ def judged(log: pd.DataFrame, urdf: Path, folder: Path, mapping: str = "") -> li
     file.write_text(mapping, encoding="utf-8")
     options = Options((path,), robot=urdf, step="where", mapping=file)
     given = setup(options)
-    where = find_where(given, given.model, *take_in(given, options))
-    return [f for f in where.intake.findings if f.check == SUSPECTED]
+    where = compare_logs(given, given.model, *load_logs(given, options))
+    return [f for f in where.loaded.findings if f.check == SUSPECTED]
 
 
 def times(quantity: str, factor: float, joints: str = "012") -> Spoil:
@@ -260,7 +260,7 @@ def walked(folder: Path, turned: str = "") -> Path:
 def columns_of_walk(path: Path) -> list[Finding]:
     options = Options((path,), robot=Path("urdf/hexapod.toml"), step="where")
     given = setup(options)
-    prepared = take_in(given, options)[0].prepared
+    prepared = load_logs(given, options)[0].prepared
     seen = observe_all(given.bare, prepared)
     return wrong_columns(given.bare, seen, prepared[0].log, given.expected.ratio)
 

@@ -15,7 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup, take_in
+from pipeline.identification.workflow.setup import load_logs, setup
 from pipeline.machine.machine import machine_of_urdf
 from tests.command_line import exit_code, rows_of, sidecar_of
 from tests.demo import DEMO
@@ -257,8 +257,8 @@ def test_a_gait_file_tells_the_schedule_that_the_log_was_walked_by(tmp_path: Pat
     feet: dict[Path | None, float] = {}
     for file in (None, gait):
         given = setup(Options((bare,), gait=file, gait_start=0.9))
-        intake, _, _ = take_in(given, Options((bare,), step="read", gait_start=0.9))
-        contact = intake.prepared[0].contact
+        loaded, _, _ = load_logs(given, Options((bare,), step="read", gait_start=0.9))
+        contact = loaded.prepared[0].contact
         assert contact is not None
         feet[file] = float(np.median(contact.standing.sum(axis=1)))
     assert feet == {None: 3, gait: 5}

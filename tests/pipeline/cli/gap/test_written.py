@@ -20,7 +20,7 @@ from pipeline.identification.results import (
 )
 from pipeline.identification.selection.identify import estimated_alone, identify
 from pipeline.identification.workflow.model_writer import edits_of, model_text
-from pipeline.identification.workflow.written import Weighed, weigh_found
+from pipeline.identification.workflow.written import Validated, validate_found
 from reports.pages.gap_words import smaller_words
 from tests.pipeline.identification import bench_leg as leg
 
@@ -50,17 +50,17 @@ def found(effect: str, parameter: str, value: float, unit: str, level: str = CON
 def where() -> Any:
     truth = effect_named("coulomb_friction").apply(leg.leg_model(), (JOINT,), {"torque": FRICTION})
     log = leg.measured(truth, leg.leg_motion())
-    return SimpleNamespace(measurements=(log,), intake=SimpleNamespace(long=None))
+    return SimpleNamespace(measurements=(log,), loaded=SimpleNamespace(long=None))
 
 
-def weighed(where: Any, *names: Found) -> Weighed:
+def validated(where: Any, *names: Found) -> Validated:
     def written(among: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
         edits = edits_of(among, "log")
         robot = ModelFile(leg.ROOT / "urdf" / "leg.toml", "0" * 64, "rotor")
         text = model_text(robot.with_edits(edits), leg.ROOT)
         return tuple(among), text, edits_in(text)
 
-    return weigh_found(leg.leg_model(), where, names, written)
+    return validate_found(leg.leg_model(), where, names, written)
 
 
 RIGHT = found("coulomb_friction", "torque", FRICTION, "N*m")
@@ -69,7 +69,7 @@ SUSPECT = found("coulomb_friction", "torque", FRICTION, "N*m", SUSPECTED)
 
 
 def test_a_written_effect_explains_the_log(where: Any) -> None:
-    result = weighed(where, RIGHT)
+    result = validated(where, RIGHT)
     assert not result.unexplained
     assert result.found[0].written
     assert result.found[0].gap_after < 1.2 * result.found[0].noise_floor
@@ -77,7 +77,7 @@ def test_a_written_effect_explains_the_log(where: Any) -> None:
 
 
 def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) -> None:
-    result = weighed(where, SUSPECT)
+    result = validated(where, SUSPECT)
     assert result.unexplained
     (one,) = result.found
     assert not one.written
@@ -92,7 +92,7 @@ def test_a_suspected_name_is_left_out_and_so_is_what_it_would_close(where: Any) 
 
 
 def test_an_approximate_name_is_written_and_counts(where: Any) -> None:
-    result = weighed(where, NEAR)
+    result = validated(where, NEAR)
     assert not result.unexplained
     assert result.found[0].written
     assert 'level = "approximate"' in result.text
@@ -100,11 +100,11 @@ def test_an_approximate_name_is_written_and_counts(where: Any) -> None:
 
 def test_a_wrong_value_in_the_file_is_not_called_explained(where: Any) -> None:
     # What naming thought of it does not matter: the file is simulated.
-    assert weighed(where, found("coulomb_friction", "torque", 0.2, "N*m")).unexplained
+    assert validated(where, found("coulomb_friction", "torque", 0.2, "N*m")).unexplained
 
 
 def test_a_name_with_which_the_simulation_is_worse_is_suspected(where: Any) -> None:
-    result = weighed(where, found("viscous_friction", "coefficient", 9.0, "N*m*s/rad"))
+    result = validated(where, found("viscous_friction", "coefficient", 9.0, "N*m*s/rad"))
     (one,) = result.found
     assert one.level == SUSPECTED
     assert "validation" in one.reason

@@ -28,7 +28,7 @@ from pipeline.identification.supply.regression import (
 from pipeline.identification.supply.samples import Samples, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, joined, rows_of, terms_of
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup, take_in
+from pipeline.identification.workflow.setup import load_logs, setup
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.log import Log
 from tests.command_line import exit_code
@@ -42,8 +42,8 @@ def answered(log: Path, **options: Any) -> Account:
     """The answer without files."""
     asked = Options((log,), step="power", **options)
     given = setup(asked)
-    intake, _, _ = take_in(given, asked)
-    return account(given, intake.prepared, 0, None)
+    loaded, _, _ = load_logs(given, asked)
+    return account(given, loaded.prepared, 0, None)
 
 
 @cache

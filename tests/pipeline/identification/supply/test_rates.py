@@ -11,7 +11,7 @@ import pytest
 from pipeline.blind.machines.supply import make_supply
 from pipeline.identification.supply.account import BASIS_FOUND, RECOGNISED, Account, account
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup, take_in
+from pipeline.identification.workflow.setup import load_logs, setup
 
 SEED, TRIALS = 202, 20
 #: Terms that may stand in the answer beside what is hidden: windings of a leg that rubs carry more.
@@ -59,8 +59,8 @@ def trial(k: int, folder: Path) -> Counter[str]:
         mapping=stated,
     )
     machine = setup(asked)
-    intake, _, _ = take_in(machine, asked)
-    return score(truth, account(machine, intake.prepared, 0, None))
+    loaded, _, _ = load_logs(machine, asked)
+    return score(truth, account(machine, loaded.prepared, 0, None))
 
 
 @pytest.mark.slow

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,15 +24,13 @@ from pipeline.logs.quality.unit_check import OF_LIMITS
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import column_name
-from pipeline.logs.reading.mapping import Mapping as MappingFile
-from pipeline.logs.reading.read import read_log
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
-class Intake:
+class LoadedLogs:
     """Logs that were accepted."""
 
     prepared: tuple[Prepared, ...]  #: One per log, in the order given.
@@ -43,7 +40,7 @@ class Intake:
     #: The logs chunk by chunk where `prepared` holds but stretches of them, else None.
     long: LongLogs | None = None
 
-    def at(self, prepared: Sequence[Prepared]) -> Intake:
+    def at(self, prepared: Sequence[Prepared]) -> LoadedLogs:
         """The same logs at another bandwidth, with what is found at it."""
         found = [f for one in prepared for f in filter_findings(one)]
         return replace(
@@ -54,34 +51,6 @@ class Intake:
         )
 
 
-def take_in(
-    paths: Sequence[Path],
-    expected: Expected,
-    mapping: MappingFile | None = None,
-    *,
-    cutoff: float | None = None,
-    largest: Mapping[str, Array] | None = None,
-    contact: Callable[[Log], Contact | None] | None = None,
-) -> Intake:
-    """Read, judge and prepare several logs of one robot.
-
-    Args:
-        paths: CSV or Parquet.
-        expected: The robot's names, limits and ratios.
-        mapping: For foreign columns.
-        cutoff: Of the low-pass, instead of the one the data ask for [Hz].
-        largest: Channel to the largest magnitude the drive can give, shape (J,).
-        contact: How to tell which feet stand; by the log's own forces or columns by default.
-
-    Raises:
-        GapError: A log is unreadable, unusable or does not fit the others; one line.
-    """
-    if not paths:
-        raise LogContentError("no log given; name at least one CSV or Parquet file")
-    logs = [read_log(path, expected, mapping) for path in paths]
-    return prepare_logs(logs, expected, cutoff=cutoff, largest=largest, contact=contact)
-
-
 def prepare_logs(
     logs: Sequence[Log],
     expected: Expected,
@@ -90,7 +59,7 @@ def prepare_logs(
     largest: Mapping[str, Array] | None = None,
     contact: Callable[[Log], Contact | None] | None = None,
     wrong_columns: Callable[[Sequence[Prepared]], Sequence[Finding]] | None = None,
-) -> Intake:
+) -> LoadedLogs:
     """Judge and prepare logs that were read already; see `take_in`.
 
     Args:
@@ -117,7 +86,7 @@ def prepare_logs(
             refuse(beyond)
     prepared = _prepared(logs, [q.usable for q in qualities], cutoff, contact)
     found = tuple(finding for quality in qualities for finding in quality.findings)
-    return Intake((), (), prepared[0].settings, found).at(prepared)
+    return LoadedLogs((), (), prepared[0].settings, found).at(prepared)
 
 
 def _prepared(

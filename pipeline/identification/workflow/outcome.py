@@ -15,13 +15,13 @@ from pipeline.identification.compare.stages import Stage, noise_floor, overall
 from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Found, Naming, named
 from pipeline.identification.selection.deciding_motion import Deciding
+from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.deciding import decide
 from pipeline.identification.workflow.explain import explain
-from pipeline.identification.workflow.locate import Whereabouts
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
-from pipeline.identification.workflow.written import Weighed, weigh_found, with_found
+from pipeline.identification.workflow.written import Validated, validate_found, with_found
 from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.machine.machine import MachineModel
 from pipeline.progress import Progress
@@ -35,46 +35,43 @@ WORTH_SHOWING = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Story:
-    """Everything a page tells."""
+class Outcome:
+    """What a run found, for tables, figures and the page."""
 
     given: Setup  #: Robot and actuators.
-    where: Whereabouts  #: Steps 1 and 2.
+    compared: Compared  #: Steps 1 and 2.
     naming: Naming  #: Step 3; without candidates where a model file was checked.
-    weighed: Weighed  #: The model as written against the logs, effect by effect.
+    validated: Validated  #: The model as written against the logs, effect by effect.
     #: With and without the effects; None for a robot that does not walk.
     energy: EnergyChange | None
     #: File name to caption, one per effect that shows at a joint with rows.
     signatures: dict[str, str]
-    decides: str  #: What the deciding motion is, in words; empty without one.
+    #: Motion that decides between a found effect and its rivals, and it in words, or None.
+    decided: tuple[Deciding, str] | None
     remarks: tuple[str, ...]  #: What else a reader should know.
 
     @property
     def suspected(self) -> tuple[str, ...]:
         """Why columns may not be what their names say, in words."""
-        found = self.where.intake.findings
+        found = self.compared.loaded.findings
         return tuple(f.detail for f in found if f.check == SUSPECTED and f.verdict == "warning")
 
     @property
     def unexplained(self) -> bool:
         """Whether more than noise is left, or the log may not say what it seems to."""
-        return self.weighed.unexplained or bool(self.suspected)
+        return self.validated.unexplained or bool(self.suspected)
+
+    @property
+    def shown(self) -> tuple[int, ...]:
+        """Columns of the joints that the figure in time shows."""
+        stages = self.validated.stages
+        pairs = zip(self.naming.found, self.validated.joints, strict=True)
+        return most_improved(stages[0], stages[-1], [j for f, j in pairs if f.written])
 
     @property
     def noise(self) -> float:
         """Noise floor of all joints in the compared channel, of the test logs."""
-        return overall(noise_floor(self.where.measurements))
-
-
-@dataclass(frozen=True, eq=False)
-class Told:
-    """What a run writes."""
-
-    story: Story  #: For the page.
-    #: Motion that decides between a found effect and its rivals; None without one.
-    deciding: Deciding | None
-    model_file: str  #: Text of the model file; empty where there is nothing to add.
-    shown: tuple[int, ...]  #: Columns of the joints that the figure in time shows.
+        return overall(noise_floor(self.compared.measurements))
 
 
 def with_every(model: MachineModel, found: Sequence[Found]) -> MachineModel:
@@ -129,18 +126,18 @@ def most_improved(before: Stage, after: Stage, found: Sequence[int]) -> tuple[in
 
 
 def added(
-    given: Setup, where: Whereabouts, found: Sequence[Found], out: Path
+    given: Setup, compared: Compared, found: Sequence[Found], out: Path
 ) -> tuple[str, tuple[Edit, ...]]:
     """Step 4: the model file with what was found, and what of it is new, read back from its text.
 
     The text is empty where there is nothing to write.
     """
-    logs = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in where.measurements)
+    logs = "; ".join(f"{m.name}, SHA-256 {m.sha256}" for m in compared.measurements)
     edits = edits_of(found, logs)
     if not edits and not given.file.edits:
         return "", ()
-    first = where.measurements[0]
-    floor = floor_of(where.measurements)
+    first = compared.measurements[0]
+    floor = floor_of(compared.measurements)
     noise = {
         channel: dict(zip(first.joints, floor[:, c].tolist(), strict=True))
         for c, channel in enumerate(first.channels)
@@ -149,25 +146,25 @@ def added(
     return text, edits_in(text)[len(given.file.edits) :]
 
 
-def tell(given: Setup, where: Whereabouts, options: Options, progress: Progress) -> Told:
-    """Name what is missing and gather everything that a run tells.
+def identified(given: Setup, compared: Compared, options: Options, progress: Progress) -> Outcome:
+    """Name what is missing and gather everything that a run found.
 
     Raises:
         GapError: Nothing can be compared.
     """
-    explanation = explain(given, where, progress)
-    where = explanation.where
-    progress.step("weighing what was found")
+    explanation = explain(given, compared, progress)
+    compared = explanation.compared
+    progress.step("validating what was found")
 
     def written(found: Sequence[Found]) -> tuple[tuple[Found, ...], str, tuple[Edit, ...]]:
-        told = explanation.estimated(tuple(found))
-        return told, *added(given, where, told, options.out)
+        own = explanation.estimated(tuple(found))
+        return own, *added(given, compared, own, options.out)
 
-    weighed = weigh_found(given.model, where, explanation.naming.found, written)
-    naming = replace(explanation.naming, found=weighed.found)
+    validated = validate_found(given.model, compared, explanation.naming.found, written)
+    naming = replace(explanation.naming, found=validated.found)
     energy = cost(given, [f for f in naming.found if f.written])
-    decided = decide(given, given.model, where.measurements, naming.found)
-    return gathered(given, where, naming, weighed, energy, decided)
+    decided = decide(given, given.model, compared.measurements, naming.found)
+    return gathered(given, compared, naming, validated, energy, decided)
 
 
 def signature_name(f: Found) -> str:
@@ -177,19 +174,19 @@ def signature_name(f: Found) -> str:
 
 def gathered(
     given: Setup,
-    where: Whereabouts,
+    compared: Compared,
     naming: Naming,
-    weighed: Weighed,
+    validated: Validated,
     energy: tuple[EnergyChange | None, tuple[str, ...]],
     decided: tuple[Deciding, str] | None,
-) -> Told:
-    """What a run writes, from what it found.
+) -> Outcome:
+    """What a run found, for tables, figures and the page.
 
     Args:
         given: Robot and actuators.
-        where: Steps 1 and 2.
+        compared: Steps 1 and 2.
         naming: Effects.
-        weighed: The model as written against the logs.
+        validated: The model as written against the logs.
         energy: With and without the effects, and remarks.
         decided: Deciding motion, and it in words.
     """
@@ -199,23 +196,16 @@ def gathered(
             f"variable on which the effect depends, without it and with it."
             + ("" if f.written else " The model file written leaves it out.")
         )
-        for f, j in zip(naming.found, weighed.joints, strict=True)
-        if any(m.mask[:, j].any() for m in where.measurements)
+        for f, j in zip(naming.found, validated.joints, strict=True)
+        if any(m.mask[:, j].any() for m in compared.measurements)
     }
-    story = Story(
+    return Outcome(
         given=given,
-        where=where,
+        compared=compared,
         naming=naming,
-        weighed=weighed,
+        validated=validated,
         energy=energy[0],
         signatures=signatures,
-        decides=decided[1] if decided else "",
+        decided=decided,
         remarks=energy[1],
-    )
-    columns = [j for f, j in zip(naming.found, weighed.joints, strict=True) if f.written]
-    return Told(
-        story=story,
-        deciding=decided[0] if decided else None,
-        model_file=weighed.text,
-        shown=most_improved(weighed.stages[0], weighed.stages[-1], columns),
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from pipeline.identification.compare.bandwidth import with_encoder_noise
 from pipeline.identification.compare.circumstances import Tally, Where, edges_of, where
-from pipeline.identification.compare.intake import Intake
+from pipeline.identification.compare.loaded import LoadedLogs
 from pipeline.identification.compare.long import LongLogs
 from pipeline.identification.compare.model_check import against_model, drifts, rows_left
 from pipeline.identification.compare.observe import observe
@@ -21,10 +21,10 @@ from pipeline.simulation.predict import Prediction, Simulator
 
 
 @dataclass(frozen=True, eq=False)
-class Whereabouts:
+class Compared:
     """Steps 1 and 2."""
 
-    intake: Intake  #: The logs.
+    loaded: LoadedLogs  #: The logs.
     parts: Parts  #: Of the logs.
     fitted: int  #: How many of them may be fitted, the first ones.
     measurements: tuple[Measurement, ...]  #: One per log.
@@ -32,18 +32,18 @@ class Whereabouts:
     rows: tuple[Where, ...]  #: Of `where.csv`.
 
 
-def find_where(
-    given: Setup, model: MachineModel, intake: Intake, parts: Parts, fitted: int
-) -> Whereabouts:
+def compare_logs(
+    given: Setup, model: MachineModel, loaded: LoadedLogs, parts: Parts, fitted: int
+) -> Compared:
     """Simulate every log's own motion and table the gap.
 
     Raises:
         GapError: The model does not predict what the log measures, or betrays a wrong unit.
     """
-    seen = observe(model, intake.prepared, parts)
-    measurements = with_encoder_noise(given.bare, intake.prepared, seen)
+    seen = observe(model, loaded.prepared, parts)
+    measurements = with_encoder_noise(given.bare, loaded.prepared, seen)
     predictions = predict(model, measurements)
-    log, ratio = intake.prepared[0].log, given.expected.ratio
+    log, ratio = loaded.prepared[0].log, given.expected.ratio
     findings = [f for m in measurements for f in rows_left(m) if f.verdict == "refused"]
     findings += [] if findings else wrong_columns(given.bare, measurements, log, ratio)
     refuse(findings)
@@ -54,24 +54,24 @@ def find_where(
     ]
     refuse(findings)
     findings += drifts(measurements, predictions)
-    if intake.long is None:
+    if loaded.long is None:
         rows = where(measurements, predictions, legs_of(given))
     else:
-        rows = _where_in_chunks(given, model, intake.long, measurements, predictions)
-    intake = judged(intake)
-    intake = replace(intake, findings=(*intake.findings, *findings))
-    return Whereabouts(intake, parts, fitted, measurements, predictions, rows)
+        rows = _where_in_chunks(given, model, loaded.long, measurements, predictions)
+    loaded = judged(loaded)
+    loaded = replace(loaded, findings=(*loaded.findings, *findings))
+    return Compared(loaded, parts, fitted, measurements, predictions, rows)
 
 
-def judged(intake: Intake) -> Intake:
+def judged(loaded: LoadedLogs) -> LoadedLogs:
     """With the judgement on every row where only stretches are held.
 
     Raises:
         GapError: A chunk cannot be used.
     """
-    if intake.long is None:
-        return intake
-    return replace(intake, findings=intake.long.findings(intake.findings))
+    if loaded.long is None:
+        return loaded
+    return replace(loaded, findings=loaded.long.findings(loaded.findings))
 
 
 def _where_in_chunks(
