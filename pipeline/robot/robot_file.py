@@ -152,7 +152,21 @@ def load_robot_file(path: Path) -> RobotSpec:
         file.parameters, numbers, f"{where}: parameters", optional=GAIT_NUMBERS
     )
     check_parameters(parameters, build, where)
-    legs = tuple(_leg(name, leg, parameters) for name, leg in file.legs.items())
+    legs = tuple(
+        LegSpec(
+            name=name,
+            joints=leg.joints,
+            foot=leg.foot,
+            side=leg.side,
+            station=leg.station,
+            neutral_foot=built_neutral_foot(parameters, leg.side, leg.station)
+            if build
+            else leg.neutral_foot,
+            start_posture=leg.start_posture or (0.0,) * len(leg.joints),
+            start_stated=leg.start_posture is not None,
+        )
+        for name, leg in file.legs.items()
+    )
     names = list(file.legs)
     _refuse_shared(legs, file.held, where)
     feet = names if file.standing.feet is None else list(file.standing.feet)
@@ -252,23 +266,6 @@ def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
     if len(set(value)) != len(value):
         raise RobotFileError(f"{where}: a leg is named twice")
     return tuple(value)
-
-
-def _leg(name: str, leg: OwnLegTable | BuiltLegTable, parameters: ParameterSet) -> LegSpec:
-    if isinstance(leg, BuiltLegTable):
-        neutral = built_neutral_foot(parameters, leg.side, leg.station)
-    else:
-        neutral = leg.neutral_foot
-    return LegSpec(
-        name=name,
-        joints=leg.joints,
-        foot=leg.foot,
-        side=leg.side,
-        station=leg.station,
-        neutral_foot=neutral,
-        start_posture=leg.start_posture or (0.0,) * len(leg.joints),
-        start_stated=leg.start_posture is not None,
-    )
 
 
 def _refuse_shared(legs: tuple[LegSpec, ...], held: Mapping[str, float], where: str) -> None:

@@ -105,13 +105,13 @@ def check_urdf(text: str, where: str) -> list[Finding]:
     root = read_elements(text, where)
     bodies = merged_bodies(root, parse_urdf(text, where, floating=False))
     # Units first: they explain what comes after.
-    findings = [*_lengths(root, where), *_sizes(root, bodies, where)]
+    findings = [*_lengths(root), *_sizes(root, bodies)]
     for joint in root.findall("joint"):
         if joint.get("type") != "fixed":
             findings += _drive(joint)
-            findings += _limits(joint, where)
+            findings += _limits(joint)
     for body in bodies:
-        findings += _links(body, where)
+        findings += _links(body)
         findings += _body(body)
     return findings
 
@@ -152,17 +152,17 @@ def _name(element: ET.Element) -> str:
     return element.get("name", "")
 
 
-def _mass(link: ET.Element, where: str) -> float:
+def _mass(link: ET.Element) -> float:
     mass = link.find("inertial/mass")
-    return 0.0 if mass is None else number(mass, "value", where)
+    return 0.0 if mass is None else number(mass, "value")
 
 
-def _moments(link: ET.Element, where: str) -> Array:
+def _moments(link: ET.Element) -> Array:
     """Principal moments about the centre of mass, shape (3,) [kg*m^2], rising."""
     tensor = link.find("inertial/inertia")
     if tensor is None:
         return np.zeros(3)
-    xx, xy, xz, yy, yz, zz = (number(tensor, key, where) for key in INERTIA_KEYS)
+    xx, xy, xz, yy, yz, zz = (number(tensor, key) for key in INERTIA_KEYS)
     return np.linalg.eigvalsh(np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
@@ -180,23 +180,23 @@ def _excess(mass: float, moments: Array) -> tuple[float, str]:
     return 0.0, f"moments {shown}"
 
 
-def _links(body: Body, where: str) -> Iterator[Finding]:
+def _links(body: Body) -> Iterator[Finding]:
     """What no merging mends, and what the merged body no longer shows."""
     scale = float(np.abs(np.linalg.eigvalsh(body.inertia.inertia)).max())
     for link in body.links:
-        mass, name = _mass(link, where), _name(link)
+        mass, name = _mass(link), _name(link)
         if mass < 0:
             yield Finding(name, "mass positive", False, f"{mass:.6g} kg")
             continue
         if len(body.links) > 1:
-            excess, detail = _excess(mass, _moments(link, where))
+            excess, detail = _excess(mass, _moments(link))
             if excess > MATERIAL * scale:
                 yield Finding(name, "inertia possible", False, detail)
             elif excess > 0:
                 small = f"; below {100 * MATERIAL:g} % of '{body.name}', which carries it"
                 yield _note(name, "inertia possible", detail + small)
         if mass > 0 and mass >= MATERIAL * body.inertia.mass:
-            yield from _centre_in_geometry(link, where)
+            yield from _centre_in_geometry(link)
 
 
 def _body(body: Body) -> Iterator[Finding]:
@@ -205,7 +205,7 @@ def _body(body: Body) -> Iterator[Finding]:
     held = [link for link in body.links[1:] if link.find("inertial") is not None]
     if held:
         shown = held[:_SHOWN] if len(held) > _SHOWN + 1 else held
-        names = [_name(x) + (" (0 kg)" if _mass(x, "") == 0 else "") for x in shown]
+        names = [_name(x) + (" (0 kg)" if _mass(x) == 0 else "") for x in shown]
         more = f" and {len(held) - len(names)} more" if len(held) > len(names) else ""
         detail = f"with {', '.join(names)}{more}: one body of {mass:.6g} kg"
         yield _note(body.name, MERGED, detail)
@@ -238,18 +238,18 @@ def _without_mass(body: Body) -> Finding:
     return Finding(body.name, "mass positive", False, f"0 kg{beyond}: {remedy}")
 
 
-def _centre_in_geometry(link: ET.Element, where: str) -> Iterator[Finding]:
+def _centre_in_geometry(link: ET.Element) -> Iterator[Finding]:
     """A shape for looks or contact is not the body: outside is odd, by its own size is wrong."""
     inertial = link.find("inertial")
     shapes = [*link.findall("visual"), *link.findall("collision")]
-    halves = [_half_size(shape, where) for shape in shapes]
+    halves = [_half_size(shape) for shape in shapes]
     if inertial is None or not shapes or any(half is None for half in halves):
         return  # the extent of a mesh is not known without the mesh file
-    centre, _ = place(inertial, where)
+    centre, _ = place(inertial)
     near, out = False, np.inf
     for shape, half in zip(shapes, halves, strict=True):
         assert half is not None
-        at, rpy = place(shape, where)
+        at, rpy = place(shape)
         beside = np.abs(pin.rpy.rpyToMatrix(rpy).T @ (centre - at)) - half
         own = float(np.linalg.norm(np.maximum(beside, 0.0)))
         # One that is large enough suffices: a small part in addition makes nothing worse.
@@ -262,18 +262,18 @@ def _centre_in_geometry(link: ET.Element, where: str) -> Iterator[Finding]:
     yield Finding(_name(link), check, near, detail, note=outside)
 
 
-def _half_size(shape: ET.Element, where: str) -> Array | None:
+def _half_size(shape: ET.Element) -> Array | None:
     """Half the edges of the box around a primitive [m]; None for a mesh."""
     solid = shape.find("geometry/*")
     assert solid is not None  # the structure holds
     if solid.tag == "box":
-        return numbers(solid, "size", where, (0, 0, 0)) / 2
+        return numbers(solid, "size", "", (0, 0, 0)) / 2
     if solid.tag == "mesh":
         return None
-    radius = number(solid, "radius", where)
+    radius = number(solid, "radius")
     if solid.tag == "sphere":
         return np.full(3, radius)
-    length = number(solid, "length", where)
+    length = number(solid, "length")
     return np.array([radius, radius, length / 2 + (radius if solid.tag == "capsule" else 0)])
 
 
@@ -291,7 +291,7 @@ def _drive(joint: ET.Element) -> Iterator[Finding]:
         yield Finding(_name(joint), OWN_DRIVE, False, detail, tolerable=True)
 
 
-def _limits(joint: ET.Element, where: str) -> Iterator[Finding]:
+def _limits(joint: ET.Element) -> Iterator[Finding]:
     name, kind, limit = _name(joint), joint.get("type"), joint.find("limit")
     if kind not in MOVING:
         return
@@ -299,12 +299,12 @@ def _limits(joint: ET.Element, where: str) -> Iterator[Finding]:
         yield Finding(name, "limits", True, "a continuous joint without limits")
         return
     for key in ("effort", "velocity"):
-        value = number(limit, key, where)
+        value = number(limit, key)
         detail = f"{value:g}" + ("" if value else " is taken for none")
         yield Finding(name, f"{key} limit", True, detail, note=value == 0)
     if kind == "continuous":
         return
-    lower, upper = number(limit, "lower", where), number(limit, "upper", where)
+    lower, upper = number(limit, "lower"), number(limit, "upper")
     detail, none = f"lower {lower:g}, upper {upper:g}", lower == upper
     if none:
         detail += ": no range, taken for no limit in a log; a leg cannot walk with it"
@@ -327,17 +327,17 @@ def _in_radians(name: str, lower: float, upper: float) -> Finding:
     return Finding(name, "limits in radians", True, f"{lower:g} to {upper:g} rad")
 
 
-def _lengths(root: ET.Element, where: str) -> Iterator[Finding]:
+def _lengths(root: ET.Element) -> Iterator[Finding]:
     """Offsets of joints in metres."""
     for joint in root.findall("joint"):
-        xyz, _ = place(joint, where)
+        xyz, _ = place(joint)
         if (offset := float(np.linalg.norm(xyz))) > LONGEST:
             written = " ".join(f"{x:g}" for x in xyz)
             detail = f"origin {written}: {offset:g} m from its parent; millimetres?"
             yield Finding(_name(joint), "lengths in metres", False, detail)
 
 
-def _sizes(root: ET.Element, bodies: Sequence[Body], where: str) -> Iterator[Finding]:
+def _sizes(root: ET.Element, bodies: Sequence[Body]) -> Iterator[Finding]:
     """Inertias that fit the robot's size, and a mass that fits its volume."""
     above = {ends(joint)[1]: joint for joint in root.findall("joint")}
 
@@ -345,7 +345,7 @@ def _sizes(root: ET.Element, bodies: Sequence[Body], where: str) -> Iterator[Fin
         """From the root along the joints [m]."""
         total = 0.0
         while link in above:
-            total += float(np.linalg.norm(place(above[link], where)[0]))
+            total += float(np.linalg.norm(place(above[link])[0]))
             link = ends(above[link])[0]
         return total
 

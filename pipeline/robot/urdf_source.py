@@ -142,7 +142,7 @@ def numbers(element: ET.Element, key: str, where: str, default: Sequence[float])
     raise _fault(element, where, words)
 
 
-def number(element: ET.Element, key: str, where: str) -> float:
+def number(element: ET.Element, key: str, where: str = "") -> float:
     """One finite number, zero without the attribute.
 
     Raises:
@@ -151,7 +151,7 @@ def number(element: ET.Element, key: str, where: str) -> float:
     return float(numbers(element, key, where, (0,))[0])
 
 
-def place(element: ET.Element, where: str) -> tuple[Array, Array]:
+def place(element: ET.Element, where: str = "") -> tuple[Array, Array]:
     """An element's ``<origin>``: xyz [m] and rpy [rad], zero without one.
 
     Raises:
@@ -217,27 +217,24 @@ def _check_link(link: ET.Element, where: str) -> None:
     inertial = link.find("inertial")
     if inertial is not None:
         place(inertial, where)
-        mass, tensor = inertial.find("mass"), inertial.find("inertia")
-        if mass is None or tensor is None:
-            lacking = "mass" if mass is None else "inertia"
-            raise _fault(link, where, f"<inertial> without <{lacking}>; give both")
-        given = [(mass, "value", "kg"), *((tensor, key, "kg*m^2") for key in INERTIA_KEYS)]
-        for element, key, unit in given:
-            if element.get(key) is None:
-                raise _fault(link, where, f"<{element.tag}> without {key} [{unit}]")
-            try:
-                number(element, key, where)
-            except UrdfError as error:  # which link's
-                raise UrdfError(f"{error} (link '{one_line(link.get('name'))}')") from None
+        for tag, keys, unit in (("mass", ("value",), "kg"), ("inertia", INERTIA_KEYS, "kg*m^2")):
+            element = inertial.find(tag)
+            if element is None:
+                raise _fault(link, where, f"<inertial> without <{tag}>; give both")
+            for key in keys:
+                if element.get(key) is None:
+                    raise _fault(link, where, f"<{tag}> without {key} [{unit}]")
+                try:
+                    number(element, key, where)
+                except UrdfError as error:  # which link's
+                    raise UrdfError(f"{error} (link '{one_line(link.get('name'))}')") from None
     for shape in (*link.findall("visual"), *link.findall("collision")):
         place(shape, where)
         solid = shape.find("geometry/*")
         if solid is None:
-            words = f"<{shape.tag}> without <geometry> and a shape in it"
-            raise _fault(link, where, words)
+            raise _fault(link, where, f"<{shape.tag}> without <geometry> and a shape in it")
         if solid.tag not in _SHAPES:
-            words = f"shape <{solid.tag}>; {closest(solid.tag, list(_SHAPES))}"
-            raise _fault(link, where, words)
+            raise _fault(link, where, f"shape <{solid.tag}>; {closest(solid.tag, list(_SHAPES))}")
         for key, count in _SHAPES[solid.tag].items():
             if not solid.get(key):
                 raise UrdfError(f"{shown(solid, where)} without {key}")
@@ -248,14 +245,13 @@ def _check_link(link: ET.Element, where: str) -> None:
 def _check_joint(joint: ET.Element, links: list[str], joints: list[str], where: str) -> None:
     """Its type, and the names of what it joins."""
     kind = joint.get("type")
-    if kind is None:
-        raise _fault(joint, where, f"has no type; known: {', '.join(TYPES)}")
     if kind not in TYPES:
-        raise _fault(joint, where, f"type '{one_line(kind)}'; {closest(kind, TYPES)}")
+        known = f"has no type; known: {', '.join(TYPES)}"
+        other = f"type '{one_line(kind)}'; {closest(kind or '', TYPES)}"
+        raise _fault(joint, where, known if kind is None else other)
     place(joint, where)
     for tag in ("parent", "child"):
-        end = joint.find(tag)
-        name = None if end is None else end.get("link")
+        name = getattr(joint.find(tag), "attrib", {}).get("link")
         if not name:
             raise _fault(joint, where, f"has no <{tag} link=...>")
         if name not in links:

@@ -11,7 +11,7 @@ ANSWERS = ("inverse", "holding", "forward", "loss", "stored", "drawn")
 
 def asks_elements(text: str) -> bool:
     """Whether code calls an element's answers, by whatever name it goes in a loop over elements."""
-    for loop in ast.walk(ast.parse(text)):
+    for loop in ast.walk(ast.parse(text if "elements" in text else "")):
         if not isinstance(loop, ast.For) or "elements" not in ast.unparse(loop.iter):
             continue
         for call in ast.walk(loop):

@@ -49,7 +49,9 @@ def test_every_offered_posture_is_a_start_that_arrives(hexapod: Robot) -> None:
 
 
 def test_a_missing_posture_is_called_missing(hexapod: Robot) -> None:
-    lost = with_legs(hexapod, start_posture=(0.0, -1.0, 3.0), start_stated=False)
+    first, *others = hexapod.spec.legs
+    bare = replace(first, start_posture=(0.0, -1.0, 3.0), start_stated=False)
+    lost = replace(hexapod, spec=replace(hexapod.spec, legs=(bare, *others)))
     with pytest.raises(GaitError, match="start_posture is missing: from zero") as caught:
         neutral_postures(lost)
     assert "beyond its reach" not in str(caught.value)
