@@ -7,13 +7,13 @@ and accelerations follow exactly, from ``x_dot = J q_dot`` and ``x_ddot = J q_dd
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from functools import lru_cache
 
 import numpy as np
 
 from actuators.arrays import Array
 from pipeline.errors import OutOfReachError
-from pipeline.robot.inverse.least_motion import LeastMotion, freedoms
+from pipeline.robot.inverse.least_motion import Freedom, LeastMotion, freedoms
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import LegChains
 
@@ -125,9 +125,13 @@ def _refuse_jumps(chains: LegChains, q: Array, velocity: Array, time: Array) -> 
         )
 
 
-def _problems(chains: LegChains) -> Iterator[tuple[LeastMotion, list[int]]]:
+@lru_cache
+def _problems(chains: LegChains) -> tuple[tuple[LeastMotion, list[int]], ...]:
     """Legs of the same freedom, and what they are to do."""
-    free = freedoms(chains)
-    for kind in dict.fromkeys(free):
-        legs = [i for i, own in enumerate(free) if own == kind]
-        yield LeastMotion(chains.of(legs).shortened(kind.joints), kind), legs
+    alike: dict[Freedom, list[int]] = {}
+    for leg, freedom in enumerate(freedoms(chains)):
+        alike.setdefault(freedom, []).append(leg)
+    return tuple(
+        (LeastMotion(chains.of(legs).shortened(freedom.joints), freedom), legs)
+        for freedom, legs in alike.items()
+    )

@@ -37,9 +37,7 @@ Point = tuple[float, float, float]
 @cache
 def _template() -> Template:
     folder = FileSystemLoader(Path(__file__).parent)
-    environment = Environment(
-        loader=folder, autoescape=True, trim_blocks=True, keep_trailing_newline=True
-    )
+    environment = Environment(loader=folder, trim_blocks=True, keep_trailing_newline=True)
     environment.filters |= {"number": _number, "numbers": _numbers}
     return environment.get_template("robot.urdf.jinja")
 
