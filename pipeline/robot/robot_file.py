@@ -152,21 +152,7 @@ def load_robot_file(path: Path) -> RobotSpec:
         file.parameters, numbers, f"{where}: parameters", optional=GAIT_NUMBERS
     )
     check_parameters(parameters, build, where)
-    legs = tuple(
-        LegSpec(
-            name=name,
-            joints=leg.joints,
-            foot=leg.foot,
-            side=leg.side,
-            station=leg.station,
-            neutral_foot=built_neutral_foot(parameters, leg.side, leg.station)
-            if build
-            else leg.neutral_foot,
-            start_posture=leg.start_posture or (0.0,) * len(leg.joints),
-            start_stated=leg.start_posture is not None,
-        )
-        for name, leg in file.legs.items()
-    )
+    legs = _legs(file.legs, parameters)
     names = list(file.legs)
     _refuse_shared(legs, file.held, where)
     feet = names if file.standing.feet is None else list(file.standing.feet)
@@ -266,6 +252,26 @@ def leg_list(value: Any, names: list[str], where: str) -> tuple[str, ...]:
     if len(set(value)) != len(value):
         raise RobotFileError(f"{where}: a leg is named twice")
     return tuple(value)
+
+
+def _legs(
+    tables: Mapping[str, OwnLegTable | BuiltLegTable], parameters: ParameterSet
+) -> tuple[LegSpec, ...]:
+    return tuple(
+        LegSpec(
+            name=name,
+            joints=leg.joints,
+            foot=leg.foot,
+            side=leg.side,
+            station=leg.station,
+            neutral_foot=built_neutral_foot(parameters, leg.side, leg.station)
+            if isinstance(leg, BuiltLegTable)
+            else leg.neutral_foot,
+            start_posture=leg.start_posture or (0.0,) * len(leg.joints),
+            start_stated=leg.start_posture is not None,
+        )
+        for name, leg in tables.items()
+    )
 
 
 def _refuse_shared(legs: tuple[LegSpec, ...], held: Mapping[str, float], where: str) -> None:
