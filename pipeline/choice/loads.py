@@ -67,7 +67,7 @@ def loads_of(
     motions = [load.motion for load in along] or [None] * len(modes)
     for mode, motion in zip(modes, motions, strict=True):
         try:
-            own = _with_masses(machine.with_values(mode.changes), added)
+            own = with_masses(machine.with_values(mode.changes), added)
             out.append(with_spring(_load(own, mode, samples, motion), spring))
         except StanceError as error:
             raise type(error)(f"{mode.where}: {error}") from None
@@ -86,7 +86,7 @@ def with_spring(load: Load, spring: ParallelSpring | None) -> Load:
     return replace(load, series=spring.inverse(load.series))
 
 
-def _with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
+def with_masses(machine: Machine, added: Mapping[str, float] | None) -> Machine:
     """The machine with point masses [kg] at the origins of joints, on the link before each.
 
     That by the free joint of a floating base sits at the origin of the base.

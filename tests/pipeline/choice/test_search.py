@@ -16,6 +16,7 @@ from pipeline.choice.missions.mission import read_mission
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded
 from pipeline.choice.track import Account
+from pipeline.choice.wanted import Wanted, filtered
 from tests.pipeline.choice.brute import in_full
 
 ACCOUNT = Account()
@@ -47,7 +48,11 @@ def shelf() -> Shelf:
     return Shelf.of({name: parts[name] for name in names}, idle=idle)
 
 
-def test_ten_best_are_those_of_brute_force(loads: tuple[Load, ...], shelf: Shelf) -> None:
+def test_ten_best_and_front_are_those_of_brute_force(
+    loads: tuple[Load, ...], shelf: Shelf, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though only two designs are looked at before bounds decide."""
+    monkeypatch.setattr("pipeline.choice.group._FIRST", 2)
     joints = [joint for joint in loads[0].series.joints if joint.endswith("3")]
     demanded = Demanded.of("knee", joints, loads)
     designs = shelf.designs(combinations(shelf))
@@ -60,6 +65,8 @@ def test_ten_best_are_those_of_brute_force(loads: tuple[Load, ...], shelf: Shelf
     best = found.looked[found.finalists[:10]]
     assert list(best) == list(np.argsort(power, kind="stable")[:10])
     assert np.allclose(found.power, power[found.looked], rtol=1e-9)
+    own = front(power[fits], designs.mass[fits])
+    assert np.allclose(found.power[found.front], power[fits][own], rtol=1e-9)
 
 
 def test_bound_is_below_and_net_where_all_is_used_again(
@@ -153,3 +160,24 @@ def test_a_belt_of_ones_own_takes_part_in_place_of_a_gear() -> None:
     assert designs.ratio[at] == 9.0
     assert designs.load[at] > 0.0
     assert designs.coulomb[at] > designs.coulomb[1 - at]
+
+
+def test_options_leave_what_they_do_not_name() -> None:
+    """A filter of motors leaves all gears of the kinds asked for, and the brakes."""
+    wanted = Wanted(only=("maxon_148867",), without=("hd_",), kinds=("strain_wave", "planetary"))
+    left = filtered(load_parts(), wanted)
+    assert [name for name, part in left.items() if part.kind == "motor"] == ["maxon_148867"]
+    assert {part.kind for part in left.values()} == {"motor", "planetary", "brake"}
+
+
+def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds(shelf: Shelf) -> None:
+    motor, gear = ("maxon_634043", "", ""), ("", "hd_csg_17_80", "")
+    both = shelf.designs([(*motor[:1], *gear[1:])])
+    one, two = shelf.designs([motor]), shelf.designs([gear])
+    assert both.mass == one.mass + two.mass
+    assert (both.ratio, both.gear_peak) == (two.ratio, two.gear_peak)
+    assert np.isinf(one.gear_peak)
+    assert np.isfinite(both.gear_peak)
+    # A gear that locks needs no brake.
+    braked = {gear for _, gear, brake in combinations(shelf) if brake}
+    assert braked == {"", "hd_csg_17_80", "hd_csg_25_100", "maxon_gp_62_a_100", "maxon_gp_42_hd_74"}

@@ -10,7 +10,7 @@ import pytest
 import pipeline as lw
 from actuators.loading.parts import load_parts
 from pipeline.choice.errors import ChoiceError
-from pipeline.choice.loads import Load, loads_of, with_spring
+from pipeline.choice.loads import Load, loads_of, with_masses, with_spring
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.parts.shelf import Shelf
 from pipeline.choice.search import Demanded
@@ -96,3 +96,14 @@ def test_the_spring_that_is_found_is_the_best_of_a_grid_and_for_standing_carries
     for k in np.geomspace(0.3, 100.0, 6):
         for angle in range(-180, 181, 40):
             assert best <= 1.002 * power(f"{joints[0]}={k:.6f} N*m/rad@{angle} deg", walked)
+
+
+def test_an_actuator_sits_on_the_link_before_its_joint_and_a_battery_on_the_base() -> None:
+    machine = lw.load("urdf/solo12.toml")
+    model, (hip, *_) = machine.ready.robot.model, machine.ready.robot.spec.legs[0].joints
+    (own,) = loads_of(machine, [STAND], {model.names[1]: 0.7})
+    (payload,) = loads_of(machine, [replace(STAND, changes={"gait.payload_mass": "0.7 kg"})])
+    assert np.allclose(own.series.torque, payload.series.torque, atol=1e-9)
+    heavier = with_masses(machine, {hip: 0.5}).ready.robot.model.inertias
+    more = [a.mass - b.mass for a, b in zip(heavier, model.inertias, strict=True)]
+    assert np.flatnonzero(more).tolist() == [model.parents[model.getJointId(hip)]]

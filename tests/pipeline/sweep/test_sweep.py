@@ -129,6 +129,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--vary", "sped=0.1,0.2 m/s"], "did you mean 'speed'"),
         (["--vary", "harmonic_drive.lod=1,2"], "no such number"),
         (["--vary", "speed=0.1:0.4:7 kg"], "expected a velocity"),
+        (["--vary", "hip_spacing=1,2 kg"], "its unit is"),
         (["--vary", "speed=0.1:0.4:7 furlong"], "unknown unit"),
         (["--vary", "speed=0.1,nan m/s"], "nan is no finite number"),
         (["--vary", "payload=0:5:1000000000 kg"], "1000000000 values"),
