@@ -9,9 +9,10 @@ import pytest
 
 import pipeline as lw
 from pipeline.errors import RobotFileError
-from pipeline.measured.evaluate import ROBOTS, predicted
+from pipeline.measured.evaluate import ROBOTS, Prediction, predicted
 from pipeline.measured.facts import read_facts
 from pipeline.measured.page import write_measured
+from pipeline.measured.tables import ratio_rows
 
 #: Solo12 standing and two unknowns: 2 ways by 2 numbers.
 SMALL = """
@@ -116,3 +117,11 @@ def test_facts_that_cannot_be_are_one_line(facts: Path, old: str, new: str, word
     (facts / "small.toml").write_text(SMALL.replace(old, new), encoding="utf-8")
     with pytest.raises(RobotFileError, match=words):
         read_facts(facts)
+
+
+def test_a_ratio_pairs_equal_choices() -> None:
+    facts = read_facts()["magnecko"]
+    over = Prediction({(0,): 2.0, (1,): 8.0, (3,): 1.0}, (0,))
+    under = Prediction({(0,): 1.0, (1,): 4.0, (2,): 100.0}, (0,))
+    (row,) = ratio_rows(facts, {facts.ratio[0].over: over, facts.ratio[0].under: under})
+    assert (row.low, row.nominal, row.high) == (2.0, 2.0, 2.0)
