@@ -7,9 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
-from pydantic import ValidationError
-
-from actuators.checked import checked
+from actuators.checked import Table, checked
 from actuators.errors import closest
 from actuators.parameters import ParameterSet, parameters_from_table
 from actuators.text_file import UnreadableTextError, read_toml_file
@@ -17,7 +15,13 @@ from actuators.units import si_unit
 from pipeline.errors import RobotFileError
 from pipeline.robot.published import SCHEME, published_names, urdf_path
 from pipeline.robot.robot_numbers import BUILD_SCHEMA, GAIT_NUMBERS, GAIT_SCHEMA, check_parameters
-from pipeline.robot.robot_tables import BuiltLegTable, FileTable, OwnLegTable
+from pipeline.robot.robot_tables import (
+    BuiltLegTable,
+    FileTable,
+    LegTable,
+    OwnLegTable,
+    RobotTable,
+)
 
 #: Of the project, from the folder it is run in.
 DEFAULT_ROBOT: Final = Path("urdf/hexapod.toml")
@@ -145,8 +149,9 @@ def load_robot_file(path: Path) -> RobotSpec:
     where = str(path)
     build = table["robot"].get("build") if isinstance(table.get("robot"), dict) else None
     schema: type[FileTable[Any]] = FileTable[BuiltLegTable] if build else FileTable[OwnLegTable]
+    leg_table = BuiltLegTable if build else OwnLegTable
     numbers = GAIT_SCHEMA | BUILD_SCHEMA if build else GAIT_SCHEMA
-    _refuse_missing(schema, numbers, table, where)
+    _refuse_missing(leg_table, numbers, table, where)
     file = checked(schema, table, where, RobotFileError)
     parameters = parameters_from_table(
         file.parameters, numbers, f"{where}: parameters", optional=GAIT_NUMBERS
@@ -212,17 +217,19 @@ def merged_gait(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str,
 
 
 def _refuse_missing(
-    schema: type[FileTable[Any]], numbers: Mapping[str, str], table: Mapping[str, Any], where: str
+    leg: type[LegTable], numbers: Mapping[str, str], table: Mapping[str, Any], where: str
 ) -> None:
     """Name all keys that a file lacks, so that who writes one need not run it for each."""
     if any(not isinstance(table.get(key, {}), dict) for key in FileTable.model_fields):
         return
-    lacking = []
-    try:
-        schema.model_validate({"robot": {}, "legs": {}, "parameters": {}, **table})
-    except ValidationError as wrong:
-        errors = wrong.errors(include_url=False, include_context=False)
-        lacking = [".".join(map(str, e["loc"])) for e in errors if e["type"] == "missing"]
+    tables: list[tuple[str, type[Table], object]] = [("robot", RobotTable, table.get("robot", {}))]
+    tables += [(f"legs.{name}", leg, given) for name, given in table.get("legs", {}).items()]
+    lacking = [
+        f"{place}.{key}"
+        for place, schema, given in tables
+        for key, field in schema.model_fields.items()
+        if isinstance(given, dict) and field.is_required() and key not in given
+    ]
     if not table.get("legs"):
         foot = "neutral_foot" if numbers is GAIT_SCHEMA else "station"
         lacking.append(f"[legs.NAME] with joints, foot, side, {foot}")

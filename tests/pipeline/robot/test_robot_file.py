@@ -189,3 +189,11 @@ def test_without_a_standing_table_every_leg_stands(root: Path, tmp_path: Path) -
     spec = load_robot_file(path)
     assert spec.standing_feet == ("lf", "lm", "lr", "rf", "rm", "rr")
     assert load_robot_file(root / "urdf" / "hexapod.toml").standing_feet == ("lf", "lr", "rm")
+
+
+def test_all_that_a_file_lacks_is_said_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text('[robot]\nname = "x"\n[legs.a]\njoints = ["j"]\n', encoding="utf-8")
+    lacking = r"robot\.urdf, robot\.base_link, legs\.a\.foot, .*parameters\.gravity \[m/s\^2\]; see"
+    with pytest.raises(RobotFileError, match=rf"own\.toml: missing: {lacking}"):
+        load_robot_file(path)
