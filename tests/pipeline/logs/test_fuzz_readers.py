@@ -251,7 +251,7 @@ def test_the_unmutated_inputs_are_accepted(two_joints: Expected, tmp_path: Path)
 
 
 @pytest.mark.parametrize(
-    "count", [100, pytest.param(10_000, marks=pytest.mark.slow)], ids=["few", "many"]
+    "count", [40, pytest.param(10_000, marks=pytest.mark.slow)], ids=["few", "many"]
 )
 @pytest.mark.parametrize("kind", ["csv", "parquet", "toml"])
 def test_changed_inputs(two_joints: Expected, tmp_path: Path, kind: str, count: int) -> None:
