@@ -172,17 +172,14 @@ class Spool:
         """Stamps of the headers, or recording times where any header has none; and remarks."""
         none = sum(int((block.stamps <= 0).sum()) for block in self._blocks)
         stamps = [block.logged if none else block.stamps for block in self._blocks]
-        remarks = []
-        if none:
-            remarks.append(
-                f"{none} messages have no stamp in their header: the times are those at which "
-                "messages were recorded, late by what travelling takes, and unevenly so"
-            )
+        remarks = [
+            f"{none} messages have no stamp in their header: the times are those at which messages "
+            "were recorded, late by what travelling takes, and unevenly so"
+        ] * bool(none)
         last: dict[tuple[Column, ...], int] = {}
         back = 0
         for block, when in zip(self._blocks, stamps, strict=True):
-            before = np.concatenate([[last.get(block.columns, when[0])], when[:-1]])
-            back += int((when < before).sum())
+            back += int((np.diff(when, prepend=last.get(block.columns, when[0])) < 0).sum())
             last[block.columns] = int(when[-1])
         if back:
             remarks.append(f"{back} messages are stamped before the one that came before; sorted")

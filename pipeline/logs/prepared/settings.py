@@ -48,16 +48,11 @@ def choose_settings(
     *,
     cutoff: float | None = None,
 ) -> Settings:
-    """Choose one grid and one cut-off for several logs.
+    """Choose one grid and one cut-off for several logs, by their good positions and efforts (N, J).
 
-    The cut-off is the lowest any moving joint asks for (`choose_cutoff`), so that no joint's
-    accelerations are mostly noise; the torque of every joint depends on those of the others. It is
-    at most `OWN_SHARE` of the slowest channel's own rate, whatever the rate of the rows.
-
-    Args:
-        logs: One or several.
-        usable: Per log which positions and efforts are good, each shape (N, J).
-        cutoff: Set by the user instead [Hz].
+    The cut-off [Hz] is the user's, or the lowest any moving joint asks for (`choose_cutoff`), so
+    that no joint's accelerations are mostly noise; the torque of every joint depends on those of
+    the others. It is at most `OWN_SHARE` of the slowest channel's own rate, whatever the rows'.
 
     Raises:
         PreparationError: The user's cut-off does not fit the rate or the length.

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -117,14 +117,13 @@ def survey(stream: Stream, *, prove_last: float | None = None) -> Survey:
 def join_logs(*parts: Log) -> Log:
     """Rows of pieces of one log, one after the other."""
     first = parts[0]
-    changes: dict[str, Any] = {}
-    for name, value in vars(first).items():
-        if isinstance(value, np.ndarray) and value.shape and value.shape[0] == len(first):
-            changes[name] = np.concatenate([getattr(part, name) for part in parts])
-    changes["extra"] = {
-        key: np.concatenate([part.extra[key] for part in parts]) for key in first.extra
+    arrays = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name, value in vars(first).items()
+        if isinstance(value, np.ndarray)
     }
-    return first.with_changes(**changes)
+    extra = {key: np.concatenate([part.extra[key] for part in parts]) for key in first.extra}
+    return first.with_changes(extra=extra, **arrays)
 
 
 def prepared_chunks(

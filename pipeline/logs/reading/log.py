@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,8 +28,7 @@ SUPPLY: Final = ("supply", "supply_current", "supply_power")
 BY_MODEL: Final = "none logged: the model's stands in"
 
 
-@dataclass(frozen=True)
-class Effort:
+class Effort(NamedTuple):
     """The channel that is compared."""
 
     channel: str  #: Key of `EFFORTS`.
@@ -149,11 +148,7 @@ class Log:
 
     @property
     def effort(self) -> Effort:
-        """The channel in which measurement and simulation are compared.
-
-        Raises:
-            LogContentError: The chosen channel is not in the log.
-        """
+        """The channel in which measurement and simulation are compared, where the log has it."""
         channels = self.channels
         channel = self.chosen_effort or (channels[0] if channels else "")
         if channel not in channels:
@@ -165,14 +160,10 @@ class Log:
 
     def rows(self, part: slice | NDArray[np.intp] | Mask) -> Log:
         """The same log with some of its rows, in order."""
-        changes: dict[str, Any] = {}
-        for f in fields(self):
-            value = getattr(self, f.name)
-            if isinstance(value, np.ndarray):
-                changes[f.name] = value[part]
-        changes["extra"] = {key: value[part] for key, value in self.extra.items()}
-        return self.with_changes(**changes)
+        arrays = {k: x[part] for k, x in vars(self).items() if isinstance(x, np.ndarray)}
+        extra = {key: value[part] for key, value in self.extra.items()}
+        return replace(self, extra=extra, **arrays)
 
     def with_changes(self, **changes: Any) -> Log:
         """The same log with some attributes replaced."""
-        return Log(**{f.name: getattr(self, f.name) for f in fields(self)} | changes)
+        return replace(self, **changes)

@@ -35,16 +35,13 @@ class Ripple:
 
 
 def strongest_order(rest: Array, angle: Array, velocity: Array, rate: float) -> Ripple | None:
-    """The order that stands out most.
+    """The order that stands out most; None where none does, or the joint does not turn far enough.
 
     Args:
         rest: Effort above the cut-off, shape (N,).
         angle: Of the joint, shape (N,) [rad].
         velocity: Likewise [rad/s].
         rate: Rows per second [Hz].
-
-    Returns:
-        None where none stands out, or the joint does not turn both ways far enough.
     """
     good = np.isfinite(rest) & np.isfinite(angle)
     span = float(np.ptp(angle[good])) if good.any() else 0.0

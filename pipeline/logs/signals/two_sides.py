@@ -62,7 +62,7 @@ class TwoSides:
 def read_off(
     ahead: Array, torque: Array, velocity: Array, ok: Mask, noise: float, rest: float
 ) -> TwoSides | None:
-    """Fit line, step and loop.
+    """Fit line, step and loop; None where the torque hardly changes or too few rows are left.
 
     Args:
         ahead: Motor over ratio less joint, shape (N,) [rad], at one bandwidth with the torque.
@@ -71,9 +71,6 @@ def read_off(
         ok: Rows that are good, shape (N,).
         noise: Standard deviation of the torque [N*m].
         rest: Speed below which the joint's direction is not known [rad/s].
-
-    Returns:
-        None where the torque hardly changes or too few rows are left.
     """
     good = ok & np.isfinite(ahead) & np.isfinite(torque) & (np.abs(velocity) > rest)
     # The torque that was logged has friction in it: the side is that of what passes the play.
