@@ -19,7 +19,6 @@ import hashlib
 import json
 import logging
 import os
-import re
 import shutil
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
@@ -27,23 +26,16 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from reports.atomic import PREFIX, make_folder, output_errors
 from reports.errors import OutputError
 
 logger = logging.getLogger("legwatt")
-#: Of every hidden folder made here.
-PREFIX = ".legwatt-"
 #: Files that are decided upon and may not all be in place.
 PENDING = PREFIX + "pending"
 #: Lies in the folder it describes; hidden, because it is no result.
 MANIFEST = ".legwatt.json"
 KEPT = ".kept"
 _FORMAT = 1
-#: What a system says when it will not write.
-_REFUSALS = {
-    *(errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS, errno.EACCES, errno.EPERM),
-    *(errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ELOOP, errno.ENOENT),
-    *(errno.EBUSY, errno.EXDEV, errno.ENOTEMPTY),
-}
 #: Folders that this process holds: real path to the descriptor that carries the lock.
 _HELD: dict[str, int] = {}
 
@@ -119,12 +111,7 @@ def holding(out: Path) -> Iterator[None]:
     own = False
     try:
         with output_errors(out):
-            try:
-                out.mkdir(parents=True, exist_ok=True)
-            except (FileExistsError, NotADirectoryError):
-                raise OutputError(
-                    f"{out}: is a file or lies below one, not a folder; choose another folder"
-                ) from None
+            make_folder(out)
             own = _lock(out)
             if not os.access(out, os.W_OK | os.X_OK):
                 read_only = os.statvfs(out).f_flag & os.ST_RDONLY
@@ -191,7 +178,7 @@ def staged(
     with holding(out), output_errors(out):
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=out))
         try:
-            with output_errors(out, folder):
+            with output_errors(out, {folder: out}):
                 yield folder
                 before = read_manifest(out)
                 new = {p.relative_to(folder).as_posix(): sha256(p) for p in _files(folder)}
@@ -279,32 +266,3 @@ def settled(folder: Path) -> None:
     if (folder / PENDING).is_dir():
         with holding(folder):
             pass
-
-
-@contextmanager
-def output_errors(out: Path, folder: Path | None = None) -> Iterator[None]:
-    """Turn a system's refusal to write into one line about the place that was asked for.
-
-    Args:
-        out: That place.
-        folder: What stands for it while the files are gathered.
-
-    Raises:
-        OutputError: In place of the refusal.
-    """
-
-    def meant(text: str) -> str:
-        text = text if folder is None else text.replace(str(folder), str(out))
-        return re.sub(rf"/{re.escape(PREFIX)}[^/:\s]*", "", text)  # never a name of our own
-
-    try:
-        yield
-    except OutputError as error:
-        raise OutputError(meant(str(error))) from None
-    except OSError as error:
-        if error.errno not in _REFUSALS:
-            raise
-        place = meant(str(error.filename or out))
-        raise OutputError(
-            f"{place}: cannot be written ({error.strerror}); choose another folder"
-        ) from None

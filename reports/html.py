@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from reports.atomic import write_text
 from reports.errors import ReportError
-from reports.page import Block, FigureBlock, Page, Points, TableBlock, Text, cell_text
+from reports.page import Page, TableBlock, cell_text
 from reports.typeset import prose
 
 if TYPE_CHECKING:
@@ -52,19 +52,10 @@ def html(page: Page, folder: Path) -> str:
         keep_trailing_newline=True,
     )
     environment.filters.update(marked=marked, cell=cell_text, breakable=breakable, prose=prose)
-    return environment.get_template("page.html").render(
-        page=page,
-        picture=_block(page.picture, folder) if page.picture else None,
-        script=_script(page),
-        sections=[
-            {
-                "id": f"s{number}",
-                "heading": section.heading,
-                "blocks": [_block(block, folder) for block in section.blocks],
-            }
-            for number, section in enumerate(page.sections, 1)
-        ],
+    environment.filters.update(
+        data=_data, link=lambda file: os.path.relpath(file, folder).replace(os.sep, "/")
     )
+    return environment.get_template("page.html").render(page=page, script=_script(page))
 
 
 def _script(page: Page) -> str:
@@ -75,31 +66,15 @@ def _script(page: Page) -> str:
     return (_TEMPLATES / "sort.js").read_text(encoding="utf-8")
 
 
-def _block(block: Block, folder: Path) -> dict[str, object]:
-    """A block with its kind, for the template to distinguish them."""
-    if isinstance(block, Text):
-        return {"kind": "text", "it": block}
-    if isinstance(block, Points):
-        return {"kind": "points", "it": block}
-    if isinstance(block, TableBlock):
-        return {"kind": "table", "it": block}
-    return {
-        "kind": "figure",
-        "it": block,
-        "data": _data(block),
-        "link": os.path.relpath(block.file, folder).replace(os.sep, "/"),
-    }
-
-
-def _data(block: FigureBlock) -> str:
-    mime = _MIME.get(block.file.suffix.lower())
+def _data(file: Path) -> str:
+    mime = _MIME.get(file.suffix.lower())
     if mime is None:
-        raise ReportError(f"{block.file}: a page shows SVG or PNG pictures only")
+        raise ReportError(f"{file}: a page shows SVG or PNG pictures only")
     try:
-        content = block.file.read_bytes()
+        content = file.read_bytes()
     except OSError as error:
         raise ReportError(
-            f"{block.file}: cannot be read ({error.strerror}); draw the figure before the page"
+            f"{file}: cannot be read ({error.strerror}); draw the figure before the page"
         ) from None
     return f"data:{mime};base64,{base64.b64encode(content).decode('ascii')}"
 

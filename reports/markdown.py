@@ -1,4 +1,4 @@
-"""A page as Markdown: summary.md and report.md."""
+"""A page as Markdown, beside the same as HTML: figures and tables are linked relative to it."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ import os
 from pathlib import Path
 
 from reports.atomic import write_text
-from reports.page import Block, FigureBlock, Page, Points, TableBlock, Text, cell_text
+from reports.html import write_html
+from reports.page import Block, FigureBlock, Page, TableBlock, cell_text
 from reports.typeset import prose
 
 
-def write_markdown(page: Page, path: Path) -> Path:
-    """Write a page as Markdown; figures and tables are linked relative to it.
+def write_pages(page: Page, folder: Path, name: str) -> None:
+    """Write a page as Markdown under a name, and as ``index.html``.
 
     Raises:
+        ReportError: A figure that is missing or neither SVG nor PNG.
         OutputError: The folder cannot be written.
     """
-    write_text(path, markdown(page, path.parent))
-    return path
+    write_text(folder / name, markdown(page, folder))
+    write_html(page, folder / "index.html")
 
 
 def markdown(page: Page, folder: Path) -> str:
@@ -41,10 +43,10 @@ def markdown(page: Page, folder: Path) -> str:
 
 
 def _block(block: Block, folder: Path) -> str:
-    if isinstance(block, Text):
-        return prose(block.text)
-    if isinstance(block, Points):
-        return "\n".join(f"- {item}" for item in map(prose, block.items))
+    if isinstance(block, str):
+        return prose(block)
+    if isinstance(block, tuple):
+        return "\n".join(f"- {item}" for item in map(prose, block))
     if isinstance(block, FigureBlock):
         picture = os.path.relpath(block.file, folder).replace(os.sep, "/")
         caption = prose(block.caption)

@@ -18,20 +18,6 @@ from reports.typeset import number_text, prose, unit_text
 
 
 @dataclass(frozen=True)
-class Text:
-    """A paragraph."""
-
-    text: str
-
-
-@dataclass(frozen=True)
-class Points:
-    """A list."""
-
-    items: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class TableBlock:
     """A table to read."""
 
@@ -82,7 +68,8 @@ class FigureBlock:
     half: bool = False
 
 
-Block = Text | Points | TableBlock | FigureBlock
+#: A paragraph, a list, a table or a figure.
+Block = str | tuple[str, ...] | TableBlock | FigureBlock
 
 
 @dataclass(frozen=True)
@@ -130,12 +117,9 @@ def table_block(
     """Show a table that is also written as CSV, under the headings that it declares.
 
     Args:
-        table: The table.
         columns: Which columns, all by default; a mapping gives other headings than declared.
         caption: One sentence; the table's description by default.
         keep: Which rows, one flag per row; all by default.
-        tones: See `TableBlock`.
-        digits: See `TableBlock`.
 
     Raises:
         ReportError: A column that the table lacks.

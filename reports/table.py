@@ -118,9 +118,7 @@ def table_of(
     Args:
         kind: Dataclass whose fields are columns (`reports.column`), which names the table.
         rows: Of that kind, or what its columns take their values of.
-        name: Of the table, where it is another.
         about: One sentence, where it depends on the run.
-        exact: See `Table`.
     """
     columns, meanings = {}, {}
     for declared in fields(kind):
@@ -155,13 +153,11 @@ def wide_series(
     """A wide time series: `time_s`, then `<owner>__<quantity>_<unit>` for every joint or foot.
 
     Args:
-        name: Of the table.
         time: Shape (N,) [s]. A time that occurs twice marks an instant at which something jumps:
             the first row is the limit from the left, the second that from the right.
         owners: Of the columns, J of them.
         quantities: Each with values of shape (N, J).
         labels: Columns between time and quantities, header to (values, meaning), e.g. the segment.
-        description: One sentence.
 
     Raises:
         TableError: Shapes that do not fit, or headers that clash.

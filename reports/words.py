@@ -11,10 +11,8 @@ from typing import Any
 from reports.page import (
     Block,
     FigureBlock,
-    Points,
     Section,
     TableBlock,
-    Text,
     cell_text,
     table_block,
 )
@@ -31,18 +29,12 @@ class Words:
         """Keep what to load when a paragraph is first asked for.
 
         Args:
-            template: Name of the file, without its ending.
             names: What its macros use besides their arguments.
         """
         self._template, self._names = template, names
 
     def __call__(self, paragraph: str, *arguments: Any) -> str:
-        """A paragraph on one line; empty where there is nothing to say.
-
-        Args:
-            paragraph: Name of the macro.
-            arguments: Of the macro.
-        """
+        """A paragraph on one line; empty where there is nothing to say."""
         return " ".join(self.text(paragraph, *arguments).split())
 
     def text(self, macro: str, *arguments: Any) -> str:
@@ -55,11 +47,7 @@ class Shown:
     """Tables that a template shows: `table` writes a line that `sections` reads."""
 
     def __init__(self, tables: Mapping[str, Table]) -> None:
-        """Show none yet.
-
-        Args:
-            tables: Of the run, by name.
-        """
+        """Show none yet."""
         self.tables = tables
         self.blocks: list[TableBlock] = []
 
@@ -76,8 +64,6 @@ def sections(text: str, shown: Shown, folder: Path) -> tuple[Section, ...]:
 
     Args:
         text: Parts are apart by empty lines; ``half`` after a figure puts two side by side.
-        shown: Its tables.
-        folder: Of the figures.
     """
     out: list[tuple[str, list[Block]]] = []
     for part in filter(None, (part.strip() for part in re.split(r"\n[ \n]*\n", text))):
@@ -87,7 +73,7 @@ def sections(text: str, shown: Shown, folder: Path) -> tuple[Section, ...]:
         blocks = out[-1][1]
         if part.startswith("- "):
             items = re.split(r"\n- ", part[2:])
-            blocks.append(Points(tuple(" ".join(item.split()) for item in items)))
+            blocks.append(tuple(" ".join(item.split()) for item in items))
         elif part.startswith("[table "):
             blocks.append(shown.blocks[int(part[7:-1])])
         elif _FIGURE.match(part):
@@ -96,7 +82,7 @@ def sections(text: str, shown: Shown, folder: Path) -> tuple[Section, ...]:
             )
             blocks += [FigureBlock(folder / f, text, half=bool(half)) for text, f, half in figures]
         else:
-            blocks.append(Text(" ".join(part.split())))
+            blocks.append(" ".join(part.split()))
     return tuple(Section(heading, tuple(blocks)) for heading, blocks in out)
 
 

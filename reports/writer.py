@@ -17,12 +17,10 @@ from typing import Any
 
 import numpy as np
 
-from reports.atomic import replacing, write_text
+from reports.atomic import replacing
 from reports.errors import OutputError, TableError
 from reports.roundoff import RULE, without_roundoff
 from reports.table import Table
-
-__all__ = ["csv_bytes", "write_table", "write_text"]
 
 #: A text that is nothing but a number, as a paper's "2.04".
 _NUMBER = r"^([-+]?[0-9]+)\.([0-9]*(?:[eE][-+]?[0-9]+)?)$"
@@ -42,7 +40,6 @@ def write_table(
     """Write `<name>.csv` and `<name>.meta.json`; with comma decimals `<name>.comma.csv`, too.
 
     Args:
-        table: What to write.
         out_dir: Folder; made when it is missing.
         meta: For the sidecar: hashes of inputs, versions, options, seed, warnings. Keys are sorted
             and folders of absolute paths are left out, so that two machines write the same.
@@ -76,7 +73,6 @@ def csv_bytes(table: Table, *, decimal: str = ".") -> bytes:
     """The CSV file of a table.
 
     Args:
-        table: What to write.
         decimal: ``"."``, or ``","`` for semicolons, decimal commas and a byte-order mark, by which
             spreadsheets know UTF-8. A text that is a number gets its comma, too.
 

@@ -14,8 +14,8 @@ from pipeline.simulation.found_bodies import (
     found_bodies,
     not_in_urdf,
 )
+from reports.atomic import write_text
 from reports.pages.gap_words import URDF_FILE
-from reports.writer import write_text
 
 
 def bodies_of(given: Setup, text: str) -> FoundBodies:

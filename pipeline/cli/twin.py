@@ -12,7 +12,7 @@ from pathlib import Path
 from pipeline.blind.machines.supply import make_supply
 from pipeline.blind.machines.trial import make
 from pipeline.errors import PipelineError
-from reports.folder import PREFIX, output_errors
+from reports.atomic import PREFIX, output_errors
 
 
 @contextmanager

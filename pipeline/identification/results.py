@@ -5,6 +5,7 @@ How often they let a wrong name pass stands in `pipeline/blind/README.md`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Final
@@ -129,6 +130,15 @@ class Found:
         """Whether it belongs into a model file."""
         return self.level != SUSPECTED
 
+    @property
+    def removed(self) -> float | None:
+        """Share of the squared gap above the noise floor's that it removes, as a ratio of roots."""
+        above = self.gap_before**2 - self.noise_floor**2
+        if above <= 0:
+            return None
+        rest = max(self.gap_after**2 - self.noise_floor**2, 0.0)
+        return 1.0 - math.sqrt(min(rest / above, 1.0))
+
 
 @dataclass(frozen=True)
 class Residual:
@@ -143,6 +153,11 @@ class Residual:
     description: str  #: What it depends on, in words; empty where it is noise.
     #: Held-out rows that were compared; without any the error is that of fitted rows.
     rows: int = 1
+
+    @property
+    def ratio(self) -> float:
+        """Error over noise floor; 0 without a noise floor."""
+        return self.error / self.noise_floor if self.noise_floor > 0 else 0.0
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from reports.figures.ranges import Range, ranges_figure
 from reports.figures.save import save_figures
 from reports.folder import staged
 from reports.html import write_html
-from reports.page import FigureBlock, Page, Section, Text, table_block
+from reports.page import FigureBlock, Page, Section, table_block
 from reports.table import Table, table_of
 from reports.typeset import number_text
 from reports.writer import write_table
@@ -102,9 +102,9 @@ def _page(every: Mapping[str, Facts], tables: Mapping[str, Table], folder: Path)
         assumed = zip(measured.columns["assumed"], own, strict=True)
         likeliest = dict.fromkeys(text for text, mine in assumed if mine and text)
         blocks: tuple[Any, ...] = (
-            Text(f"Measured: {facts.source}. {facts.note}"),
+            f"Measured: {facts.source}. {facts.note}",
             table_block(measured, columns, keep=own, digits=3),
-            *(Text(f"**Likeliest:** {text}.") for text in likeliest),
+            *(f"**Likeliest:** {text}." for text in likeliest),
             table_block(unknowns, moves, keep=moved, digits=3),
         )
         sections.append(Section(facts.title, blocks))

@@ -52,11 +52,7 @@ def modules(package: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def stage(source: Path) -> None:
-    """Lay out Sphinx's source.
-
-    Args:
-        source: A new folder.
-    """
+    """Lay out Sphinx's source."""
     shown = pages()
     for page in shown:
         target = source / ("index.md" if page == README else page)
@@ -162,9 +158,6 @@ def _api_page(name: str, own: list[str], inner: list[str]) -> str:
 
 def build(out: Path) -> int:
     """Build the site into a folder, which is replaced as a whole where it succeeds.
-
-    Args:
-        out: Of the site; anything in it goes.
 
     Returns:
         Sphinx's exit code.

@@ -85,8 +85,6 @@ def break_even_figure(
         share: Of standing, increasing, shape (S,).
         speed: Of walking [m/s], increasing, shape (V,).
         less: Idle power of a driver [W] to power of the second less the first [W], shape (V, S).
-        first: Candidate.
-        second: Candidate.
     """
     from matplotlib.patches import Patch
 

@@ -27,9 +27,7 @@ def ranges_figure(rows: Sequence[Range], *, title: str, unit: str, subtitle: str
 
     Args:
         rows: From the top down; all numbers above zero.
-        title: First line.
         unit: Of the axis, with the quantity.
-        subtitle: Second line.
     """
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch

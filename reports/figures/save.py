@@ -74,7 +74,6 @@ def save_figures(
 
     Args:
         drawings: File name without ending to what makes the figure.
-        folder: For the files.
         done: Called with the share that is drawn, now and then.
 
     Returns:

@@ -128,8 +128,6 @@ def new_figure(
 
     Args:
         height: [in].
-        title: First line.
-        subtitle: Second line.
         width: [in].
         arranged: Whether a layout places the axes; otherwise the caller does.
     """
@@ -160,10 +158,7 @@ def name_rows(axes: Axes, names: Sequence[str], thick: float, *, above: bool) ->
     """Names of horizontal bars, beside them or, in a narrow figure, above them.
 
     Args:
-        axes: The axes.
         names: From the top down, at 0, 1, ...
-        thick: Height of a bar.
-        above: Whether the figure is narrow.
     """
     axes.set_yticks(range(len(names)), [] if above else names)
     for row, name in enumerate(names if above else ()):
@@ -193,15 +188,8 @@ def arrow(
     """An arrow from tail to tip in data coordinates, each of shape (2,).
 
     Args:
-        axes: To draw in.
-        tip: Where it points.
-        tail: Where it begins.
-        color: Of line and head.
-        style: Matplotlib's name of the arrow.
         head: Half its width, and its length, in tens of points.
         width: Of the line [points].
-        zorder: Of the arrow.
-        linestyle: Matplotlib's.
     """
     shape = f"{style},head_width={head[0]:g},head_length={head[1]:g}"
     look = {"arrowstyle": shape, "linewidth": width, "linestyle": linestyle, "color": color}

@@ -12,7 +12,7 @@ import numpy as np
 from reports.figures.choice import break_even_figure, day_figure, front_figure
 from reports.figures.save import save_figures
 from reports.html import write_html
-from reports.page import Block, FigureBlock, Page, Section, TableBlock, Text, table_block
+from reports.page import Block, FigureBlock, Page, Section, TableBlock, table_block
 from reports.table import Table
 
 if TYPE_CHECKING:
@@ -72,9 +72,6 @@ def write_choice_page(
     Args:
         tables: Of the choice, by name, rows as in `reports.tables.choice`; at least the answer.
         parts: By name; those that no table names are left out.
-        lines: The answer, a sentence each.
-        out: Folder.
-        title: Of the page.
 
     Returns:
         How many files.
@@ -95,16 +92,7 @@ def choice_page(
     *,
     title: str,
 ) -> Page:
-    """The page; see `write_choice_page`.
-
-    Args:
-        tables: As there.
-        parts: As there.
-        lines: As there.
-        out: Folder that holds the pictures.
-        figures: Their names.
-        title: Of the page.
-    """
+    """The page; see `write_choice_page`."""
     named = {
         str(name)
         for table in tables.values()
@@ -161,7 +149,7 @@ def _sources(parts: Mapping[str, PartSource], named: set[str]) -> tuple[Block, .
         sortable=True,
         anchor=ANCHOR,
     )
-    return Text("What no sheet prints is a range of the part's class; the note says so."), table
+    return "What no sheet prints is a range of the part's class; the note says so.", table
 
 
 def _drawings(tables: Mapping[str, Table]) -> dict[str, Callable[[], Figure]]:

@@ -15,9 +15,6 @@ _WAYS = {0: "", 1: "to the left", 2: "backward", 3: "to the right"}
 def conditions(spec: RobotSpec) -> tuple[str, ...]:
     """What is not as usual: other than straight ahead on level ground without a load.
 
-    Args:
-        spec: Robot file with a gait.
-
     Returns:
         Phrases, for a subtitle or a sentence; none where all is as usual.
     """

@@ -17,6 +17,7 @@ from pipeline.identification.results import (
     APPROXIMATE,
     CONFIRMED,
     SUSPECTED,
+    UNEXPLAINED,
     Estimate,
     Found,
     Member,
@@ -24,11 +25,9 @@ from pipeline.identification.results import (
 )
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.logs.errors import EffectError
-from pipeline.logs.prepared.measurement import TEST, Measurement
-from pipeline.logs.signals.grid import runs_of
 from pipeline.simulation.energy_change import PAIR, EnergyChange
 from pipeline.simulation.found_bodies import FoundBodies, FoundBody
-from reports.page import Block, Points, TableBlock, Text
+from reports.page import TableBlock
 from reports.typeset import MINUS
 from reports.words import Words, listed, number
 
@@ -40,10 +39,14 @@ STANDS_OUT = 1.25
 MANY_EFFECTS = 3
 #: Parameters of one effect that a sentence names.
 MANY = 6
-#: Held-out rows turn one way where less than this share turns the other way.
-ONE_WAY = 0.05
 #: A change of energy below this is none, as a share.
 NO_CHANGE = 5e-4
+#: Verdicts to how they look.
+TONES = {
+    **dict.fromkeys(("accepted", "noise", "ok"), "good"),
+    **dict.fromkeys(("unexplained", "warning", "refused"), "bad"),
+    **dict.fromkeys(("rejected", "not identifiable on this motion", "masked"), "quiet"),
+}
 #: A band in words, by how rows are sorted.
 _CIRCUMSTANCES = {
     "phase": "in {}",
@@ -111,7 +114,7 @@ def _ranges(members: Sequence[Member]) -> str:
         return ""
     return "; ".join(
         f"{name} {number(min(p.value for p in own))} to {number(max(p.value for p in own))}"
-        f"{_unit(own[0].unit)}"
+        f"{f' {own[0].unit}' if own[0].unit not in ('', '1') else ''}"
         for name, own in by.items()
     )
 
@@ -135,10 +138,6 @@ def _sized(value: float, p: Estimate) -> str:
     return ("0" if float(text) == 0 else text).replace("-", MINUS)
 
 
-def _unit(unit: str) -> str:
-    return "" if unit in ("", "1") else f" {unit}"
-
-
 def smaller_words(
     found: Sequence[Found],
     joints: Sequence[str],
@@ -149,22 +148,11 @@ def smaller_words(
     """How much smaller the gap of the model as written is, on held-out data.
 
     Args:
-        found: Effects, validated.
         joints: Per effect, the joint at which it shows.
         whole: Gap of all joints of the model as it was and as written.
-        unit: Of the gap.
-        noise: Noise floor of all joints.
     """
     pairs = [(f, joint) for f, joint in zip(found, joints, strict=True) if f.written]
     return WORDS("smaller", pairs, len(found) - len(pairs), whole, unit, noise)
-
-
-def _removed(before: float, after: float, noise: float) -> float | None:
-    """Share of the gap above the noise floor that an effect removes; None where there is none."""
-    above = before**2 - noise**2
-    if above <= 0:
-        return None
-    return 1.0 - math.sqrt(min(max(after**2 - noise**2, 0.0) / above, 1.0))
 
 
 def priced(change: EnergyChange, alternative: str) -> list[str]:
@@ -175,29 +163,6 @@ def priced(change: EnergyChange, alternative: str) -> list[str]:
 def energy_words(change: EnergyChange, alternative: str) -> str:
     """What it costs in joules, and the break-even."""
     return WORDS("energy", change, priced(change, alternative), alternative)
-
-
-def held_out_words(measurements: Sequence[Measurement]) -> str:
-    """Which stretches are held out."""
-    spans, seconds = [], 0.0
-    for m in measurements:
-        first, after = runs_of(m.part == TEST)
-        for start, stop in zip(m.time[first], m.time[after - 1], strict=True):
-            spans.append(f"{start:.2f} to {stop:.2f} s of log '{m.name}'")
-            seconds += stop - start
-    return WORDS("held_out", spans, seconds)
-
-
-def one_way_words(measurements: Sequence[Measurement], joints: Sequence[int]) -> list[str]:
-    """Joints with an effect whose held-out rows all turn one way, a remark each."""
-    out = []
-    for j in dict.fromkeys(joints):
-        speeds = np.concatenate([m.v[(m.part == TEST) & m.mask[:, j], j] for m in measurements])
-        ahead = float((speeds > 0).mean()) if speeds.size else 0.5
-        if min(ahead, 1.0 - ahead) < ONE_WAY:
-            way = "positive" if ahead > 0.5 else "negative"
-            out.append(WORDS("one_way", measurements[0].joints[j], way))
-    return out
 
 
 def low_confidence(found: Sequence[Found]) -> list[str]:
@@ -232,57 +197,11 @@ def _body_value(body: FoundBody, k: int, unit: str) -> str:
     return WORDS("parameters", [Estimate("", value, low, high, unit)])
 
 
-def bodies_blocks(found: FoundBodies) -> tuple[Block, ...]:
-    """The table, and what the corrected URDF holds; nothing without bodies."""
-    if not found.bodies:
-        return ()
-    rows = tuple(
-        (
-            body.link,
-            f"**{', '.join(body.differs_in)}**" if body.differs_in else "nothing",
-            float(body.urdf[0]),
-            float(body.found[0]),
-            *(float(end[0]) if np.isfinite(end[0]) else None for end in (body.low, body.high)),
-            *(_place(point) for point in (body.urdf, body.found)),
-        )
-        for body in found.bodies
-    )
-    table = TableBlock(
-        ("link", "differs in", "mass by URDF [kg]", "as found [kg]", "95 % from", "to")
-        + ("centre of mass by URDF [mm]", "as found [mm]"),
-        rows,
-        "Links with all that is fixed to them, largest change first; centre of mass in the link's "
-        "frame. A link differs where the URDF's value lies outside the 95 % interval, that of the "
-        "centre of mass as wide as those of mass and first moment allow. What one motion tells of "
-        "a chain of links are combinations of their parameters, so that single masses may be open "
-        "where the torque is not.",
-        "bodies.csv",
-        {"nothing": "quiet"},
-        3,
-    )
-    if not found.urdf:
-        return (table,)
-    text = (
-        f"[{URDF_FILE}]({URDF_FILE}) is the robot's URDF with these bodies in its inertial "
-        "elements; comments, meshes' names and all else are those of the file given."
-    )
-    if not found.elsewhere:
-        return table, Text(text)
-    text += " A URDF's inertial elements cannot carry, so that they stand in model.toml alone:"
-    return table, Text(text), Points(found.elsewhere)
-
-
-def _place(point: np.ndarray) -> str:
-    return ", ".join(number(1e3 * x, 3) for x in point[1:])
-
-
 WORDS = Words(
     "gap",
     named=named,
     ranges=_ranges,
     sized=_sized,
-    unit_after=_unit,
-    removed=_removed,
     body_value=_body_value,
     many_effects=MANY_EFFECTS,
     many_parameters=MANY,
@@ -290,4 +209,7 @@ WORDS = Words(
     minus=MINUS,
     urdf_file=URDF_FILE,
     inf=math.inf,
+    block=TableBlock,
+    tones=TONES,
+    unexplained=UNEXPLAINED,
 )

@@ -8,61 +8,21 @@ import numpy as np
 
 from pipeline.machine.motors import Motors
 from reports.table import Table
-from reports.typeset import number_text
+from reports.words import Words
 
 #: Coefficient of friction of dry ground of which no robot file states one: handbooks print 0.6 to
 #: 1.0 for rubber on dry concrete.
 DRY_GROUND = 1.0
-OWN = (
-    "Put in your own: `python -m pipeline init-actuator`, then `--actuators FOLDER`, or "
-    "`[actuators]` in the robot file"
-)
-#: Quantity of `motor_limits` to how its breach is said.
-_ASKS = {
-    "voltage": "{peak} V where the supply has {limit} V",
-    "current": "{peak} A where the motor bears {limit} A at most",
-    "rms_current": "{peak} A root mean square where the motor bears {limit} A continuously",
-    "speed": "{peak} rad/s where the motor is permitted {limit} rad/s",
-}
+ROBOT = Words("robot")
 
 
 def motors_text(motors: Motors, whose: str = "") -> str:
     """Which motors drive the joints, what they weigh, and how to put in others.
 
     Args:
-        motors: Of the machine.
         whose: Where they come from, where robot file and command line do not state them.
     """
-    which = " or ".join(motors.titles)
-    ratio = _span(motors.ratio, ":1")
-    if motors.mass[1] > 0:
-        each = f", {_span(motors.mass, ' kg')} each"
-    else:
-        each = ", whose files state no `mass`"
-    weight = (
-        f" All {motors.joints} weigh **{number_text(motors.total)} kg** without gears, the robot "
-        f"{number_text(motors.robot)} kg."
-        if motors.total
-        else ""
-    )
-    if motors.stated or whose:
-        whose = whose or "as stated for this robot"
-        return f"**Whose motors:** {whose}, {which} at {ratio}{each}.{weight}"
-    heavy = (
-        " The assumed motors weigh more than the robot they would move: no watt below is that of a "
-        "machine that can be built."
-        if motors.too_heavy
-        else ""
-    )
-    return (
-        f"**Whose motors:** none are stated for this robot; assumed at every joint is the "
-        f"catalogue's {which} at {ratio}{each}.{weight}{heavy} {OWN}."
-    )
-
-
-def _span(pair: tuple[float, float], unit: str) -> str:
-    low, high = (f"{number_text(x)}" for x in pair)
-    return f"{low}{unit}" if low == high else f"{low} to {high}{unit}"
+    return ROBOT("motors", motors, whose)
 
 
 def limits_text(
@@ -83,12 +43,7 @@ def limits_text(
     out = [f"**Beyond the motors:** {'; '.join(asks)}."] if asks else []
     foot, needed = greatest_friction(tables)
     if slips(needed, friction):
-        out.append(
-            f"**Beyond the ground:** leg `{foot}` needs a coefficient of friction of "
-            f"**{number_text(needed)}** by this rule of forces, dry ground seldom offers more than "
-            f"{number_text(DRY_GROUND)}; `--friction-coefficient 0.8` looks for forces within it, "
-            "or says that the robot slides."
-        )
+        out.append(ROBOT("beyond_ground", foot, needed, DRY_GROUND))
     return tuple(out)
 
 
@@ -103,12 +58,8 @@ def _breaches(table: Table, titles: Mapping[str, str]) -> list[str]:
         # Of alternatives that are alike the first, whatever their last digits are.
         worst = max(rows, key=lambda i: round(float(c["peak"][i] / c["limit"][i]), 9))
         name, count = str(c["alternative"][worst]), len({c["alternative"][i] for i in rows})
-        every = len(set(c["alternative"]))
-        others = f", {count} of {every} alternatives" if every > 1 else ""
-        ask = _ASKS[quantity].format(
-            peak=number_text(c["peak"][worst]), limit=number_text(c["limit"][worst])
-        )
-        said.append(f"{ask} (`{c['joint'][worst]}`, {titles[name]}{others})")
+        of = (quantity, c["peak"][worst], c["limit"][worst], c["joint"][worst])
+        said.append(ROBOT("breach", *of, titles[name], count, len(set(c["alternative"]))))
     return said
 
 

@@ -7,6 +7,7 @@ from collections import Counter
 from actuators.loading.build import Catalog
 from pipeline.robot.robot import Robot
 from pipeline.simulation.settings import Settings
+from reports.pages.motor_words import ROBOT
 
 #: The leg the paper follows; the first leg of a robot that has no such leg.
 SHOWN_LEG = "rm"
@@ -41,22 +42,12 @@ def short_titles(catalog: Catalog) -> dict[str, str]:
 def names_text(given: Settings) -> str:
     """A paragraph for the first place where a reader meets the names."""
     legs = {joint for leg in given.robot.spec.legs for joint in leg.joints}
-    outside = "" if legs >= set(given.robot.joints) else " with the joints outside them"
-    titles = [f"`{name}` ({title})" for name, title in short_titles(given.catalog).items()]
-    return (
-        f"An *alternative* is one way to build the actuators of all joints: {', '.join(titles)}. "
-        f"{legs_text(given.robot)} `robot` is all {len(given.robot.leg_names)} legs together"
-        f"{outside}."
-    )
+    outside = set(given.robot.joints) - legs
+    titles, count = short_titles(given.catalog), len(given.robot.leg_names)
+    return ROBOT("names", titles, legs_text(given.robot), count, bool(outside))
 
 
 def legs_text(robot: Robot) -> str:
     """What the legs' names say and how their joints are numbered."""
     leg = shown_leg(robot)
-    if not _is_two_letters(leg):
-        return f"The leg shown is `{leg}`; a leg's joints are in order from the body outward."
-    words = leg_words(leg).split(" (")[0]
-    return (
-        f"A leg's name is its side and its place: `{leg}` is the {words}; its joints are in order "
-        "from the body outward."
-    )
+    return ROBOT("legs", leg, leg_words(leg).split(" (")[0] if _is_two_letters(leg) else "")

@@ -12,9 +12,8 @@ from pipeline.identification.supply.account import (
     UNEXPLAINED,
     Account,
 )
-from reports.html import write_html
-from reports.markdown import write_markdown
-from reports.page import FigureBlock, Number, Page, Section, Text, table_block
+from reports.markdown import write_pages
+from reports.page import FigureBlock, Number, Page, Section, table_block
 from reports.table import Table
 from reports.words import Words, number, percent
 
@@ -62,7 +61,7 @@ def write_power_page(
         picture=FigureBlock(folder / "power_shares_narrow.svg", alt="Shares of the power."),
         answer=answer[:3],
         sections=(
-            Section("The answer in full", tuple(map(Text, answer))),
+            Section("The answer in full", tuple(answer)),
             Section(
                 "Term by term",
                 (
@@ -79,10 +78,9 @@ def write_power_page(
             Section("Drive by drive", (table_block(by_name["power_drives"], digits=3),)),
             Section(
                 "What the data are worth",
-                (*map(Text, warnings), table_block(by_name["quality"], digits=3)),
+                (*warnings, table_block(by_name["quality"], digits=3)),
             ),
         ),
         files={f"{t.name}.csv": t.description for t in tables},
     )
-    write_markdown(page, folder / "report.md")
-    write_html(page, folder / "index.html")
+    write_pages(page, folder, "report.md")

@@ -13,11 +13,11 @@ from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.simulation.settings import Settings
-from reports.html import write_html
-from reports.markdown import write_markdown
+from reports.markdown import write_pages
 from reports.page import FigureBlock, Number, Page
 from reports.pages.gait_words import conditions, gait_and_conditions, pace
 from reports.pages.motor_words import (
+    ROBOT,
     greatest_friction,
     limits_text,
     motors_text,
@@ -40,17 +40,13 @@ def write_robot_page(
     """Write ``summary.md`` and ``index.html``.
 
     Args:
-        given: The run.
-        tables: All tables of the run.
         out: Folder; the figures must be there already.
-        remarks: What a reader should not overlook.
 
     Returns:
         How many files.
     """
     page = robot_page(given, {t.name: t for t in tables}, out, remarks)
-    write_markdown(page, out / "summary.md")
-    write_html(page, out / "index.html")
+    write_pages(page, out, "summary.md")
     return 2
 
 
@@ -124,46 +120,23 @@ def _numbers_first(
 
 
 def _answer(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
-    robot, energy = given.robot, tables["robot_energy"].columns
-    joints = sorted({len(leg.joints) for leg in robot.spec.legs})
-    held = len(robot.joints) - sum(len(leg.joints) for leg in robot.spec.legs)
-    outside = f" and {held} joint{'s' if held > 1 else ''} outside the legs" if held else ""
-    what = (
-        f"**{robot.spec.name}**, {number_text(given.machine.mass)} kg on {len(robot.leg_names)} "
-        f"legs of {' or '.join(map(str, joints))} joints{outside}, walks "
-        f"{_walk(given, gait_of(robot.spec))}."
-    )
-    titles = short_titles(given.catalog)
-    costs = "; ".join(
-        f"{titles[name]} **{number_text(power)} W**"
-        for name, power in zip(energy["alternative"], energy["average_power_W"], strict=True)
-    )
-    cost = f"**What it costs** to drive all joints, on average over one cycle: {costs}."
-    return (what, cost, *_fitted_and_known(given, tables))
-
-
-def _fitted_and_known(given: Settings, tables: Mapping[str, Table]) -> tuple[str, ...]:
-    """A sentence each on what was fitted, predicted, and what is known and assumed."""
-    c = tables["parameters"].columns
-    own = [basis for group, basis in zip(c["group"], c["basis"], strict=True)
-           if group != given.robot.spec.name]  # fmt: skip
-    count = Counter(map(str, own))
-    elsewhere = count["calibrated"] + count["identified"]
+    """A sentence each on the walk, its cost, what was fitted and predicted, and what is known."""
+    robot, energy, c = given.robot, tables["robot_energy"].columns, tables["parameters"].columns
+    joints = [len(leg.joints) for leg in robot.spec.legs]
+    held, titles = len(robot.joints) - sum(joints), short_titles(given.catalog)
+    powers = zip(energy["alternative"], energy["average_power_W"], strict=True)
+    groups = zip(c["group"], c["basis"], strict=True)
+    own = [str(basis) for group, basis in groups if group != robot.spec.name]
+    count = Counter(own)
     effects = given.effects.names if given.effects else ()
-    here = f"{', '.join(effects)}, by the model file" if effects else "nothing to this robot"
-    more = (
-        f"; {elsewhere} of the {len(own)} numbers of the actuators were fitted to another machine"
-        if elsewhere
-        else ""
-    )
-    known = count["datasheet"] + count["published"] + count["derived"]
     return (
-        f"**Fitted:** {here}{more}.",
-        "**Predicted:** every watt here, for these motors and no others; nothing that was measured "
-        "on this robot is on this page.",
-        f"**Known:** bodies and joints by the URDF, {known} numbers of the actuators by data sheet "
-        f"or publication; {count['assumed']} are assumed. Every one with its source is under "
-        "*What went in*.",
+        ROBOT("walks", given, sorted(set(joints)), held, _walk(given, gait_of(robot.spec))),
+        ROBOT("costs", [(titles[name], power) for name, power in powers]),
+        ROBOT("fitted", effects, count["calibrated"] + count["identified"], len(own)),
+        ROBOT("predicted"),
+        ROBOT(
+            "known", count["datasheet"] + count["published"] + count["derived"], count["assumed"]
+        ),
     )
 
 
@@ -180,23 +153,15 @@ def _stability(table: Table) -> str:
     c = table.columns
     margins = np.array(c["least_margin_m"], dtype=float)
     at = int(margins.argmin())
-    return (
-        f"**Stability:** the centre of mass stays at least {number_text(1e3 * margins[at])} mm "
-        f"inside the feet that stand ({c['segment'][at]}, at {number_text(c['at_time_s'][at])} s); "
-        f"the lightest foot carries {number_text(min(c['least_normal_force_N']))} N."
-    )
+    lightest = min(c["least_normal_force_N"])
+    return ROBOT("stability", margins[at], c["segment"][at], c["at_time_s"][at], lightest)
 
 
 class Run(Shown):
     """What the sections of a run's page are about."""
 
     def __init__(self, given: Settings, tables: Mapping[str, Table]) -> None:
-        """Collect it.
-
-        Args:
-            given: The run.
-            tables: All tables of the run.
-        """
+        """Collect it."""
         super().__init__(tables)
         robot, leg = given.robot, shown_leg(given.robot)
         self.robot, self.leg = robot.spec.name, leg_words(leg)

@@ -13,8 +13,7 @@ from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.judgement.readings import CalibratedReading, readings, verdict
 from pipeline.paper.judgement.sensitivity import ranking
 from pipeline.simulation.settings import Settings
-from reports.html import write_html
-from reports.markdown import write_markdown
+from reports.markdown import write_pages
 from reports.page import Page, TableBlock, table_block
 from reports.pages.motor_words import limits_text, motors_text
 from reports.pages.names import short_titles
@@ -68,17 +67,13 @@ def write_summary(given: Settings, judged: Judgement, tables: Sequence[Table], o
     """Write ``summary.md`` and ``index.html``.
 
     Args:
-        given: The run.
-        judged: Ours against the paper's.
-        tables: All tables of the run.
         out: Folder; the figures must be there already.
 
     Returns:
         How many files.
     """
     page = summary(given, judged, {t.name: t for t in tables}, out)
-    write_markdown(page, out / "summary.md")
-    write_html(page, out / "index.html")
+    write_pages(page, out, "summary.md")
     return 2
 
 

@@ -74,11 +74,7 @@ def answer(judged: Judgement, tables: Mapping[str, Table]) -> tuple[str, ...]:
 
 
 def first_paragraph(judged: Judgement) -> str:
-    """What is fitted, predicted and contradicted, and what the fit costs, for a cold reader.
-
-    Args:
-        judged: With the calibration's sets.
-    """
+    """What is fitted, predicted and contradicted, and what the fit costs, for a cold reader."""
     rows = _rows(judged)
     ratios = [f"{rows[f'walking_ratio_{name}'].computed:.1f}" for name in _REAL]
     fitted = WORDS("fitted", rows["robot_mass"].published, ratios, rows[EVEN].computed)
@@ -159,11 +155,7 @@ def roles_text() -> str:
 
 
 def measure_next(ranked: Sequence[Sensitivity]) -> str:
-    """Which number to measure next, if the sensitivities can tell.
-
-    Args:
-        ranked: Total indices on what is to be known better, largest first.
-    """
+    """Which number to measure next, if the sensitivities can tell."""
     return WORDS("measure_next", leading(ranked))
 
 

@@ -105,10 +105,5 @@ class EffectRow:
 
 
 def blind_table(kind: Any, rows: Sequence[Mapping[str, Any]]) -> Table:
-    """A table of rows that are mappings from header to value.
-
-    Args:
-        kind: One of the rows above.
-        rows: Header to value.
-    """
+    """A table of rows that are mappings from header to value."""
     return table_of(kind, [kind(**row) for row in rows])

@@ -40,8 +40,6 @@ def rollout(
     """One log and two simulations of it.
 
     Args:
-        log: Its name.
-        joints: J names.
         time: Shape (N,) [s].
         measured: Positions of the machine, shape (N, J) [rad].
         before: Of the model as it was, likewise.

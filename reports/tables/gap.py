@@ -133,7 +133,6 @@ def deciding_motion(time: Array, joints: Sequence[str], position: Array) -> Tabl
 
     Args:
         time: Shape (N,) [s].
-        joints: Names of the columns.
         position: Shape (N, J) [rad].
     """
     headers = [f"{joint}__position_rad" for joint in joints]

@@ -33,11 +33,7 @@ class InputRow:
 
 
 def parameters(groups: Iterable[tuple[str, Iterable[Parameter]]]) -> Table:
-    """All parameters in the units of their files.
-
-    Args:
-        groups: Owner (robot file, component) and its parameters.
-    """
+    """All parameters in the units of their files."""
     rows = []
     for owner, entries in groups:
         for p in entries:

@@ -199,7 +199,6 @@ def walking_joint_demand(demand: MotionDemand, sliding: Collection[str] = ()) ->
     """Motion and torque of every joint over the cycle.
 
     Args:
-        demand: Of all joints.
         sliding: Joints that slide: metres and newtons, not radians and newton metres.
     """
     parts, quantities = demand.segments, []
@@ -254,12 +253,7 @@ def walking_contact_forces(demand: MotionDemand) -> Table:
 def walking_stage_energy(
     results: Mapping[str, ChainResult], stage_names: Mapping[str, Mapping[str, str]]
 ) -> Table:
-    """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20).
-
-    Args:
-        results: By alternative.
-        stage_names: By alternative, every stage in words.
-    """
+    """E(+) and E(-) at every stage (Fig. 14, 16, 18 and 20)."""
     rows = [
         StageRow(name, joint, e.stage, stage_names[name][e.stage], e.forward[j], e.reverse[j])
         for name, result in results.items()
@@ -282,12 +276,7 @@ def walking_losses(results: Mapping[str, ChainResult], supplies: Mapping[str, Su
 
 
 def motor_limits(limits: Mapping[str, Sequence[LimitRow]], name: str = "motor_limits") -> Table:
-    """Peaks over the cycle, or at standstill, against the motor's data sheet.
-
-    Args:
-        limits: By alternative.
-        name: Of the table.
-    """
+    """Peaks over the cycle, or at standstill, against the motor's data sheet."""
     rows = [MotorLimit(n, *vars(row).values()) for n, own in limits.items() for row in own]
     return table_of(MotorLimit, rows, name=name)
 

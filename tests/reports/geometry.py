@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
@@ -21,6 +22,7 @@ AIR = 2.0
 PAGE = 1180.0
 
 
+@lru_cache(maxsize=1)  # what is asked of one figure measures it once
 def texts(figure: Figure) -> list[tuple[Text, Bbox]]:
     """Every text that is drawn, with its box [px]."""
     with house_style():

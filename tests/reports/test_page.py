@@ -13,14 +13,12 @@ from hypothesis import strategies as st
 
 from reports.errors import OutputError, ReportError
 from reports.html import html, marked, write_html
-from reports.markdown import markdown, write_markdown
+from reports.markdown import markdown, write_pages
 from reports.page import (
     FigureBlock,
     Page,
-    Points,
     Section,
     TableBlock,
-    Text,
     cell_text,
     table_block,
 )
@@ -68,9 +66,9 @@ def page(tmp_path: Path) -> Page:
         "Answer",
         ("**94 %** of the *time*, see `x < y`.",),
         (
-            Section("One", (Text("A [file](t.csv) & <tag>."), table)),
-            Section("Two", (FigureBlock(picture, "A picture."), Points(("p", "q")))),
-            Section("Three", (Points(("r",)),)),
+            Section("One", ("A [file](t.csv) & <tag>.", table)),
+            Section("Two", (FigureBlock(picture, "A picture."), ("p", "q"))),
+            Section("Three", (("r",),)),
         ),
         {"t.csv": "the table"},
         "legwatt",
@@ -116,8 +114,7 @@ def test_markdown_tables_and_pictures(page: Page, tmp_path: Path) -> None:
 
 
 def test_both_are_written_whole(page: Page, tmp_path: Path) -> None:
-    write_html(page, tmp_path / "out" / "index.html")
-    write_markdown(page, tmp_path / "out" / "summary.md")
+    write_pages(page, tmp_path / "out", "summary.md")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["index.html", "summary.md"]
     text = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
     assert 'href="../figure.svg"' in text
@@ -211,7 +208,7 @@ def test_units_and_percentages_are_written_one_way_in_both_forms(tmp_path: Path)
     page = Page(
         "Torque in N*m",
         ("**2.00 N*m**, 94.0% of *time*, -3 m/s^2, `a*b` [x](m/s^2.csv).",),
-        (Section("In N*m", (Points(("94%",)), TableBlock(("N*m",), (("-2 N*m",),), "N*m"))),),
+        (Section("In N*m", (("94%",), TableBlock(("N*m",), (("-2 N*m",),), "N*m"))),),
     )
     for text in (html(page, tmp_path), markdown(page, tmp_path)):
         words = (

@@ -9,7 +9,7 @@ import pytest
 from reports.figures.save import save_figure
 from reports.figures.style import new_figure
 from reports.html import write_html
-from reports.page import FigureBlock, Page, Section, TableBlock, Text
+from reports.page import FigureBlock, Page, Section, TableBlock
 from tests.reports.browser import layout, needs_chromium, needs_poppler, printed
 
 pytestmark = needs_chromium
@@ -35,7 +35,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "wide",
     )
     title = "A page whose title is long enough for two lines on a telephone"
-    blocks = (Text(LONG), fits, FigureBlock(folder / "figure.svg", "f"), wide)
+    blocks = (LONG, fits, FigureBlock(folder / "figure.svg", "f"), wide)
     return write_html(Page(title, (LONG,) * 2, (Section("s", blocks),)), folder / "index.html")
 
 

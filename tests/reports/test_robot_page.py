@@ -17,7 +17,7 @@ from pipeline.simulation.walk_stand import Standing, Walking, stand, walk
 from reports.figures.save import save_figures
 from reports.html import html, write_html
 from reports.markdown import markdown
-from reports.page import FigureBlock, Page, Points, Section, Text
+from reports.page import FigureBlock, Page, Section
 from reports.pages.motor_words import limits_text, motors_text
 from reports.pages.robot_page import first_picture, robot_page
 from reports.table import Table
@@ -69,9 +69,9 @@ def test_the_first_paragraphs_say_robot_cost_what_is_fitted_and_known(
     assert f"{bases.count('assumed')} are assumed" in known
     least = min(tables["walking_stability"].columns["least_margin_m"])
     (said,) = (s.blocks[0] for s in page[0].sections if s.heading.endswith("stability"))
-    assert isinstance(said, Text)
-    assert f"{1e3 * least:.3g}"[:3] in said.text
-    assert page[0].sections[0] == Section("Notes", (Points(("a remark",)),))
+    assert isinstance(said, str)
+    assert f"{1e3 * least:.3g}"[:3] in said
+    assert page[0].sections[0] == Section("Notes", (("a remark",),))
 
 
 def test_whose_motors_are_assumed_stands_first(page: tuple[Page, Path], solo: Run) -> None:

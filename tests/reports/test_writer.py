@@ -18,9 +18,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from reports import writer
+from reports.atomic import write_text
 from reports.errors import OutputError, TableError
 from reports.table import Table
-from reports.writer import csv_bytes, without_folders, write_table, write_text
+from reports.writer import csv_bytes, without_folders, write_table
 
 META = {"seed": 1, "inputs": {"b.toml": "ff", "a.toml": "00"}, "warnings": []}
 

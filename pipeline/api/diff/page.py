@@ -13,7 +13,7 @@ from reports.column import column
 from reports.errors import ReportError
 from reports.folder import staged
 from reports.html import write_html
-from reports.page import Block, FigureBlock, Page, Section, TableBlock, Text
+from reports.page import Block, FigureBlock, Page, Section, TableBlock
 from reports.table import header_words, table_of
 from reports.typeset import unit_text
 from reports.writer import write_table
@@ -160,7 +160,7 @@ def page(both: Comparison, folder: Path) -> Page:
         for side, words in (("a", f"A: {Path(name).stem.replace('_', ' ')}"), ("b", "B"))
     ]
     own = {x: [n for n, y in both.alone.items() if y == x] for x in "AB"}
-    rest = [Text(f"In {x} alone: {', '.join(names)}.") for x, names in own.items() if names]
+    rest = [f"In {x} alone: {', '.join(names)}." for x, names in own.items() if names]
     sections.append(Section("Figures", (*pairs, *rest)))
     return Page(
         "Two runs side by side: A is {}, B is {}".format(*labels(both.a, both.b)),
@@ -178,11 +178,11 @@ def _went_in(both: Comparison) -> tuple[Block, ...]:
         blocks.append(TableBlock(("what", "A", "B"), both.inputs, caption))
     if any(map(differs, both.table(PARAMETERS))):
         blocks.append(_block(both, PARAMETERS, _shown(both, PARAMETERS)))
-    return tuple(blocks) or (Text("Nothing that the runs state differs."),)
+    return tuple(blocks) or ("Nothing that the runs state differs.",)
 
 
 def _same(names: Sequence[str], text: str) -> tuple[Block, ...]:
-    return (Text(f"{text}: {', '.join(names)}."),) if names else ()
+    return (f"{text}: {', '.join(names)}.",) if names else ()
 
 
 def _shown(both: Comparison, name: str) -> list[Pair]:

@@ -23,6 +23,8 @@ from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import Validated, validate_found, with_found
 from pipeline.logs.columns.findings import SUSPECTED
+from pipeline.logs.prepared.measurement import TEST
+from pipeline.logs.signals.grid import runs_of
 from pipeline.machine.machine import MachineModel
 from pipeline.progress import Progress
 from pipeline.simulation.edited import Effects, effects
@@ -32,6 +34,8 @@ from pipeline.simulation.energy_change import EnergyChange, energy_change
 SHOWN = 3
 #: ... where the gap shrinks by this share at least.
 WORTH_SHOWING = 0.25
+#: Held-out rows turn one way where less than this share turns the other way.
+ONE_WAY = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +76,32 @@ class Outcome:
     def noise(self) -> float:
         """Noise floor of all joints in the compared channel, of the test logs."""
         return overall(noise_floor(self.compared.measurements))
+
+    @property
+    def gaps(self) -> tuple[float, float]:
+        """Gap of all joints of the model as it was and as written."""
+        stages = self.validated.stages
+        return overall(stages[0].gap), overall(stages[-1].gap)
+
+    @property
+    def held_out(self) -> list[tuple[str, float, float]]:
+        """Log, start and end [s] of every stretch that is held out."""
+        return [
+            (m.name, float(m.time[start]), float(m.time[stop - 1]))
+            for m in self.compared.measurements
+            for start, stop in np.column_stack(runs_of(m.part == TEST)).tolist()
+        ]
+
+    @property
+    def one_way(self) -> list[tuple[str, str]]:
+        """Joints with an effect whose held-out rows all turn one way, and which."""
+        out, logs = [], self.compared.measurements
+        for j in dict.fromkeys(self.validated.joints):
+            speeds = np.concatenate([m.v[(m.part == TEST) & m.mask[:, j], j] for m in logs])
+            ahead = float((speeds > 0).mean()) if speeds.size else 0.5
+            if min(ahead, 1.0 - ahead) < ONE_WAY:
+                out.append((logs[0].joints[j], "positive" if ahead > 0.5 else "negative"))
+        return out
 
 
 def with_every(model: MachineModel, found: Sequence[Found]) -> MachineModel:

@@ -86,12 +86,7 @@ class Section:
 
 
 def chain_sections(catalog: Catalog, name: str) -> list[Section]:
-    """An alternative from the supply to the joint.
-
-    Args:
-        catalog: Components and alternatives.
-        name: Of the alternative.
-    """
+    """An alternative from the supply to the joint."""
     alternative, chain = catalog.alternatives[name], catalog.chain(name)
     words, motor = alternative.stage_names, alternative.motor
     numbers = _numbers(catalog, {n: f"{motor}.{n}" for n in _MOTOR_NUMBERS})
@@ -127,13 +122,7 @@ def _numbers(catalog: Catalog, references: Mapping[str, str]) -> tuple[str, ...]
 
 @house_style()
 def actuator_chain_figure(sections: Sequence[Section], *, title: str, subtitle: str = "") -> Figure:
-    """Draw an actuator from the motor's terminals at the top to the joint at the bottom.
-
-    Args:
-        sections: From `chain_sections`.
-        title: Names the alternative.
-        subtitle: Second line.
-    """
+    """Draw an actuator from the motor's terminals at the top to the joint at the bottom."""
     heading = textwrap.wrap(title, _TITLE_CHARS)
     legend = [
         "down, blue: E(+), towards the joint; up: E(\N{MINUS SIGN}), back from it",

@@ -41,11 +41,7 @@ def joint_torques_figure(
 
     Args:
         stretches: One period.
-        joints: Columns of the torques.
         legs: Leg to its joints from the base outward; legs may differ in how many they have.
-        sliding: Joints whose torque is a force.
-        title: First line.
-        subtitle: Second line.
     """
     columns = {joint: column for column, joint in enumerate(joints)}
     others = [joint for joint in joints if not any(joint in own for own in legs.values())]
@@ -75,9 +71,6 @@ def ground_forces_figure(
 
     Args:
         stretches: One period.
-        legs: Columns of the forces.
-        title: First line.
-        subtitle: Second line.
     """
     figure = new_figure(6.2, title, subtitle)
     panels = figure.subplots(3, 1, sharex=True, height_ratios=[1.5, 1.0, 1.0])

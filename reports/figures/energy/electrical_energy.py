@@ -38,8 +38,6 @@ def electrical_energy_figure(
         joints: Labels of the parts, J of them.
         alternatives: Name to energy per joint, shape (J,) [J].
         reference: The alternative to which the ratio at the end of a bar is; None for no ratio.
-        title: First line.
-        subtitle: Second line.
         width: [in]; names stand above their bars where it is less than usual.
     """
     totals = {name: float(a.sum()) for name, a in alternatives.items()}

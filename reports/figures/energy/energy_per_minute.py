@@ -52,8 +52,6 @@ def energy_per_minute_figure(
     Args:
         lines: The alternatives, at the same shares of the time standing.
         names: Alternative to what the legend calls it.
-        title: First line.
-        subtitle: Second line.
         break_even: Marked and enlarged; None where there is none.
     """
     from matplotlib.lines import Line2D

@@ -49,11 +49,6 @@ def joint_demand_figure(
 
     Args:
         stretches: One period.
-        column: Of the joint.
-        leg: Whose joint it is.
-        title: First line.
-        subtitle: Second line.
-        slides: Whether the joint is prismatic.
     """
     times = [s.time for s in stretches]
     velocities, torques = ([getattr(s, n)[:, column] for s in stretches] for n in _VARIABLES)

@@ -55,7 +55,6 @@ def common_scale(
 
     Args:
         every: Series at the motors' shafts and the motor of each of its joints.
-        joints: Those to draw.
 
     Returns:
         Speed [rad/s] and torque [N*m].
@@ -94,8 +93,6 @@ def motor_limits_figure(
         motors: Whose limits are drawn, one per joint of the series.
         joints: Those to draw, name to label of the panel.
         support: Start and end of every stretch of time in which the joints' leg stands [s].
-        title: First line.
-        subtitle: Second line.
         scale: Of the panels, to give several figures the same: half the ranges of speed [rad/s]
             and torque [N*m].
     """

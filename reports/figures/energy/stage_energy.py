@@ -48,8 +48,6 @@ def stage_energy_figure(
         stages: From the joint to the supply, energy in one cycle.
         joints: Those to draw, name to label of the panel.
         places: Stage to the words that say where it is, as `Alternative.stage_names` has them.
-        title: Names the alternative.
-        subtitle: Second line.
         limits: Largest E(+) and E(-) to scale for [J], to give several figures the same scale.
     """
     from matplotlib.patches import Patch
@@ -150,11 +148,6 @@ def _joules(value: float) -> str:
 
 
 def stage_symbol(stage: str, letter: str = "E") -> str:
-    """A stage's energy as a formula; what TeX would read otherwise stands for itself.
-
-    Args:
-        stage: Short name.
-        letter: Of another variable, such as torque.
-    """
+    """A stage's energy as a formula; what TeX would read otherwise stands for itself."""
     plain = re.sub(r"([_#%&${}])", r"\\\1", stage)
     return rf"${letter}_{{\mathrm{{{plain}}}}}$"

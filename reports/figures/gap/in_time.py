@@ -51,14 +51,7 @@ class GapTrace:
 def gap_time_figure(
     traces: Sequence[GapTrace], *, title: str, subtitle: str = "", channel: str = "effort"
 ) -> Figure:
-    """Draw joints side by side: above the channel, below what is left of it.
-
-    Args:
-        traces: One to three joints.
-        title: Headline.
-        subtitle: Second line.
-        channel: Name of the compared channel.
-    """
+    """Draw joints side by side: above the channel, below what is left of it."""
     figure = new_figure(5.2, title, subtitle)
     axes = figure.subplots(2, len(traces), sharex="col", squeeze=False, height_ratios=(1.0, 1.0))
     for k, trace in enumerate(traces):

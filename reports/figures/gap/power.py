@@ -64,7 +64,6 @@ def power_shares_figure(shares: Sequence[Share], *, title: str, width: float = W
 
     Args:
         shares: Terms in order with their 95 % intervals, what was measured among them.
-        title: Headline.
         width: [in]; labels stand above their bars where it is less than usual.
     """
     bars = [s for s in shares if s.term != MEASURED]

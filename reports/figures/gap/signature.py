@@ -47,9 +47,6 @@ def gap_signature_figure(
         x: Of the variable, shape (N,).
         gaps: Measured minus predicted without the effect, and with it, each shape (N,).
         noise_floor: Standard deviation of the noise.
-        unit: Of the gap.
-        title: Headline.
-        subtitle: Second line.
 
     Raises:
         FigureError: No rows.

@@ -45,9 +45,6 @@ def gap_waterfall_figure(
         before: Gap of the model as it was.
         steps: Effects in the order of acceptance, each with the gap after it.
         noise_floor: What no model can explain.
-        unit: Of all.
-        title: Headline.
-        subtitle: Second line.
         width: [in]; labels stand above their bars where it is less than usual.
     """
     labels = ["model as it was", *(label for label, _ in steps), "what is left"]

@@ -41,14 +41,7 @@ class WhereGroup:
 def where_map_figure(
     joints: Sequence[str], groups: Sequence[WhereGroup], *, title: str, subtitle: str = ""
 ) -> Figure:
-    """Draw the map.
-
-    Args:
-        joints: Rows, from the top.
-        groups: Columns.
-        title: Headline.
-        subtitle: Second line.
-    """
+    """Draw the map."""
     from matplotlib.colors import LogNorm
 
     names = 0.15 + 0.076 * max(len(joint) for joint in joints)

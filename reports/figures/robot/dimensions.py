@@ -42,7 +42,6 @@ def dimension(axes: Axes, start: Array, end: Array, offset: tuple[float, float],
         start: Shape (2,) [m].
         end: Shape (2,) [m].
         offset: From the measured points to the dimension line [m].
-        text: Value with unit.
     """
     shift = np.asarray(offset)
     a, b = start + shift, end + shift

@@ -34,13 +34,7 @@ _CELL = 0.012
 
 
 def gait_steps(steps: Steps, *, title: str, subtitle: str = "") -> str:
-    """The SVG's text.
-
-    Args:
-        steps: One cycle.
-        title: First line.
-        subtitle: Second line.
-    """
+    """The SVG's text."""
     shown_in = float(np.clip(steps.period, _SHORTEST, _LONGEST))
     pace = "at its own speed"
     if abs(shown_in - steps.period) >= 1e-9:

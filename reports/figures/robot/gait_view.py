@@ -54,8 +54,6 @@ def gait_figure(
         stretches: One period.
         shown: The leg whose path is shown from the side.
         body: Of the trunk as seen from above, an outline in the base frame, shape (P, 2) [m].
-        title: First line.
-        subtitle: Second line.
 
     Raises:
         FigureError: Unknown leg, or no stretch in which it stands and none in which it swings.

@@ -62,7 +62,6 @@ def joint_directions_figure(
         scene: Everything visible in the zero pose.
         legs: All legs in the zero pose.
         shown: Name of the leg that is shown obliquely, with its joints' names.
-        title: First line.
         zero_pose: The robot file's words, written below the picture.
     """
     leg = next(leg for leg in legs if leg.name == shown)

@@ -29,10 +29,6 @@ def mesh_file(name: str, folder: Path | None) -> Path | None:
 
     ``package://NAME/PATH`` is looked for as folder ``NAME`` in every folder above the URDF, in
     ``ROS_PACKAGE_PATH``, and among the robots of example-robot-data.
-
-    Args:
-        name: As the URDF has it.
-        folder: Folder of the URDF.
     """
     scheme, separator, rest = name.partition("://")
     if not separator:

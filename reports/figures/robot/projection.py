@@ -67,8 +67,6 @@ def draw_scene(
     """Draw a scene into axes whose unit is the metre.
 
     Args:
-        axes: Matplotlib axes; its aspect is set to equal.
-        view: The camera.
         scene: What to draw; at least one solid.
         fade: From 0 to 1, towards white, for a robot behind its annotation.
         pixels: Along the longer side of the picture.
@@ -179,8 +177,6 @@ def _spans(
 
     Args:
         flat: Corners of triangles [samples], shape (F, 3, 2).
-        which: Triangle of each row.
-        y: The rows.
     """
     low, high = np.full(y.size, np.inf), np.full(y.size, -np.inf)
     for i, j in ((0, 1), (1, 2), (2, 0)):

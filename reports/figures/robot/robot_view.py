@@ -38,8 +38,6 @@ def robot_figure(
     Args:
         scene: Everything visible in the world, z up.
         legs: For labels and dimensions; the feet that stand are the lowest.
-        title: First line.
-        subtitle: Second line.
         mass_centre: Centre of mass in the world, shape (3,) [m].
     """
     unit = reach(scene)

@@ -124,7 +124,6 @@ def sticks(leg: Leg, legs: Sequence[Leg], bodies: Sequence[int]) -> list[Solid]:
     """Sticks from the middle of the trunk through a leg's joints to its foot.
 
     Args:
-        leg: The leg, of which the URDF shows nothing.
         legs: All legs, whose first joints are around the middle of the trunk.
         bodies: Numbers of the bodies that carry each stick, from the trunk outward.
     """

@@ -41,7 +41,6 @@ def read_visuals(urdf: str, folder: Path | None = None) -> Visuals:
     """The surfaces of a URDF: visuals, and where a visual's mesh is missing the collision shapes.
 
     Args:
-        urdf: Text of the URDF.
         folder: Of the URDF, from which its meshes are looked for.
 
     Raises:

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from reports.atomic import write_text
 from reports.folder import staged
 from reports.table import Table
-from reports.writer import write_table, write_text
+from reports.writer import write_table
 from tests.command_line import Rows, exit_code
 from tests.conftest import SKETCH
 
