@@ -13,9 +13,9 @@ from pipeline.identification.supply.account import (
     Account,
 )
 from reports.markdown import write_pages
-from reports.page import FigureBlock, Number, Page, Section, table_block
+from reports.page import FigureBlock, Number, Page
 from reports.table import Table
-from reports.words import Words, number, percent
+from reports.words import Shown, Words, number, percent, sections
 
 WORDS = Words("power")
 
@@ -42,7 +42,7 @@ def write_power_page(
     balance: Account, robot: str, tables: Sequence[Table], warnings: Sequence[str], folder: Path
 ) -> None:
     """Write ``report.md`` and ``index.html``; the figures must be there already."""
-    by_name = {t.name: t for t in tables}
+    run = Shown({t.name: t for t in tables})
     shares = {s.term: s for s in balance.shares}
     measured, left = shares[MEASURED], shares[UNEXPLAINED]
     answer = power_answer(balance)
@@ -60,27 +60,7 @@ def write_power_page(
         ),
         picture=FigureBlock(folder / "power_shares_narrow.svg", alt="Shares of the power."),
         answer=answer[:3],
-        sections=(
-            Section("The answer in full", tuple(answer)),
-            Section(
-                "Term by term",
-                (
-                    FigureBlock(
-                        folder / "power_shares.svg", "Each term begins where that above ends."
-                    ),
-                    table_block(by_name["power"], digits=3),
-                    FigureBlock(
-                        folder / "power_in_time.svg",
-                        "Power at the supply; shaded: held-out samples.",
-                    ),
-                ),
-            ),
-            Section("Drive by drive", (table_block(by_name["power_drives"], digits=3),)),
-            Section(
-                "What the data are worth",
-                (*warnings, table_block(by_name["quality"], digits=3)),
-            ),
-        ),
+        sections=sections(WORDS.text("page", run, answer, warnings), run, folder),
         files={f"{t.name}.csv": t.description for t in tables},
     )
     write_pages(page, folder, "report.md")

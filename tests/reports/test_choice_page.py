@@ -14,7 +14,7 @@ import pytest
 from reports.pages.choice_page import PartSource, write_choice_page
 from reports.table import Table
 from reports.tables.choice import AnswerRow, BestRow, BreakEvenRow, DayRow, FrontRow
-from tests.reports.browser import layout, needs_chromium, needs_poppler, printed, run
+from tests.reports.browser import needs_chromium, run
 
 PARTS = {
     "motor_a": PartSource("Motor A", "datasheet", "maker's page <1>", "peak current is a range"),
@@ -116,19 +116,3 @@ def test_a_message_on_the_console_is_noticed(tmp_path: Path) -> None:
     options = ("--enable-logging=stderr", "--virtual-time-budget=3000", "--dump-dom")
     with pytest.raises(AssertionError):
         run(tmp_path, *options, bad.as_uri())
-
-
-@needs_chromium
-def test_it_fits_a_telephone_and_a_screen(page: Path, tmp_path: Path) -> None:
-    for width in (400, 1280):
-        shown = layout(page, width, tmp_path)
-        assert shown.page <= width
-        assert not shown.beyond
-
-
-@needs_chromium
-@needs_poppler
-def test_it_prints_without_its_fields(page: Path, tmp_path: Path) -> None:
-    words = [word.text for word in printed(page, tmp_path)]
-    assert "motor_b" in words
-    assert "Show" not in words

@@ -65,20 +65,6 @@ def test_nothing_to_object_to_with_the_other_axis(root: Path) -> None:
         assert objections(draw) == [], name
 
 
-def test_motor_and_stage_panels_have_one_scale_in_all_alternatives(
-    figures: Drawings,
-) -> None:
-    for kind in ("motor_limits", "stage_energy"):
-        limits = {
-            tuple((axes.get_xlim(), axes.get_ylim()) for axes in draw().axes)
-            if kind == "motor_limits"
-            else draw().axes[0].get_ylim()
-            for name, draw in figures.items()
-            if name.startswith(kind)
-        }
-        assert len(limits) == 1
-
-
 def test_leg_names_are_explained() -> None:
     assert leg_words("rm") == "middle right leg (rm)"
     assert leg_words("lf") == "front left leg (lf)"

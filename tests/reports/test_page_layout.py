@@ -39,7 +39,7 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_html(Page(title, (LONG,) * 2, (Section("s", blocks),)), folder / "index.html")
 
 
-@pytest.mark.parametrize("width", [1280, 800, 400])
+@pytest.mark.parametrize("width", [1280, 400])
 def test_nothing_is_wider_than_the_window(page: Path, tmp_path: Path, width: int) -> None:
     """Tables that are, scroll in a frame that is not; pictures shrink and keep their shape."""
     seen = layout(page, width, tmp_path)
