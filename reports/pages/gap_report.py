@@ -146,7 +146,7 @@ class Run(Shown):
         super().__init__(tables)
         given, compared = outcome.given, outcome.compared
         self.outcome, self.given = outcome, given
-        self.parts, self.settings = where.parts, compared.loaded.settings
+        self.parts, self.settings = compared.parts, compared.loaded.settings
         legged = given.robot is not None and given.robot.floating
         self.legs = legs_text(given.robot) if given.robot is not None and legged else ""
         self.whole = [by == WHOLE for by in tables["where"].columns["by"]]
