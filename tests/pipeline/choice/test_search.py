@@ -65,6 +65,8 @@ def test_ten_best_and_front_are_those_of_brute_force(
     best = found.looked[found.finalists[:10]]
     assert list(best) == list(np.argsort(power, kind="stable")[:10])
     assert np.allclose(found.power, power[found.looked], rtol=1e-9)
+    monkeypatch.setattr("pipeline.choice.group.FINALISTS", 1)
+    found = search(demanded, designs, ACCOUNT)
     own = front(power[fits], designs.mass[fits])
     assert np.allclose(found.power[found.front], power[fits][own], rtol=1e-9)
 
@@ -164,10 +166,12 @@ def test_a_belt_of_ones_own_takes_part_in_place_of_a_gear() -> None:
 
 def test_options_leave_what_they_do_not_name() -> None:
     """A filter of motors leaves all gears of the kinds asked for, and the brakes."""
-    wanted = Wanted(only=("maxon_148867",), without=("hd_",), kinds=("strain_wave", "planetary"))
+    only, kinds = ("maxon_148867", "wittenstein"), ("strain_wave", "planetary")
+    wanted = Wanted(only=only, without=("hd_",), kinds=kinds)
     left = filtered(load_parts(), wanted)
     assert [name for name, part in left.items() if part.kind == "motor"] == ["maxon_148867"]
     assert {part.kind for part in left.values()} == {"motor", "planetary", "brake"}
+    assert any(name.startswith("mitsubishi") for name in left)
 
 
 def test_numbers_of_parts_add_ratios_multiply_and_the_lower_limit_holds(shelf: Shelf) -> None:
