@@ -12,7 +12,7 @@ ARGS   ?=
 # A name as one word of the shell, whatever is in it.
 quoted = '$(subst ','\'',$(1))'
 # Of the faults that tests reach; all of them take about two hours.
-SHARE  ?= 0.15
+SHARE  ?= 0.01
 # A run of blind whose tables the page of blind trials takes over.
 BLIND  ?=
 
