@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -95,7 +95,7 @@ class _Columns:
         return [c for c, n in self.named.items() if n.quantity in quantities]
 
     def change(self, column: str, why: str, quantity: str, joint: str) -> None:
-        self.named[column] = replace(self.named[column], quantity=quantity, joint=joint)
+        self.named[column] = self.named[column]._replace(quantity=quantity, joint=joint)
         self.why[column] = why
 
     def position_of(self, joint: str) -> str:
@@ -166,7 +166,8 @@ class _Columns:
                 called, _ = assign(own, owners)
                 for column in columns:
                     named = self.named[column]
-                    self.named[column] = replace(named, joint=called.get(named.joint, named.joint))
+                    joint = called.get(named.joint, named.joint)
+                    self.named[column] = named._replace(joint=joint)
 
     def _limits(self, joint: str) -> tuple[float, float]:
         if self.expected is None or joint not in self.expected.joints:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 from actuators.units import dimension
 from pipeline.logs.reading.csv_head import unit_spelt
@@ -46,8 +45,7 @@ _ENDS: Final = {
 _KEYWORD: Final = {word: quantity for quantity, words in _WORDS.items() for word in words}
 
 
-@dataclass(frozen=True)
-class Named:
+class Named(NamedTuple):
     """What a column's name says."""
 
     column: str  #: The name.
@@ -55,7 +53,6 @@ class Named:
     quantity: str
     joint: str  #: What is left of the name; empty where nothing is.
     unit: str  #: Stated by the name or a row of units; empty where none is.
-    motor: bool  #: Whether the name speaks of a motor.
 
 
 def words_of(name: str) -> list[str]:
@@ -97,7 +94,7 @@ def _read(column: str, text: str, unit: str) -> Named:
         quantity = "motor_position"
     if quantity and unit and not _fits(quantity, unit):
         quantity = ""
-    return Named(column, quantity, "_".join(rest), unit, motor)
+    return Named(column, quantity, "_".join(rest), unit)
 
 
 def _fits(quantity: str, unit: str) -> bool:

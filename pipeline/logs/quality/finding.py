@@ -42,7 +42,6 @@ class Findings(list[Finding]):
     """A list of one log's findings that fills in its name."""
 
     def __init__(self, log: str) -> None:
-        """Begin with the log's name."""
         super().__init__()
         self._log = log
 

@@ -12,6 +12,8 @@ from actuators.units import dimension
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.reading.mapping import CsvTable
 
+#: Columns, lines above the numbers, units by column, and the first time of columns of times.
+CsvHead = tuple[tuple[str, ...], int, dict[str, str], dict[str, str]]
 _REMARK: Final = "#"
 _ISO: Final = re.compile(
     r"\s*\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d(\.\d{1,9})?)?\s*(Z|[+-]\d\d:?\d\d)?\s*"
@@ -50,9 +52,7 @@ def unit_spelt(text: str) -> str:
     return ""
 
 
-def read_head(
-    head: bytes, dialect: CsvTable, where: str
-) -> tuple[tuple[str, ...], int, dict[str, str], dict[str, str]]:
+def read_head(head: bytes, dialect: CsvTable, where: str) -> CsvHead:
     """Understand a file's first bytes.
 
     Lines that begin with ``#`` are remarks, unless the last of them is the header of what follows.

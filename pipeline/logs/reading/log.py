@@ -162,7 +162,7 @@ class Log:
         """The same log with some of its rows, in order."""
         arrays = {k: x[part] for k, x in vars(self).items() if isinstance(x, np.ndarray)}
         extra = {key: value[part] for key, value in self.extra.items()}
-        return replace(self, extra=extra, **arrays)
+        return self.with_changes(extra=extra, **arrays)
 
     def with_changes(self, **changes: Any) -> Log:
         """The same log with some attributes replaced."""

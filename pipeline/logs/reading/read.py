@@ -163,7 +163,7 @@ def _stand_still(
     position: Array, joints: dict[str, Array], plan: ReadingPlan
 ) -> tuple[Array, dict[str, str]]:
     """Positions (N, J), joints that the log does not know at a place; and what is left out, why."""
-    expected, out, why = plan.expected, position.copy(), {}
+    expected, out, why = plan.expected, position.copy(), dict[str, str]()
     duty = plan.mapping.controller.law == "duty"
     if "goal_position" in joints and (duty or plan.derives_torque):
         return out, why

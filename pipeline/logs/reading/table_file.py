@@ -15,7 +15,7 @@ from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.formats.convert import plain
-from pipeline.logs.reading.csv_head import read_head
+from pipeline.logs.reading.csv_head import CsvHead, read_head
 from pipeline.logs.reading.mapping import CsvTable
 
 _HEADER_BYTES: Final = 1 << 20
@@ -66,6 +66,7 @@ def open_table(path: Path, dialect: CsvTable | None = None) -> TableFile:
     if not head.strip():
         raise LogFormatError(f"{where}: the file is empty; give a log as CSV or Parquet")
     parquet = head.startswith(b"PAR1")
+    head_of_csv: CsvHead
     if parquet:
         try:
             head_of_csv = ((*map(str, pq.read_schema(made.path).names),), 1, {}, {})

@@ -307,6 +307,7 @@ def test_weak_correlation_is_said_and_no_reason_to_stop(
     assert "little in common" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_scaled_log_is_never_called_explained_without_a_name(
     tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str], simulated_leg: Columns
 ) -> None:
