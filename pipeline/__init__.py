@@ -18,20 +18,18 @@ if TYPE_CHECKING:
     from actuators.loading.own_folder import init_actuator
     from pipeline.api.demand import Demand, demand, energy
     from pipeline.api.init import init
-    from pipeline.api.logs import compare, forward, identify, read_log, validate
+    from pipeline.api.logs import compare, forward, identify, power, read_log, validate
     from pipeline.api.machine import Machine, load
     from pipeline.api.motion import stand, walk
     from pipeline.api.reports import reports
-    from pipeline.api.supply.power import power
 
 _HOME = {
     **dict.fromkeys(("Machine", "load"), "pipeline.api.machine"),
     **dict.fromkeys(("stand", "walk"), "pipeline.api.motion"),
     **dict.fromkeys(("Demand", "demand", "energy"), "pipeline.api.demand"),
     **dict.fromkeys(
-        ("read_log", "compare", "identify", "validate", "forward"), "pipeline.api.logs"
+        ("read_log", "compare", "identify", "validate", "power", "forward"), "pipeline.api.logs"
     ),
-    "power": "pipeline.api.supply.power",
     "init": "pipeline.api.init",
     "init_actuator": "actuators.loading.own_folder",
     "reports": "pipeline.api.reports",

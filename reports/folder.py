@@ -26,8 +26,8 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from reports.atomic import PREFIX, make_folder, output_errors
-from reports.errors import OutputError
+from pipeline.atomic import PREFIX, make_folder, output_errors
+from pipeline.errors import OutputError
 
 logger = logging.getLogger("legwatt")
 #: Files that are decided upon and may not all be in place.

@@ -8,8 +8,8 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from reports.atomic import write_text
-from reports.errors import ReportError
+from pipeline.atomic import write_text
+from pipeline.errors import ReportError
 from reports.page import Page, TableBlock, cell_text
 from reports.typeset import prose
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from reports.atomic import write_text
+from pipeline.atomic import write_text
 from reports.html import write_html
 from reports.page import Block, FigureBlock, Page, TableBlock, cell_text
 from reports.typeset import prose

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from reports.errors import ReportError
+from pipeline.errors import ReportError
 from reports.roundoff import without_roundoff
 from reports.table import Table
 from reports.typeset import number_text, prose, unit_text

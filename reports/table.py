@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from reports.errors import TableError
+from pipeline.errors import TableError
 from reports.typeset import unit_suffix, unit_text
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ class Table:
     name: str  #: File name without ending, e.g. ``"standing"``.
     #: Header to values, in the order of the file. NaN and None are empty cells.
     columns: Mapping[str, Column]
-    #: Header to (meaning, unit) or (meaning, unit, title); see `reports.column`.
+    #: Header to (meaning, unit) or (meaning, unit, title); see `pipeline.column`.
     meanings: Mapping[str, Meaning]
     description: str = ""  #: One sentence on what the table holds and its sign conventions.
     #: Whether the numbers were given and not computed, so that none is round-off.
@@ -116,7 +116,7 @@ def table_of(
     """A tidy table of rows.
 
     Args:
-        kind: Dataclass whose fields are columns (`reports.column`), which names the table.
+        kind: Dataclass whose fields are columns (`pipeline.column`), which names the table.
         rows: Of that kind, or what its columns take their values of.
         about: One sentence, where it depends on the run.
     """

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from reports.atomic import replacing
-from reports.errors import OutputError, TableError
+from pipeline.atomic import replacing
+from pipeline.errors import OutputError, TableError
 from reports.roundoff import RULE, without_roundoff
 from reports.table import Table
 

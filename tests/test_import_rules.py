@@ -35,13 +35,12 @@ LEAVES = {
     *("actuators.units", "actuators.parameters", "actuators.errors", "actuators.text_file"),
     "actuators.checked",
     *(
+        "pipeline.atomic",
         "pipeline.checkpoint",
+        "pipeline.column",
         "pipeline.errors",
         "pipeline.progress",
         "pipeline.spread",
-        "reports.atomic",
-        "reports.column",
-        "reports.errors",
     ),
 }
 #: Numbers, and the library by which files are read.

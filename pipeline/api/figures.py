@@ -14,6 +14,7 @@ from actuators.arrays import Array
 from actuators.energy.energy import stage_energies
 from pipeline.api.pictures.scene import Scene, mass_centre
 from pipeline.api.pictures.walk import steps_of, stretches, thinned
+from pipeline.atomic import write_text
 from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.ground import Ground
@@ -22,7 +23,6 @@ from pipeline.paper.judgement.judge import Judgement
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
-from reports.atomic import write_text
 from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
 from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
 from reports.figures.energy.electrical_energy import electrical_energy_figure

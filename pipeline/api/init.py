@@ -15,6 +15,7 @@ import pinocchio as pin
 
 from actuators.errors import one_line
 from actuators.loading.build import CATALOG, load_catalog
+from pipeline.atomic import replacing
 from pipeline.dynamics.gait_check import check_gait
 from pipeline.errors import PipelineError, RobotFileError
 from pipeline.machine.motors import Motors, motors_of
@@ -26,7 +27,6 @@ from pipeline.robot.guess.pace import shorter
 from pipeline.robot.guess.writer import robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.atomic import replacing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from pipeline.api.gap_bodies import bodies_of, refuse_own_urdf, write_model
-from pipeline.api.gap_meta import inputs_of, metadata
-from pipeline.api.gap_tables import (
+from pipeline.api.gap.bodies import bodies_of, refuse_own_urdf, write_model
+from pipeline.api.gap.log_result import Common, LogResult
+from pipeline.api.gap.meta import inputs_of, metadata
+from pipeline.api.gap.power import Powered, added_up
+from pipeline.api.gap.tables import (
     candidates_table,
     forward_table,
     found_table,
     rollout_tables,
 )
 from pipeline.api.machine import Machine
-from pipeline.api.result import Result, by_name
+from pipeline.api.result import by_name
 from pipeline.effects.model_file import ModelFile, edits_in
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.workflow.compared import Compared, compare_logs, judged
@@ -32,29 +34,6 @@ from pipeline.progress import Progress
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.table import Table, table_of
 from reports.tables.gap import QualityRow, WhereRow, bodies, deciding_motion
-
-#: What every result of logs begins with: verb, tables, sidecar, inputs, machine, findings.
-Common = tuple[
-    str,
-    dict[str, Table],
-    Callable[[], dict[str, Any]],
-    tuple[Path, ...],
-    Setup,
-    Sequence[Finding],
-]
-
-
-@dataclass(frozen=True, eq=False)
-class LogResult(Result):
-    """What one step finds in logs."""
-
-    given: Setup  #: The machine as the step computed it.
-    findings: Sequence[Finding]  #: What the logs are worth.
-
-    @property
-    def quality(self) -> Table:
-        """What the logs are worth: one row per judgement."""
-        return self.table("quality")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +56,7 @@ class Comparison(LogResult):
         return self.table("where")
 
     def _write(self, out: Path, decimal: str) -> None:
-        from pipeline.api.gap_figures import write_where_map
+        from pipeline.api.gap.figures import write_where_map
 
         super()._write(out, decimal)
         model = self.given.model
@@ -130,7 +109,7 @@ class Identified(LogResult):
         if self.step != "name":
             write_model(out, self.outcome.validated.text, self.bodies)
         if self.step in ("all", "shrink"):
-            from pipeline.api.gap_figures import write_pictures_and_page
+            from pipeline.api.gap.figures import write_pictures_and_page
 
             write_pictures_and_page(self.outcome, self.bodies, list(self.tables.values()), out)
 
@@ -219,6 +198,23 @@ def validate(logs: Any, machine: Machine, **options: Any) -> Identified:
     return replace(result, machine=machine)
 
 
+def power(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Powered:
+    """What a machine's supply gives, against the sum over its drives.
+
+    Args:
+        logs: With samples of the supply, from `read_log` or by path.
+        machine: With a motor in every joint.
+        test: Logs that are held out: nothing is fitted to them.
+        **options: See `pipeline.identification.workflow.options.Options`.
+
+    Raises:
+        GapError: A log has no power at the supply, or too few samples of it.
+    """
+    result = analysed("power", machine, logs, test, **options)
+    assert isinstance(result, Powered)
+    return result
+
+
 def forward(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Driven:
     """Let the model drive itself under its servos' law, and compare positions.
 
@@ -295,8 +291,6 @@ def analyse(
         read = common([table_of(QualityRow, findings)], findings)
         return MeasuredLog(*read, options.logs[0], options.mapping)
     if step == "power":
-        from pipeline.api.supply.power import added_up
-
         return added_up(given, loaded, options, progress, common)
     progress.step("simulating the logs' motion")
     compared = compare_logs(given, given.model, loaded, parts, fitted)

@@ -10,6 +10,7 @@ from typing import Any
 from actuators.errors import closest
 from actuators.loading.build import CATALOG, load_catalog
 from pipeline.api.init import robot_file_of
+from pipeline.atomic import write_text
 from pipeline.effects.model_file import Edit, EditParameter, ModelFile, new_model_file
 from pipeline.effects.registry import effect_named
 from pipeline.errors import RobotFileError
@@ -18,7 +19,6 @@ from pipeline.machine.own_actuators import without_folder
 from pipeline.robot.published import published_names
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Files, Settings, read_files, settings
-from reports.atomic import write_text
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from actuators.errors import closest
-from reports.errors import TableError
+from pipeline.errors import TableError
 from reports.folder import staged
 from reports.table import Table
 from reports.writer import write_table

@@ -23,8 +23,8 @@ from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
+    from pipeline.api.gap.power import Powered
     from pipeline.api.logs import Comparison, Driven, Identified
-    from pipeline.api.supply.power import Powered
     from pipeline.identification.workflow.setup import Setup
     from pipeline.logs.quality.finding import Finding
 
@@ -126,8 +126,8 @@ def run_gap(given: argparse.Namespace) -> int:
     """
     with folder_held(given), Progress("gap") as progress:
         progress.step("loading")
+        from pipeline.api.gap.power import Powered
         from pipeline.api.logs import Comparison, Driven, Identified, analyse
-        from pipeline.api.supply.power import Powered
 
         options = options_of(given)
         result = analyse(options, progress)

@@ -87,8 +87,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     level = logging.INFO if getattr(options, "verbose", False) else logging.WARNING
     logging.basicConfig(level=level, format="%(message)s")
     from actuators.errors import ActuatorError
+    from pipeline.errors import ReportError
     from pipeline.logs.errors import GapError
-    from reports.errors import ReportError
 
     run: Run = options.run
     try:

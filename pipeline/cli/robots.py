@@ -137,9 +137,9 @@ def _lines(
 
 def run_urdf(options: argparse.Namespace) -> int:
     """Build the URDF of every robot file that says how."""
+    from pipeline.atomic import write_text
     from pipeline.robot.robot_file import load_robot_file
     from pipeline.robot.urdf_builder import build_urdf
-    from reports.atomic import write_text
 
     for path in options.files or sorted(Path("urdf").glob("*.toml")):
         spec = load_robot_file(path)

@@ -84,7 +84,7 @@ def add_calibrate(add: AddVerb) -> None:
 
 
 def _run_sweep(options: argparse.Namespace) -> int:
-    from reports.atomic import output_errors
+    from pipeline.atomic import output_errors
 
     with folder_held(options), output_errors(options.out):
         from pipeline.simulation.ground_forces.force_choice import ForceChoice
@@ -121,7 +121,7 @@ def _run_twin(options: argparse.Namespace) -> int:
 
 
 def _run_blind(options: argparse.Namespace) -> int:
-    from reports.atomic import output_errors
+    from pipeline.atomic import output_errors
 
     with folder_held(options), output_errors(options.out):
         from pipeline.cli.blind import run_blind
@@ -130,8 +130,8 @@ def _run_blind(options: argparse.Namespace) -> int:
 
 
 def _run_calibrate(options: argparse.Namespace) -> int:
+    from pipeline.atomic import output_errors
     from pipeline.cli.calibrate import WORK, run_calibrate
-    from reports.atomic import output_errors
     from reports.folder import holding
 
     with holding(WORK), output_errors(WORK):

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from pipeline.atomic import PREFIX, output_errors
 from pipeline.blind.machines.supply import make_supply
 from pipeline.blind.machines.trial import make
 from pipeline.errors import PipelineError
-from reports.atomic import PREFIX, output_errors
 
 
 @contextmanager

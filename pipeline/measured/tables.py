@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Final
 
+from pipeline.column import column
 from pipeline.measured.evaluate import Prediction
 from pipeline.measured.facts import Facts, Unknown
-from reports.column import column
 
 #: Predictions by name of the quantity, of one robot.
 Predictions = Mapping[str, Prediction]

@@ -28,6 +28,7 @@ from actuators.elements.hypoid import Hypoid
 from actuators.energy.regeneration import BUS, supply
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, ParameterSet, parameters_from_table, read_toml
+from pipeline.column import column
 from pipeline.paper.hexapod import (
     JOINTS_PER_LEG,
     MIDDLE_LEGS,
@@ -39,7 +40,6 @@ from pipeline.paper.hexapod import (
 )
 from pipeline.paper.published import ALTERNATIVES, CYCLE, EVEN, PAIR, Published
 from pipeline.paper.quantities import pair_break_even
-from reports.column import column
 
 ASSUMPTIONS_FILE = Path(__file__).parent / "assumptions.toml"
 _REVERSIBLE, _IRREVERSIBLE = PAIR

@@ -12,10 +12,10 @@ from actuators.arrays import Array
 from actuators.chain import HoldingResult
 from actuators.energy.energy import split_integral
 from actuators.energy.regeneration import BUS, Supply
+from pipeline.column import column
 from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.robot.robot_file import RobotSpec
-from reports.column import column
 
 Legs = Mapping[str, Sequence[str]]
 #: Account of the joints outside the legs, which are held.

@@ -15,12 +15,12 @@ import numpy as np
 from actuators.errors import ActuatorError
 from pipeline.api.machine import Machine, load
 from pipeline.api.tables import metadata, tables_of_walking, walked
+from pipeline.column import column
 from pipeline.errors import PipelineError
 from pipeline.simulation.cycle_energy import RobotEnergy
 from pipeline.simulation.ground_forces.force_choice import ForceChoice
 from pipeline.simulation.settings import PAPER_FORCES, SAMPLES, Settings
 from pipeline.sweep.plan import Axis, SweepError, Value
-from reports.column import column
 
 Row = dict[str, Any]
 

@@ -16,9 +16,9 @@ from typing import Final
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from pipeline.atomic import replacing
 from pipeline.sweep.case import Row, SweepRow
 from pipeline.sweep.plan import Axis, SweepError
-from reports.atomic import replacing
 
 FILE: Final = "sweep.parquet"
 PARTS: Final = "sweep.parts"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reports.atomic import replacing
+from pipeline.atomic import replacing
 from reports.figures.style import house_style
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from reports.column import column
+from pipeline.column import column
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from actuators.arrays import Array
-from reports.column import column
+from pipeline.column import column
 from reports.table import Quantity, Table, wide_series
 
 

@@ -9,8 +9,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from actuators.arrays import Array
+from pipeline.column import column as declared
 from pipeline.simulation.found_bodies import FoundBody
-from reports.column import column as declared
 from reports.table import Meaning, Table
 
 

@@ -12,9 +12,9 @@ from typing import ClassVar
 import numpy as np
 
 from actuators.units import from_si
+from pipeline.column import column
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
 from pipeline.paper.published import ROLES
-from reports.column import column
 from reports.table import Table, table_of
 
 #: What the columns of intervals mean; empty where the run's numbers are not the calibration's.

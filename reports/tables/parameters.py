@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from actuators.parameters import Parameter
 from actuators.units import from_si
-from reports.column import column
+from pipeline.column import column
 from reports.table import Table, table_of
 
 

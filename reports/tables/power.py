@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import ClassVar
 
+from pipeline.column import column as declared
 from pipeline.identification.supply.account import Account
-from reports.column import column as declared
 from reports.table import Table, table_of
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from actuators.chain import HoldingResult
+from pipeline.column import column
 from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.demand import JointDemand
-from reports.column import column
 from reports.table import Table, table_of
 
 

@@ -13,13 +13,13 @@ from actuators.chain import ChainResult
 from actuators.energy.energy import loss_energies, stage_energies
 from actuators.energy.limits import LimitRow
 from actuators.energy.regeneration import Supply
+from pipeline.column import column
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.motion.base_motion import base_in_world
 from pipeline.motion.gait import Gait
 from pipeline.motion.motion import Motion
 from pipeline.robot.inverse.foot_tracking import FootTracking
 from pipeline.simulation.walk_stand import RuleCost
-from reports.column import column
 from reports.table import Quantity, Table, table_of, wide_series
 
 #: Rules of the ground's forces in words.

@@ -20,8 +20,8 @@ from actuators.elements.motor import DCMotor
 from actuators.energy.energy import StageEnergy
 from actuators.loading.build import load_catalog
 from actuators.shaft import ShaftSeries
+from pipeline.errors import FigureError
 from pipeline.paper.judgement.fig_21 import EnergyPerMinute
-from reports.errors import FigureError
 from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, energy_per_minute_figure

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from reports.errors import OutputError
+from pipeline.errors import OutputError
 from reports.folder import MANIFEST, PENDING, holding, read_manifest, settled, staged
 
 OLD = {f"old_{k}.csv": f"old {k}" for k in range(3)} | {"both.csv": "old", "sub/both.txt": "old"}

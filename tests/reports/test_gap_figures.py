@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from reports.errors import FigureError
+from pipeline.errors import FigureError
 from reports.figures.gap.in_time import GapTrace, gap_time_figure
 from reports.figures.gap.signature import binned, gap_signature_figure
 from reports.figures.gap.waterfall import gap_waterfall_figure

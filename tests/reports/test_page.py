@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from reports.errors import OutputError, ReportError
+from pipeline.errors import OutputError, ReportError
 from reports.html import html, marked, write_html
 from reports.markdown import markdown, write_pages
 from reports.page import (

@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from reports.column import column
-from reports.errors import TableError
+from pipeline.column import column
+from pipeline.errors import TableError
 from reports.table import Quantity, Table, table_of, wide_series
 
 X = {"x": ("length", "m")}

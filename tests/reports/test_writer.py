@@ -17,9 +17,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pipeline.atomic import write_text
+from pipeline.errors import OutputError, TableError
 from reports import writer
-from reports.atomic import write_text
-from reports.errors import OutputError, TableError
 from reports.table import Table
 from reports.writer import csv_bytes, without_folders, write_table
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from actuators.errors import one_line
 from pipeline.api.diff.runs import Run, RunTable
-from reports.errors import ReportError
+from pipeline.errors import ReportError
 
 if TYPE_CHECKING:
     import pandas

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from pipeline.api.diff.compare import PARAMETERS, Comparison, Pair, compare
 from pipeline.api.diff.runs import Run, read_run
-from reports.column import column
-from reports.errors import ReportError
+from pipeline.column import column
+from pipeline.errors import ReportError
 from reports.folder import staged
 from reports.html import write_html
 from reports.page import Block, FigureBlock, Page, Section, TableBlock

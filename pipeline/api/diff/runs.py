@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from actuators.errors import one_line
-from reports.errors import ReportError
+from pipeline.errors import ReportError
 from reports.folder import read_manifest, settled, sha256
 
 if TYPE_CHECKING:

@@ -20,9 +20,9 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from pipeline.api.pictures.scene import Scene
 from pipeline.api.pictures.walk import steps_of
+from pipeline.errors import ReportError
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import walk
-from reports.errors import ReportError
 from reports.figures.robot.solids import Solid, reach
 from reports.figures.robot.steps import Steps
 from reports.pages.gait_words import gait_and_conditions

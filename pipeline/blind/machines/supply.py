@@ -25,13 +25,13 @@ from pyarrow import parquet
 from actuators.errors import closest
 from actuators.text_file import read_toml_file
 from actuators.units import to_si
+from pipeline.atomic import write_text
 from pipeline.blind.machines import own
 from pipeline.blind.machines.plant import rigid_plant
 from pipeline.blind.machines.sensors import draw_sensors, measure, sampled
 from pipeline.blind.machines.trial import stream, write_given
 from pipeline.blind.machines.walk import draw_walker, gait_course
 from pipeline.errors import PipelineError
-from reports.atomic import write_text
 
 Array = NDArray[np.float64]
 

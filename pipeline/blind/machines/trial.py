@@ -23,6 +23,7 @@ import pyarrow as pa
 from pyarrow import csv
 
 from actuators.errors import closest
+from pipeline.atomic import write_text
 from pipeline.blind.machines import forward, own
 from pipeline.blind.machines.chains import Machine, draw_chain, true_bodies
 from pipeline.blind.machines.hidden import BOTH, EFFECTS, Case, hide, possible
@@ -32,7 +33,6 @@ from pipeline.blind.machines.sensors import draw_sensors, measure
 from pipeline.blind.machines.visible import THRESHOLD, judge
 from pipeline.blind.machines.walk import draw_walker, gait_course
 from pipeline.errors import PipelineError, TippingError
-from reports.atomic import write_text
 
 #: Kinds of ten trials in a row: 4 single, 2 several, 2 outside the catalogue, 2 empty.
 KINDS: Final = tuple(["single", "outside", "empty", "single", "several"] * 2)

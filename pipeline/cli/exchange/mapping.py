@@ -32,12 +32,12 @@ def add_mapping(add: AddVerb) -> None:
 
 def run_mapping(given: argparse.Namespace) -> int:
     """Write the file, say what is open and what to run next."""
+    from pipeline.atomic import write_text
     from pipeline.logs.errors import GapError, MappingError
     from pipeline.logs.first_mapping.write import first_mapping
     from pipeline.logs.formats.convert import is_log, plain
     from pipeline.logs.reading.mapping import load_mapping
     from pipeline.logs.reading.plan import plan_reading
-    from reports.atomic import write_text
 
     if not is_log(given.log):
         raise MappingError(f"{one_line(given.log)}: no such log; name a file or a folder of a bag")

@@ -27,7 +27,8 @@ from pipeline.logs.prepared.stream import Stream, Survey, survey
 from pipeline.logs.quality.finding import Finding, refuse
 from pipeline.logs.quality.repeats import refuse_repeats
 from pipeline.logs.reading.expected import Expected, expected_of_model, expected_of_robot
-from pipeline.logs.reading.log import EFFORTS, Log
+from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.log_format import EFFORTS
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.logs.reading.plan import plan_reading
 from pipeline.machine.drivetrains import Actuators, drivetrains_of

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 from pipeline.logs.prepared.contact import Contact, changes_of_stance, log_contact
 from pipeline.logs.prepared.settings import Settings, choose_settings
-from pipeline.logs.reading.log import EFFORTS, Log
+from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.log_format import EFFORTS
 from pipeline.logs.signals.derivatives import LowPass
 from pipeline.logs.signals.fusion import Fusion, fuse_by_noise, position_alone
 from pipeline.logs.signals.grid import GAP, Grid, busiest, fill_gaps, long_runs, uniform_grid

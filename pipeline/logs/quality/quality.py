@@ -26,8 +26,8 @@ from pipeline.logs.quality.unit_check import (
     velocity_units,
 )
 from pipeline.logs.reading.expected import Expected
-from pipeline.logs.reading.log import EFFORTS, Log
-from pipeline.logs.reading.log_format import column_name
+from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.log_format import EFFORTS, column_name
 from pipeline.logs.signals.grid import GAP
 from pipeline.logs.signals.spacing import interpolated, own_spacing
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,9 @@ from numpy.typing import NDArray
 from actuators.arrays import Array, Mask
 from actuators.errors import closest
 from pipeline.logs.errors import LogContentError
+from pipeline.logs.reading.log_format import EFFORTS
+from pipeline.logs.reading.mapping import ColumnTable
 
-if TYPE_CHECKING:
-    from pipeline.logs.reading.mapping import ColumnTable
-
-
-#: Channels in which measurement and simulation are compared, the most direct first, with unit.
-EFFORTS: Final[Mapping[str, str]] = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 #: Commands to the servos.
 GOALS: Final = ("goal_position", "goal_velocity", "goal_torque")
 #: Of the supply: its voltage, and what it gives; seldom as often as the joints.

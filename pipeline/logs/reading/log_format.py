@@ -12,6 +12,8 @@ from pipeline.logs.errors import LogFormatError
 from pipeline.logs.reading.expected import Expected
 
 TIME: Final = "time_s"
+#: Channels in which measurement and simulation are compared, the most direct first, with unit.
+EFFORTS: Final = {"torque": "N*m", "current": "A", "voltage": "V", "power": "W"}
 #: Suffix of a joint's column -> (attribute of `Log`, unit as `actuators.units` writes it).
 JOINT_COLUMNS: Final = {
     "position_rad": ("position", "rad"),

@@ -10,8 +10,8 @@ from actuators.errors import closest, one_line
 from actuators.units import dimension
 from pipeline.logs.errors import GapError, LogFormatError, WrongRobotError
 from pipeline.logs.reading.expected import Expected
-from pipeline.logs.reading.log import EFFORTS
 from pipeline.logs.reading.log_format import (
+    EFFORTS,
     JOINT_COLUMNS,
     TIME,
     Target,

@@ -15,6 +15,8 @@ import tomlkit
 
 from actuators.loading.build import CATALOG, load_catalog
 from actuators.units import from_si, to_si
+from pipeline.atomic import replacing
+from pipeline.column import column
 from pipeline.paper.calibration.fingerprint import fingerprint
 from pipeline.paper.calibration.prior import Prior, load_prior
 from pipeline.paper.errors import CalibrationError
@@ -22,8 +24,6 @@ from pipeline.paper.hexapod import POSTURE, ROBOT, SPLITS
 from pipeline.paper.motor_constants import UNITS
 from pipeline.paper.published import load_published
 from pipeline.robot.robot_file import load_robot_file
-from reports.atomic import replacing
-from reports.column import column
 
 RESULTS_FILE = Path(__file__).parent / "results" / "calibration.json"
 _DIGITS = 9

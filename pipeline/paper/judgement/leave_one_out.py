@@ -10,11 +10,11 @@ from typing import ClassVar
 import numpy as np
 
 from actuators.units import from_si
+from pipeline.column import column
 from pipeline.paper.calibration.problem import extra_target
 from pipeline.paper.judgement.evidence import LEAST, NONE, Sets, quantiles
 from pipeline.paper.motor_constants import data_sheet, joint_torques
 from pipeline.paper.published import EVEN, EXTRA, Published
-from reports.column import column
 
 #: What each exactly met target fixes; nothing else knows these numbers of the robot.
 _FIXES = {

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from actuators.units import from_si
+from pipeline.column import column
 from pipeline.paper.hexapod import PUBLISHED_LEG
 from pipeline.paper.judgement.rows import MISSED, REPRODUCED
 from pipeline.paper.published import CYCLE, EVEN, Published
 from pipeline.paper.quantities import pair_break_even
-from reports.column import column
 
 #: Half widths within which the search meets a row whose tolerance is a hard edge.
 SEARCH_SLACK = 0.02

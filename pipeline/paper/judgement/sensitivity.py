@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from reports.column import column
+from pipeline.column import column
 
 
 @dataclass(frozen=True)

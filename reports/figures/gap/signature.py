@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuators.arrays import Array
-from reports.errors import FigureError
+from pipeline.errors import FigureError
 from reports.figures.style import (
     BLUE,
     INK,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from actuators.arrays import Array
-from reports.errors import FigureError
+from pipeline.errors import FigureError
 from reports.figures.robot.dimensions import dimension
 from reports.figures.stretch import Stretch
 from reports.figures.style import (

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from actuators.arrays import Array
-from reports.errors import FigureError
+from pipeline.errors import FigureError
 from reports.figures.robot.meshes import mesh_file, read_mesh
 from reports.figures.robot.solids import GREY, Color, Solid, box, cylinder, mesh, sphere
 

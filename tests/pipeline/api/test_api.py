@@ -19,9 +19,8 @@ import pytest
 import pipeline as lw
 from actuators.errors import CatalogError
 from pipeline.api.result import Result
-from pipeline.errors import PipelineError, RobotFileError
+from pipeline.errors import PipelineError, RobotFileError, TableError
 from pipeline.logs.errors import GapError
-from reports.errors import TableError
 from tests.command_line import exit_code
 
 FOLDER = Path(__file__).parents[3] / "pipeline" / "examples"

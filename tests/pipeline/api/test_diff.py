@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from reports.atomic import write_text
+from pipeline.atomic import write_text
 from reports.folder import staged
 from reports.table import Table
 from reports.writer import write_table

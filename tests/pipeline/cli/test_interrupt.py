@@ -17,7 +17,7 @@ import pytest
 
 from pipeline.api import figures
 from pipeline.cli.main import main
-from reports.errors import FigureError
+from pipeline.errors import FigureError
 from reports.folder import MANIFEST, holding, read_manifest
 from tests.command_line import Command, exit_code, in_another_process, results
 from tests.demo import DEMO

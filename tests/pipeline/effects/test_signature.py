@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.api.gap_figures import signature_variable
+from pipeline.api.gap.figures import signature_variable
 from pipeline.effects.base import SIGNATURES, Effect
 from pipeline.effects.registry import effect_named
 from pipeline.logs.errors import EffectError

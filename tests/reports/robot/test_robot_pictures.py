@@ -12,10 +12,10 @@ import pinocchio as pin
 import pytest
 
 from pipeline.api.pictures.scene import Scene
+from pipeline.errors import FigureError
 from pipeline.motion.standing import standing_posture
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.errors import FigureError
 from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.projection import FRONT, OBLIQUE, SIDE, TOP, draw_scene, extent
 from reports.figures.robot.robot_view import robot_figure

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from pipeline.api.logs import Common, LogResult, analysed
-from pipeline.api.machine import Machine
+from pipeline.api.gap.log_result import Common, LogResult
 from pipeline.identification.compare.loaded import LoadedLogs
 from pipeline.identification.supply.account import Account, account
 from pipeline.identification.workflow.compared import judged
@@ -56,23 +54,6 @@ def added_up(
     findings = judged(loaded).findings
     own = common([table_of(QualityRow, findings), *power_tables(balance)], findings)
     return Powered(*own, balance)
-
-
-def power(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Powered:
-    """What a machine's supply gives, against the sum over its drives.
-
-    Args:
-        logs: With samples of the supply, from `read_log` or by path.
-        machine: With a motor in every joint.
-        test: Logs that are held out: nothing is fitted to them.
-        **options: See `pipeline.identification.workflow.options.Options`.
-
-    Raises:
-        GapError: A log has no power at the supply, or too few samples of it.
-    """
-    result = analysed("power", machine, logs, test, **options)
-    assert isinstance(result, Powered)
-    return result
 
 
 def write_power_figures(balance: Account, robot: str, out: Path) -> None:

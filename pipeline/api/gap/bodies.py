@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from pipeline.atomic import write_text
 from pipeline.effects.model_file import edits_in
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.errors import GapError
@@ -14,7 +15,6 @@ from pipeline.simulation.found_bodies import (
     found_bodies,
     not_in_urdf,
 )
-from reports.atomic import write_text
 from reports.pages.gap_words import URDF_FILE
 
 

@@ -13,7 +13,7 @@ from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.confidence import Rival, graded, rms, validation_errors
 from pipeline.identification.selection.evidence import State
 from pipeline.identification.selection.search import Search
-from tests.pipeline.identification.test_search import BLOCKS, FOUR, WEIGHTS, log_of
+from tests.pipeline.identification.selection.test_search import BLOCKS, FOUR, WEIGHTS, log_of
 
 #: Nothing in the name's place: much less likely, and sure over blocks.
 NOTHING = Rival(None, limits.EXCLUDED + 1.0, limits.SURE + 1.0)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from reports.errors import OutputError
+from pipeline.errors import OutputError
 
 #: Of every hidden folder of results.
 PREFIX = ".legwatt-"

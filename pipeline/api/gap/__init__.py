@@ -1,0 +1,1 @@
+"""Logs against a machine: what the steps write."""

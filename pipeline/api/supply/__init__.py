@@ -1,1 +1,0 @@
-"""What a machine takes from its supply, as one call."""
