@@ -45,7 +45,7 @@ def refuse_falling(
         )
     slack = _ROUNDING * max(1.0, float(np.abs(normal).max()))
     if lowest < -slack:
-        sample, foot = np.unravel_index(int(normal.argmin()), normal.shape)
+        sample, foot = np.argwhere(normal <= lowest + slack)[0]  # the first of those alike
         margin = stability_margins(robot, segment)[sample]
         raise TippingError(
             f"the robot tips at t = {segment.time[sample]:.4g} s ({segment.name}): the foot of leg "

@@ -26,7 +26,8 @@ def source_of(given: str) -> RobotSource:
     known = named_robot(given)
     if known is not None:
         return known
-    beside = [path.with_suffix(".srdf"), path.parent.parent / "srdf" / f"{path.stem}.srdf"]
+    name = f"{path.stem}.srdf"
+    beside = (path.parent / name, path.parent.parent / "srdf" / name)
     srdf = next((p for p in beside if p.is_file()), None)
     return RobotSource(path.stem, path, srdf, published=False)
 

@@ -75,7 +75,6 @@ def driven(seed: int, open_bridge: bool, seconds: float = 8.0) -> Log:
         position=run.position + rng.normal(0.0, 2e-5, run.position.shape),
         position_source="joint",
         voltage=voltage,
-        valid=~off,
         torque_off=off,
     )
 

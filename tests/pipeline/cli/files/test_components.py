@@ -49,6 +49,6 @@ def test_a_contradiction_of_ones_own_part_is_a_finding(
 ) -> None:
     (tmp_path / "motor").mkdir()
     path = tmp_path / "motor" / "own.toml"
-    path.write_text(TEXT.replace("318 rpm/V", "100 rpm/V"), "utf-8")
+    path.write_text(TEXT.replace("317 rpm/V", "100 rpm/V"), "utf-8")
     assert exit_code(["components", "--parts", str(tmp_path)]) == 1
     assert "motor/own.toml: --torque-constant" in capsys.readouterr().out
