@@ -64,6 +64,10 @@ def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
     """
     if isinstance(source, pd.DataFrame):
         return _motion(source, robot)
+    if not isinstance(source, str | Path):
+        raise InvalidMotionError(
+            f"a motion is a CSV file or a DataFrame with its columns, not {type(source).__name__}"
+        )
     try:
         table = pd.read_csv(source, comment="#")
     except OSError as error:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import Final
 import pandas as pd
 
 from actuators.errors import closest, one_line
+from actuators.text_file import LARGEST_TOML, UnreadableTextError, read_file, utf8
 from pipeline.choice.errors import MissionError
 
 STAND: Final = "stand"
@@ -61,10 +63,10 @@ def read_mission(path: Path, hours: float = DAY) -> tuple[Mode, ...]:
             do not sum to one, or hours to more than a day.
     """
     try:
-        table = pd.read_csv(path, comment="#", dtype=str, keep_default_na=False)
-    except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or one_line(error)
-        raise MissionError(f"{path}: no mission that can be read: {why}") from None
+        text = io.StringIO(utf8(read_file(path, LARGEST_TOML)))
+        table = pd.read_csv(text, comment="#", dtype=str, keep_default_na=False)
+    except (UnreadableTextError, ValueError) as error:
+        raise MissionError(f"{path}: no mission that can be read: {one_line(error)}") from None
     table.columns = [str(name).strip() for name in table.columns]
     for name in table.columns:
         if name not in _COLUMNS and not name.startswith("gait."):

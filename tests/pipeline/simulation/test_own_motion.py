@@ -147,3 +147,9 @@ def test_contacts_that_cannot_carry_the_robot_are_refused(
 def test_a_file_that_is_not_there_is_said_so(hexapod: Robot, tmp_path: Path) -> None:
     with pytest.raises(InvalidMotionError, match="no CSV that can be read"):
         read_motion(tmp_path / "none.csv", hexapod)
+
+
+def test_an_array_without_names_is_refused_in_one_line() -> None:
+    with pytest.raises(InvalidMotionError, match="not ndarray") as caught:
+        read_motion(np.zeros((5, 3)), None)  # type: ignore[arg-type]
+    assert "\n" not in str(caught.value)
