@@ -246,12 +246,11 @@ def _electrical(
     if IDEAL not in given.catalog.alternatives:
         subtitle += f"; no ratio: there is no alternative '{IDEAL}'"
     titles = short_titles(given.catalog)
-    ideal = titles.get(IDEAL)
     figure = partial(
         electrical_energy_figure,
         labels,
         {titles[name]: energy for name, energy in energies.items()},
-        reference=ideal,
+        reference=titles.get(IDEAL),
     )
     return {
         "electrical_energy": partial(
@@ -262,7 +261,7 @@ def _electrical(
         "electrical_energy_narrow": partial(
             figure,
             title=f"Energy per cycle, {leg_words(leg)}",
-            subtitle=f"\N{MULTIPLICATION SIGN}: times that of the {ideal}" if ideal else "",
+            subtitle=_name(given),
             width=NARROW,
         ),
     }

@@ -45,8 +45,8 @@ def left_open(problem: Problem) -> Array:
     """Effort that may be otherwise by what no log has shown, one standard deviation, (J, C).
 
     Of what was estimated and is written (effects, refitted bodies) by the scatter of the estimates
-    over blocks, of every other tolerance of a part by its stated size. On test rows, where
-    there are any: another motion may ask for what the first did not show.
+    over blocks, of every other tolerance of a part by its stated size. On a joint's test rows,
+    where it has any: another motion may ask for what the first did not show.
     """
     sums = problem.sums
     blocks = sums.blocks(TRAIN, VALIDATION)
@@ -60,16 +60,17 @@ def left_open(problem: Problem) -> Array:
     spread[~known, :] = spread[:, ~known] = 0.0
     prior = 1.0 / np.maximum(precision[:count], 1e-12)
     spread[np.arange(count), np.arange(count)] += np.where(known[:count], 0.0, prior)
-    tested = any((b.measurement.part == TEST).any() for b in problem.data_sets)
+    logs = [b.measurement for b in problem.data_sets]
+    tested = np.any([m.mask[m.part == TEST].any(axis=0) for m in logs], axis=0)
     variance, rows = np.zeros(problem.sigma.shape), np.zeros(problem.sigma.shape)
     for matrix in problem.matrices:
         data_set = matrix.data_set
-        part = data_set.parts[TEST] if tested else problem.head(problem.data_sets.index(data_set))
-        good = data_set.measurement.mask[data_set.rows[part]]
+        head = problem.head(problem.data_sets.index(data_set))
         for j, X in matrix.X.items():
+            part = data_set.parts[TEST] if tested[j] else head
             own = spread[np.ix_(matrix.ids[j], matrix.ids[j])]
             for c in range(X.shape[2]):
                 x = X[:, part, c]
                 variance[j, c] += float(np.sum(x * (own @ x))) / data_set.weight**2
-            rows[j] += good[:, j].sum()
+            rows[j] += data_set.measurement.mask[data_set.rows[part], j].sum()
     return np.asarray(np.sqrt(np.maximum(variance, 0.0) / np.maximum(rows, 1.0)) * problem.sigma)

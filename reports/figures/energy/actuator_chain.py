@@ -55,7 +55,7 @@ _MOTOR_NUMBERS = ("torque_constant", "resistance")
 #: [in]: narrow, so that letters can be read where the page is.
 _WIDTH, _MARGIN, _LINE, _GAP = 4.8, 0.12, 0.175, 0.5
 _NUMBERS_AT, _MARKS_AT = 1.82, 4.0
-_NAME_CHARS, _NUMBER_CHARS, _TITLE_CHARS, _WORD_CHARS = 20, 31, 46, 56
+_NAME_CHARS, _NUMBER_CHARS, _TITLE_CHARS, _WORD_CHARS = 20, 28, 46, 56
 _LEGEND_CHARS = 66
 
 

@@ -60,8 +60,9 @@ def electrical_energy_figure(
             left += value
         ratio = ""
         if name != reference and base > 0:
-            times = f"{number(totals[name] / base)} \N{MULTIPLICATION SIGN}"
-            ratio = f", {times}" if narrow else f"   {times} {reference}"
+            ratio = (
+                f"{', ' if narrow else '   '}{number(totals[name] / base)} \N{MULTIPLICATION SIGN}"
+            )
         names.append(f"{shorten(name, 44)}: {number(left)} J{ratio}" if narrow else name)
         if not narrow:
             axes.text(left + 0.008 * widest, row, f"{number(left)} J{ratio}", va="center")
@@ -70,6 +71,10 @@ def electrical_energy_figure(
     axes.set_ylim(len(alternatives) - 0.5, -0.95)
     axes.set_xlim(0, (1.02 if narrow else 1.25) * widest)
     axes.set_xlabel("electrical energy per cycle [J]")
+    if reference is not None and len(alternatives) > 1:
+        apart = "\n" if narrow else "; "
+        one = f"1 \N{MULTIPLICATION SIGN} is that of {shorten(reference, 44)}"
+        axes.set_xlabel(f"{axes.get_xlabel()}{apart}{one}")
     return figure
 
 

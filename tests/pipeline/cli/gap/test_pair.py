@@ -21,8 +21,9 @@ def _twin(out: Path, *hidden: str) -> dict[str, dict[str, float]]:
 
 def _gap(step: str, folder: Path, out: Path, *more: str) -> list[dict[str, str]]:
     given = folder / "given"
-    files = [str(given / "log.csv"), "--robot", str(given / "machine.urdf"), "--out", str(out)]
-    assert exit_code(["gap", step, *files, *more]) in (0, 1)
+    files = [str(given / "log.csv"), "--robot", str(given / "machine.urdf")]
+    mapping = ["--mapping", str(given / "mapping.toml")]
+    assert exit_code(["gap", step, *files, *mapping, "--out", str(out), *more]) in (0, 1)
     return rows_of(out / "found.csv") if (out / "found.csv").exists() else []
 
 

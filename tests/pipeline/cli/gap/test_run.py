@@ -19,7 +19,7 @@ COLUMNS = {
     "candidates": "effect joint place validation_before validation_after unit identifiable verdict "
     "reason",
     "found": "order effect law amounts_to joint place parameter value ci_low ci_high unit "
-    "gap_before gap_after gap_unit noise_floor level share reason written",
+    "gap_before gap_after gap_unit noise_floor level reason written",
 }
 SAME_FOR = 3.0  # [s] of the shipped logs
 SAME_SHARE = 0.95  # of all samples
