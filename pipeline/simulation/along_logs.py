@@ -51,7 +51,7 @@ def wrong_columns(
     mask = along.mask(as_logged, rough=False)
     bodies = along.bodies(as_logged, rough=False)
     copied = copies(log, along.effort(0.0, rough=False), bodies, mask)
-    return copied or column_findings(log, search(along), ratio)
+    return copied or column_findings(log, search(along, bodies), ratio)
 
 
 class AlongLogs:
@@ -87,8 +87,6 @@ class AlongLogs:
     def mask(self, reading: Reading, *, rough: bool) -> Mask:
         """Rows that count, shape (N, J)."""
         mask = np.concatenate([m.mask[rows] for m, rows in self._each(rough)])
-        if not reading.late.size:
-            return mask
         return mask[:, reading.effort_of] & mask[:, reading.position_of]
 
     def bodies(self, reading: Reading, *, rough: bool) -> Bodies:

@@ -71,9 +71,14 @@ class Mended:
     pushed: float = 0.0
 
 
-def search(along: Along) -> Mended:
-    """Find the reading of a log's columns that its motion asks for."""
-    one = _Search(along)
+def search(along: Along, as_logged: Bodies) -> Mended:
+    """Find the reading of a log's columns that its motion asks for.
+
+    Args:
+        along: Logs and model.
+        as_logged: What the model says along the motion as its columns are named.
+    """
+    one = _Search(along, as_logged)
     reading, score = one.reading, one.now
     before, pushed = score.share, one.pushed()
     steps: list[tuple[Hypothesis, float]] = []
@@ -102,11 +107,11 @@ class _Tried:
 class _Search:
     """Scores of readings; models along motions are kept while they are asked for."""
 
-    def __init__(self, along: Along) -> None:
+    def __init__(self, along: Along, as_logged: Bodies) -> None:
         self._along = along
-        self._models: dict[tuple[bytes, bool], Explaining] = {}
-        self.reading = as_named(along.mask(as_named(0), rough=False).shape[1])
-        model = self._model(self.reading, rough=False)
+        self.reading = as_named(as_logged.base.shape[1])
+        model = Explaining(as_logged, along.mask(self.reading, rough=False))
+        self._models = {(self.reading.motion, False): model}
         model.count_independent(self._effort(self.reading, rough=False))
         self.independent, self.floor = model.independent, model.bodies.floor
         self._live = tuple(model.joints)
@@ -124,8 +129,7 @@ class _Search:
         if key not in self._models:
             bodies = self._along.bodies(r, rough=rough)
             model = Explaining(bodies, self._along.mask(r, rough=rough))
-            if self._models:
-                model.independent = self.independent
+            model.independent = self.independent
             self._models[key] = model
         return self._models[key]
 
