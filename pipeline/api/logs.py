@@ -19,7 +19,7 @@ from pipeline.api.gap.tables import (
 )
 from pipeline.api.machine import Machine
 from pipeline.api.result import by_name
-from pipeline.effects.model_file import ModelFile, edits_in
+from pipeline.effects.model_file import edits_in
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.workflow.compared import Compared, compare_logs, judged
 from pipeline.identification.workflow.forward import Drive, by_model, rms
@@ -31,6 +31,7 @@ from pipeline.identification.workflow.validate import check
 from pipeline.logs.formats.convert import plain
 from pipeline.logs.quality.finding import Finding
 from pipeline.progress import Progress
+from pipeline.simulation.files import Files
 from pipeline.simulation.found_bodies import FoundBodies
 from reports.table import Table, table_of
 from reports.tables.gap import QualityRow, WhereRow, bodies, deciding_motion
@@ -251,18 +252,18 @@ def analysed(
         mapping=Path(mapping) if mapping else None,
         **options,
     )
-    return analyse(asked, known=machine.model)
+    return analyse(asked, files=machine.files)
 
 
 def analyse(
-    options: Options, progress: Progress | None = None, *, known: ModelFile | None = None
+    options: Options, progress: Progress | None = None, *, files: Files | None = None
 ) -> LogResult:
     """Run one step, or all of them.
 
     Args:
         options: Of the run.
         progress: Told what is being done.
-        known: Effects of the machine; those of the options' model file by default.
+        files: What names the machine, where it was read; by the options otherwise.
 
     Raises:
         PipelineError: Unusable robot.
@@ -270,12 +271,12 @@ def analyse(
         GapError: Unusable log, mapping or model file.
     """
     progress = progress or Progress()
-    check_options(options, known)
+    check_options(options, files)
     progress.step("reading foreign files")
     logs = (*options.logs, *options.holdout)
     for k, path in enumerate(logs):
         plain(path, lambda share, k=k: progress.done((k + share) / len(logs)))  # type: ignore[misc]
-    given = setup(options, known)
+    given = setup(options, files)
     refuse_own_urdf(given, options.out)
     step = options.step
 

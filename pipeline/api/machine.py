@@ -18,7 +18,8 @@ from pipeline.logs.errors import EffectError
 from pipeline.machine.own_actuators import without_folder
 from pipeline.robot.published import published_names
 from pipeline.simulation.edited import IDEAL
-from pipeline.simulation.settings import Files, Settings, read_files, settings
+from pipeline.simulation.files import Files, read_files
+from pipeline.simulation.settings import Settings, settings
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,14 +41,13 @@ from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_valid
 
 from actuators.checked import Names, Number, Pair, Table, Text, checked
 from actuators.errors import closest, one_line
-from actuators.loading.build import CATALOG, load_catalog
+from actuators.loading.build import CATALOG
 from actuators.text_file import UnreadableTextError, parsed, read_toml_file
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.logs.errors import EffectError, ModelFileError
-from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
-from pipeline.machine.own_actuators import actuator_folder, own_actuators
-from pipeline.robot.robot import load_robot
+from pipeline.machine.machine import MachineModel
+from pipeline.machine.own_actuators import actuator_folder
 from pipeline.robot.robot_file import load_robot_file
 
 SCHEMA: Final = 1
@@ -228,30 +227,6 @@ def new_model_file(robot: Path, alternative: str = "", catalog: Path = CATALOG) 
     if alternative:
         hashes = {p.name: file_sha256(p) for p in sorted(catalog.glob("*.toml"))}
     return ModelFile(robot, file_sha256(robot), alternative, hashes)
-
-
-def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
-    """The machine of a model file before its edits.
-
-    Args:
-        file: The model file.
-        actuators: Folder of the actuator files; the robot file's or the project's by default.
-
-    Raises:
-        pipeline.errors.PipelineError: The robot file or URDF cannot be used.
-        actuators.errors.ActuatorError: The catalogue has no such alternative.
-        ModelFileError: A bare URDF that is not there.
-    """
-    if file.robot.suffix.lower() == ".urdf":
-        parts = load_catalog(actuators or CATALOG)
-        chain = parts.chain(file.alternative) if file.alternative else None
-        return machine_of_urdf(file.robot, actuators=chain)
-    spec = load_robot_file(file.robot)
-    catalog = load_catalog(actuators or actuator_folder(spec) or CATALOG)
-    own = own_actuators(spec, catalog)
-    name = file.alternative
-    drives = own.actuators(own.catalog(catalog), name) if name else None
-    return machine_of_robot(load_robot(spec), drives)
 
 
 def apply_edits(model: MachineModel, edits: Sequence[Edit]) -> MachineModel:

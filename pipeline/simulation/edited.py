@@ -43,7 +43,6 @@ class Effects:
     """A model file's effects, ready for standing and walking."""
 
     robot: Robot  #: With the bodies and the ground that the effects change.
-    file: str  #: The model file's name.
     names: tuple[str, ...]  #: Of the effects in order.
     found_with: str  #: Alternative against which they were found; empty for none.
     apply: Callable[[MachineModel], MachineModel]  #: Puts them into a machine.
@@ -138,7 +137,6 @@ def effects(
     actuators: Actuators,
     apply: Callable[[MachineModel], MachineModel],
     names: tuple[str, ...],
-    file: str,
     *,
     found_with: str | None = None,
     warnings: tuple[str, ...] = (),
@@ -150,7 +148,6 @@ def effects(
         actuators: Of the alternative they were found against, or of any with a motor.
         apply: Puts the effects into a machine.
         names: Of the effects in order.
-        file: The model file's name.
         found_with: Alternative against which they were found, empty for none; the chain's by
             default.
         warnings: What of the model file a reader should know.
@@ -163,4 +160,4 @@ def effects(
     model = changed_model(machine.rigid, machine.bodies)
     edited = robot if model is robot.model else replace(robot, model=model)
     own = actuators.name if found_with is None else found_with
-    return Effects(edited, file, names, own, apply, bare, machine, warnings)
+    return Effects(edited, names, own, apply, bare, machine, warnings)

@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuators.errors import CatalogError
-from actuators.loading.build import CATALOG, Catalog, load_catalog
+from actuators.loading.build import Catalog
 from pipeline.dynamics.force_rules import GroundForces
-from pipeline.effects.model_file import ModelFile, apply_edits, read_model_file
+from pipeline.effects.model_file import apply_edits
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.drivetrains import Actuators
 from pipeline.machine.motors import Motors, motors_of
-from pipeline.machine.own_actuators import (
-    OwnActuators,
-    actuator_folder,
-    own_actuators,
-    without_folder,
-)
+from pipeline.machine.own_actuators import OwnActuators
 from pipeline.motion.gait import gait_table
-from pipeline.motion.gait_table import spec_with_gait
 from pipeline.motion.motion import Motion
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
-from pipeline.simulation.changes import changed
+from pipeline.robot.robot_file import RobotSpec
 from pipeline.simulation.edited import IDEAL, Effects, effects
+from pipeline.simulation.files import Files, Stated, stated
 from pipeline.simulation.ground_forces.force_choice import ForceChoice
 from pipeline.simulation.ground_forces.least_power import Adjust
 from pipeline.simulation.memory import refuse_beyond_memory
@@ -42,53 +36,6 @@ if TYPE_CHECKING:
 LEAST_SAMPLES = 51
 SAMPLES = 751
 PAPER_FORCES = ForceChoice()
-
-
-@dataclass(frozen=True)
-class Files:
-    """What a machine's files say, before numbers are changed."""
-
-    robot: Path  #: Robot file, or the URDF of a robot on a fixed base.
-    spec: RobotSpec | None = field(repr=False)  #: The robot file's contents; None for a URDF.
-    catalog: Catalog = field(repr=False)  #: Actuator components and alternatives.
-    #: Folder of the user's own actuator files; None for the project's catalogue.
-    actuators: Path | None = None
-    gait: Path | None = None  #: The gait file; None without one.
-    model: ModelFile | None = None  #: Effects of the model file; None without one.
-    model_path: Path | None = None  #: The model file; None without one.
-
-
-def read_files(
-    robot: Path | None = None,
-    *,
-    model: Path | None = None,
-    gait: Path | None = None,
-    actuators: Path | None = None,
-) -> Files:
-    """Read what names a machine.
-
-    Args:
-        robot: Robot file or URDF; the model file's or the project's hexapod by default.
-        model: Model file with effects.
-        gait: File with a table ``[gait]`` to walk instead of the robot file's.
-        actuators: Folder of actuator files; the robot file's or the project's by default.
-
-    Raises:
-        PipelineError: The robot file or the gait file cannot be used.
-        ActuatorError: A catalogue file cannot be used.
-        GapError: The model file cannot be used.
-    """
-    file = read_model_file(model, actuators) if model else None
-    path = robot or (file.robot if file else DEFAULT_ROBOT)
-    spec = None
-    if path.suffix.lower() != ".urdf":
-        spec = spec_with_gait(path, gait)
-        if actuators:
-            spec = without_folder(spec)
-        actuators = actuators or actuator_folder(spec)
-    elif not path.is_file():
-        raise RobotFileError(f"{path}: no such robot file; name a robot file or URDF")
-    return Files(path, spec, load_catalog(actuators or CATALOG), actuators, gait, file, model)
 
 
 @dataclass(frozen=True, eq=False)
@@ -235,20 +182,18 @@ def settings(
         ActuatorError: A changed parameter cannot be used.
         GapError: Effects do not fit the robot.
     """
-    assert files.spec is not None
     changes = changes or {}
-    spec, catalog, notes = changed(files.spec, files.catalog, changes)
-    own = own_actuators(spec, catalog)
-    catalog = own.catalog(catalog)
-    bare, warnings = _bare(spec, before)
+    said = stated(files, changes)
+    assert said.spec is not None
+    bare, warnings = _bare(said.spec, before)
     robot = before.robot if before and bare is before.bare else with_payload(bare)
-    effects = _effects(files, robot, catalog, own) if files.model else None
+    effects = _effects(files, robot, said) if files.model else None
     return Settings(
-        files, dict(changes), bare, robot, catalog, own, effects, tuple(notes), tuple(warnings)
+        files, dict(changes), bare, robot, said.catalog, said.own, effects, said.notes, warnings
     )
 
 
-def _bare(spec: RobotSpec, before: Settings | None) -> tuple[Robot, Sequence[str]]:
+def _bare(spec: RobotSpec, before: Settings | None) -> tuple[Robot, tuple[str, ...]]:
     """The robot without its payload, and what of its bodies a reader should know."""
     if before is not None:
         old = before.robot.spec
@@ -260,19 +205,18 @@ def _bare(spec: RobotSpec, before: Settings | None) -> tuple[Robot, Sequence[str
     return bare, refuse_impossible(bare)
 
 
-def _effects(files: Files, robot: Robot, catalog: Catalog, own: OwnActuators) -> Effects:
+def _effects(files: Files, robot: Robot, said: Stated) -> Effects:
     """The model file's effects on this robot."""
     file = files.model
     assert file is not None
-    others = [name for name in catalog.alternatives if name != IDEAL]
+    others = [name for name in said.catalog.alternatives if name != IDEAL]
     if not (file.alternative or others):
         raise CatalogError("effects need an actuator with a motor of its own; add an alternative")
     return effects(
         robot,
-        own.actuators(catalog, file.alternative or others[0]),
+        said.chain(file.alternative or others[0]),
         lambda machine: apply_edits(machine, file.edits),
         tuple(edit.effect for edit in file.edits),
-        files.model_path.name if files.model_path else "model.toml",
         found_with=file.alternative,
         warnings=file.changed,
     )

@@ -26,7 +26,7 @@ from actuators.units import dimension, from_si, to_si
 from pipeline.api.machine import Machine
 from pipeline.errors import PipelineError
 from pipeline.motion.gait_table import gait_keys
-from pipeline.simulation.changes import GAIT, changed
+from pipeline.simulation.files import GAIT, stated
 from reports.typeset import unit_suffix
 
 #: Everyday words for keys of ``[gait]``.
@@ -114,11 +114,9 @@ def _axis(text: str, machine: Machine) -> Axis:
     elif own:
         unit = "" if own == "1" else own
     axis = Axis(key, unit, values, ranged)
-    files = machine.files
-    assert files.spec is not None
     for value in values:  # each by itself is one that ``--set`` takes; together they may not be
         try:
-            changed(files.spec, files.catalog, {**machine.changes, key: axis.change(value)})
+            stated(machine.files, {**machine.changes, key: axis.change(value)})
         except (PipelineError, ActuatorError) as error:
             raise ValueError(str(error).partition(": ")[2] or str(error)) from None
     return axis

@@ -121,7 +121,7 @@ def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -
     def apply(model: MachineModel) -> MachineModel:
         return with_every(apply_edits(model, edits), found)
 
-    return effects(given.robot, actuators, apply, names, "model.toml", found_with=given.alternative)
+    return effects(given.robot, actuators, apply, names, found_with=given.alternative)
 
 
 def cost(

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from actuators.loading.build import CATALOG, Catalog, load_catalog
-from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file, read_model_file
-from pipeline.errors import RobotFileError
+from actuators.loading.build import CATALOG, Catalog
+from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file
 from pipeline.identification.compare.bandwidth import lowered, naming_cutoff
 from pipeline.identification.compare.loaded import LoadedLogs, prepare_logs
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
@@ -34,33 +33,25 @@ from pipeline.logs.reading.plan import plan_reading
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.motors import Motors, motors_of
-from pipeline.machine.own_actuators import (
-    OwnActuators,
-    actuator_folder,
-    own_actuators,
-    without_folder,
-)
-from pipeline.motion.gait_table import spec_with_gait
+from pipeline.machine.own_actuators import OwnActuators
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.along_logs import wrong_columns
-from pipeline.simulation.changes import changed
+from pipeline.simulation.files import Files, read_files, stated
 
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
 DEFAULT_ALTERNATIVE = "rotor"
 #: The channel that is compared without an actuator, for a robot file as for a bare URDF.
 AT_JOINT = "torque"
-BASES = ("fixed", "level", "measured")
 
 
 @dataclass(frozen=True)
 class Setup:
     """The machine as its files describe it."""
 
-    path: Path  #: Robot file or URDF.
+    files: Files  #: What was read.
     sources: tuple[Path, ...]  #: Every file that was read, for hashes.
     robot: Robot | None  #: None for a bare URDF.
     model: MachineModel  #: As the workflow computes it.
@@ -74,7 +65,11 @@ class Setup:
     warnings: tuple[str, ...] = ()  #: What of the files a reader should know, in words.
     #: Joints of the URDF that mimic another, to the other's name; no log may move them.
     mimics: Mapping[str, str] = field(default_factory=dict)
-    folder: Path = CATALOG  #: Of the actuator files, the user's or the project's.
+
+    @property
+    def path(self) -> Path:
+        """Robot file or URDF."""
+        return self.files.robot
 
     @property
     def motors(self) -> Motors | None:
@@ -83,8 +78,8 @@ class Setup:
             return None
         used = {self.alternative: self.own.actuators(self.catalog, self.alternative)}
         mass = float(sum(inertia.mass for inertia in self.bare.rigid.inertias))
-        stated = self.folder != CATALOG
-        return motors_of(self.catalog, self.own, used, self.bare.joints, mass, stated=stated)
+        said = self.files.actuators is not None
+        return motors_of(self.catalog, self.own, used, self.bare.joints, mass, stated=said)
 
     @property
     def legged(self) -> bool:
@@ -92,12 +87,12 @@ class Setup:
         return self.robot is not None and self.robot.floating
 
 
-def setup(options: Options, known: ModelFile | None = None) -> Setup:
+def setup(options: Options, files: Files | None = None) -> Setup:
     """Load the robot, its actuator and the model file.
 
     Args:
         options: Of the run.
-        known: What a model file would hold, where it was not written; `options.model` otherwise.
+        files: What names the machine, where it was read; by the options otherwise.
 
     Raises:
         PipelineError: The robot file or URDF cannot be used.
@@ -105,90 +100,84 @@ def setup(options: Options, known: ModelFile | None = None) -> Setup:
         GapError: `--base` does not fit the robot, nothing says how it is driven, or the model file
             cannot be used.
     """
-    given_file = read_model_file(options.model, options.actuators) if options.model else known
-    path: Path = options.robot or (given_file.robot if given_file else DEFAULT_ROBOT)
-    parts = _parts(path, options)
-    catalog, own = parts.catalog, parts.own
+    files = _on_base(files or _files(options), options.base)
+    said, path, given_file = stated(files, options.changes), files.robot, files.model
     alternative = _alternative(options, given_file)
-    if parts.spec is None:
-        chain = catalog.chain(alternative) if alternative else None
+    if said.spec is None:
+        robot, text, where = None, read_urdf(path), str(path)
+        chain = said.chain(alternative) if alternative else None
         bare = machine_of_urdf(path, actuators=chain)
-        text = read_urdf(path)
-        odd = tolerated(check_urdf(text, str(path)))
-        robot = None
         expected = expected_of_model(
             bare.rigid, bare.name, joints=bare.joints, ratio=_ratio(chain, bare.joints)
         )
         sources: tuple[Path, ...] = (path,)
     else:
-        robot = load_robot(parts.spec)
+        robot = load_robot(said.spec)
         refuse_impossible(robot, tolerant=True)
-        text, odd = robot.urdf, tolerated(check_urdf(robot.urdf, source_of(robot)))
+        text, where = robot.urdf, source_of(robot)
         robot = with_payload(robot)
         # Motor-side positions need a ratio whatever channel is compared.
-        usual = alternative or own.usual or _default(catalog)
-        actuators = own.actuators(catalog, usual)
-        expected = expected_of_robot(robot, ratio=_ratio(actuators, robot.joints))
+        usual = alternative or said.own.usual or _default(said.catalog)
+        chain = said.chain(usual)
+        expected = expected_of_robot(robot, ratio=_ratio(chain, robot.joints))
         electrical = options.step == "power" or _channel(options, expected) != AT_JOINT
         if not alternative and electrical:
             alternative = usual
-        bare = machine_of_robot(robot, actuators if alternative else None)
+        bare = machine_of_robot(robot, chain if alternative else None)
         sources = (*robot.spec.sources, *(() if robot.spec.build else (robot.spec.urdf,)))
+    folder = files.actuators or CATALOG
     edits = given_file.edits if given_file else ()
     noise = given_file.noise if given_file else {}
-    file = replace(new_model_file(path, alternative, parts.folder), edits=edits, noise=noise)
     return Setup(
-        path=path,
-        sources=(*sources, *(_catalog_files(parts.folder) if alternative else ())),
+        files=files,
+        sources=(*sources, *(sorted(folder.glob("*.toml")) if alternative else ())),
         robot=robot,
         model=apply_edits(bare, edits),
         expected=expected,
-        catalog=catalog,
-        own=own,
+        catalog=said.catalog,
+        own=said.own,
         alternative=alternative,
-        file=file,
+        file=replace(new_model_file(path, alternative, folder), edits=edits, noise=noise),
         bare=bare,
-        folder=parts.folder,
-        warnings=(*parts.remarks, *odd, *(given_file.changed if given_file else ())),
+        warnings=(
+            *_told(options.changes),
+            *said.notes,
+            *tolerated(check_urdf(text, where)),
+            *(given_file.changed if given_file else ()),
+        ),
         mimics=mimics_in(text, str(path)),
     )
 
 
-@dataclass(frozen=True)
-class _Parts:
-    """What the files say, numbers changed: no robot file for a bare URDF."""
-
-    spec: RobotSpec | None
-    folder: Path
-    catalog: Catalog
-    own: OwnActuators
-    remarks: tuple[str, ...]
+def _files(options: Options) -> Files:
+    return read_files(
+        options.robot, model=options.model, gait=options.gait, actuators=options.actuators
+    )
 
 
-def _parts(path: Path, options: Options) -> _Parts:
-    """Robot file and actuators as asked for.
+def _told(changes: Mapping[str, object]) -> list[str]:
+    numbers = ", ".join(f"{key}={value}" for key, value in changes.items())
+    told = f"numbers changed for this run alone: {numbers}; a model file does not hold them"
+    return [told] if changes else []
+
+
+def _on_base(files: Files, base: str | None) -> Files:
+    """The machine on the base that is asked for.
 
     Raises:
-        PipelineError: The robot file or a change cannot be used.
-        ActuatorError: The catalogue cannot be used.
-        GapError: `--base` does not fit the robot.
+        GapError: It does not stand on such a base.
     """
-    if not path.is_file():
-        fact = "is a folder" if path.is_dir() else "no such robot file"
-        raise RobotFileError(f"{path}: {fact}; name a robot file or URDF with --robot")
-    numbers = ", ".join(f"{key}={value}" for key, value in options.changes.items())
-    told = [f"numbers changed for this run alone: {numbers}; a model file does not hold them"]
-    told = told if numbers else []
-    spec = _spec(path, options.base, options.gait)
-    if spec is None:
-        folder = options.actuators or CATALOG
-        _, catalog, _ = changed(None, load_catalog(folder), options.changes)
-        return _Parts(None, folder, catalog, OwnActuators(), tuple(told))
-    folder = options.actuators or actuator_folder(spec) or CATALOG
-    spec = without_folder(spec) if options.actuators else spec
-    spec, catalog, remarks = changed(spec, load_catalog(folder), options.changes)
-    own = own_actuators(spec, catalog)
-    return _Parts(spec, folder, own.catalog(catalog), own, (*told, *remarks))
+    spec = files.spec
+    if spec is not None and base == "fixed" and spec.floating:
+        return replace(files, spec=replace(spec, floating=False))
+    if base in ("level", "measured") and spec is None:
+        raise GapError(
+            f"{files.robot}: a bare URDF stands on a fixed base; write a robot file for "
+            f"--base {base}"
+        )
+    if base in ("level", "measured") and spec is not None and not spec.floating:
+        raise GapError(f"{files.robot}: its base is fixed; leave --base {base} out")
+    return files
 
 
 def _alternative(options: Options, file: ModelFile | None) -> str:
@@ -229,30 +218,6 @@ def _channel(options: Options, expected: Expected) -> str:
         return str(options.effort)
     mapping = load_mapping(options.mapping) if options.mapping else None
     return plan_reading(options.logs[0], expected, mapping).channel
-
-
-def _spec(path: Path, base: str | None, gait: Path | None) -> RobotSpec | None:
-    """A robot file, base and gait as asked for; None for a bare URDF."""
-    if path.suffix.lower() != ".toml":
-        if base in ("level", "measured"):
-            raise GapError(
-                f"{path}: a bare URDF stands on a fixed base; write a robot file for --base {base}"
-            )
-        if gait is not None:
-            raise GapError(
-                f"{path}: a bare URDF walks no gait; write a robot file for --gait {gait}"
-            )
-        return None
-    spec = spec_with_gait(path, gait)
-    if base == "fixed" and spec.floating:
-        spec = replace(spec, floating=False)
-    if base in ("level", "measured") and not spec.floating:
-        raise GapError(f"{path}: its base is fixed; leave --base {base} out")
-    return spec
-
-
-def _catalog_files(folder: Path) -> tuple[Path, ...]:
-    return tuple(sorted(folder.glob("*.toml")))
 
 
 def _ratio(actuators: Actuators | None, joints: tuple[str, ...]) -> np.ndarray | None:
@@ -379,7 +344,7 @@ def _largest(given: Setup) -> dict[str, np.ndarray]:
     }
 
 
-def check_options(options: Options, known: ModelFile | None = None) -> None:
+def check_options(options: Options, files: Files | None = None) -> None:
     """Refuse options that cannot be, before anything is read.
 
     Raises:
@@ -400,7 +365,7 @@ def check_options(options: Options, known: ModelFile | None = None) -> None:
         if file and not file.is_file():
             fact = "is a folder, expected a" if file.is_dir() else "no such"
             raise error(f"{file}: {fact} {what} file")
-    if options.step == "shrink" and not (options.model or known):
+    if options.step == "shrink" and not (options.model or (files and files.model)):
         raise ModelFileError("gap shrink: name the model file to check with --model")
     if options.gait_start is not None and not math.isfinite(options.gait_start):
         raise GapError(f"--gait-start {options.gait_start}: expected a time in the log [s]")

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from actuators.errors import closest, one_line
-from pipeline.effects.model_file import apply_edits, base_model, read_model_file
+from pipeline.effects.model_file import apply_edits, read_model_file
 from pipeline.logs.errors import MappingError, ModelFileError
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.robot.robot import load_robot
@@ -14,6 +14,7 @@ from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_source import read_urdf
 from pipeline.simulation.export import mjcf, ros2_control, urdf
 from pipeline.simulation.export.joints import found_text, joint_numbers, left_out
+from pipeline.simulation.files import base_model
 
 KINDS = ("mjcf", "urdf", "ros2_control")
 

@@ -13,7 +13,6 @@ from pipeline.effects.model_file import (
     Edit,
     EditParameter,
     apply_edits,
-    base_model,
     new_model_file,
     read_model_file,
 )
@@ -22,6 +21,7 @@ from pipeline.errors import PipelineError
 from pipeline.identification.workflow.model_writer import model_text
 from pipeline.logs.errors import GapError
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.files import base_model
 from tests.pipeline.logs.test_fuzz_readers import TOML_TOKENS, mutated
 
 #: Places on the leg by kind of place; what acts on other things is not on a leg.

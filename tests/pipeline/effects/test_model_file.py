@@ -10,12 +10,12 @@ from pipeline.effects.model_file import (
     Edit,
     EditParameter,
     apply_edits,
-    base_model,
     new_model_file,
     read_model_file,
 )
 from pipeline.identification.workflow.model_writer import model_text
 from pipeline.logs.errors import GapError, ModelFileError
+from pipeline.simulation.files import base_model
 
 
 def _edit(value: float = 0.4) -> Edit:

@@ -16,12 +16,13 @@ from pipeline.effects.drive.transmission_coupling import BareCoupling
 from pipeline.effects.drive.winding_heating import SensedHeating
 from pipeline.effects.flexible.friction_curve import FrictionCurveEffect
 from pipeline.effects.flexible.position_curve import PositionCurveEffect
-from pipeline.effects.model_file import apply_edits, base_model, new_model_file, read_model_file
+from pipeline.effects.model_file import apply_edits, new_model_file, read_model_file
 from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.identification.results import Estimate, Found
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.logs.errors import ModelFileError
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.files import base_model
 
 FORMS = (*(e for e in EFFECTS.values() if e.competes), BareCoupling(), SensedHeating())
 EVERY = (*EFFECTS.values(), BareCoupling(), SensedHeating())

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from pipeline.cli.gap import options_of
 from pipeline.cli.main import main, parser
-from pipeline.effects.model_file import apply_edits, base_model, read_model_file
+from pipeline.effects.model_file import apply_edits, read_model_file
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.results import SUSPECTED, Found
 from pipeline.identification.workflow.compared import Compared, compare_logs
@@ -27,6 +27,7 @@ from pipeline.identification.workflow.validate import check
 from pipeline.identification.workflow.written import Validated
 from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.progress import Progress
+from pipeline.simulation.files import base_model
 from pipeline.simulation.predict import Simulator
 
 Array = NDArray[np.float64]

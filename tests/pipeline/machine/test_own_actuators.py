@@ -11,12 +11,13 @@ from actuators.chain import Chain
 from actuators.energy.energy import stage_energy
 from actuators.loading.build import load_catalog
 from pipeline.api.machine import load
-from pipeline.effects.model_file import Edit, EditParameter, base_model, new_model_file
+from pipeline.effects.model_file import Edit, EditParameter, new_model_file
 from pipeline.errors import RobotFileError
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
 from pipeline.robot.robot_file import load_robot_file
+from pipeline.simulation.files import base_model
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import stand, walk
 

@@ -37,7 +37,7 @@ def with_effect(
     def apply(model: MachineModel) -> MachineModel:
         return effect_named(name).apply(model, (place,), values)
 
-    return effects(robot, catalog.chain(against), apply, (name,), "model.toml")
+    return effects(robot, catalog.chain(against), apply, (name,))
 
 
 def test_a_friction_of_nothing_changes_nothing(hexapod: Robot, catalog: Catalog) -> None:
@@ -157,9 +157,7 @@ def test_gears_with_losses_of_their_own_do_not_get_a_found_friction_besides(
         return effect_named("coulomb_friction").apply(model, (JOINT,), {"torque": 4.0})
 
     chains = catalog.chains()
-    edit = effects(
-        hexapod, chains["rotor"], apply, ("coulomb_friction",), "model.toml", found_with=against
-    )
+    edit = effects(hexapod, chains["rotor"], apply, ("coulomb_friction",), found_with=against)
     for name, chain in chains.items():
         assert (edit.chain(chain) is chain) == (name != against)
     assert edit.of_drivetrain == (JOINT,)

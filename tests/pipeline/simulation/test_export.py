@@ -18,12 +18,12 @@ from pipeline.cli.main import main
 from pipeline.effects.model_file import (
     CATALOG,
     apply_edits,
-    base_model,
     file_sha256,
     read_model_file,
 )
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.export.joints import bodies_of
+from pipeline.simulation.files import base_model
 
 Array = NDArray[np.float64]
 Effects = tuple[tuple[str, str, dict[str, tuple[float, str]]], ...]

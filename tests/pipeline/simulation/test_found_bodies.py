@@ -9,10 +9,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.effects.model_file import Edit, EditParameter, apply_edits, base_model, new_model_file
+from pipeline.effects.model_file import Edit, EditParameter, apply_edits, new_model_file
 from pipeline.effects.registry import EFFECTS
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.urdf_source import read_urdf
+from pipeline.simulation.files import base_model
 from pipeline.simulation.found_bodies import corrected_urdf, found_bodies, not_in_urdf
 from pipeline.simulation.rigid_bodies import changed_model
 from reports.pages.gap_words import body_words

@@ -113,9 +113,7 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
 def test_standing_and_walking_squeeze_in_the_same_sense(hexapod: Robot, name: str) -> None:
     """As `stand` and `walk` demand it of the actuators."""
     stance = STANCES[name]
-    edit = effects(
-        hexapod, load_catalog().chain("rotor"), squeezed, ("internal_foot_force",), "model.toml"
-    )
+    edit = effects(hexapod, load_catalog().chain("rotor"), squeezed, ("internal_foot_force",))
     before = stand(hexapod, {}, feet=stance).demand
     after = stand(edit.robot, {}, feet=stance, adjust=edit.demand).demand
     np.testing.assert_allclose(

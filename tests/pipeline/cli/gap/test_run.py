@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.effects.model_file import apply_edits, base_model, read_model_file
+from pipeline.effects.model_file import apply_edits, read_model_file
+from pipeline.simulation.files import base_model
 from tests.command_line import exit_code, rows_of, sidecar_of
 from tests.demo import DEMO, HIDDEN
 from tests.reports.browser import layout, needs_chromium
