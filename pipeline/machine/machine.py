@@ -11,7 +11,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from actuators.errors import closest
 from pipeline.logs.errors import ModelError
@@ -113,6 +115,19 @@ class MachineModel:
     def __post_init__(self) -> None:
         if not self.links:
             object.__setattr__(self, "links", _links(self.rigid))
+
+    def in_leg(self, place: str) -> tuple[int, int]:
+        """Leg that a link or joint belongs to and its number there; -1 and -1 outside the legs."""
+        joint = place if place in self.joints else self.carrier(place)
+        if self.layout is None or joint not in self.joints:
+            return -1, -1
+        leg, number = self.layout.places[self.index(joint)].tolist()
+        return leg, number
+
+    def own_leg(self, place: str) -> NDArray[np.intp]:
+        """Columns of the joints of the leg that a link or joint belongs to."""
+        assert self.layout is not None
+        return self.layout.of(self.in_leg(place)[0])
 
     def carrier(self, link: str) -> str:
         """Joint that carries a link.

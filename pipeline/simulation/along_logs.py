@@ -17,9 +17,8 @@ from pipeline.logs.columns.search import search
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.reading.log import Log
-from pipeline.machine.machine import Bodies as Edited
-from pipeline.machine.machine import MachineModel
-from pipeline.simulation.predict import Simulator
+from pipeline.machine.machine import BodyChange, MachineModel
+from pipeline.simulation.predict import Prediction, Simulator
 from pipeline.simulation.rigid_bodies import legs_are_separate
 
 #: Rows that are compared, of all logs together, and of them those of a rough comparison.
@@ -32,8 +31,10 @@ _SHIFT: Final = 0.3
 #: what an end carries over the mass of all that moves, and how far out over the links' length.
 _CARRIED: Final = 0.2
 _OUT: Final = 0.5
-#: Bodies lighter than this share of what the model says are none.
-_LIGHTEST: Final = 0.1
+#: Scale of all of a body, and the mass an end carries ...
+_ALL, _MASS = "scale", "mass"
+#: ... and their least change: bodies lighter than a tenth of what the model says are none.
+_LEAST: Final = {_ALL: -0.9, _MASS: 0.0}
 
 
 def wrong_columns(
@@ -102,26 +103,41 @@ class AlongLogs:
             simulator = Simulator(m)
             now = simulator.predict(self._model)
             base.append(now.effort[..., 0])
-            changed = [base[-1]]
-            if not rough:
-                models = (self._model.with_bodies(o.edited) for o in self._open)
-                steps = (simulator.predict(model, now).effort - now.effort for model in models)
-                changed = [d[..., 0] / o.step for d, o in zip(steps, self._open, strict=True)]
-            columns.append(np.stack(changed))
-        opened = (_Open(self._model.bodies, 1.0, _SCALE, _LIGHTEST - 1.0),) if rough else self._open
-        least = np.array([o.least for o in opened])
-        carried = [o.spread == _CARRIED and o.least == 0.0 for o in opened]
+            columns.append(base[-1][None] if rough else self._columns(simulator, now))
+        opened = (_Open("", _ALL, BodyChange(), 1.0, _SCALE),) if rough else self._open
+        least = np.array([_LEAST.get(o.what, -np.inf) for o in opened])
         return Bodies(
             base=np.concatenate(base),
             columns=np.concatenate(columns, axis=1),
             spread=np.array([o.spread for o in opened]),
             least=least,
-            relative=least == _LIGHTEST - 1.0,
+            relative=np.array([o.what == _ALL for o in opened]),
             v=np.concatenate([m.v for m in ms]),
             a=np.concatenate([m.a for m in ms]),
             rest=ms[0].rest_speed[of] * np.abs(factor),
-            ends=np.flatnonzero(carried),
+            ends=np.flatnonzero([o.what == _MASS for o in opened]),
         )
+
+    def _columns(self, simulator: Simulator, now: Prediction) -> Array:
+        """Change of the effort per unit of each open parameter, shape (P, N, J).
+
+        One prediction serves the like changes of all legs that leave each other alone.
+        """
+        model, separate = self._model, legs_are_separate(self._model, simulator.measurement)
+        groups: dict[tuple[str, object], list[int]] = {}
+        for k, o in enumerate(self._open):
+            leg, number = model.in_leg(o.joint)
+            groups.setdefault((o.what, number if separate and leg >= 0 else o.joint), []).append(k)
+        out = np.zeros((len(self._open), *now.torque.shape))
+        for group in groups.values():
+            bodies = model.bodies
+            for k in group:
+                bodies = bodies.with_body(self._open[k].joint, self._open[k].change)
+            moved = simulator.predict(model.with_bodies(bodies), now).effort - now.effort
+            for k in group:
+                own = model.own_leg(self._open[k].joint) if len(group) > 1 else slice(None)
+                out[k][:, own] = moved[:, own, 0] / self._open[k].step
+        return out
 
 
 def _surely(model: MachineModel, m: Measurement) -> Measurement:
@@ -152,37 +168,36 @@ def _later(m: Measurement, late: float) -> Array:
 
 
 class _Open(NamedTuple):
-    """A change of bodies: edited, by which step, spread and least value in its units."""
+    """A change of the body of one joint: which, by what step, with which spread."""
 
-    edited: Edited
+    joint: str
+    what: str
+    change: BodyChange
     step: float
     spread: float
-    least: float
 
 
 def _open(model: MachineModel) -> Iterator[_Open]:
-    rigid, bodies = model.rigid, model.bodies
+    rigid = model.rigid
     moving = {joint: rigid.getJointId(joint) for joint in model.joints}
     total = sum(rigid.inertias[i].mass for i in moving.values())
     lengths = [float(np.linalg.norm(rigid.jointPlacements[i].translation)) for i in moving.values()]
     for joint, i in moving.items():
-        body, change = rigid.inertias[i], bodies.body(joint)
+        body, change = rigid.inertias[i], model.bodies.body(joint)
         if body.mass > 0.0:
             scaled = replace(change, scale=change.scale * 1.1)
-            yield _Open(bodies.with_body(joint, scaled), 0.1, _SCALE, _LIGHTEST - 1.0)
+            yield _Open(joint, _ALL, scaled, 0.1, _SCALE)
             size = float(
                 np.sqrt(0.5 * np.trace(body.inertia) / body.mass + body.lever @ body.lever)
             )
-            for axis in np.eye(3):
+            for name, axis in zip("xyz", np.eye(3), strict=True):
                 shift = tuple(np.add(change.shift, 0.01 * size * axis).tolist())
-                edited = bodies.with_body(joint, replace(change, shift=shift))
-                yield _Open(edited, 0.01, _SHIFT, -np.inf)
+                yield _Open(joint, f"centre {name}", replace(change, shift=shift), 0.01, _SHIFT)
         if i in set(rigid.parents[1:]) or total <= 0.0:
             continue
-        unit = 0.1 * total
-        for k, arm in enumerate([1.0, *[max(float(np.mean(lengths)), 0.01)] * 3]):
+        arm = max(float(np.mean(lengths)), 0.01)
+        for k, what in enumerate((_MASS, "moment x", "moment y", "moment z")):
             carried = np.array(change.carried or (0.0,) * 10)
-            carried[k] += unit * arm
-            edit = replace(change, carried=tuple(carried.tolist()))
-            spread, least = (_CARRIED, 0.0) if k == 0 else (_CARRIED * _OUT, -np.inf)
-            yield _Open(bodies.with_body(joint, edit), 0.1, spread, least)
+            carried[k] += 0.1 * total * (arm if k else 1.0)
+            edited = replace(change, carried=tuple(carried.tolist()))
+            yield _Open(joint, what, edited, 0.1, _CARRIED * (_OUT if k else 1.0))

@@ -26,7 +26,6 @@ from pipeline.identification.regression.tolerances import (
     UNCERTAINTY,
     Nuisance,
     grouped,
-    leg_place,
     nuisance_columns,
     nuisances,
     of_own_leg,
@@ -257,8 +256,8 @@ class Problem:
         ):
             return [(place, effect_columns(data_set, base, effect, place, shape, self.sigma))]
         places = effect.places(base.model, data_set.measurement)
-        leg, number = leg_place(self.model, place[0])
-        group = [p for p in places if leg_place(self.model, p[0])[1] == number]
+        leg, number = self.model.in_leg(place[0])
+        group = [p for p in places if self.model.in_leg(p[0])[1] == number]
         if leg < 0 or len(group) < 2:
             return [(place, effect_columns(data_set, base, effect, place, shape, self.sigma))]
         whole = effect_columns(data_set, base, _Everywhere(effect, group), place, shape, self.sigma)

@@ -159,19 +159,9 @@ def nuisance_columns(
     return [of_own_leg(base.model, nuisance.place, whole) for nuisance in group]
 
 
-def leg_place(model: MachineModel, place: str) -> tuple[int, int]:
-    """Leg that a link or joint belongs to and its number there; -1 and -1 outside the legs."""
-    joint = place if place in model.joints else model.carrier(place)
-    if model.layout is None or joint not in model.joints:
-        return -1, -1
-    leg, number = model.layout.places[model.index(joint)].tolist()
-    return leg, number
-
-
 def of_own_leg(model: MachineModel, place: str, column: dict[int, Array]) -> dict[int, Array]:
     """Of a column by joint what stands at joints of the leg of a link or joint."""
-    assert model.layout is not None
-    own = model.layout.of(leg_place(model, place)[0])
+    own = model.own_leg(place)
     return {j: c for j, c in column.items() if j in own}
 
 
@@ -181,7 +171,7 @@ def grouped(model: MachineModel, m: Measurement, every: Sequence[Nuisance]) -> l
         return [[n] for n in every]
     groups: dict[tuple[str, int | str], list[Nuisance]] = {}
     for n in every:
-        leg, number = leg_place(model, n.place) if n.place else (-1, -1)
+        leg, number = model.in_leg(n.place) if n.place else (-1, -1)
         groups.setdefault((n.kind, n.place if leg < 0 else number), []).append(n)
     return list(groups.values())
 
