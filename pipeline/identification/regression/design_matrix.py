@@ -14,11 +14,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.effects.base import REACH, Coordinate, Place
+from pipeline.effects.base import REACH, Coordinate, Effect, Place
 from pipeline.logs.errors import NamingError
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
+from pipeline.simulation.rigid_bodies import legs_are_separate
 
 Array = NDArray[np.float64]
 Column = Mapping[int, Array]
@@ -37,6 +38,8 @@ class Editing(Protocol):
         """The changed model."""
 
 
+#: Effects whose like at another leg leaves this leg alone, where legs are separate.
+_OF_ONE_LEG = ("link_mass", "center_of_mass_offset", "position_offset")
 #: Rows kept per period of the low-pass's cut-off: twice what the sampling theorem asks.
 ROWS_PER_PERIOD = 4.0
 #: Most informative rows of all logs together.
@@ -167,6 +170,78 @@ def effect_columns(
         change = data_set.simulator.difference(start, _edit(effect, base, place, moved, shape))
         out.append(data_set.whitened(change.effort / step, change.joints, sigma))
     return out
+
+
+def columns_of_legs(
+    data_set: DataSet,
+    base: Prediction,
+    effect: Effect,
+    place: Place,
+    shape: Mapping[str, float],
+    sigma: Array,
+) -> list[tuple[Place, list[dict[int, Array]]]]:
+    """Columns of an effect; of the like ones of all legs where one prediction serves all.
+
+    Args:
+        data_set: The log.
+        base: Prediction of the model without the effect.
+        effect: The effect.
+        place: Where.
+        shape: Its nonlinear parameters.
+        sigma: Shape (J, C).
+
+    Returns:
+        Places, this one among them, and the columns there, one per coordinate.
+    """
+    model, m, group = base.model, data_set.measurement, []
+    if effect.name in _OF_ONE_LEG and legs_are_separate(model, m):
+        number = model.in_leg(place[0])[1]
+        group = [p for p in effect.places(model, m) if model.in_leg(p[0])[1] == number >= 0]
+    if len(group) < 2:
+        return [(place, effect_columns(data_set, base, effect, place, shape, sigma))]
+    whole = effect_columns(data_set, base, _Everywhere(effect, group), place, shape, sigma)
+    return [(p, [of_own_leg(model, p[0], column) for column in whole]) for p in group]
+
+
+def of_own_leg(model: MachineModel, place: str, column: Column) -> dict[int, Array]:
+    """Of a column by joint what stands at joints of the leg of a link or joint."""
+    own = model.own_leg(place)
+    return {j: c for j, c in column.items() if j in own}
+
+
+class _Everywhere:
+    """An effect at several places at once, for their columns alone."""
+
+    def __init__(self, effect: Effect, places: Sequence[Place]) -> None:
+        self.coordinates = effect.coordinates
+        self._effect, self._places = effect, places
+
+    def edit(
+        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
+    ) -> MachineModel:
+        """The effect everywhere."""
+        for other in self._places:
+            model = self._effect.edit(model, other, x, shape)
+        return model
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """An effect in the model."""
+
+    effect: Effect  #: The effect.
+    place: Place  #: Where.
+    x: Mapping[str, float]  #: Its coordinates.
+    shape: Mapping[str, float]  #: Its nonlinear parameters.
+
+    @property
+    def nonlinear(self) -> dict[str, float]:
+        """Nonlinear parameters that are estimated."""
+        return {n: v for n, v in self.shape.items() if n not in self.effect.fixed}
+
+    def apply(self, model: MachineModel) -> MachineModel:
+        """The model with the effect."""
+        return self.effect.edit(model, self.place, self.x, self.shape)
 
 
 def _edit(

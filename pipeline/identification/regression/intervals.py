@@ -21,8 +21,9 @@ from scipy.stats import chi2
 
 from pipeline.effects.bodies.rigid_body_parameters import NAMES, UNITS
 from pipeline.effects.sensing.time_delay import SKEW_TOLERANCE
+from pipeline.identification.regression.design_matrix import Accepted
 from pipeline.identification.regression.normal_equations import BlockSums, inverse_spd, solve_spd
-from pipeline.identification.regression.problem import Accepted, Problem
+from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.identification.results import Estimate
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION

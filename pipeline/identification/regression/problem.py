@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from pipeline.effects.base import Effect, Place
 from pipeline.identification.regression.design_matrix import (
+    Accepted,
     DataSet,
-    effect_columns,
+    columns_of_legs,
     residual,
 )
 from pipeline.identification.regression.normal_equations import (
@@ -28,20 +29,16 @@ from pipeline.identification.regression.tolerances import (
     grouped,
     nuisance_columns,
     nuisances,
-    of_own_leg,
 )
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction
-from pipeline.simulation.rigid_bodies import legs_are_separate
 
 Array = NDArray[np.float64]
 #: Log and form of a column, and its place.
 _Key = tuple[tuple[object, ...], Place]
 #: Whether effects of a joint hardly change them; one per coordinate, each by joint.
 _Columns = tuple[bool, list[dict[int, Array]]]
-
-
 #: Change of a tolerance, in sigmas, after which columns at its joint are computed anew.
 _STALE = 0.1
 #: Relative step of a nonlinear parameter for its column.
@@ -50,43 +47,6 @@ SHAPE_STEP = 1e-4
 _HELD = 3.0
 #: Prior precision of what is not free.
 FIXED = 1e9
-#: Effects whose like at another leg leaves this leg alone, where legs are separate.
-_OF_ONE_LEG = ("link_mass", "center_of_mass_offset", "position_offset")
-
-
-class _Everywhere:
-    """An effect at several places at once, for their columns alone."""
-
-    def __init__(self, effect: Effect, places: Sequence[Place]) -> None:
-        self.coordinates = effect.coordinates
-        self._effect, self._places = effect, places
-
-    def edit(
-        self, model: MachineModel, place: Place, x: Mapping[str, float], shape: Mapping[str, float]
-    ) -> MachineModel:
-        """The effect everywhere."""
-        for other in self._places:
-            model = self._effect.edit(model, other, x, shape)
-        return model
-
-
-@dataclass(frozen=True)
-class Accepted:
-    """An effect in the model."""
-
-    effect: Effect  #: The effect.
-    place: Place  #: Where.
-    x: Mapping[str, float]  #: Its coordinates.
-    shape: Mapping[str, float]  #: Its nonlinear parameters.
-
-    @property
-    def nonlinear(self) -> dict[str, float]:
-        """Nonlinear parameters that are estimated."""
-        return {n: v for n, v in self.shape.items() if n not in self.effect.fixed}
-
-    def apply(self, model: MachineModel) -> MachineModel:
-        """The model with the effect."""
-        return self.effect.edit(model, self.place, self.x, self.shape)
 
 
 @dataclass(eq=False)
@@ -241,27 +201,12 @@ class Problem:
         form = (log, effect.name, *(c.name for c in effect.coordinates), *sorted(shape.items()))
         if (form, place) not in self._columns:
             kept = effect.additive or effect.rescales
-            for sibling, columns in self._columns_of_legs(log, effect, place, shape):
+            data_set = self.data_sets[log]
+            base = self.files()[log] if effect.rescales else self.predictions[log]
+            every = columns_of_legs(data_set, base, effect, place, shape, self.sigma)
+            for sibling, columns in every:
                 self._columns[form, sibling] = kept, columns
         return self._columns[form, place][1]
-
-    def _columns_of_legs(
-        self, log: int, effect: Effect, place: Place, shape: Mapping[str, float]
-    ) -> list[tuple[Place, list[dict[int, Array]]]]:
-        """Columns of a candidate; of the like ones of all legs where one prediction serves all."""
-        data_set = self.data_sets[log]
-        base = self.files()[log] if effect.rescales else self.predictions[log]
-        if effect.name not in _OF_ONE_LEG or not legs_are_separate(
-            self.model, data_set.measurement
-        ):
-            return [(place, effect_columns(data_set, base, effect, place, shape, self.sigma))]
-        places = effect.places(base.model, data_set.measurement)
-        leg, number = self.model.in_leg(place[0])
-        group = [p for p in places if self.model.in_leg(p[0])[1] == number]
-        if leg < 0 or len(group) < 2:
-            return [(place, effect_columns(data_set, base, effect, place, shape, self.sigma))]
-        whole = effect_columns(data_set, base, _Everywhere(effect, group), place, shape, self.sigma)
-        return [(p, [of_own_leg(self.model, p[0], column) for column in whole]) for p in group]
 
     def tolerance_columns(self, log: int) -> list[dict[int, Array]]:
         """Columns of the tolerances, per standard deviation of each."""
@@ -390,16 +335,6 @@ class Problem:
         out = energy / np.maximum(square, 1e-300)
         out[: len(self.tolerances)] = 0.0
         return out
-
-    def gradient(self, matrices: Sequence[DesignMatrix]) -> Array:
-        """X^T W r (n,) without test rows, of this residual with columns of another estimate."""
-        h = self.precision * self.mean
-        for k, matrix in enumerate(matrices):
-            rest, rows = residual(matrix.data_set, self.predictions[k], self.sigma), self.head(k)
-            for j, r in rest.items():
-                weighted = r[rows] * self.weights[j]
-                h[matrix.ids[j]] += np.tensordot(matrix.X[j][:, rows], weighted, axes=2)
-        return h
 
     def cost(self) -> float:
         """Twice the negative logarithm of likelihood and prior of what the model holds."""

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.identification.regression.normal_equations import solve_spd
-from pipeline.identification.regression.problem import Accepted, Problem
+from pipeline.identification.regression.design_matrix import Accepted, residual
+from pipeline.identification.regression.normal_equations import DesignMatrix, solve_spd
+from pipeline.identification.regression.problem import Problem
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
 Array = NDArray[np.float64]
@@ -42,7 +44,7 @@ def _with_these_columns(problem: Problem, cost: float) -> tuple[Problem, float]:
     damping = 0.0
     for _ in range(_STEPS):
         D = np.diag(damping * np.diag(A))
-        after = _stepped(problem, _bounded(A + D, problem.gradient(matrices), *_bounds(problem)))
+        after = _stepped(problem, _bounded(A + D, gradient(problem, matrices), *_bounds(problem)))
         reached = after.cost()
         if reached >= cost:
             damping = max(_DAMPED, 10.0 * damping)
@@ -123,3 +125,17 @@ def _effect_stepped(problem: Problem, a: Accepted, step: Array, change: Array) -
         if seen and a.effect.plausible(problem.model, a.place, x, shape):
             return replace(a, x=x, shape=shape)
     return a
+
+
+def gradient(problem: Problem, matrices: Sequence[DesignMatrix]) -> Array:
+    """X^T W r (n,) without test rows, of this residual with columns of another estimate."""
+    h = problem.precision * problem.mean
+    for k, matrix in enumerate(matrices):
+        rest, rows = (
+            residual(matrix.data_set, problem.predictions[k], problem.sigma),
+            problem.head(k),
+        )
+        for j, r in rest.items():
+            weighted = r[rows] * problem.weights[j]
+            h[matrix.ids[j]] += np.tensordot(matrix.X[j][:, rows], weighted, axes=2)
+    return h

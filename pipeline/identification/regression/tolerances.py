@@ -19,7 +19,7 @@ from pipeline.effects.drive.joint_elasticity import COMPLIANCE_TOLERANCE
 from pipeline.effects.drive.torque_constant_error import CONSTANT_TOLERANCE
 from pipeline.effects.sensing.position_offset import ENCODER_TOLERANCE
 from pipeline.effects.sensing.time_delay import SKEW_TOLERANCE
-from pipeline.identification.regression.design_matrix import DataSet
+from pipeline.identification.regression.design_matrix import DataSet, of_own_leg
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction
@@ -157,12 +157,6 @@ def nuisance_columns(
     change = data_set.simulator.difference(base, model)
     whole = data_set.whitened(change.effort / step, change.joints, sigma)
     return [of_own_leg(base.model, nuisance.place, whole) for nuisance in group]
-
-
-def of_own_leg(model: MachineModel, place: str, column: dict[int, Array]) -> dict[int, Array]:
-    """Of a column by joint what stands at joints of the leg of a link or joint."""
-    own = model.own_leg(place)
-    return {j: c for j, c in column.items() if j in own}
 
 
 def grouped(model: MachineModel, m: Measurement, every: Sequence[Nuisance]) -> list[list[Nuisance]]:

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.effects.base import REACH
-from pipeline.identification.regression.problem import Accepted, Problem
+from pipeline.identification.regression.design_matrix import Accepted
+from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.refit import refit
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.evidence import State, noise_weights

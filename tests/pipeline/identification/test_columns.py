@@ -10,9 +10,13 @@ import pytest
 from pipeline.effects.bodies.link_mass import AXES, LinkMass, last_links
 from pipeline.effects.drive.torque_ripple import TorqueRipple
 from pipeline.effects.registry import effect_named
-from pipeline.identification.regression.design_matrix import effect_columns, make_data_sets
+from pipeline.identification.regression.design_matrix import (
+    Accepted,
+    effect_columns,
+    make_data_sets,
+)
 from pipeline.identification.regression.floor import left_open
-from pipeline.identification.regression.problem import Accepted, Problem
+from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.tolerances import grouped, nuisance_column
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.pool import make_pool

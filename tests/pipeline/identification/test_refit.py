@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from pipeline.effects.registry import effect_named
-from pipeline.identification.regression.design_matrix import make_data_set, make_data_sets
+from pipeline.identification.regression.design_matrix import Accepted, make_data_set, make_data_sets
 from pipeline.identification.regression.intervals import _certain
-from pipeline.identification.regression.problem import Accepted, Problem
-from pipeline.identification.regression.refit import _bounded, refit
+from pipeline.identification.regression.problem import Problem
+from pipeline.identification.regression.refit import _bounded, gradient, refit
 from pipeline.identification.selection.noise import _correlation, fast_noise
 from pipeline.identification.selection.pool import make_pool
 from pipeline.identification.selection.search import Search
@@ -59,7 +59,7 @@ def test_estimating_anew_never_makes_a_log_less_likely(
 def test_the_gradient_is_that_of_the_cost(log: Measurement) -> None:
     """Half the fall of the cost per step of each unknown, by central differences."""
     problem = problem_of(log, stribeck(0.25, 0.5, 0.08))
-    downhill = problem.gradient(problem.matrices)
+    downhill = gradient(problem, problem.matrices)
     (coordinates, shape) = problem.spans()[0]
     assert (coordinates.stop - coordinates.start, shape.stop - shape.start) == (2, 1)
     for k, (c, v, s) in enumerate([(1e-4, 0, 0), (0, 1e-4, 0), (0, 0, 1e-5)]):
