@@ -15,7 +15,7 @@ from pipeline.api.demand import demand
 from pipeline.api.machine import Machine
 from pipeline.choice.errors import MissionError
 from pipeline.choice.missions.mission import Mode
-from pipeline.effects.bodies.link_mass import point_mass
+from pipeline.effects.bodies import point_mass
 from pipeline.errors import PipelineError, StanceError
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion

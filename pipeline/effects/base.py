@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import ClassVar, Final
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, Final
 
-from actuators.errors import closest
+from actuators.elements.position_torque import PositionTorque
+from actuators.errors import closest, one_line
 from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
@@ -63,6 +64,17 @@ class Coordinate:
 def place_text(place: Sequence[str]) -> str:
     """A place as a reader sees it."""
     return " with ".join(place) if place else "the whole machine"
+
+
+def at_joint(model: MachineModel, place: Place, **changes: Any) -> MachineModel:
+    """A machine with other attributes of the actuator and sensors of a joint."""
+    return model.with_actuator(replace(model.actuator(place[0]), **changes))
+
+
+def beside(model: MachineModel, place: Place, law: PositionTorque) -> MachineModel:
+    """A machine with a torque more that follows from the position of a joint."""
+    laws = (*model.actuator(place[0]).position_torques, law)
+    return at_joint(model, place, position_torques=laws)
 
 
 class Effect(ABC):
@@ -159,22 +171,30 @@ class Effect(ABC):
             EffectError: A parameter is missing, unknown or out of bounds.
             ModelError: The place does not exist.
         """
-        known = [p.name for p in self.parameters]
-        for name in values:
-            if name not in known:
-                raise EffectError(f"{self.name}: no parameter '{name}'; {closest(name, known)}")
-        for parameter in self.parameters:
-            if parameter.name not in values:
-                if parameter.optional:
-                    continue
-                raise EffectError(f"{self.name}: parameter '{parameter.name}' is missing")
-            value = values[parameter.name]
-            if not parameter.low <= value <= parameter.high:
+        self.refuse_other_names(values)
+        for p in self.parameters:
+            if p.name in values and not p.low <= values[p.name] <= p.high:
                 raise EffectError(
-                    f"{self.name}: {parameter.name} = {value:g} lies outside "
-                    f"{parameter.low:g} to {parameter.high:g} {parameter.unit}"
+                    f"{self.name}: {p.name} = {values[p.name]:g} lies outside "
+                    f"{p.low:g} to {p.high:g} {p.unit}"
                 )
         return self.edit(model, place, *self.internal(values))
+
+    def refuse_other_names(self, names: Collection[str]) -> None:
+        """Refuse parameters that are not the effect's, and the lack of one.
+
+        Raises:
+            EffectError: Names it; offers the closest match.
+        """
+        known = [p.name for p in self.parameters]
+        for name in names:
+            if name not in known:
+                raise EffectError(
+                    f"{self.name} has no parameter '{one_line(name)}': {closest(name, known)}"
+                )
+        for p in self.parameters:
+            if p.name not in names and not p.optional:
+                raise EffectError(f"{self.name} needs the parameter '{p.name}'")
 
     def unit(self, parameter: str, channel: str) -> str:
         """Unit of a parameter in a log whose compared channel is `channel`."""

@@ -40,7 +40,7 @@ from typing import Annotated, Final, Literal, Self
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
 
 from actuators.checked import Names, Number, Pair, Table, Text, checked
-from actuators.errors import closest, one_line
+from actuators.errors import one_line
 from actuators.loading.build import CATALOG
 from actuators.text_file import UnreadableTextError, parsed, read_toml_file
 from pipeline.effects.base import CHANNEL_UNITS
@@ -158,22 +158,19 @@ class _Edit(Table):
     @model_validator(mode="after")
     def _of_the_effect(self) -> Self:
         """The effect's parameters, all and no others, in its units."""
-        known = {p.name: p for p in effect_named(self.effect).parameters}
-        for name, written in self.parameters.items():
-            if name not in known:
+        effect = effect_named(self.effect)
+        try:
+            effect.refuse_other_names(self.parameters)
+        except EffectError as error:
+            raise ValueError(str(error)) from None
+        for own in effect.parameters:
+            written = self.parameters.get(own.name)
+            allowed = tuple(CHANNEL_UNITS.values()) if own.unit == "channel" else (own.unit,)
+            if written is not None and written.unit not in allowed:
                 raise ValueError(
-                    f"{self.effect} has no parameter '{one_line(name)}': "
-                    f"{closest(name, list(known))}"
+                    f"{own.name}: unit '{one_line(written.unit)}'; expected "
+                    f"'{' or '.join(allowed)}'"
                 )
-            own = known[name].unit
-            allowed = tuple(CHANNEL_UNITS.values()) if own == "channel" else (own,)
-            if written.unit not in allowed:
-                raise ValueError(
-                    f"{name}: unit '{one_line(written.unit)}'; expected '{' or '.join(allowed)}'"
-                )
-        for name, parameter in known.items():
-            if name not in self.parameters and not parameter.optional:
-                raise ValueError(f"{self.effect} needs the parameter '{name}'")
         return self
 
 

@@ -8,36 +8,40 @@ from typing import Final
 
 from actuators.errors import closest
 from pipeline.effects.base import Effect
-from pipeline.effects.bodies.base_tilt import BaseTilt
-from pipeline.effects.bodies.center_of_mass_offset import CenterOfMassOffset
-from pipeline.effects.bodies.internal_foot_force import InternalFootForce
-from pipeline.effects.bodies.link_mass import LinkMass
-from pipeline.effects.bodies.rigid_body_parameters import RigidBodyParameters
-from pipeline.effects.drive.backlash import Backlash
-from pipeline.effects.drive.joint_elasticity import JointElasticity
-from pipeline.effects.drive.parallel_spring import ParallelSpring
-from pipeline.effects.drive.rotor_inertia import RotorInertia
-from pipeline.effects.drive.torque_constant_error import TorqueConstantError
-from pipeline.effects.drive.torque_ripple import TorqueRipple
-from pipeline.effects.drive.transmission_coupling import BareCoupling, TransmissionCoupling
-from pipeline.effects.drive.winding_heating import SensedHeating, WindingHeating
-from pipeline.effects.flexible.friction_curve import FrictionCurveEffect
-from pipeline.effects.flexible.position_curve import PositionCurveEffect
-from pipeline.effects.friction.joint_friction import JointFrictionLaw
-from pipeline.effects.friction.presets import (
+from pipeline.effects.bodies import (
+    BaseTilt,
+    CenterOfMassOffset,
+    InternalFootForce,
+    LinkMass,
+    RigidBodyParameters,
+)
+from pipeline.effects.curves import FrictionCurveEffect, PositionCurveEffect
+from pipeline.effects.friction import (
     BackdriveLoss,
     CoulombFriction,
     DirectionDependentFriction,
+    JointFrictionLaw,
     LoadDependentFriction,
     QuadraticDrag,
     StribeckFriction,
     ViscousFriction,
+    WarmingFriction,
 )
-from pipeline.effects.friction.warming_friction import WarmingFriction
-from pipeline.effects.sensing.effort_gain import EffortGain
-from pipeline.effects.sensing.effort_offset import EffortOffset
-from pipeline.effects.sensing.position_offset import PositionOffset
-from pipeline.effects.sensing.time_delay import TimeDelay
+from pipeline.effects.motor import (
+    ParallelSpring,
+    SensedHeating,
+    TorqueConstantError,
+    TorqueRipple,
+    WindingHeating,
+)
+from pipeline.effects.sensors import EffortGain, EffortOffset, PositionOffset, TimeDelay
+from pipeline.effects.transmission import (
+    Backlash,
+    BareCoupling,
+    JointElasticity,
+    RotorInertia,
+    TransmissionCoupling,
+)
 from pipeline.logs.errors import EffectError
 from pipeline.machine.machine import MachineModel
 

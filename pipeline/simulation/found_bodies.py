@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.effects.base import Values, place_text
-from pipeline.effects.bodies.rigid_body_parameters import physical
+from pipeline.effects.bodies import physical
 from pipeline.effects.model_file import Edit, apply_edits
 from pipeline.effects.registry import effect_named
 from pipeline.machine.machine import MachineModel, link_name

@@ -9,9 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.effects.base import CHANNEL_COLUMNS, place_text
-from pipeline.effects.drive.torque_constant_error import TorqueConstantError
+from pipeline.effects.motor import TorqueConstantError
 from pipeline.effects.registry import effect_named
-from pipeline.effects.sensing.effort_gain import EffortGain
+from pipeline.effects.sensors import EffortGain
 from pipeline.identification.compare.circumstances import WHOLE, Where
 from pipeline.identification.results import (
     APPROXIMATE,

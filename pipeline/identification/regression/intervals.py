@@ -19,8 +19,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from pipeline.effects.bodies.rigid_body_parameters import NAMES, UNITS
-from pipeline.effects.sensing.time_delay import SKEW_TOLERANCE
+from pipeline.effects.bodies import NAMES, UNITS
+from pipeline.effects.sensors import SKEW_TOLERANCE
 from pipeline.identification.regression.design_matrix import Accepted
 from pipeline.identification.regression.normal_equations import BlockSums, inverse_spd, solve_spd
 from pipeline.identification.regression.problem import Problem

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.elements.friction import Friction
-from pipeline.effects.bodies.link_mass import observable
-from pipeline.effects.drive.joint_elasticity import COMPLIANCE_TOLERANCE
-from pipeline.effects.drive.torque_constant_error import CONSTANT_TOLERANCE
-from pipeline.effects.sensing.position_offset import ENCODER_TOLERANCE
-from pipeline.effects.sensing.time_delay import SKEW_TOLERANCE
+from pipeline.effects.bodies import observable
+from pipeline.effects.motor import CONSTANT_TOLERANCE
+from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
+from pipeline.effects.transmission import COMPLIANCE_TOLERANCE
 from pipeline.identification.regression.design_matrix import DataSet, of_own_leg
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.effects.base import Effect, Place, Values
-from pipeline.effects.drive.torque_ripple import TorqueRipple
+from pipeline.effects.motor import TorqueRipple
 from pipeline.logs.prepared.measurement import TRAIN, Measurement
 from pipeline.logs.reading.expected import Expected
 from pipeline.machine.machine import MachineModel

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from pipeline.effects.bodies.link_mass import AXES, AddedBody, last_links, point_mass
-from pipeline.effects.drive.torque_ripple import TorqueRipple
+from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
+from pipeline.effects.motor import TorqueRipple
 from pipeline.identification.regression.design_matrix import effect_columns, residual
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Problem

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.effects.base import REACH, Effect, Place
-from pipeline.effects.bodies.link_mass import LinkMass
-from pipeline.effects.drive.torque_ripple import TorqueRipple
-from pipeline.effects.friction.presets import FrictionPreset
+from pipeline.effects.bodies import LinkMass
+from pipeline.effects.friction import FrictionPreset
+from pipeline.effects.motor import TorqueRipple
 from pipeline.effects.registry import catalogue
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.selection.noise import fast_noise, saturated

@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 from pipeline.effects.base import Effect, Place
-from pipeline.effects.bodies.link_mass import LinkMass
-from pipeline.effects.drive.transmission_coupling import BareCoupling
-from pipeline.effects.drive.winding_heating import SensedHeating
-from pipeline.effects.flexible.friction_curve import FrictionCurveEffect
-from pipeline.effects.flexible.position_curve import PositionCurveEffect
+from pipeline.effects.bodies import LinkMass
+from pipeline.effects.curves import FrictionCurveEffect, PositionCurveEffect
 from pipeline.effects.model_file import apply_edits, new_model_file, read_model_file
+from pipeline.effects.motor import SensedHeating
 from pipeline.effects.registry import EFFECTS, catalogue
+from pipeline.effects.transmission import BareCoupling
 from pipeline.identification.results import Estimate, Found
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.logs.errors import ModelFileError

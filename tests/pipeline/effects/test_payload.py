@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipeline.effects.bodies.link_mass import point_mass
+from pipeline.effects.bodies import point_mass
 from pipeline.effects.registry import effect_named
 from pipeline.identification.selection.identify import identify
 from pipeline.identification.selection.places import _point

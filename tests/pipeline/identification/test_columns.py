@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.effects.bodies.link_mass import AXES, LinkMass, last_links
-from pipeline.effects.drive.torque_ripple import TorqueRipple
+from pipeline.effects.bodies import AXES, LinkMass, last_links
+from pipeline.effects.motor import TorqueRipple
 from pipeline.effects.registry import effect_named
 from pipeline.identification.regression.design_matrix import (
     Accepted,

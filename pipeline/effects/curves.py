@@ -1,4 +1,4 @@
-"""Friction of a joint whose law has no name in the catalogue, as curves."""
+"""Curves for what has no law in the catalogue: friction of a joint, torque over its position."""
 
 from __future__ import annotations
 
@@ -7,17 +7,16 @@ from typing import ClassVar, Final
 import numpy as np
 
 from actuators.elements.friction_curve import FrictionCurve
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
-from pipeline.effects.flexible.knots import place_knots
+from actuators.elements.position_torque import PositionCurve
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, beside
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
 #: Knots on the speed above zero, at these quantiles of what occurs.
 _QUANTILES: Final = (0.2, 0.45, 0.75, 1.0)
 _SPEEDS: Final = range(1, len(_QUANTILES) + 2)
-_PLACES: Final = range(1, 8)
-#: Travel over which friction builds up after a reversal, at first [rad].
-_TRAVELS: Final = (0.0,)
+_SPOTS: Final = range(1, 8)
+_LEVELS: Final = range(1, 10)
 
 
 class FrictionCurveEffect(Effect):
@@ -34,37 +33,32 @@ class FrictionCurveEffect(Effect):
         *(Parameter(f"forward_{k}", "N*m", 0.0, 1e4) for k in _SPEEDS),
         *(Parameter(f"backward_{k}", "N*m", 0.0, 1e4) for k in _SPEEDS),
         *(Parameter(f"share_{k}", "1", 0.0, 0.9) for k in _SPEEDS),
-        *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _PLACES),
-        *(Parameter(f"spot_{k}", "N*m", 0.0, 1e4) for k in _PLACES),
+        *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _SPOTS),
+        *(Parameter(f"spot_{k}", "N*m", 0.0, 1e4) for k in _SPOTS),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
     coordinates: ClassVar = (
         *(Coordinate(f"forward_{k}", 1e-2, required=False) for k in _SPEEDS),
         *(Coordinate(f"backward_{k}", 1e-2, required=False) for k in _SPEEDS),
         *(Coordinate(f"share_{k}", 1e-3, required=False) for k in _SPEEDS),
-        *(Coordinate(f"spot_{k}", 1e-2, required=False) for k in _PLACES),
+        *(Coordinate(f"spot_{k}", 1e-2, required=False) for k in _SPOTS),
     )
     has_law: ClassVar = False
-    fixed: ClassVar = (
-        *(f"speed_{k}" for k in _SPEEDS),
-        *(f"place_{k}" for k in _PLACES),
-    )
+    fixed: ClassVar = (*(f"speed_{k}" for k in _SPEEDS), *(f"place_{k}" for k in _SPOTS))
     excitation = "moves both ways at many speeds and loads"
 
     def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
-        """Knots where the joint was; with and without a rise over the travel."""
+        """Knots where the joint was."""
         j = m.joints.index(place[0])
         speed = np.abs(m.v[:, j])
         speed = speed[speed > m.rest_speed[j]]
-        places = place_knots(m, j, len(_PLACES))
+        places = _even_knots(m, j, _SPOTS)
         if speed.size == 0 or not places:
             return []
         knots = np.unique([0.0, *np.quantile(speed, _QUANTILES)])
         if knots.size < len(_SPEEDS):
             return []
-        shape = {f"speed_{k}": float(x) for k, x in zip(_SPEEDS, knots, strict=True)}
-        shape |= {f"place_{k}": x for k, x in zip(_PLACES, places, strict=True)}
-        return [shape | ({"travel": travel} if travel else {}) for travel in _TRAVELS]
+        return [{f"speed_{k}": float(x) for k, x in zip(_SPEEDS, knots, strict=True)} | places]
 
     def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
         """Insert the curves at the joint's side."""
@@ -81,7 +75,45 @@ class FrictionCurveEffect(Effect):
             levels=tuple(0.5 * (f + b) for f, b in both),
             asymmetries=tuple(0.5 * (f - b) for f, b in both),
             shares=curve("share"),
-            places=curve("place", _PLACES),
-            spots=curve("spot", _PLACES),
+            places=curve("place", _SPOTS),
+            spots=curve("spot", _SPOTS),
         )
         return model.with_actuator(model.actuator(place[0]).with_output(element))
+
+
+class PositionCurveEffect(Effect):
+    """Torque over position that the actuator has to supply in addition: cable, spring, cogging."""
+
+    name = "position_curve"
+    additive = True
+    parameters: ClassVar = (
+        *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _LEVELS),
+        *(Parameter(f"level_{k}", "N*m", -1e4, 1e4) for k in _LEVELS),
+    )
+    coordinates: ClassVar = tuple(
+        Coordinate(f"level_{k}", 1e-2, signed=True, required=False) for k in _LEVELS
+    )
+    has_law: ClassVar = False
+    fixed: ClassVar = tuple(f"place_{k}" for k in _LEVELS)
+    signature = "position"
+    excitation = "turns slowly through the whole travel, in both directions"
+
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+        """Knots over the travel."""
+        places = _even_knots(m, m.joints.index(place[0]), _LEVELS)
+        return [places] if places else []
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Add it at the joint."""
+        places = tuple(shape[f"place_{k}"] for k in _LEVELS)
+        levels = tuple(x[f"level_{k}"] for k in _LEVELS)
+        return beside(model, place, PositionCurve(self.name, places, levels))
+
+
+def _even_knots(m: Measurement, joint: int, knots: range) -> dict[str, float]:
+    """Even knots over the travel of a joint [rad]; none where it stands."""
+    low, high = float(m.q[:, joint].min()), float(m.q[:, joint].max())
+    if high <= low + 1e-6:
+        return {}
+    places = np.linspace(low, high, len(knots)).tolist()
+    return {f"place_{k}": x for k, x in zip(knots, places, strict=True)}

@@ -1,0 +1,225 @@
+"""Effects of bodies, ground and stance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Final
+
+import numpy as np
+import pinocchio as pin
+
+from actuators.arrays import Array
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values
+from pipeline.logs.errors import EffectError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+
+#: In the order of `pin.Inertia.toDynamicParameters`: about the origin of the joint's frame.
+NAMES: Final = ("mass", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+UNITS: Final = ("kg", *("kg*m",) * 3, *("kg*m^2",) * 6)
+#: Where a payload is in the frame of its link's joint.
+AXES: Final = ("x", "y", "z")
+FARTHEST: Final = 10.0  # [m]
+
+
+class RigidBodyParameters(Effect):
+    """Mass, first moments and rotational inertia of a link, in place of the robot file's.
+
+    Moments are taken about the frame of the joint that carries the link, along its axes.
+    """
+
+    name = "rigid_body_parameters"
+    place_kind = "link"
+    parameters: ClassVar = tuple(
+        Parameter(n, u, 0.0 if n in ("mass", "Ixx", "Iyy", "Izz") else -1e6, 1e6)
+        for n, u in zip(NAMES, UNITS, strict=True)
+    )
+    coordinates: ClassVar = ()
+    competes: ClassVar = False
+    signature = "acceleration"
+    excitation = "moves all joints at once, fast and slowly, through all their travel"
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Put them in the place of the file's.
+
+        Raises:
+            EffectError: No body has such parameters.
+        """
+        values = {**x, **shape}
+        ten = np.array([values[n] for n in NAMES])
+        if not physical(ten):
+            raise EffectError(
+                f"{self.name} at {place[0]}: no body has such parameters; its pseudo-inertia must "
+                "be positive definite"
+            )
+        rigid = model.rigid.copy()
+        rigid.inertias[rigid.getJointId(model.carrier(place[0]))] = (
+            pin.Inertia.FromDynamicParameters(ten)
+        )
+        identified = tuple(dict.fromkeys((*model.identified, place[0])))
+        return replace(model, rigid=rigid, identified=identified)
+
+
+def physical(ten: Array) -> bool:
+    """Whether ten inertial parameters are those of a body.
+
+    The pseudo-inertia [[tr(I) / 2 - I, m c], [(m c)^T, m]] is positive definite (Wensing, Kim and
+    Slotine, RA-L 2018).
+    """
+    pseudo = pin.PseudoInertia.FromDynamicParameters(ten).toMatrix()
+    scale = np.sqrt(np.maximum(np.diag(pseudo), 1e-300))
+    return bool(ten[0] > 0 and np.linalg.eigvalsh(pseudo / np.outer(scale, scale))[0] > 0)
+
+
+class LinkMass(Effect):
+    """A payload: a point mass more, at the link's centre of mass or where it is said to be."""
+
+    name = "link_mass"
+    additive = True
+    place_kind = "link"
+    parameters: ClassVar = (
+        Parameter("mass", "kg", -1e4, 1e4),
+        *(Parameter(axis, "m", -FARTHEST, FARTHEST, optional=True) for axis in AXES),
+    )
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("mass", 1e-2, signed=True),)
+    signature = "position"
+    excitation = "holds and moves the link in clearly different postures"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Every moving link; the base's own mass rests on measured feet unseen."""
+        return _observable_links(model, m)
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Add the mass."""
+        joint = model.carrier(place[0])
+        if any(axis in shape for axis in AXES):
+            centre = np.array([shape.get(axis, 0.0) for axis in AXES])
+            return _carrying(model, joint, point_mass(x["mass"], centre))
+        body = model.bodies.body(joint)
+        changed = replace(body, payload=body.payload + x["mass"])
+        return model.with_bodies(model.bodies.with_body(joint, changed))
+
+    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
+        """Something of the link is left, and the payload is within reach and no second robot."""
+        if max((abs(shape.get(axis, 0.0)) for axis in AXES), default=0.0) > FARTHEST:
+            return False
+        masses = [body.mass for body in model.rigid.inertias]
+        own = masses[model.rigid.getJointId(model.carrier(place[0]))]
+        return bool(-0.9 * own < x["mass"] < 2.0 * sum(masses))
+
+
+class AddedBody:
+    """Ten inertial parameters more at a link, in which joint torques are linear."""
+
+    coordinates: ClassVar = tuple(Coordinate(name, 1e-2, signed=True) for name in NAMES)
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Add them."""
+        return _carrying(model, model.carrier(place[0]), np.array([x[n] for n in NAMES]))
+
+
+def last_links(model: MachineModel) -> list[str]:
+    """Links that carry no other."""
+    carriers = {link: model.rigid.getJointId(joint) for link, joint in model.links.items()}
+    inner = {int(p) for k, p in enumerate(model.rigid.parents) if k in carriers.values()}
+    return [link for link, k in carriers.items() if k not in inner]
+
+
+def point_mass(mass: float, place: Array) -> Array:
+    """Ten inertial parameters of a point mass [kg] at a place (3,) [m]."""
+    turning = mass * (place @ place * np.eye(3) - np.outer(place, place))
+    return np.array([mass, *(mass * place), *turning[[0, 0, 1, 0, 1, 2], [0, 1, 1, 2, 2, 2]]])
+
+
+def _carrying(model: MachineModel, joint: str, more: Array) -> MachineModel:
+    body = model.bodies.body(joint)
+    carried = tuple((np.array(body.carried or (0.0,) * len(more)) + more).tolist())
+    return model.with_bodies(model.bodies.with_body(joint, replace(body, carried=carried)))
+
+
+def observable(model: MachineModel, m: Measurement, joint: str) -> bool:
+    """Whether joint torques depend on the body at a joint at all."""
+    base = model.floating and model.rigid.getJointId(joint) == 1
+    return not (base and _sensed(m))
+
+
+def _sensed(m: Measurement) -> bool:
+    """Whether all forces of the ground are measured."""
+    return m.foot_force is not None and not np.isnan(m.foot_force).any()
+
+
+def _observable_links(model: MachineModel, m: Measurement) -> list[Place]:
+    return [(link,) for link, joint in model.links.items() if observable(model, m, joint)]
+
+
+class CenterOfMassOffset(Effect):
+    """Displacement of a link's centre of mass in the frame of its joint."""
+
+    name = "center_of_mass_offset"
+    additive = True
+    place_kind = "link"
+    parameters: ClassVar = tuple(Parameter(axis, "m", -0.5, 0.5) for axis in AXES)
+    coordinates: ClassVar = tuple(
+        Coordinate(axis, 1e-3, signed=True, required=False) for axis in AXES
+    )
+    signature = "position"
+    excitation = "holds the link in postures all around its axis"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Every moving link whose body the torques can show."""
+        return _observable_links(model, m)
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Displace it."""
+        joint = model.carrier(place[0])
+        body = model.bodies.body(joint)
+        moved = tuple(s + x[axis] for s, axis in zip(body.shift, AXES, strict=True))
+        changed = replace(body, shift=(moved[0], moved[1], moved[2]))
+        return model.with_bodies(model.bodies.with_body(joint, changed))
+
+
+class BaseTilt(Effect):
+    """Ground, or a stand, that is not level: gravity does not point along its normal."""
+
+    name = "base_tilt"
+    additive = True
+    place_kind = "ground"
+    parameters: ClassVar = tuple(Parameter(axis, "rad", -0.6, 0.6) for axis in ("roll", "pitch"))
+    coordinates: ClassVar = tuple(
+        Coordinate(axis, 1e-3, signed=True, required=False) for axis in ("roll", "pitch")
+    )
+    signature = "position"
+    excitation = "holds links outstretched in several directions"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """The ground."""
+        return [("ground",)]
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Tilt it further."""
+        roll, pitch = model.bodies.tilt
+        return model.with_bodies(replace(model.bodies, tilt=(roll + x["roll"], pitch + x["pitch"])))
+
+
+class InternalFootForce(Effect):
+    """Feet that squeeze the ground: a lateral force pair between those of either side.
+
+    It is above the least tangential forces; positive spreads the feet.
+    """
+
+    name = "internal_foot_force"
+    additive = True
+    place_kind = "ground"
+    parameters: ClassVar = (Parameter("lateral", "N", -1e5, 1e5),)
+    coordinates: ClassVar = (Coordinate("lateral", 1.0, signed=True),)
+    signature = "support"
+    excitation = "stands on different sets of feet, with tangential forces measured"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """The ground under a walking robot whose tangential forces are not measured."""
+        return [("ground",)] if model.floating and not _sensed(m) else []
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Squeeze further."""
+        squeeze = model.bodies.squeeze + x["lateral"]
+        return model.with_bodies(replace(model.bodies, squeeze=squeeze))

@@ -1,1 +1,0 @@
-"""Effects of bodies, ground and stance."""

@@ -1,1 +1,0 @@
-"""Curves for what has no law in the catalogue."""

@@ -1,1 +1,0 @@
-"""Effects of friction at a joint."""

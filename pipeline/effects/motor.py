@@ -1,0 +1,216 @@
+"""Effects of a motor, and of torques beside it that follow from the joint's position."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuators.arrays import Array
+from actuators.elements.heating import Heating
+from actuators.elements.position_torque import ParallelSpring as Spring
+from actuators.elements.position_torque import Ripple
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, at_joint, beside
+from pipeline.logs.errors import EffectError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+
+CONSTANT_TOLERANCE: Final = 0.02  # one standard deviation [1]
+_TIMES: Final = (1.5, 4.0, 10.0, 30.0)  # [s]
+#: Above or below what the data sheet's values hold for [K]; insulation gives way.
+_HOTTEST: Final = 150.0
+_LEAST_ORDER: Final = 4.0  # periods per turn; below it is a spring rather than a ripple
+_PERIODS: Final = 1.5  # least number of periods inside the travel
+_SOFTEST: Final = 1e-9  # [N*m/rad]
+
+
+class TorqueConstantError(Effect):
+    """Torque per current, and voltage per speed, off by a factor.
+
+    Fitted as the factor more of current (x > 0: k / (1 + x)) or of back-EMF (x < 0: k (1 - x)), in
+    which the larger one is linear: a factor of five is found in one step. Where current alone is
+    measured, a current sensor's wrong gain is the same and goes by this name.
+    """
+
+    name = "torque_constant_error"
+    parameters: ClassVar = (Parameter("relative", "1", -0.99, 99.0),)
+    coordinates: ClassVar = (Coordinate("more", 1e-3, signed=True),)
+    signature = "load"
+    rescales = True
+    kinds_absorbed: ClassVar = ("torque_constant",)
+    excitation = "carries clearly different known loads"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Joints with a motor, where the torque itself is not sensed."""
+        return _electric(model, m)
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Scale it."""
+        motor = model.actuator(place[0]).motor
+        if motor is None:
+            raise EffectError(f"{self.name}: joint '{place[0]}' has no motor in the model")
+        factor = 1.0 + self.physical(x, shape)["relative"]
+        constant = float(np.asarray(motor.torque_constant) * factor)
+        return at_joint(model, place, motor=replace(motor, torque_constant=constant))
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """How much larger than stated, as a share."""
+        more = x["more"]
+        return {"relative": 1.0 / (1.0 + more) - 1.0 if more > 0.0 else -more}
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """How much more current, or less than nothing: how much more back-EMF."""
+        relative = float(values["relative"])
+        return {"more": -relative / (1.0 + relative) if relative < 0.0 else -relative}, {}
+
+
+class WindingHeating(Effect):
+    """Windings that warm up: one thermal node per motor, warmed by R I^2 and what surrounds it."""
+
+    name = "winding_heating"
+    parameters: ClassVar = (
+        Parameter("rise", "K", -_HOTTEST, _HOTTEST),
+        Parameter("thermal_resistance", "K/W", 0.0, 1e3),
+        Parameter("time_constant", "s", 0.01, 1e5),
+        Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
+    )
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+        Coordinate("rise", 1.0, signed=True, required=False),
+        Coordinate("thermal_resistance", 0.5, required=False),
+    )
+    signature = "time"
+    excitation = "works hard for several thermal time constants, then repeats its first motion"
+    sensed: ClassVar = False  #: Whether the motors' temperature is measured where it competes.
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Joints with a motor without thermal node, where an electrical channel is measured."""
+        if (m.temperature is not None) != self.sensed:
+            return []
+        return [place for place in _electric(model, m) if model.actuator(place[0]).heating is None]
+
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+        """Time constants that a log of this length can show."""
+        length = float(m.time[-1] - m.time[0])
+        return [{"time_constant": t} for t in _TIMES if t < 1.5 * length]
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Give the motor a thermal node."""
+        return at_joint(model, place, heating=Heating(**self.physical(x, shape)))
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Of the node."""
+        return {"rise": 0.0, "thermal_resistance": 0.0, **x, **shape}
+
+
+class SensedHeating(WindingHeating):
+    """The same where a sensor on the motor's housing is read: it shows what warmed it before."""
+
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+        Coordinate("sensor_gain", 0.1, required=False),
+        Coordinate("thermal_resistance", 0.5, required=False),
+    )
+    sensed: ClassVar = True
+
+
+def _electric(model: MachineModel, m: Measurement) -> list[Place]:
+    """Joints with a motor whose torque is not sensed."""
+    if "torque" in m.channels:
+        return []
+    return [(a.name,) for a in model.actuators if a.motor is not None]
+
+
+class TorqueRipple(Effect):
+    """Torque periodic in the joint's angle: error of a gear, cogging of a motor; of any order.
+
+    The torque amplitude sin(order position + phase) acts on the joint in its positive sense: the
+    actuator has to supply so much less.
+    """
+
+    name = "torque_ripple"
+    additive = True
+    parameters: ClassVar = (
+        Parameter("amplitude", "N*m", 0.0, 1e3),
+        Parameter("order", "1", 0.0, 1e6),
+        Parameter("phase", "rad", -10.0, 10.0),
+    )
+    coordinates: ClassVar = (
+        Coordinate("sine", 1e-2, signed=True, required=False),
+        Coordinate("cosine", 1e-2, signed=True, required=False),
+    )
+    signature = "position"
+    excitation = "turns slowly and evenly through the whole travel"
+
+    def orders(self, m: Measurement, joint: int) -> Array:
+        """Orders that this motion can show, so dense that none lies between two."""
+        q, v = m.q[:, joint], m.v[:, joint]
+        travel = float(np.ptp(q))
+        speed = float(np.quantile(np.abs(v), 0.3)) + float(m.rest_speed[joint])
+        if travel < 1e-3:
+            return np.empty(0)
+        top = min(2 * np.pi * 0.6 * m.bandwidth / speed, 2000.0)
+        low = max(_LEAST_ORDER, _PERIODS * 2 * np.pi / travel)
+        return np.arange(low, max(top, low), 0.35 * 2 * np.pi / travel)
+
+    def strongest(
+        self, m: Measurement, joint: int, rows: slice | NDArray[np.intp], series: Array, count: int
+    ) -> list[dict[str, float]]:
+        """Orders of the joint's angle that a series (R,) on some rows holds most of."""
+        orders, q = self.orders(m, joint), m.q[rows, joint]
+        power = np.array([abs(np.exp(-1j * order * q) @ series) for order in orders])
+        return [{"order": float(orders[k])} for k in np.argsort(power)[::-1][:count]]
+
+    def shown(self, m: Measurement, place: Place, shape: Values) -> bool:
+        """Whether it repeats inside the travel: else it is any function of the position."""
+        travel = float(np.ptp(m.q[:, m.joints.index(place[0])]))
+        return shape["order"] >= max(_LEAST_ORDER, _PERIODS * 2 * np.pi / max(travel, 1e-9))
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Add it at the joint."""
+        p = self.physical(x, shape)
+        return beside(model, place, Ripple(self.name, -p["amplitude"], p["order"], p["phase"]))
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Amplitude and phase."""
+        return {
+            "amplitude": float(np.hypot(x["sine"], x["cosine"])),
+            "order": shape["order"],
+            "phase": float(np.arctan2(x["cosine"], x["sine"])),
+        }
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """Sine and cosine."""
+        a, phase = values["amplitude"], values["phase"]
+        return {"sine": a * np.cos(phase), "cosine": a * np.sin(phase)}, {"order": values["order"]}
+
+
+class ParallelSpring(Effect):
+    """A spring from one link to the next: torque in proportion to the distance from its rest."""
+
+    name = "parallel_spring"
+    additive = True
+    parameters: ClassVar = (
+        Parameter("stiffness", "N*m/rad", -1e4, 1e4),
+        Parameter("rest", "rad", -1e3, 1e3),
+    )
+    coordinates: ClassVar = (
+        Coordinate("stiffness", 1e-2, signed=True),
+        Coordinate("preload", 1e-2, signed=True, required=False),
+    )
+    signature = "position"
+    excitation = "holds many positions over the whole travel, in several postures of the others"
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Add it at the joint; the preload is its torque at position zero."""
+        return beside(model, place, Spring(self.name, **self.physical(x, shape)))
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Stiffness and rest."""
+        stiffness = x["stiffness"] if abs(x["stiffness"]) > _SOFTEST else _SOFTEST
+        return {"stiffness": stiffness, "rest": -x["preload"] / stiffness}
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """Stiffness and preload."""
+        k = values["stiffness"]
+        return {"stiffness": k, "preload": -k * values["rest"]}, {}

@@ -1,0 +1,150 @@
+"""Effects of sensors: zeros, gains and delays of what a log holds."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Final
+
+from pipeline.effects.base import (
+    CHANNEL_COLUMNS,
+    Coordinate,
+    Effect,
+    Parameter,
+    Place,
+    Values,
+    at_joint,
+)
+from pipeline.logs.errors import EffectError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+
+ENCODER_TOLERANCE: Final = 2.5e-3  # one standard deviation [rad]
+#: Skew between channels that sampling leaves, one standard deviation [s].
+SKEW_TOLERANCE: Final = 3e-4
+#: Stands for every joint: one scale of a whole channel, as of a unit or a driver's setting.
+EVERY: Final = "*"
+#: Place of a delay that all joints share.
+ALL: Place = ("effort channels",)
+
+
+class PositionOffset(Effect):
+    """A constant added by the position sensor: an encoder whose zero is off."""
+
+    name = "position_offset"
+    parameters: ClassVar = (Parameter("angle", "rad", -1.6, 1.6),)
+    coordinates: ClassVar = (Coordinate("angle", 1e-3, signed=True),)
+    signature = "position"
+    kinds_absorbed: ClassVar = ("encoder",)
+    excitation = "holds the link in postures all around its axis"
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Shift the sensor's zero."""
+        offset = model.actuator(place[0]).encoder_offset + x["angle"]
+        return at_joint(model, place, encoder_offset=offset)
+
+
+class EffortOffset(Effect):
+    """A constant added by the sensor of torque, current or voltage."""
+
+    name = "effort_offset"
+    additive = True
+    parameters: ClassVar = (Parameter("offset", "channel", -1e4, 1e4),)
+    coordinates: ClassVar = (Coordinate("offset", 1e-3, signed=True),)
+    signature = "time"
+    kinds_absorbed: ClassVar = ("effort_zero",)
+    excitation = "stands still without load, then moves both ways"
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Shift the sensor's zero."""
+        offset = model.actuator(place[0]).effort_offset + x["offset"]
+        return at_joint(model, place, effort_offset=offset)
+
+
+class EffortGain(Effect):
+    """A column of torque, current, voltage or power that reads a multiple of what it should.
+
+    It acts at one column, or at the like columns of all joints (``*__current_A``). A current
+    without a voltage cannot tell the sensor's gain of one joint from the torque constant,
+    so that there the constant has the name. With a measured current, voltage is predicted from
+    that current over its gain: the two columns together tell gain and constant apart.
+    """
+
+    name = "effort_gain"
+    place_kind = "effort column"
+    parameters: ClassVar = (Parameter("gain", "1", 0.01, 100.0),)
+    coordinates: ClassVar = (Coordinate("more", 1e-3, signed=True),)
+    signature = "load"
+    rescales = True
+    excitation = "carries clearly different known loads"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """All columns of a channel together, then each of its own."""
+        out: list[Place] = []
+        for channel in m.channels:
+            if len(model.joints) > 1:
+                out.append((f"{EVERY}__{CHANNEL_COLUMNS[channel]}",))
+            if m.channels == ("current",):
+                continue
+            out += [(f"{joint}__{CHANNEL_COLUMNS[channel]}",) for joint in model.joints]
+        return out
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Let the column read more."""
+        owner, channel = column_of(place)
+        for joint in model.joints if owner == EVERY else (owner,):
+            gains = model.actuator(joint).gains
+            gain = gains.get(channel, 1.0) * (1.0 + x["more"])
+            model = at_joint(model, (joint,), gains={**gains, channel: gain})
+        return model
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """How many times what it should."""
+        return {"gain": 1.0 + x["more"]}
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """How much more than once."""
+        return {"more": float(values["gain"]) - 1.0}, {}
+
+
+def column_of(place: Place) -> tuple[str, str]:
+    """Joint, or `EVERY`, and channel of a place.
+
+    Raises:
+        EffectError: It is no column of an effort.
+    """
+    owner, _, quantity = place[0].rpartition("__")
+    channels = {column: channel for channel, column in CHANNEL_COLUMNS.items()}
+    if len(place) != 1 or not owner or quantity not in channels:
+        raise EffectError(
+            f"effort_gain: place '{' '.join(place)}' is no column of an effort; expected "
+            f"JOINT__{', JOINT__'.join(channels)}, or * for all joints"
+        )
+    return owner, channels[quantity]
+
+
+class TimeDelay(Effect):
+    """One delay between position and effort, of all joints alike or of one joint.
+
+    Only one of all joints competes by itself; a joint's own comes of a machine fitted as a whole.
+    """
+
+    name = "time_delay"
+    place_kind = "effort channels"
+    parameters: ClassVar = (Parameter("delay", "s", -0.5, 0.5),)
+    coordinates: ClassVar = (Coordinate("delay", 2e-4, signed=True),)
+    signature = "effort rate"
+    reaches: ClassVar = (1.0, 20.0, 60.0, 150.0)
+    excitation = "changes its torque fast: accelerates, brakes and reverses"
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """All effort channels."""
+        return [ALL]
+
+    def absorbs(self, place: Place) -> tuple[tuple[str, str], ...]:
+        """The skew of the channels."""
+        return (("skew", ""),)
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Delay them further, or one joint's alone."""
+        for joint in model.joints if place == ALL else place[:1]:
+            model = at_joint(model, (joint,), delay=model.actuator(joint).delay + x["delay"])
+        return model

@@ -1,0 +1,221 @@
+"""Effects between motor and joint: elasticity, backlash, inertia, coupling of two joints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import ClassVar, Final
+
+import numpy as np
+
+from actuators.elements.friction import Friction
+from actuators.elements.inertia import Inertia
+from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, at_joint
+from pipeline.logs.errors import EffectError
+from pipeline.logs.prepared.measurement import Measurement
+from pipeline.machine.machine import MachineModel
+
+#: Wind-up of what a robot file calls rigid, one standard deviation [rad/(N*m)].
+COMPLIANCE_TOLERANCE: Final = 1.2e-5
+_SHARES: Final = (0.02, 0.1, 0.3, 1.0)  # of the joint's torque, at which a flank may be seated
+_FULL: Final = 1.0  # a joint carried along by a bevel or a cable turns one to one
+_LEAST_RATIO: Final = 0.1  # below it the shaft is the own joint's
+
+
+class JointElasticity(Effect):
+    """A spring between motor and joint: one turns ahead of the other by torque / stiffness.
+
+    Spong, J. Dyn. Sys. Meas. Control 109, 1987. With the encoder at the joint the motor's speed
+    and acceleration follow; with the encoder at the motor the joint's do.
+    """
+
+    name = "joint_elasticity"
+    parameters: ClassVar = (Parameter("stiffness", "N*m/rad", 1.0, 1e12),)
+    coordinates: ClassVar = (Coordinate("compliance", 1e-6),)
+    signature = "torque rate"
+    reaches: ClassVar = (1.0, 100.0, 600.0)
+    kinds_absorbed: ClassVar = ("compliance",)
+    excitation = "changes its torque fast: accelerates, brakes and steps hard"
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Put it in series with what winds up already."""
+        compliance = model.actuator(place[0]).compliance + x["compliance"]
+        return at_joint(model, place, compliance=compliance)
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Stiffness."""
+        return {"stiffness": 1.0 / max(x["compliance"], 1e-12)}
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """Compliance."""
+        return {"compliance": 1.0 / values["stiffness"]}, {}
+
+
+class Backlash(Effect):
+    """Motor and joint lie half the width apart, on the side of the flank that carries.
+
+    The motor leads by width / 2 tanh(torque / crossing) + torque / stiffness: a describing
+    function of backlash with seated flanks (Nordin and Gutman, Automatica 38, 2002, treat backlash
+    with elastic flanks). Below the crossing torque the joint floats between the flanks, where its
+    place does not follow from the torque alone; the flanks give, and their stiffness comes with the
+    width.
+    """
+
+    name = "backlash"
+    parameters: ClassVar = (
+        Parameter("width", "rad", 0.0, 1.0),
+        Parameter("stiffness", "N*m/rad", 1.0, 1e12),
+        Parameter("crossing", "N*m", 0.0, 1e4),
+    )
+    coordinates: ClassVar = (
+        Coordinate("width", 1e-5),
+        Coordinate("compliance", 1e-6, required=False),
+    )
+    signature = "load"
+    kinds_absorbed: ClassVar = ("compliance",)
+    excitation = "lets the torque change its sign often, slowly and fast"
+    contains: ClassVar = ("joint_elasticity",)
+
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+        """Crossing torques, as shares of what the joint's actuator gives on the whole."""
+        scale = _torque_scale(model, m, place[0])
+        return [{"crossing": share * scale} for share in _SHARES]
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Widen what is there."""
+        a = model.actuator(place[0])
+        width, compliance = a.backlash + x["width"], a.compliance + x["compliance"]
+        return at_joint(model, place, backlash=width, compliance=compliance, **shape)
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Width, stiffness and crossing torque."""
+        return {"width": x["width"], "stiffness": 1.0 / max(x["compliance"], 1e-12), **shape}
+
+    def internal(self, values: Values) -> tuple[dict[str, float], dict[str, float]]:
+        """Width, compliance and crossing torque."""
+        x = {"width": values["width"], "compliance": 1.0 / values["stiffness"]}
+        return x, {"crossing": values["crossing"]}
+
+
+def _torque_scale(model: MachineModel, m: Measurement, joint: str) -> float:
+    """RMS torque of a joint's actuator by the measured channel, transmission without loss [N*m]."""
+    actuator = model.actuator(joint)
+    channel, rows = m.channels[0], m.effort[m.has_say, model.index(joint), 0]
+    size = float(np.sqrt(np.nanmean(rows**2)))
+    if channel == "torque" or actuator.motor is None:
+        return max(size, 1e-9)
+    constant = float(np.asarray(actuator.motor.torque_constant))
+    resistance = float(np.asarray(actuator.motor.resistance))
+    current = {"current": size, "voltage": size / resistance}.get(
+        channel, float(np.sqrt(size / resistance))
+    )
+    return max(abs(actuator.ratio) * constant * current, 1e-9)
+
+
+class RotorInertia(Effect):
+    """Inertia beyond the data sheet at the motor's shaft, which without a gear is the joint's."""
+
+    name = "rotor_inertia"
+    additive = True
+    parameters: ClassVar = (Parameter("added", "kg*m^2", 0.0, 1e3),)
+    coordinates: ClassVar = (Coordinate("added", 1e-7),)
+    signature = "acceleration"
+    excitation = "accelerates hard on an axis whose load does not change"
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Insert it at the motor."""
+        element = Inertia(name=self.name, inertia=x["added"])
+        actuator = model.actuator(place[0]).with_element(element, at_motor=True)
+        return model.with_actuator(actuator)
+
+
+class TransmissionCoupling(Effect):
+    """Motor angle = own joint + ratio x other joint; its torque acts on both.
+
+    Where the model has no actuator, the inertia and friction of the shared shaft come with the
+    coupling; where it has one, the ratio alone is missing.
+    """
+
+    name = "transmission_coupling"
+    place_kind = "joint pair"
+    parameters: ClassVar = (
+        Parameter("ratio", "1", -5.0, 5.0),
+        Parameter("inertia", "kg*m^2", 0.0, 1e3),
+        Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
+        Parameter("coulomb", "N*m", 0.0, 1e3),
+        Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
+        Parameter("travel", "rad", 0.0, 1.0, optional=True),
+    )
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("ratio", 1e-3, signed=True),)
+    signature = "velocity of the other joint"
+    excitation = "moves one joint of the pair while the other stands still, then the other way"
+    driven: ClassVar = True  #: Whether it is that of joints with a motor in the model.
+
+    def places(self, model: MachineModel, m: Measurement) -> list[Place]:
+        """Motor of a joint with a neighbour on the same chain of links, neither coupled yet."""
+        return [
+            (a.name, other)
+            for a in model.actuators
+            if (a.motor is not None) == self.driven and not a.coupled_to
+            for other in free_neighbours(model, a.name)
+        ]
+
+    def edit(self, model: MachineModel, place: Place, x: Values, shape: Values) -> MachineModel:
+        """Couple them, by a shaft with inertia and friction where it has any."""
+        _refuse_circle(model, place)
+        values = {**x, **shape}
+        actuator = replace(
+            model.actuator(place[0]), coupled_to=place[1], coupling=values.pop("ratio")
+        )
+        if not self.driven or any(values.values()):  # a ratio alone comes with a shaft of nothing
+            inertia = Inertia(name=f"{self.name}_inertia", inertia=values.pop("inertia"))
+            friction = Friction(name=self.name, **values)
+            actuator = actuator.with_element(friction).with_element(inertia)
+        return model.with_actuator(actuator)
+
+    def physical(self, x: Values, shape: Values) -> dict[str, float]:
+        """Ratio, and nothing more at the shaft."""
+        return {"inertia": 0.0, "viscous": 0.0, "coulomb": 0.0, **shape, **x}
+
+
+class BareCoupling(TransmissionCoupling):
+    """The coupling of a machine whose model has no actuator yet: the shaft comes with it."""
+
+    coordinates: ClassVar[tuple[Coordinate, ...]] = (
+        Coordinate("inertia", 1e-3, required=False),
+        Coordinate("viscous", 1e-2, required=False),
+        Coordinate("coulomb", 1e-2, required=False),
+    )
+    driven: ClassVar = False
+
+    def shapes(self, model: MachineModel, m: Measurement, place: Place) -> list[dict[str, float]]:
+        """One to one, in either sense."""
+        return [{"ratio": _FULL}, {"ratio": -_FULL}]
+
+    def plausible(self, model: MachineModel, place: Place, x: Values, shape: Values) -> bool:
+        """With a ratio of next to nothing the shaft is the joint's own."""
+        own = super().plausible(model, place, x, shape)
+        return own and abs(shape["ratio"]) >= _LEAST_RATIO
+
+
+def _refuse_circle(model: MachineModel, place: Place) -> None:
+    if len(place) != 2 or place[0] == place[1]:
+        raise EffectError(f"transmission_coupling: place {place} must name two joints")
+    joint, seen = place[1], {place[0]}
+    while joint:
+        if joint in seen:
+            raise EffectError(
+                f"transmission_coupling: {place[0]} and {place[1]} are coupled the other way"
+            )
+        seen.add(joint)
+        joint = model.actuator(joint).coupled_to
+
+
+def free_neighbours(model: MachineModel, joint: str) -> list[str]:
+    """Joints before and behind one on the same chain of links, whose motors turn with no other."""
+    parents, own = model.rigid.parents, model.rigid.getJointId(joint)
+    at = {other: model.rigid.getJointId(other) for other in model.joints}
+    return [
+        other
+        for other, k in at.items()
+        if (parents[own] == k or parents[k] == own) and not model.actuator(other).coupled_to
+    ]
