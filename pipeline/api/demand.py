@@ -49,7 +49,7 @@ class Demand:
 
 def demand(
     machine: Machine,
-    motion: str | Path | pandas.DataFrame | None = None,
+    motion: str | Path | pandas.DataFrame | NDArray[np.float64] | None = None,
     *,
     samples: int = SAMPLES,
     quasi_static: bool = False,
@@ -64,8 +64,9 @@ def demand(
 
     Args:
         machine: From `load`, with a floating base where it walks its gait.
-        motion: CSV file or table of joint positions and contacts in place of the gait, for a robot
-            on a fixed base, too; see `pipeline.simulation.own_motion` for its columns.
+        motion: CSV file, table or array of time, joint positions and contacts in place of the
+            gait, for a robot on a fixed base, too; see `pipeline.simulation.own_motion` for its
+            columns.
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         forces: Rule of the ground's forces: ``least_tangential``, ``least_torque`` or

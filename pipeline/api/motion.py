@@ -21,6 +21,8 @@ from reports.table import Table
 if TYPE_CHECKING:
     import pandas
 
+    from actuators.arrays import Array
+
 
 @dataclass(frozen=True, eq=False)
 class Stand(Result):
@@ -102,7 +104,7 @@ def walk(
     machine: Machine,
     actuator: str | None = None,
     *,
-    motion: str | Path | pandas.DataFrame | None = None,
+    motion: str | Path | pandas.DataFrame | Array | None = None,
     samples: int = SAMPLES,
     quasi_static: bool = False,
     regeneration: str = "none",
@@ -116,8 +118,9 @@ def walk(
         machine: From `load`, with a floating base.
         actuator: Name of an alternative, which the ideal one is put beside, since ratios refer to
             it; all alternatives by default.
-        motion: CSV file or table of joint positions and contacts in place of the gait, for a robot
-            on a fixed base, too; see `pipeline.simulation.own_motion` for its columns.
+        motion: CSV file, table or array of time, joint positions and contacts in place of the
+            gait, for a robot on a fixed base, too; see `pipeline.simulation.own_motion` for its
+            columns.
         samples: Per half period of the gait.
         quasi_static: Leave out the links' inertial terms.
         regeneration: What becomes of returned energy: ``none``, ``bus`` or a fraction.

@@ -4,7 +4,8 @@ Columns: ``time_s``; ``JOINT__position_rad`` of every joint (``JOINT__position_m
 on a floating base ``LEG__contact`` of every leg (1 where its foot carries load, else 0) and, where
 it is known, the base in the world: ``base__x_m``, ``base__y_m``, ``base__z_m`` and its attitude
 ``base__roll_rad``, ``base__pitch_rad``, ``base__yaw_rad`` (yaw after pitch after roll). A contact
-holds from its row to the next row that says otherwise.
+holds from its row to the next row that says otherwise. An array has the columns without the base's
+pose in this order: time, joints and contacts as the robot file has them (`needed_columns`).
 
 Without a pose the base moves so that standing feet stay where they are, in the sense of least
 squares (Kabsch, Acta Cryst. A32, 1976); it begins at the origin as ``[gait]`` tilts it.
@@ -51,8 +52,15 @@ FEWEST_ROWS: Final = DEGREE + 1
 MOST_SLIP: Final = 0.01
 
 
-def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
-    """A motion from a CSV file or a table; see the module for its columns.
+def needed_columns(robot: Robot) -> list[str]:
+    """Columns that every motion of a robot has: time, joint positions and contacts of its feet."""
+    units = ["m" if joint in robot.sliding_joints else "rad" for joint in robot.joints]
+    joints = [f"{j}__position_{unit}" for j, unit in zip(robot.joints, units, strict=True)]
+    return ["time_s", *joints, *(f"{leg}__contact" for leg in robot.leg_names if robot.floating)]
+
+
+def read_motion(source: Path | pd.DataFrame | Array, robot: Robot) -> Motion:
+    """A motion from a CSV file, a table or an array; see the module for its columns.
 
     Args:
         source: Columns of the robot's joints other than positions are left unread.
@@ -62,11 +70,19 @@ def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
         InvalidMotionError: It cannot be read; a column is missing, unknown or not a number; time
             does not increase; a position lies beyond its limits; contacts do not fit the motion.
     """
+    if isinstance(source, np.ndarray):
+        columns = needed_columns(robot)
+        if source.shape[1:] != (len(columns),):
+            raise InvalidMotionError(
+                f"an array of shape {source.shape}; a column for each of {', '.join(columns)} is "
+                "expected"
+            )
+        return _motion(pd.DataFrame(source, columns=columns), robot)
     if isinstance(source, pd.DataFrame):
         return _motion(source, robot)
     if not isinstance(source, str | Path):
         raise InvalidMotionError(
-            f"a motion is a CSV file or a DataFrame with its columns, not {type(source).__name__}"
+            f"a motion is a CSV file, a DataFrame or an array, not {type(source).__name__}"
         )
     try:
         table = pd.read_csv(source, comment="#")
@@ -84,17 +100,16 @@ def read_motion(source: Path | pd.DataFrame, robot: Robot) -> Motion:
 
 
 def _motion(table: pd.DataFrame, robot: Robot) -> Motion:
-    units = ["m" if joint in robot.sliding_joints else "rad" for joint in robot.joints]
-    joints = [f"{j}__position_{unit}" for j, unit in zip(robot.joints, units, strict=True)]
-    feet = [f"{leg}__contact" for leg in robot.leg_names] if robot.floating else []
+    needed = needed_columns(robot)
+    joints, feet = needed[1 : 1 + len(robot.joints)], needed[1 + len(robot.joints) :]
     given = [column for column in (*PLACE, *ATTITUDE) if column in table.columns]
     if given and given not in ([*PLACE, *ATTITUDE], [*ATTITUDE]):
         raise InvalidMotionError(
             f"columns {', '.join(given)} alone; give the base's attitude {', '.join(ATTITUDE)}, "
             f"with or without its place {', '.join(PLACE)}"
         )
-    _refuse_other_columns(table, robot, ["time_s", *joints, *feet])
-    values = _numbers(table, ["time_s", *joints, *feet, *given])
+    _refuse_other_columns(table, robot, needed)
+    values = _numbers(table, [*needed, *given])
     time, q = values["time_s"].to_numpy(), values[joints].to_numpy()
     if np.any(np.diff(time) <= 0):
         row = int(np.argmax(np.diff(time) <= 0)) + 1

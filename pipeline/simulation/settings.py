@@ -32,6 +32,8 @@ from pipeline.simulation.walk_stand import Regeneration
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+    from actuators.arrays import Array
+
 #: Every joint's energy is then within 0.7 % of the limit of fine sampling, on every transfer path.
 LEAST_SAMPLES = 51
 SAMPLES = 751
@@ -68,7 +70,7 @@ class Settings:
         regeneration: str = "none",
         forces: ForceChoice = PAPER_FORCES,
         compare_forces: bool = False,
-        motion: Path | DataFrame | None = None,
+        motion: Path | DataFrame | Array | None = None,
         walks: bool = True,
     ) -> Settings:
         """The same machine, to walk in this way; defaults are the command line's.
@@ -110,7 +112,7 @@ class Settings:
             motion_file=motion if isinstance(motion, Path) else None,
         )
 
-    def _moved(self, motion: Path | DataFrame) -> Motion:
+    def _moved(self, motion: Path | DataFrame | Array) -> Motion:
         from pipeline.simulation.own_motion import read_motion  # pandas, where it is needed
 
         return read_motion(motion, self.machine)

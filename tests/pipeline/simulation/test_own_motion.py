@@ -16,7 +16,7 @@ from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.simulation.own_motion import ATTITUDE, PLACE, read_motion
+from pipeline.simulation.own_motion import ATTITUDE, PLACE, needed_columns, read_motion
 
 
 def written(robot: Robot, motion: Motion, *, base: bool = False) -> pd.DataFrame:
@@ -149,7 +149,27 @@ def test_a_file_that_is_not_there_is_said_so(hexapod: Robot, tmp_path: Path) -> 
         read_motion(tmp_path / "none.csv", hexapod)
 
 
-def test_an_array_without_names_is_refused_in_one_line() -> None:
-    with pytest.raises(InvalidMotionError, match="not ndarray") as caught:
-        read_motion(np.zeros((5, 3)), None)  # type: ignore[arg-type]
+def test_an_array_is_read_as_the_table_of_the_same_columns(
+    hexapod: Robot, table: pd.DataFrame
+) -> None:
+    array = table[needed_columns(hexapod)].to_numpy(dtype=np.float64)
+    pairs = zip(
+        read_motion(array, hexapod).segments, read_motion(table, hexapod).segments, strict=True
+    )
+    for one, other in pairs:
+        assert one.stance == other.stance
+        np.testing.assert_array_equal(one.configuration, other.configuration)
+
+
+@pytest.mark.parametrize("shape", [(5,), (5, 3), (5, 24), (5, 26)])
+def test_an_array_of_another_width_is_refused_with_the_columns_it_lacks(
+    hexapod: Robot, shape: tuple[int, ...]
+) -> None:
+    with pytest.raises(InvalidMotionError, match=r"time_s, .*lf__contact") as caught:
+        read_motion(np.zeros(shape), hexapod)
     assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_motion_is_refused_in_one_line(hexapod: Robot) -> None:
+    with pytest.raises(InvalidMotionError, match="not list"):
+        read_motion([1.0, 2.0], hexapod)  # type: ignore[arg-type]
