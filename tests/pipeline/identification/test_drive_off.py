@@ -99,6 +99,7 @@ def named(bridge: str) -> Naming:
     return identify(stated(), measurements(bridge)).naming
 
 
+@pytest.mark.slow
 def test_only_rows_whose_filter_sees_no_drive_count() -> None:
     told, untold = (measurements(bridge, 1, 4.8)[0] for bridge in ("open", None))
     assert told.open_winding is not None

@@ -39,6 +39,7 @@ def test_the_files_interval_is_the_tolerance(motion: Measurement) -> None:
     assert sigma["torque_constant", "rm_joint_1"] == 0.02
 
 
+@pytest.mark.slow
 def test_load_friction_keeps_its_name_beside_an_unknown_torque_constant(
     motion: Measurement,
 ) -> None:

@@ -125,6 +125,7 @@ def test_two_effects_are_both_named(motion) -> None:  # type: ignore[no-untyped-
     }
 
 
+@pytest.mark.slow
 def test_law_outside_the_catalogue_stays_unexplained(motion) -> None:  # type: ignore[no-untyped-def]
     nominal = leg.leg_model()
     log = leg.measured(nominal, motion)
