@@ -134,11 +134,7 @@ def write(
             progress.step("drawing figures")
             files += _pictures(given, (standing, walking), judged, tables, out, said, progress)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
-    return (*_first_lines(given, tables, judged), *said, *_remarks(given))
-
-
-def _remarks(given: Settings) -> tuple[str, ...]:
-    return (*given.remarks, *(given.effects.remarks if given.effects else ()))
+    return (*_first_lines(given, tables, judged), *said, *given.remarks)
 
 
 def _first_lines(
@@ -189,7 +185,7 @@ def _pictures(
 
     files = write_figures(given, *results, out, paper=judged is not None, done=progress.done)
     if judged is None:
-        return files + write_robot_page(given, tables, out, [*said, *_remarks(given)])
+        return files + write_robot_page(given, tables, out, [*said, *given.remarks])
     titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}
     files += write_fig_21(judged, titles, out)
     return files + write_summary(given, judged, tables, out)

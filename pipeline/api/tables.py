@@ -204,7 +204,7 @@ def metadata(given: Settings) -> dict[str, Any]:
         "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
         "joint's direction; electrical power positive from supply to motor",
         "zero_pose": spec.zero_pose,
-        "warnings": [*given.remarks, *(given.effects.remarks if given.effects else ())],
+        "warnings": list(given.remarks),
     }
 
 

@@ -1,31 +1,7 @@
 """The model file: a robot, its actuators, and an ordered list of edits with their evidence.
 
-    schema = 1
-
-    [robot]
-    file = "hexapod.toml"            # relative to the model file
-    sha256 = "..."
-
-    [actuators]
-    alternative = "rotor"            # of the catalogue; empty: torque is the actuator's own
-    [actuators.sha256]
-    "rotor_re40.toml" = "..."
-
-    [[edit]]
-    effect = "coulomb_friction"
-    place = ["rm_joint_1"]
-    basis = "identified"
-    level = "confirmed"
-    source = "log.csv, SHA-256 ..."
-    [edit.parameters.torque]
-    value = 0.108
-    unit = "N*m"
-    interval = [0.101, 0.114]
-
-    [noise.current]                  # [A]: standard deviation of what no effect explains
-    rm_joint_1 = 0.0021              # sensor and encoder noise, tolerances of the parts
-
-Edits are applied in order to what the files say; the files themselves are never changed.
+The README of this room shows one. Edits are applied in order to what the files say; the files
+themselves are never changed.
 """
 
 from __future__ import annotations

@@ -115,13 +115,7 @@ def leg_joints(spec: RobotSpec) -> dict[str, tuple[str, ...]]:
 def standing_energies(
     demand: JointDemand, holding: Mapping[str, HoldingResult], legs: Legs
 ) -> list[StandingEnergy]:
-    """Energy of each leg in three seconds of standing.
-
-    Args:
-        demand: For the order of the joints.
-        holding: By alternative.
-        legs: Leg to its joints.
-    """
+    """Energy of each leg in three seconds of standing, by alternative."""
     return [
         StandingEnergy(
             name,
@@ -160,12 +154,7 @@ def robot_energies(
 ) -> list[RobotEnergy]:
     """Average power, cost of transport, and how support and transfer share the energy.
 
-    Args:
-        demand: For the segments and their standing feet.
-        supplies: By alternative.
-        legs: Leg to its joints.
-        weight: Of the robot [N].
-        speed: Of walking [m/s].
+    `weight`: of the robot [N]. `speed`: of walking [m/s].
     """
     rows = []
     for name, supply in supplies.items():

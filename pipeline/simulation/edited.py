@@ -86,12 +86,7 @@ class Effects:
         return {name: self.chain(chain) for name, chain in chains.items()}
 
     def demand(self, segment: Segment, demand: JointDemand) -> JointDemand:
-        """What the actuators supply besides: springs, ripples, feet that squeeze the ground.
-
-        Args:
-            segment: The motion.
-            demand: Of the bodies and the ground.
-        """
+        """Demand of bodies and ground with springs, ripples, and feet that squeeze the ground."""
         torque = np.array(demand.torque)
         for k, actuator in enumerate(self._machine.actuators):
             torque[:, k] = actuator.drive_load(demand.position[:, k], torque[:, k])
@@ -141,16 +136,10 @@ def effects(
     found_with: str | None = None,
     warnings: tuple[str, ...] = (),
 ) -> Effects:
-    """Effects on a robot.
+    """Effects on a robot as its file states it; see `Effects` for what they hold.
 
-    Args:
-        robot: As its file states it.
-        actuators: Of the alternative they were found against, or of any with a motor.
-        apply: Puts the effects into a machine.
-        names: Of the effects in order.
-        found_with: Alternative against which they were found, empty for none; the chain's by
-            default.
-        warnings: What of the model file a reader should know.
+    `actuators`: of the alternative they were found against, or of any with a motor; it counts as
+    the former where `found_with` names none.
 
     Raises:
         GapError: An effect does not fit the robot.

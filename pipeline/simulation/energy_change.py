@@ -42,13 +42,7 @@ class EnergyChange:
 def energy_change(
     robot: Robot, chains: Mapping[str, Actuators], effects: Effects, known: Effects | None = None
 ) -> EnergyChange:
-    """Walk and stand with and without effects.
-
-    Args:
-        robot: With a floating base and a gait.
-        chains: By alternative.
-        effects: All of them.
-        known: Those among them that the comparison starts with; none by default.
+    """Walk and stand with and without effects, but those `known`, which count on both sides.
 
     Raises:
         TippingError: With the effects a foot would have to pull.
@@ -88,14 +82,8 @@ def crossing(costs: Mapping[str, Cost], period: float) -> float:
 def break_even(extra: float, saved: float) -> float:
     """Fraction of time standing at which two actuators cost the same; above it the second pays.
 
-    (1 - f) extra = f saved, both over the same time (Fig. 21 of the paper).
-
-    Args:
-        extra: What the second one costs more walking [J, or W].
-        saved: What it costs less standing for as long [J, or W].
-
-    Returns:
-        f, or NaN where it never costs more walking, or saves nothing standing.
+    (1 - f) extra = f saved (Fig. 21 of the paper), with what the second one costs more walking and
+    less standing for as long [J, or W]; NaN where it does not do both.
     """
     if extra <= 0 or saved <= 0:
         return math.nan

@@ -79,14 +79,10 @@ def read_files(
     actuators: Path | None = None,
     known: ModelFile | None = None,
 ) -> Files:
-    """Read what names a machine.
+    """Read what names a machine; see `Files`.
 
-    Args:
-        robot: Robot file or URDF; the model file's or the project's hexapod by default.
-        model: Model file with effects.
-        gait: File with a table ``[gait]`` to walk instead of the robot file's.
-        actuators: Folder of actuator files; the robot file's or the project's by default.
-        known: What a model file would hold, where none is named.
+    What is not given is the model file's, the robot file's or the project's; `known` is what a
+    model file would hold, where none is named.
 
     Raises:
         PipelineError: The robot file or the gait file cannot be used.
@@ -114,9 +110,7 @@ def read_files(
 def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
     """The machine of a model file before its edits, without a payload of its gait.
 
-    Args:
-        file: The model file.
-        actuators: Folder of the actuator files; the robot file's or the project's by default.
+    `actuators`: folder of actuator files; the robot file's or the project's by default.
 
     Raises:
         PipelineError: The robot file or URDF cannot be used.
@@ -133,9 +127,7 @@ def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
 def stated(files: Files, changes: Mapping[str, object]) -> Stated:
     """Robot and actuators with changed numbers.
 
-    Args:
-        files: From `read_files`.
-        changes: Key to value, in the unit that the key's file writes; a number or its text.
+    `changes`: key to value, a number or its text, in the unit that the key's file writes.
 
     Raises:
         RobotFileError: No such number, or none that can be; names it and the closest match.

@@ -117,9 +117,7 @@ class _Instant:
     def electrical(self, position: Array, speed: Array) -> tuple[Array, Array]:
         """Voltage and current of the motors, each (J,).
 
-        Args:
-            position: As the sensors read [rad].
-            speed: Of the motors [rad/s].
+        `position`: as the sensors read [rad]. `speed`: of the motors [rad/s].
         """
         duty = np.clip(self.servo.gain * (self.goal - position), -1.0, 1.0)
         idle = np.nan if self.servo.open_bridge else 0.0
@@ -131,11 +129,8 @@ class _Instant:
 class ForwardSimulator:
     """Forward simulation of one machine.
 
-    Args:
-        model: Fixed base, a motor in every joint, transmissions without backlash or coupling.
-
     Raises:
-        ModelError: The model has something else.
+        ModelError: The base floats, a joint has no motor, a transmission has backlash or coupling.
 
     Note:
         Transmissions are taken as rigid: an elastic deflection that was estimated as a tolerance
@@ -169,11 +164,7 @@ class ForwardSimulator:
         self._ratio = np.array([a.ratio for a in model.actuators])
 
     def run(self, servo: ServoInput) -> Rollout:
-        """Simulate from the first instant to the last.
-
-        Args:
-            servo: Goals, supply, gain, first position and velocity.
-        """
+        """Simulate from the first instant to the last."""
         n, joints = servo.goal.shape
         position, velocity, voltage, current = (np.empty((n, joints)) for _ in range(4))
         q, v = servo.position - self._offset, servo.velocity.copy()
@@ -242,11 +233,7 @@ class ForwardSimulator:
     ) -> tuple[Array, Array]:
         """Directions of motion (zero where a joint is held) and accelerations, each (J,).
 
-        Args:
-            now: The present instant.
-            q: Joint positions.
-            v: Joint velocities.
-            given: Directions decided before; by velocity and holding torque when None.
+        `given`: directions decided before; by velocity and holding torque when None.
         """
         full = pin.integrate(self._rigid, self._neutral, self._spread(q))
         bias = pin.rnea(self._rigid, self._data, full, self._spread(v), np.zeros(self._rigid.nv))

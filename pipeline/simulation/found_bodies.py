@@ -91,10 +91,7 @@ def found_bodies(bare: MachineModel, edits: Sequence[Edit]) -> tuple[FoundBody, 
     """Every body that edits change: those that differ first, then by the size of the change.
 
     Size is the change of mass and of the first moment over the robot's reach, |dm| + |d(m c)| / L.
-
-    Args:
-        bare: The machine before the edits.
-        edits: Of a model file; those of bodies count.
+    `bare`: the machine before the edits.
     """
     own = of_bodies(edits)
     old, new = (changed_model(m.rigid, m.bodies) for m in (bare, apply_edits(bare, own)))
@@ -118,13 +115,8 @@ def corrected_urdf(text: str, where: str, bare: MachineModel, edits: Sequence[Ed
 
     Of links that are fixed to each other a motion determines the sum. What was found goes
     into the link that the joint carries; where no body would be left of it by itself, it is the
-    whole, and the links fixed to it have no inertial element any more.
-
-    Args:
-        text: The URDF of the machine.
-        where: Its file, for messages.
-        bare: The machine before the edits.
-        edits: Of a model file; those of bodies count.
+    whole, and the links fixed to it have no inertial element any more. `where`: the file of the
+    URDF's text. `bare`: the machine before the edits.
 
     Raises:
         UrdfError: The text is no URDF.

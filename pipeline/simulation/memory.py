@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
 from pipeline.errors import GaitError
@@ -23,24 +24,15 @@ _CGROUPS = (
 
 
 def needed(samples: int, joints: int, alternatives: int) -> int:
-    """Memory of one walking cycle [bytes].
-
-    Args:
-        samples: Per half period.
-        joints: Of the robot.
-        alternatives: Actuators that are compared.
-    """
+    """Memory of one walking cycle [bytes]; samples are those of half a period."""
     return samples * SEGMENTS * joints * (PER_SAMPLE + PER_ALTERNATIVE * alternatives)
 
 
 def free() -> int:
     """Memory that can still be had, of the machine or of the container [bytes]."""
-    amounts = []
-    for line in _text("/proc/meminfo").splitlines():
-        if line.startswith("MemAvailable:"):
-            amounts.append(1024 * int(line.split()[1]))
-    if not amounts:
-        amounts.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    free = re.search(r"^MemAvailable: +(\d+)", _text("/proc/meminfo"), re.MULTILINE)
+    all_there_is = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    amounts = [1024 * int(free[1]) if free else all_there_is]
     for limit, used in _CGROUPS:
         numbers = _text(limit).strip(), _text(used).strip()
         if all(number.isdigit() for number in numbers):  # "max" where there is none
@@ -57,11 +49,6 @@ def _text(path: str) -> str:
 
 def refuse_beyond_memory(samples: int, joints: int, alternatives: int) -> None:
     """Refuse a cycle that does not fit into memory, before anything is computed.
-
-    Args:
-        samples: Per half period.
-        joints: Of the robot.
-        alternatives: Actuators that are compared.
 
     Raises:
         GaitError: It needs more than is free; says how much, and how many samples fit.

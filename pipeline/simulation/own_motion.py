@@ -62,10 +62,6 @@ def needed_columns(robot: Robot) -> list[str]:
 def read_motion(source: Path | pd.DataFrame | Array, robot: Robot) -> Motion:
     """A motion from a CSV file, a table or an array; see the module for its columns.
 
-    Args:
-        source: Columns of the robot's joints other than positions are left unread.
-        robot: With its payload.
-
     Raises:
         InvalidMotionError: It cannot be read; a column is missing, unknown or not a number; time
             does not increase; a position lies beyond its limits; contacts do not fit the motion.
@@ -202,13 +198,8 @@ def _base(
 ) -> tuple[Array, Rotation]:
     """Place (N, 3) and attitude of the base: as given, else as standing feet leave it.
 
-    Args:
-        time: Shape (N,) [s].
-        feet: In the base frame [m], shape (N, L, 3).
-        phases: Of contact.
-        turn: Attitude, or that of the first row.
-        place: As given [m], shape (N, 3).
-        known: Whether `turn` is known at all rows.
+    `feet`: in the base frame [m], shape (N, L, 3). `turn`: attitude, or that of the first row where
+    it is not `known`. `place`: as given [m], shape (N, 3).
     """
     matrix = turn.as_matrix()
     origin = np.zeros((len(time), 3)) if place is None else np.array(place)

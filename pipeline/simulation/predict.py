@@ -49,11 +49,7 @@ class Simulator:
         self._bodies = RigidBodies(measurement)
 
     def predict(self, model: MachineModel, near: Prediction | None = None) -> Prediction:
-        """Predict with a model.
-
-        Args:
-            model: With the measurement's joints.
-            near: A prediction of a similar model, whose equal parts are taken over.
+        """Predict with a model; equal parts of a `near` model's prediction are taken over.
 
         Raises:
             ModelError: The model's joints are not the measurement's.

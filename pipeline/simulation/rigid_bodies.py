@@ -71,11 +71,8 @@ def strained(body: pin.Inertia, strain: Sequence[float]) -> pin.Inertia:
         m exp(a),    c + k d,    exp(a) exp(E) M exp(E).
 
     A rotation of the axes in which it is measured turns E and d and nothing else. The centre of a
-    slender link may lie off its axis as far as along it: motors and wires sit beside it.
-
-    Args:
-        body: Before.
-        strain: Of the symmetric E the entries xx, yy, zz, then a, then of E xy, xz, yz, and d.
+    slender link may lie off its axis as far as along it: motors and wires sit beside it. `strain`:
+    of the symmetric E the entries xx, yy, zz, then a, then of E xy, xz, yz, and d.
     """
     ten = tuple(np.asarray(body.toDynamicParameters()).tolist())
     return pin.Inertia.FromDynamicParameters(np.array(_strained(ten, tuple(strain))))
@@ -143,9 +140,7 @@ class RigidBodies:
     def torque(self, machine: MachineModel, motion: tuple[Array, Array, Array]) -> Array:
         """Joint torques, shape (N, J) [N*m].
 
-        Args:
-            machine: Its bodies, ground and legs.
-            motion: Position, velocity and acceleration of the joints, each (N, J).
+        `motion`: position, velocity and acceleration of the joints, each (N, J).
         """
         model = changed_model(machine.rigid, machine.bodies)
         q, v, a, joints = _configuration(machine, model, motion)
@@ -313,9 +308,7 @@ def _ground_forces(
 def outward(left: Sequence[bool], standing: NDArray[np.generic]) -> Array:
     """Share of each standing foot in a lateral force of one newton per side, (n, F).
 
-    Args:
-        left: Which feet are on the left side, (F,).
-        standing: Which feet stand, (n, F).
+    `left`: which feet are on the left side, (F,). `standing`: which feet stand, (n, F).
     """
     own = np.array(left)
     out = np.zeros(standing.shape)

@@ -75,15 +75,9 @@ class Settings:
     ) -> Settings:
         """The same machine, to walk in this way; defaults are the command line's.
 
-        Args:
-            samples: Per half period of the gait.
-            quasi_static: Whether the links' inertial terms are left out.
-            regeneration: ``none``, ``bus`` or a fraction of returned energy that is used again.
-            forces: Rule and friction of the ground's forces.
-            compare_forces: Whether what the rules cost is to be compared.
-            motion: Joint positions and contacts in place of the gait; see
-                `pipeline.simulation.own_motion`.
-            walks: Whether a gait cycle will be computed, which must fit into memory.
+        `regeneration`: ``none``, ``bus`` or a fraction of returned energy that is used again.
+        `motion`: see `pipeline.simulation.own_motion`. `walks`: whether a gait cycle will be
+        computed, which must fit into memory. For the rest see `Settings`.
 
         Raises:
             GaitError: Too few samples or too many, or forces that cannot be.
@@ -138,8 +132,8 @@ class Settings:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a reader of the numbers should know of the changes and the robot."""
-        return (*self.notes, *self.warnings)
+        """What a reader of the numbers should know of the changes, the robot and the effects."""
+        return (*self.notes, *self.warnings, *(self.effects.remarks if self.effects else ()))
 
     @property
     def machine(self) -> Robot:
@@ -172,12 +166,9 @@ class Settings:
 def settings(
     files: Files, changes: Mapping[str, object] | None = None, before: Settings | None = None
 ) -> Settings:
-    """Apply changed numbers to what the files say, and build robot, actuators and effects.
+    """Apply changed numbers to what the files of a robot say, build robot, actuators and effects.
 
-    Args:
-        files: From `read_files`, of a robot file.
-        changes: Key to value, in the unit that the key's file writes.
-        before: Made of the same robot: what of it stays is not built again.
+    `changes`: see `stated`. `before`: made of the same robot: what of it stays is not built again.
 
     Raises:
         PipelineError: A robot that cannot be, or a change that cannot be used.

@@ -81,12 +81,7 @@ class RuleCost:
 
 
 def joint_series(demand: MotionDemand, joints: Sequence[str] | None = None) -> ShaftSeries:
-    """The joints' side of the actuators: segments in a row, split at velocity zeros.
-
-    Args:
-        demand: Of all joints.
-        joints: Those to follow; all by default.
-    """
+    """The joints' side of the actuators: segments in a row, split at velocity zeros."""
     names = tuple(joints or demand.joints)
     columns = [demand.joints.index(joint) for joint in names]
     time = np.concatenate([part.time for part in demand.segments])
@@ -104,14 +99,7 @@ def stand(
     adjust: Adjust | None = None,
     forces: GroundForces = PAPER,
 ) -> Standing:
-    """Stand still and hold.
-
-    Args:
-        robot: With a floating base.
-        chains: By alternative.
-        feet: Legs that stand; the robot file's by default.
-        adjust: Changes the demand on the actuators; see `pipeline.simulation.edited`.
-        forces: How the ground's forces are chosen.
+    """Stand still on some legs, the robot file's by default, and hold; see `walk`.
 
     Raises:
         StanceError: A foot would have to pull or slide.
@@ -195,16 +183,9 @@ def compare_rules(
     adjust: Adjust | None = None,
     friction_coefficient: float | None = None,
 ) -> Iterator[RuleCost]:
-    """What every rule of the ground's forces costs along a motion, one after the other.
+    """What every rule of the ground's forces costs along a motion, one after the other; see `walk`.
 
-    Args:
-        robot: With a floating base.
-        chains: By alternative.
-        motion: The gait's.
-        quasi_static: Leave out the links' inertial terms.
-        regeneration: What becomes of returned energy; none by default.
-        adjust: Changes the demand on the actuators.
-        friction_coefficient: For all rules; None for no limit.
+    `friction_coefficient`: of all rules [1]; None for no limit.
     """
     for rule in RULES:
         demand = None

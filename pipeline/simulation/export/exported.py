@@ -37,14 +37,10 @@ def exported(
     actuators: Path | None = None,
     mapping: Path | None = None,
 ) -> Exported:
-    """Write a machine with what was found on it for another tool.
+    """Write the machine of a model file, with what was found on it, as one of `KINDS`.
 
-    Args:
-        model: Model file.
-        to: ``mjcf``, ``urdf`` or ``ros2_control``.
-        robot: Robot file or URDF instead of the one that the model file names.
-        actuators: Folder of actuator files; the robot file's or the project's by default.
-        mapping: Mapping file whose ``[pd_gains]`` are the servos' gains.
+    `robot`: in place of the model file's. `actuators`: folder; the robot file's or the project's by
+    default. `mapping`: mapping file whose ``[pd_gains]`` are the servos' gains.
 
     Raises:
         GapError: The model file or mapping cannot be used.

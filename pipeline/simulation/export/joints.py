@@ -50,11 +50,7 @@ class JointNumbers:
 
 
 def joint_numbers(machine: MachineModel) -> tuple[JointNumbers, ...]:
-    """The numbers of every joint.
-
-    Args:
-        machine: With its effects.
-    """
+    """The numbers of every joint."""
     return tuple(_numbers(machine, a) for a in machine.actuators)
 
 

@@ -23,14 +23,10 @@ def mjcf(
     remarks: Sequence[str],
     gains: Mapping[str, tuple[float, float]] | None = None,
 ) -> str:
-    """Write a machine as MJCF.
+    """Write a machine as MJCF, with remarks at its top.
 
-    Args:
-        machine: With its effects.
-        numbers: Of its joints.
-        remarks: Lines for the top of the file.
-        gains: Joint to stiffness [N*m/rad] and damping [N*m*s/rad] of its servo; motors that take
-            torques without.
+    `gains`: joint to stiffness [N*m/rad] and damping [N*m*s/rad] of its servo; a joint without is
+    driven by torque.
     """
     model = bodies_of(machine)
     root = ElementTree.Element("mujoco", model=machine.name)

@@ -25,13 +25,8 @@ def ros2_control(
     """Write the parameters of a `joint_trajectory_controller` with an effort interface.
 
     It commands, by its documentation, ``ff_velocity_scale v_goal + p e + d de/dt``: viscous
-    friction is what the first term makes up for.
-
-    Args:
-        numbers: Of the joints.
-        remarks: Lines for the top of the file.
-        gains: Joint to stiffness [N*m/rad] and damping [N*m*s/rad] of its servo; zeros to be filled
-            in without.
+    friction is what the first term makes up for. `gains`: joint to stiffness [N*m/rad] and damping
+    [N*m*s/rad] of its servo; zeros to be filled in without.
     """
     lines = [*(f"# {r}" for r in remarks), "joint_trajectory_controller:", "  ros__parameters:"]
     lines.append("    joints:")

@@ -27,15 +27,9 @@ def urdf(
     numbers: Sequence[JointNumbers],
     remarks: Sequence[str],
 ) -> str:
-    """Write what was found into a URDF.
+    """Write what was found into the text of a URDF, that of file `where`.
 
-    Args:
-        text: The robot's URDF.
-        where: Its file, for messages.
-        bare: The machine before the edits.
-        edits: Of the model file.
-        numbers: Of the joints, with the edits.
-        remarks: Lines for the top of the file.
+    `bare`: the machine before the edits. `numbers`: of the joints with them.
 
     Raises:
         UrdfError: The text is no URDF.

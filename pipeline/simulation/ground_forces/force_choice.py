@@ -25,11 +25,7 @@ class ForceChoice:
     friction_coefficient: float | None = None
 
     def on(self, ground: float | None) -> ForceChoice:
-        """The same on a ground whose coefficient of friction holds where no option names one.
-
-        Args:
-            ground: Of ``[gait]`` [1]; None for no limit.
-        """
+        """The same on a ground whose coefficient [1] holds where no option names one."""
         own = self.friction_coefficient
         return replace(self, friction_coefficient=ground if own is None else own)
 
@@ -62,13 +58,7 @@ class ForceChoice:
     def ground(
         self, chains: Mapping[str, Actuators], recovered: float, adjust: Adjust | None
     ) -> GroundForces:
-        """What dynamics takes.
-
-        Args:
-            chains: By alternative.
-            recovered: Share of returned power that counts as gained at an instant.
-            adjust: Changes the demand on the actuators; see `pipeline.simulation.edited`.
-        """
+        """What dynamics takes; see `LeastPower`."""
         rule: ForceRule | None = None
         if self.rule == LEAST_TORQUE:
             rule = LeastTorque()

@@ -57,13 +57,8 @@ class PowerLaw:
         """Power out of the supply with kinks rounded, and its two derivatives.
 
         Each max(x, 0) becomes (x + sqrt(x^2 + w^2)) / 2, which is convex and lies above it by at
-        most w / 2.
-
-        Args:
-            torque: Shape (n, Q) [N*m].
-            width: w of the kinks [N*m], shape (n, 1).
-            width_of_power: w where power changes its sign [W], shape (n, 1); that which the width
-                of the kinks makes of it by default.
+        most w / 2. `torque`: (n, Q) [N*m]. `width`: w of the kinks, (n, 1) [N*m]. `width_of_power`:
+        w where power changes its sign, (n, 1) [W]; what `width` makes of it by default.
         """
         ramp, step, peak = _rounded(torque[..., None] - self.kink, width[..., None])
         motor = self.start + self.slope * torque + (self.bend * ramp).sum(axis=-1)
@@ -89,13 +84,10 @@ class PowerLaw:
 
 
 def power_law(asked: Asked, reach: Array, shape: tuple[int, ...], recovered: float) -> PowerLaw:
-    """Read the law off a chain.
+    """Read the law of torques shaped (n, Q) off a chain.
 
-    Args:
-        asked: The chain.
-        reach: Largest torque of interest at each instant [N*m], shape (n, 1).
-        shape: (n, Q).
-        recovered: Share of returned power that is used again.
+    `reach`: largest torque of interest at each instant, (n, 1) [N*m]. `recovered`: share of
+    returned power that is used again.
     """
     torque = [np.broadcast_to(node * reach, shape) for node in _NODES]
     answers = [asked(node) for node in torque]
