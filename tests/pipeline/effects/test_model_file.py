@@ -1,55 +1,149 @@
-"""Model files: what is written is read again, what is wrong is said in one line."""
+"""Model files: what naming finds is read back as the machine that was found, or refused."""
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
+from actuators.errors import ActuatorError
+from pipeline.effects.base import Effect, Place
+from pipeline.effects.bodies import LinkMass
+from pipeline.effects.curves import FrictionCurveEffect, PositionCurveEffect
 from pipeline.effects.model_file import (
     Edit,
     EditParameter,
+    ModelFile,
     apply_edits,
     new_model_file,
     read_model_file,
 )
+from pipeline.effects.motor import SensedHeating
+from pipeline.effects.registry import EFFECTS, catalogue
+from pipeline.effects.transmission import BareCoupling
+from pipeline.errors import PipelineError
 from pipeline.identification.workflow.model_writer import model_text
 from pipeline.logs.errors import GapError, ModelFileError
+from pipeline.machine.machine import MachineModel
 from pipeline.simulation.files import base_model
+from tests.pipeline.logs.test_fuzz_readers import TOML_TOKENS, mutated
+
+EVERY = (*EFFECTS.values(), BareCoupling(), SensedHeating())
+FORMS = tuple(effect for effect in EVERY if effect.competes)
+#: Places of the leg, by kind.
+PLACES: Mapping[str, Place] = {
+    "joint": ("rm_joint_2",),
+    "joint pair": ("rm_joint_2", "rm_joint_3"),
+    "link": ("rm_femur_link",),
+    "ground": ("ground",),
+    "effort channels": ("effort channels",),
+    "effort column": ("rm_joint_2__current_A",),
+}
+#: Nonlinear parameters, which `shapes` would take from a log.
+SHAPES: Mapping[type[Effect], Mapping[str, float]] = {
+    type(EFFECTS["stribeck_friction"]): {"velocity": 0.05},
+    type(EFFECTS["backlash"]): {"crossing": 0.7},
+    type(EFFECTS["torque_ripple"]): {"order": 100.0},
+    type(EFFECTS["winding_heating"]): {"time_constant": 4.0},
+    type(EFFECTS["warming_friction"]): {"reference": 300.0},
+    SensedHeating: {"time_constant": 10.0},
+    BareCoupling: {"ratio": -1.0},
+    LinkMass: {"x": 0.1, "y": -0.02, "z": 0.3},
+    FrictionCurveEffect: {
+        **{f"speed_{k}": 0.5 * (k - 1) for k in range(1, 6)},
+        **{f"place_{k}": 0.1 * (k - 4) for k in range(1, 8)},
+        "travel": 0.02,
+    },
+    PositionCurveEffect: {f"place_{k}": 0.1 * (k - 5) for k in range(1, 10)},
+}
+FRICTION = EFFECTS["coulomb_friction"]
 
 
-def _edit(value: float = 0.4) -> Edit:
-    return Edit(
-        "coulomb_friction",
-        ("rm_joint_2",),
-        (EditParameter("torque", value, "N*m", (0.3, 0.5)),),
-        source="log.csv, SHA-256 00",
+def edit_of(effect: Effect, values: Mapping[str, float], channel: str = "current") -> Edit:
+    found = tuple(
+        EditParameter(p.name, v, effect.unit(p.name, channel), (v - 0.1 * abs(v), v + 0.1 * abs(v)))
+        for p in effect.parameters
+        if (v := values.get(p.name)) is not None
     )
+    return Edit(effect.name, PLACES[effect.place_kind], found, source="log.csv, SHA-256 00")
 
 
-def _written(tmp_path: Path, root: Path) -> Path:
-    file = new_model_file(root / "urdf" / "leg.toml", "rotor").with_edits([_edit()])
-    path = tmp_path / "model.toml"
-    path.write_text(model_text(file, tmp_path), encoding="utf-8")
+@pytest.fixture
+def leg(root: Path) -> ModelFile:
+    return new_model_file(root / "urdf" / "leg.toml", "rotor")
+
+
+def written(folder: Path, file: ModelFile, *edits: Edit) -> Path:
+    path = folder / "model.toml"
+    path.write_text(model_text(file.with_edits(edits), folder), encoding="utf-8")
     return path
 
 
-def test_round_trip(tmp_path: Path, root: Path) -> None:
-    path = _written(tmp_path, root)
-    file = read_model_file(path)
-    assert file.edits == (_edit(),)
-    assert file.alternative == "rotor"
-    assert file.changed == ()
-    machine = apply_edits(base_model(file), file.edits)
-    names = [e.name for e in machine.actuator("rm_joint_2").elements]
-    assert names[0] == "coulomb_friction"
+def _leaves(thing: Any, where: str = "") -> Iterator[tuple[str, Any]]:
+    """Everything a machine is made of, by where it stands."""
+    if dataclasses.is_dataclass(thing):
+        yield f"{where}()", type(thing).__name__
+        inside = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
+    elif isinstance(thing, Mapping | tuple):
+        inside = dict(thing if isinstance(thing, Mapping) else enumerate(thing))
+    else:
+        yield where, thing
+        return
+    for key, value in inside.items():
+        yield from _leaves(value, f"{where}.{key}")
 
 
-def test_edits_leave_the_base_model_alone(root: Path) -> None:
-    base = base_model(new_model_file(root / "urdf" / "leg.toml", "rotor"))
+def same(one: MachineModel, other: MachineModel) -> bool:
+    """Whether two machines are made of the same parts with the same numbers."""
+    a, b = (dict(_leaves((m.bodies, m.actuators))) for m in (one, other))
+    return a.keys() == b.keys() and all(
+        np.allclose(value, b[where], rtol=1e-9, atol=0.0, equal_nan=True)
+        if isinstance(value, float | np.ndarray)
+        else value == b[where]
+        for where, value in a.items()
+    )
+
+
+@pytest.mark.parametrize(("size", "channel"), [(7.0, "current"), (-7.0, "voltage")])
+@pytest.mark.parametrize("effect", FORMS, ids=lambda effect: type(effect).__name__)
+def test_what_is_found_is_read_back_as_the_same_machine(
+    tmp_path: Path, root: Path, effect: Effect, channel: str, size: float
+) -> None:
+    bare = isinstance(effect, BareCoupling)
+    file = new_model_file(root / "urdf" / "leg.toml", "" if bare else "rotor")
+    base, shape = base_model(file), dict(SHAPES.get(type(effect), {}))
+    x = {
+        c.name: (1.0 if c.signed or size > 0 else -1.0) * size * (k + 1) * c.step
+        for k, c in enumerate(effect.coordinates)
+    }
     before = base.actuators
-    apply_edits(base, [_edit()])
+    found = effect.edit(base, PLACES[effect.place_kind], x, shape)
+    assert not same(found, base)
     assert base.actuators is before
+    edit = edit_of(effect, effect.physical(x, shape), channel)
+    path = written(tmp_path, file, edit)
+    back = read_model_file(path)
+    assert (back.edits, back.alternative, back.changed) == ((edit,), file.alternative, ())
+    assert same(apply_edits(base_model(back), back.edits), found)
+    # Written once more it is the same file: a model that is added to keeps what it had.
+    assert model_text(back, tmp_path) == path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("alternative", ["", "rotor"])
+def test_every_form_that_competes_is_tried_above(root: Path, alternative: str) -> None:
+    model = base_model(new_model_file(root / "urdf" / "leg.toml", alternative))
+    assert {type(e) for e in catalogue(model)} <= {type(e) for e in FORMS}
+
+
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_estimates_at_their_bounds_are_read_back(tmp_path: Path, leg: ModelFile, end: str) -> None:
+    """Whatever is plausible lies in the reader's bounds, the bounds themselves among it."""
+    edits = [edit_of(e, {p.name: float(getattr(p, end)) for p in e.parameters}) for e in EVERY]
+    assert list(read_model_file(written(tmp_path, leg, *edits)).edits) == edits
 
 
 @pytest.mark.parametrize(
@@ -62,14 +156,15 @@ def test_edits_leave_the_base_model_alone(root: Path) -> None:
         ("schema = 1", "schema = 2", "'schema' must be 1"),
         ("basis =", "bases =", "did you mean 'basis'"),
         ("parameters.torque", "parameters.torqe", "did you mean 'torque'"),
+        ('level = "confirmed"', 'level = "doubtful"', "edit 1.level"),
         ("schema = 1", "schema = [", "malformed TOML"),
     ],
 )
 def test_errors_are_one_clear_line(
-    tmp_path: Path, root: Path, old: str, new: str, said: str
+    tmp_path: Path, leg: ModelFile, old: str, new: str, said: str
 ) -> None:
-    path = _written(tmp_path, root)
-    text = path.read_text(encoding="utf-8")
+    edit = edit_of(FRICTION, {"torque": 0.4})
+    text = (path := written(tmp_path, leg, edit)).read_text(encoding="utf-8")
     assert old in text
     path.write_text(text.replace(old, new), encoding="utf-8")
     with pytest.raises(ModelFileError) as error:
@@ -78,16 +173,78 @@ def test_errors_are_one_clear_line(
     assert "\n" not in str(error.value)
 
 
-def test_changed_sources_are_told(tmp_path: Path, root: Path) -> None:
-    path = _written(tmp_path, root)
-    text = path.read_text(encoding="utf-8")
-    file = read_model_file(path)
-    path.write_text(text.replace(file.robot_sha256, "0" * 64), encoding="utf-8")
+def test_levels_and_what_may_be_left_out_are_kept_and_changed_sources_told(
+    tmp_path: Path, leg: ModelFile
+) -> None:
+    edit = dataclasses.replace(edit_of(FRICTION, {"torque": 0.4}), level="approximate")
+    heating = {"rise": 3.0, "thermal_resistance": 2.0, "time_constant": 4.0}
+    edits = (edit, edit_of(EFFECTS["winding_heating"], heating))
+    path = written(tmp_path, leg, *edits)
+    assert read_model_file(path).edits == edits
+    text = path.read_text(encoding="utf-8").replace(leg.robot_sha256, "0" * 64)
+    path.write_text(text, encoding="utf-8")
     assert "other SHA-256" in read_model_file(path).changed[0]
 
 
-def test_unknown_place_is_refused(root: Path) -> None:
-    base = base_model(new_model_file(root / "urdf" / "leg.toml", "rotor"))
-    edit = Edit("coulomb_friction", ("rm_join_2",), _edit().parameters)
-    with pytest.raises(GapError, match="did you mean 'rm_joint_2'"):
-        apply_edits(base, [edit])
+@pytest.mark.parametrize(
+    ("place", "values", "said"),
+    [
+        ("rm_join_2", {"torque": 0.4}, "did you mean 'rm_joint_2'"),
+        ("rm_joint_2", {"torque": -1.0}, "-1 lies outside 0"),
+        ("rm_joint_2", {}, "needs the parameter 'torque'"),
+    ],
+)
+def test_an_edit_that_cannot_be_is_refused(
+    leg: ModelFile, place: str, values: dict[str, float], said: str
+) -> None:
+    edit = dataclasses.replace(edit_of(FRICTION, values), place=(place,))
+    with pytest.raises(GapError, match=said):
+        apply_edits(base_model(leg), [edit])
+
+
+VALUES = (
+    *('"N*m"', '"kg"', '"xyz"', '""', "0", "1", "-1", "2.5", "1e20", "-1e308", "1e308", "nan"),
+    *("inf", "-inf", "true", "[]", '["rm_joint_1"]', '["rm_joint_1", "rm_joint_1"]', '["x"]', "{}"),
+    *("[0, 1]", "[1, 0]", "[0]", "[nan, inf]", "2020-01-01", '"coulomb_friction"', '"backlash"'),
+    *('"base_tilt"', '"transmission_coupling"', '"identified"', '["rm_tibia_link"]', "99" * 200),
+)
+TABLES = ("[[edit]]", "[edit]", "[robot]", "[actuators]", "[edit.parameters.mass]", "[x]", "[[x]]")
+
+
+def respelt(text: bytes, rng: np.random.Generator) -> bytes:
+    """Well-formed TOML, mostly, with other values, lines and tables."""
+    lines = text.decode().splitlines()
+    for _ in range(int(rng.integers(1, 4))):
+        at = int(rng.integers(len(lines)))
+        if "=" in lines[at] and rng.integers(4):
+            lines[at] = f"{lines[at].split('=')[0]}= {VALUES[int(rng.integers(len(VALUES)))]}"
+        elif rng.integers(2):
+            del lines[at]
+        else:
+            lines.insert(at, TABLES[int(rng.integers(len(TABLES)))])
+    return "\n".join(lines).encode()
+
+
+@pytest.mark.parametrize("count", [150, pytest.param(10_000, marks=pytest.mark.slow)])
+def test_whatever_its_bytes_a_clear_line_or_a_model(
+    tmp_path: Path, leg: ModelFile, count: int
+) -> None:
+    bare, rng = base_model(leg), np.random.default_rng(1)
+    names = ("coulomb_friction", "link_mass", "torque_ripple", "effort_offset", "rotor_inertia")
+    each = [(EFFECTS[n], {p.name: 0.1 for p in EFFECTS[n].parameters}) for n in names]
+    path = written(tmp_path, leg, *(edit_of(effect, values) for effect, values in each))
+    text, accepted = path.read_bytes(), 0
+    for _ in range(count):
+        rough = bool(rng.integers(3) == 0)
+        path.write_bytes(mutated(text, rng, TOML_TOKENS) if rough else respelt(text, rng))
+        try:
+            model = apply_edits(bare, read_model_file(path).edits)
+        except (GapError, ActuatorError, PipelineError) as error:
+            said = str(error)
+        else:
+            said = ""
+            assert model.joints == bare.joints
+        accepted += not said
+        assert "\n" not in said
+        assert len(said) < 700
+    assert 0.02 < accepted / count < 0.8  # most mutations must matter, and not all be the same

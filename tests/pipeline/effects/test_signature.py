@@ -13,29 +13,19 @@ from pipeline.effects.base import SIGNATURES, Effect
 from pipeline.effects.registry import effect_named
 from pipeline.logs.errors import EffectError
 
+NOTHING = np.zeros((3, 2))
 LOG: Any = SimpleNamespace(
-    joints=("near", "far"),
-    channels=("current",),
-    time=np.zeros(3),
-    q=np.zeros((3, 2)),
-    v=np.zeros((3, 2)),
-    a=np.zeros((3, 2)),
-    derivative=lambda x: x,
-    lowpass=lambda x: x,
+    **{"joints": ("near", "far"), "channels": ("current",), "time": np.zeros(3)},
+    **dict.fromkeys("qva", NOTHING),
+    **dict.fromkeys(("derivative", "lowpass"), lambda x: x),
 )
-PREDICTION: Any = SimpleNamespace(torque=np.zeros((3, 2)), effort=np.zeros((3, 2, 1)))
+PREDICTION: Any = SimpleNamespace(torque=NOTHING, effort=NOTHING[..., None])
 
 
 def test_every_signature_is_a_variable_of_its_own() -> None:
-    labels = {
-        name: signature_variable(name, LOG, PREDICTION, 0, ("near", "far"))[0]
-        for name in SIGNATURES
-        if name != "support"  # the load, too: on the leg that stands
-    }
-    assert len(set(labels.values())) == len(labels)
-
-
-def test_a_signature_that_nothing_draws_is_refused_where_the_effect_is_written() -> None:
+    names = [name for name in SIGNATURES if name != "support"]  # the load, too, where a leg stands
+    drawn = (signature_variable(n, LOG, PREDICTION, 0, ("near", "far"))[0] for n in names)
+    assert len(set(drawn)) == len(names)
     with pytest.raises(EffectError, match=r"Misread: no signature 'speed'; known: .*velocity"):
         type("Misread", (Effect,), {"signature": "speed"})
 
@@ -43,7 +33,8 @@ def test_a_signature_that_nothing_draws_is_refused_where_the_effect_is_written()
 @pytest.mark.parametrize(
     ("name", "kinds"),
     [
-        *((name, ("compliance",)) for name in ("backlash", "joint_elasticity")),
+        ("backlash", ("compliance",)),
+        ("joint_elasticity", ("compliance",)),
         ("torque_constant_error", ("torque_constant",)),
         ("effort_offset", ("effort_zero",)),
         ("position_offset", ("encoder",)),

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuators.chain import Chain
 from actuators.energy.balance import balance_residual
 from actuators.energy.energy import stage_energies
 from actuators.energy.regeneration import supply
@@ -15,53 +14,36 @@ from actuators.loading.build import load_catalog
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking, walk
 
-ALTERNATIVES = ("ideal", "rotor", "reversible", "irreversible")
+CHAINS = load_catalog().chains()
 POLICIES = (("none", 0.0), ("fraction", 0.5), ("fraction", 1.0), ("bus", 0.0))
 SAMPLES = 751
 
 
 @pytest.fixture(scope="module")
-def chains() -> dict[str, Chain]:
-    return load_catalog().chains()
+def cycle(hexapod: Robot) -> Walking:
+    return walk(hexapod, CHAINS, samples=SAMPLES)
 
 
 @pytest.fixture(scope="module")
-def cycle(hexapod: Robot, chains: dict[str, Chain]) -> Walking:
-    return walk(hexapod, chains, samples=SAMPLES)
+def fine_cycle(hexapod: Robot) -> Walking:
+    return walk(hexapod, CHAINS, samples=8 * (SAMPLES - 1) + 1)
 
 
-@pytest.fixture(scope="module")
-def fine_cycle(hexapod: Robot, chains: dict[str, Chain]) -> Walking:
-    return walk(hexapod, chains, samples=20 * (SAMPLES - 1) + 1)
-
-
-@pytest.mark.parametrize("alternative", ALTERNATIVES)
-@pytest.mark.parametrize("policy", POLICIES, ids=lambda p: f"{p[0]}-{p[1]}")
-def test_power_balances_at_every_sample(
-    cycle: Walking, alternative: str, policy: tuple[str, float]
+@pytest.mark.parametrize("alternative", CHAINS)
+def test_power_balances_at_every_sample_and_no_element_gives_energy_away(
+    cycle: Walking, alternative: str
 ) -> None:
     """Supplied - dumped - joint - losses - stored, relative to the terms: below 1e-9."""
     result = cycle.results[alternative]
-    account = supply(result, *policy)
-    assert np.abs(balance_residual(result, account)).max() < 1e-9
+    for policy in POLICIES:
+        assert np.abs(balance_residual(result, supply(result, *policy))).max() < 1e-9
+    assert min(loss.min() for loss in result.losses.values()) >= 0
+    wrong = result.losses | {"winding": result.losses["winding"] * 1.001}
+    assert np.abs(balance_residual(replace(result, losses=wrong))).max() > 1e-6
 
 
-def test_the_balance_can_fail(cycle: Walking) -> None:
-    """A winding loss of a thousandth too much shows."""
-    result = cycle.results["reversible"]
-    losses = dict(result.losses)
-    losses["winding"] = losses["winding"] * 1.001
-    assert np.abs(balance_residual(replace(result, losses=losses))).max() > 1e-6
-
-
-@pytest.mark.parametrize("alternative", ALTERNATIVES)
-def test_no_element_gives_energy_away(cycle: Walking, alternative: str) -> None:
-    for name, loss in cycle.results[alternative].losses.items():
-        assert loss.min() >= 0, name
-
-
-@pytest.mark.parametrize("alternative", ALTERNATIVES)
-def test_within_a_thousandth_of_twenty_times_finer_sampling(
+@pytest.mark.parametrize("alternative", CHAINS)
+def test_within_a_thousandth_of_eight_times_finer_sampling(
     cycle: Walking, fine_cycle: Walking, alternative: str
 ) -> None:
     """Every stage and joint, E(+) and E(-), relative to itself.
@@ -69,17 +51,16 @@ def test_within_a_thousandth_of_twenty_times_finer_sampling(
     Where an energy is less than a thousandth of what flows through its stage (E_el(-) of a joint
     that hardly regenerates), 0.1 % of that thousandth counts.
     """
-    coarse = stage_energies(cycle.results[alternative])
-    fine = stage_energies(fine_cycle.results[alternative])
-    for a, b in zip(coarse, fine, strict=True):
+    walks = (cycle, fine_cycle)
+    for a, b in zip(*(stage_energies(w.results[alternative]) for w in walks), strict=True):
         floor = 1e-3 * (b.forward + b.reverse)
-        assert (np.abs(a.forward - b.forward) <= 1e-3 * np.maximum(b.forward, floor)).all()
-        assert (np.abs(a.reverse - b.reverse) <= 1e-3 * np.maximum(b.reverse, floor)).all()
-    drawn = [w.supplies[alternative].supplied_energy for w in (cycle, fine_cycle)]
+        for coarse, fine in ((a.forward, b.forward), (a.reverse, b.reverse)):
+            assert (np.abs(coarse - fine) <= 1e-3 * np.maximum(fine, floor)).all()
+    drawn = [w.supplies[alternative].supplied_energy for w in walks]
     np.testing.assert_allclose(drawn[0], drawn[1], rtol=1e-3)
 
 
-@pytest.mark.parametrize("alternative", ALTERNATIVES)
+@pytest.mark.parametrize("alternative", CHAINS)
 def test_policies_are_in_order(cycle: Walking, alternative: str) -> None:
     """The more is used again the less is drawn; what is drawn less what is dumped is the same."""
     accounts = [supply(cycle.results[alternative], *policy) for policy in POLICIES]
@@ -94,22 +75,14 @@ def test_policies_are_in_order(cycle: Walking, alternative: str) -> None:
     np.testing.assert_allclose(net, net[0], rtol=1e-9)
 
 
-def test_the_more_ideal_the_less_energy(cycle: Walking) -> None:
-    """Section V: "the more ideal are the actuator components the lower is the consumption"."""
+def test_the_papers_words_on_ideal_actuators_hold(cycle: Walking) -> None:
+    """Section V: the more ideal the lower is the consumption; Section IV.A.1: see below."""
     energy = {name: float(s.supplied_energy.sum()) for name, s in cycle.supplies.items()}
     assert energy["ideal"] < energy["rotor"] < min(energy["reversible"], energy["irreversible"])
-
-
-def test_middle_legs_give_back_at_the_joint_what_they_take(cycle: Walking) -> None:
-    """Section IV.A.1, per joint of the fore-aft symmetric middle leg, within 1e-4."""
-    stage = stage_energies(cycle.results["ideal"])[0]
-    for joint in (f"{leg}_joint_{k}" for leg in ("lm", "rm") for k in (1, 2, 3)):
-        column = stage.joints.index(joint)
-        assert stage.reverse[column] == pytest.approx(stage.forward[column], rel=1e-4)
-
-
-def test_an_ideal_transmission_passes_energy_on(cycle: Walking) -> None:
-    """Section IV.A.1: the energy is the same at the transmission's input and output."""
     out, motor, _ = stage_energies(cycle.results["ideal"])
+    # The energy is the same at the transmission's input and output.
     np.testing.assert_allclose(motor.forward, out.forward, rtol=1e-12)
     np.testing.assert_allclose(motor.reverse, out.reverse, rtol=1e-12)
+    # Joints of a middle leg, symmetric fore and aft, give back what they take.
+    middle = [k for k, joint in enumerate(out.joints) if joint.startswith(("lm", "rm"))]
+    np.testing.assert_allclose(out.reverse[middle], out.forward[middle], rtol=1e-4)

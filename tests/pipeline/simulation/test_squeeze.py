@@ -24,11 +24,7 @@ from pipeline.simulation.walk_stand import stand
 
 Array = NDArray[np.float64]
 PUSH = 30.0  # of all feet on one side [N]
-STANCES = {
-    "all": ("lf", "lm", "lr", "rf", "rm", "rr"),
-    "five": ("lf", "lm", "lr", "rf", "rr"),
-    "tripod": ("lf", "lr", "rm"),
-}
+FIVE = ("lf", "lm", "lr", "rf", "rr")
 
 
 def squeezed(model: MachineModel) -> MachineModel:
@@ -36,51 +32,30 @@ def squeezed(model: MachineModel) -> MachineModel:
 
 
 def expected(robot: Robot, position: Array, stance: tuple[str, ...]) -> Array:
-    """What the joints need less of it, (J,) [N*m]: -sum f . dp/dq by central differences."""
+    """What the joints need less of it, (J,) [N*m]: -sum f . dp/dq by Pinocchio's Jacobians."""
     model, data = robot.model, robot.model.createData()
-    index = [model.joints[model.getJointId(j)].idx_q for j in robot.joints]
-
-    def feet(q: Array) -> dict[str, Array]:
-        whole = pin.neutral(model)
-        whole[index] = q
-        pin.framesForwardKinematics(model, data, whole)
-        return {
-            leg.name: data.oMf[model.getFrameId(leg.foot)].translation.copy()
-            for leg in robot.spec.legs
-        }
-
+    pin.computeJointJacobians(model, data, robot.configuration(position[None])[0])
     out = np.zeros(position.size)
-    step = 1e-6
-    for k in range(position.size):
-        ahead, behind = position.copy(), position.copy()
-        ahead[k] += step
-        behind[k] -= step
-        high, low = feet(ahead), feet(behind)
-        for leg in robot.spec.legs:
-            mates = [n for n in stance if n[0] == leg.name[0]]
-            if leg.name in stance:
-                outward = 1.0 if leg.side == "left" else -1.0  # y points left
-                moved = (high[leg.name] - low[leg.name])[1] / (2 * step)
-                out[k] -= outward * PUSH / len(mates) * moved
+    for leg in robot.spec.legs:
+        if leg.name in stance:
+            frame = model.getFrameId(leg.foot)
+            moved = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)[1]
+            outward = 1.0 if leg.side == "left" else -1.0  # y points left
+            mates = sum(name[0] == leg.name[0] for name in stance)
+            out -= outward * PUSH / mates * moved[robot.velocity_index]
     return out
 
 
-@pytest.fixture(scope="module")
-def position(hexapod: Robot) -> Array:
-    """Standing, every leg a little differently."""
-    q = stand(hexapod, {}).demand.position[0]
-    return np.asarray(q + np.random.default_rng(4).normal(scale=0.05, size=q.size))
-
-
-@pytest.mark.parametrize("name", STANCES)
+@pytest.mark.parametrize("stance", [FIVE, ("lf", "lr", "rm")], ids=["five", "tripod"])
 def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
-    hexapod: Robot, position: Array, name: str
+    hexapod: Robot, stance: tuple[str, ...]
 ) -> None:
-    """As the log's own model predicts it."""
-    stance, n = STANCES[name], 3
+    """As the log's own model predicts it, standing with every leg a little differently."""
+    position = stand(hexapod, {}).demand.position[0]
+    position = position + np.random.default_rng(4).normal(scale=0.05, size=position.size)
     machine = machine_of_robot(hexapod, load_catalog().chain("rotor"))
+    n = 3
     still = np.zeros((n, 18))
-    standing = np.tile([leg in stance for leg in hexapod.leg_names], (n, 1))
     log = Measurement(
         name="standing",
         time=np.arange(n) / 100.0,
@@ -95,29 +70,21 @@ def test_ground_that_pushes_feet_outward_saves_what_the_joints_would_do(
         part=np.full(n, TRAIN, dtype=np.int8),
         block=np.zeros(n, dtype=np.intp),
         pieces=(slice(0, n),),
-        standing=standing,
+        standing=np.tile([leg in stance for leg in hexapod.leg_names], (n, 1)),
     )
-    before, after = (
-        RigidBodies(log).torque(m, (log.q, log.v, log.a)) for m in (machine, squeezed(machine))
-    )
-    np.testing.assert_allclose((after - before)[0], expected(hexapod, position, stance), atol=1e-6)
-    assert np.abs(after - before).max() > 0.5
     # Measured forces are the ground's without the squeeze that no sensor sees.
-    measured = replace(log, foot_force=np.zeros((n, 6, 3)))
-    bodies = RigidBodies(measured)
-    change = [bodies.torque(m, (log.q, log.v, log.a)) for m in (machine, squeezed(machine))]
-    np.testing.assert_allclose(change[1] - change[0], after - before, atol=1e-9)
+    for m in (log, replace(log, foot_force=np.zeros((n, 6, 3)))):
+        bodies = RigidBodies(m)
+        before, after = (bodies.torque(x, (m.q, m.v, m.a)) for x in (machine, squeezed(machine)))
+        saved = expected(hexapod, position, stance)
+        np.testing.assert_allclose((after - before)[0], saved, atol=1e-9)
+        assert np.abs(saved).max() > 0.5
 
 
-@pytest.mark.parametrize("name", ["all", "five"])
-def test_standing_and_walking_squeeze_in_the_same_sense(hexapod: Robot, name: str) -> None:
+def test_standing_and_walking_squeeze_in_the_same_sense(hexapod: Robot) -> None:
     """As `stand` and `walk` demand it of the actuators."""
-    stance = STANCES[name]
     edit = effects(hexapod, load_catalog().chain("rotor"), squeezed, ("internal_foot_force",))
-    before = stand(hexapod, {}, feet=stance).demand
-    after = stand(edit.robot, {}, feet=stance, adjust=edit.demand).demand
-    np.testing.assert_allclose(
-        (after.torque - before.torque)[0],
-        expected(hexapod, before.position[0], stance),
-        atol=1e-6,
-    )
+    before = stand(hexapod, {}, feet=FIVE).demand
+    after = stand(edit.robot, {}, feet=FIVE, adjust=edit.demand).demand
+    saved = expected(hexapod, before.position[0], FIVE)
+    np.testing.assert_allclose((after.torque - before.torque)[0], saved, atol=1e-9)
