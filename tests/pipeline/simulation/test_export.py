@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 from ruamel.yaml import YAML
 
+from actuators.errors import ActuatorError
 from actuators.shaft import ShaftSeries
 from pipeline.cli.main import main
 from pipeline.effects.model_file import (
@@ -21,7 +22,9 @@ from pipeline.effects.model_file import (
     file_sha256,
     read_model_file,
 )
+from pipeline.logs.errors import MappingError, ModelFileError
 from pipeline.machine.machine import MachineModel
+from pipeline.simulation.export.exported import exported
 from pipeline.simulation.export.joints import bodies_of
 from pipeline.simulation.files import base_model
 
@@ -129,8 +132,8 @@ def our_torque(machine: MachineModel, q: Array, v: Array, a: Array) -> Array:
     return out
 
 
-def mujoco_torque(path: Path, q: Array, v: Array, a: Array) -> Array:
-    model = mujoco.MjModel.from_xml_path(str(path))
+def mujoco_torque(text: str, q: Array, v: Array, a: Array) -> Array:
+    model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     out = np.empty_like(q)
     for k in range(len(q)):
@@ -140,103 +143,76 @@ def mujoco_torque(path: Path, q: Array, v: Array, a: Array) -> Array:
     return out
 
 
-def test_mujoco_computes_the_torques_that_we_do(
-    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_mujoco_computes_the_torques_that_we_do(write: Write) -> None:
     model = write(PLAIN)
-    out = tmp_path / "arm.xml"
-    assert main(["gap", "export", str(model), "--to", "mjcf", "--out", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert [line for line in said.splitlines() if "not carried over" in line] == [
-        "not carried over: meshes, collisions and contacts: bodies and joints alone are written"
-    ]
+    made, machine = exported(model, "mjcf"), machine_of(model)
+    assert made.left == ("meshes, collisions and contacts: bodies and joints alone are written",)
     q, v, a = motion()
-    ours = our_torque(machine_of(model), q, v, a)
-    assert np.abs(mujoco_torque(out, q, v, a) - ours).max() < 1e-3 * np.abs(ours).max()
+    ours = our_torque(machine, q, v, a)
+    assert np.abs(mujoco_torque(made.text, q, v, a) - ours).max() < 1e-3 * np.abs(ours).max()
     # Without what was found they are far apart: the comparison can fail.
-    bare = write(())
-    assert main(["gap", "export", str(bare), "--to", "mjcf", "--out", str(tmp_path / "b.xml")]) == 0
-    assert np.abs(mujoco_torque(tmp_path / "b.xml", q, v, a) - ours).max() > 1.0
+    bare = exported(write(()), "mjcf").text
+    assert np.abs(mujoco_torque(bare, q, v, a) - ours).max() > 1.0
 
 
-def test_what_has_no_number_is_told(
+def test_what_has_no_number_is_told_in_terminal_and_file(
     write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    model = write(BENT)
     out = tmp_path / "arm.xml"
-    assert main(["gap", "export", str(model), "--to", "mjcf", "--out", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert "shoulder: friction grows with load, by 0.1 of it" in said
-    assert "elbow: friction bends with speed: up to 0.3" in said
-    assert "elbow: elasticity of the transmission, 900 N*m/rad" in said
-    assert "friction grows with load" in out.read_text(encoding="utf-8")
+    assert main(["gap", "export", str(write(BENT)), "--to", "mjcf", "--out", str(out)]) == 0
+    for said in (capsys.readouterr().out, out.read_text(encoding="utf-8")):
+        assert "shoulder: friction grows with load, by 0.1 of it" in said
+        assert "elbow: friction bends with speed: up to 0.3" in said
+        assert "elbow: elasticity of the transmission, 900 N*m/rad" in said
 
 
 def test_the_urdf_read_again_has_friction_and_bodies(write: Write, tmp_path: Path) -> None:
-    model = write(PLAIN)
-    out = tmp_path / "found.urdf"
-    assert main(["gap", "export", str(model), "--to", "urdf", "--out", str(out)]) == 0
-    again, machine = pin.buildModelFromUrdf(str(out)), machine_of(model)
+    model, out = write(PLAIN), tmp_path / "found.urdf"
+    out.write_text(exported(model, "urdf").text, encoding="utf-8")
+    again = pin.buildModelFromUrdf(str(out))
     # Pinocchio reads `dynamics`: friction as dry friction, damping as viscous.
     assert np.allclose(again.upperDryFrictionLimit, [1.3, 0.0], atol=1e-7)
     assert np.allclose(again.damping, [0.7, 0.2], atol=1e-7)
-    for mine, theirs in zip(bodies_of(machine).inertias, again.inertias, strict=True):
-        assert np.allclose(
-            mine.toDynamicParameters(), theirs.toDynamicParameters(), rtol=1e-6, atol=1e-9
-        )
+    for mine, theirs in zip(bodies_of(machine_of(model)).inertias, again.inertias, strict=True):
+        pair = mine.toDynamicParameters(), theirs.toDynamicParameters()
+        assert np.allclose(*pair, rtol=1e-6, atol=1e-9)
     assert main(["check", str(out)]) == 0
 
 
 def test_gains_of_a_mapping_go_along(write: Write, tmp_path: Path) -> None:
-    model = write(PLAIN)
-    mapping = tmp_path / "mapping.toml"
+    model, mapping = write(PLAIN), tmp_path / "mapping.toml"
     mapping.write_text("[pd_gains]\nkp = {shoulder = 80.0, elbow = 40.0}\nkd = 2.0\n")
-    export = ["gap", "export", str(model), "--mapping", str(mapping)]
-    out = tmp_path / "control.yaml"
-    assert main([*export, "--to", "ros2_control", "--out", str(out)]) == 0
-    gains = YAML(typ="safe").load(out)["joint_trajectory_controller"]["ros__parameters"]["gains"]
+    control = YAML(typ="safe").load(exported(model, "ros2_control", mapping=mapping).text)
+    gains = control["joint_trajectory_controller"]["ros__parameters"]["gains"]
     # A parameter of ROS 2 that is a double refuses a whole number.
     assert {type(x) for own in gains.values() for x in own.values()} == {float}
-    assert gains["shoulder"] == {
-        "p": 80.0,
-        "i": 0.0,
-        "d": 2.0,
-        "ff_velocity_scale": pytest.approx(0.7),
-        "u_clamp_max": 60,
-        "u_clamp_min": -60,
-    }
-    assert main([*export, "--to", "mjcf", "--out", str(tmp_path / "arm.xml")]) == 0
-    compiled = mujoco.MjModel.from_xml_path(str(tmp_path / "arm.xml"))
+    limits = {"u_clamp_max": 60, "u_clamp_min": -60}
+    damping = {"ff_velocity_scale": pytest.approx(0.7)}
+    assert gains["shoulder"] == {"p": 80.0, "i": 0.0, "d": 2.0} | damping | limits
+    compiled = mujoco.MjModel.from_xml_string(exported(model, "mjcf", mapping=mapping).text)
     assert compiled.actuator_gainprm[0, 0] == 80.0
     assert np.allclose(compiled.actuator_biasprm[0, :3], [0.0, -80.0, -2.0])
     mapping.write_text("[pd_gains]\nkp = {knee = 80.0}\n")
-    assert main([*export, "--to", "mjcf", "--out", str(tmp_path / "none.xml")]) == 2
-    assert not (tmp_path / "none.xml").exists()
+    with pytest.raises(MappingError, match=r"mapping\.toml: .*shoulder"):
+        exported(model, "mjcf", mapping=mapping)
 
 
-def test_files_that_moved_and_actuators_of_ones_own(
-    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_files_that_moved_and_actuators_of_ones_own(write: Write, tmp_path: Path) -> None:
     """The URDF may be named anew, a changed one is told, other actuators have a folder."""
-    model = write(PLAIN)
-    moved = tmp_path / "moved.urdf"
+    model, moved, own = write(PLAIN), tmp_path / "moved.urdf", tmp_path / "actuators"
     (tmp_path / "arm.urdf").rename(moved)
-    export = ["gap", "export", str(model), "--to", "mjcf", "--out", str(tmp_path / "arm.xml")]
-    assert main(export) == 2
-    assert "arm.urdf" in capsys.readouterr().err
-    assert main([*export, "--robot", str(moved)]) == 0
-    assert "note" not in capsys.readouterr().out
+    with pytest.raises(ModelFileError, match=r"arm\.urdf"):
+        exported(model, "mjcf")
+    assert exported(model, "mjcf", robot=moved).remarks == ()
     moved.write_text(URDF.replace('mass value="2.0"', 'mass value="2.1"'), encoding="utf-8")
-    assert main([*export, "--robot", str(moved)]) == 0
-    assert "note: model.toml: moved.urdf is not the one" in capsys.readouterr().out
-    own = tmp_path / "actuators"
+    (remark,) = exported(model, "mjcf", robot=moved).remarks
+    assert remark.startswith("model.toml: moved.urdf is not the one")
     shutil.copytree(CATALOG, own)
     names = own / "alternatives.toml"
-    names.write_text(
-        names.read_text("utf-8").replace("[[rotor", "[[of_mine").replace("[rotor", "[of_mine"),
-        encoding="utf-8",
-    )
-    text = model.read_text(encoding="utf-8")
-    model.write_text(text + '\n[actuators]\nalternative = "of_mine"\n', encoding="utf-8")
-    assert main([*export, "--robot", str(moved)]) == 2
-    assert main([*export, "--robot", str(moved), "--actuators", str(own)]) == 0
+    text = names.read_text("utf-8").replace("[[rotor", "[[of_mine").replace("[rotor", "[of_mine")
+    names.write_text(text, encoding="utf-8")
+    with model.open("a", encoding="utf-8") as file:
+        file.write('\n[actuators]\nalternative = "of_mine"\n')
+    with pytest.raises(ActuatorError, match="of_mine"):
+        exported(model, "mjcf", robot=moved)
+    assert exported(model, "mjcf", robot=moved, actuators=own).joints == 2

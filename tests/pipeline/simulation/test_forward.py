@@ -46,7 +46,7 @@ def machine(*friction: Friction, **changes: object) -> MachineModel:
 
 
 def driven(
-    goal: Callable[[Array], Array], q: float = 0.0, v: float = 0.0, seconds: float = 3.0
+    goal: Callable[[Array], Array], q: float = 0.0, v: float = 0.0, seconds: float = 1.0
 ) -> ServoInput:
     time = np.arange(round(seconds * 200) + 1) / 200
     return ServoInput(
@@ -62,7 +62,7 @@ def driven(
     )
 
 
-def free(q: float, seconds: float = 3.0) -> ServoInput:
+def free(q: float, seconds: float = 1.0) -> ServoInput:
     drive = driven(np.zeros_like, q, seconds=seconds)
     return replace(drive, off=np.ones_like(drive.off))
 
@@ -82,7 +82,7 @@ def test_another_integrator_gives_the_same_motion() -> None:
         torque = RATIO * CONSTANT * current - viscous * x[1]
         return [x[1], (torque - MASS * GRAVITY * LEVER * np.sin(x[0])) / INERTIA]
 
-    other = solve_ivp(rate, (0, 3), [0.3, -1.0], t_eval=servo.time, rtol=1e-9, max_step=2e-3)
+    other = solve_ivp(rate, (0, 1), [0.3, -1.0], t_eval=servo.time, rtol=1e-9, max_step=2e-3)
     own = ForwardSimulator(machine(Friction("f", viscous=viscous))).run(servo)
     assert np.abs(own.position[:, 0] - other.y[0]).max() < 2e-5
     assert np.abs(own.velocity[:, 0] - other.y[1]).max() < 2e-4
@@ -94,7 +94,7 @@ def test_load_friction_forward_is_its_inverse() -> None:
         Friction("load", load=0.35, coulomb=0.01),
         Friction("s", excess=0.02, stribeck_speed=0.3),
     )
-    servo = driven(lambda t: np.asarray(1.2 * np.sin(3.0 * t)))
+    servo = driven(lambda t: np.asarray(1.2 * np.sin(3.0 * t)), seconds=2.0)
     run = ForwardSimulator(model).run(servo)
     a = np.gradient(run.velocity[:, 0], run.time)
     load = LINK * a + MASS * GRAVITY * LEVER * np.sin(run.position[:, 0])
@@ -108,13 +108,13 @@ def test_load_friction_forward_is_its_inverse() -> None:
         for k in np.flatnonzero(np.diff(np.sign(event)) + (v[1:] == 0.0)):
             smooth[max(0, k - 2) : k + 4] = False
     smooth[:2] = smooth[-2:] = False
-    assert smooth.mean() > 0.7
+    assert smooth.mean() > 0.6
     assert np.abs(needed - given)[smooth].max() < 0.01 * np.abs(given).max()
 
 
 def test_a_free_swing_loses_what_friction_takes() -> None:
     coulomb = 0.05
-    run = ForwardSimulator(machine(Friction("c", coulomb=coulomb))).run(free(1.0, 6.0))
+    run = ForwardSimulator(machine(Friction("c", coulomb=coulomb))).run(free(1.0, 4.0))
     q, v = run.position[:, 0], run.velocity[:, 0]
     energy = 0.5 * INERTIA * v**2 - MASS * GRAVITY * LEVER * np.cos(q)
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q)))])
@@ -133,7 +133,7 @@ def test_a_held_joint_breaks_away_at_its_friction(torque: float, moves: bool) ->
     weight = MASS * GRAVITY * LEVER * np.sin(q)
     least = weight * (1 + share) + coulomb  # to lift it [N*m]
     voltage = torque * least / RATIO / CONSTANT * RESISTANCE
-    servo = driven(lambda t: np.full_like(t, q + voltage / SUPPLY / GAIN), q=q, seconds=0.5)
+    servo = driven(lambda t: np.full_like(t, q + voltage / SUPPLY / GAIN), q=q, seconds=0.2)
     run = ForwardSimulator(machine(Friction("f", coulomb=coulomb, load=share))).run(servo)
     assert (run.position[-1, 0] > q + 1e-4) == moves
     if not moves:
@@ -142,12 +142,12 @@ def test_a_held_joint_breaks_away_at_its_friction(torque: float, moves: bool) ->
 
 def test_a_self_locking_gear_is_not_driven_back() -> None:
     lock = Friction("q", when_driving=0.4, when_driven=0.99)
-    held = ForwardSimulator(machine(lock, Friction("c", coulomb=0.01))).run(free(1.0, 1.0))
+    held = ForwardSimulator(machine(lock, Friction("c", coulomb=0.01))).run(free(1.0, 0.2))
     assert np.ptp(held.position) == 0.0
 
 
 def test_energy_is_conserved_without_losses() -> None:
-    run = ForwardSimulator(machine()).run(free(1.2, 10.0))
+    run = ForwardSimulator(machine()).run(free(1.2, 2.0))
     q, v = run.position[:, 0], run.velocity[:, 0]
     energy = 0.5 * INERTIA * v**2 - MASS * GRAVITY * LEVER * np.cos(q)
     assert np.ptp(energy) < 2e-4 * MASS * GRAVITY * LEVER
@@ -156,28 +156,27 @@ def test_energy_is_conserved_without_losses() -> None:
 def test_a_shorted_winding_brakes() -> None:
     swing = free(1.0)
     short = ForwardSimulator(machine()).run(replace(swing, open_bridge=False))
-    free_ = ForwardSimulator(machine()).run(swing)
-    assert np.abs(short.position[-200:]).max() < 0.5 * np.abs(free_.position[-200:]).max()
+    energy = 0.5 * INERTIA * short.velocity**2 - MASS * GRAVITY * LEVER * np.cos(short.position)
+    assert (np.diff(energy[:, 0]) < 1e-6).all()
+    assert energy[-1, 0] < energy[0, 0] - 0.05
     assert np.allclose(short.current, -CONSTANT * RATIO * short.velocity / RESISTANCE)
 
 
 def test_a_sensor_that_reads_high_and_a_warm_motor() -> None:
-    servo = driven(lambda t: np.full_like(t, 0.5), seconds=4.0)
-    stiff = Friction("v", viscous=0.05)
-    plain = ForwardSimulator(machine(stiff)).run(servo)
-    off = ForwardSimulator(machine(stiff, encoder_offset=0.1)).run(servo)
-    # The servo brings its sensor, not the joint, to the goal: the weight differs.
-    q = off.position[-1, 0] - 0.1
-    weight = MASS * GRAVITY * LEVER * np.sin(q) / RATIO
-    assert off.current[-1, 0] * CONSTANT == pytest.approx(weight, rel=1e-3)
+    """The servo brings its sensor, not the joint, to the goal; a warm motor gives less."""
+    servo = driven(lambda t: np.full_like(t, 0.5), q=0.45)
     warm = replace(servo, temperature=np.full((servo.time.size, 1), 45.0))
-    hot = ForwardSimulator(machine(stiff, heating=Heating(sensor_gain=3.0))).run(warm)
-    assert abs(0.5 - hot.position[-1, 0]) > 1.1 * abs(0.5 - plain.position[-1, 0])
+    stiff, node = Friction("v", viscous=0.05), Heating(sensor_gain=3.0)
+    cold = ForwardSimulator(machine(stiff, encoder_offset=0.1)).run(servo)
+    hot = ForwardSimulator(machine(stiff, encoder_offset=0.1, heating=node)).run(warm)
+    weight = MASS * GRAVITY * LEVER * np.sin(cold.position[-1, 0] - 0.1) / RATIO
+    assert cold.current[-1, 0] * CONSTANT == pytest.approx(weight, rel=1e-2)
+    assert abs(0.5 - hot.position[-1, 0]) > 1.1 * abs(0.5 - cold.position[-1, 0])
 
 
 def test_a_held_motor_warms_until_its_loss_leaves_it() -> None:
     node = Heating(thermal_resistance=12.0, time_constant=0.4)
-    servo = driven(lambda t: np.full_like(t, 1.0), seconds=4.0)
+    servo = driven(lambda t: np.full_like(t, 1.0), seconds=3.0)
     run = ForwardSimulator(machine(Friction("c", coulomb=5.0), heating=node)).run(servo)
     voltage = SUPPLY * GAIN
     # dT = R_th U^2 / (R0 (1 + COPPER dT)), solved for dT; magnets lose torque, not resistance.

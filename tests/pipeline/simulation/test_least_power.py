@@ -67,34 +67,33 @@ def test_derivatives_of_the_rounded_power_are_those_of_differences(
     np.testing.assert_allclose(here[2], (above[1] - below[1]) / (2 * h), atol=1e-6)
 
 
-@pytest.mark.parametrize("limit", [None, 0.3])
-@pytest.mark.parametrize("name", CHAINS)
+@pytest.mark.parametrize(
+    ("name", "limit"),
+    [("ideal", 0.3), ("rotor", None), ("reversible", 0.3), ("irreversible", None)],
+)
 def test_no_general_solver_finds_less_power(
     hexapod: Robot, step: Segment, name: str, limit: float | None
 ) -> None:
-    """Nelder and Mead's method on the chain itself, at two instants, with bounds as penalties."""
+    """Nelder and Mead's method on the chain itself, at an instant, with bounds as penalties."""
     stance = shown(hexapod, step, limit)
     rule = LeastPower(CHAINS[name])
     force, basis = rule.forces(stance), internal_basis(stance.feet)
     power = PowerOfJoints(rule, stance)
-    for row in (7, 30):
-        rows = np.array([row])
+    row = 30
+    rows = np.array([row])
 
-        def cost(z: np.ndarray, row: int = row, rows: np.ndarray = rows) -> float:
-            tried = stance.force[row] + basis[row] @ z
-            beyond = np.maximum(-tried[:, 2], 0.0).sum()
-            if limit is not None:
-                beyond += np.maximum(
-                    np.hypot(tried[:, 0], tried[:, 1]) - limit * tried[:, 2], 0.0
-                ).sum()
-            return float(power.total(rows, tried[None])[0] + 1e3 * beyond)
+    def cost(z: np.ndarray) -> float:
+        tried = stance.force[row] + basis[row] @ z
+        beyond = np.maximum(-tried[:, 2], 0.0).sum()
+        if limit is not None:
+            beyond += np.maximum(np.hypot(*tried.T[:2]) - limit * tried[:, 2], 0.0).sum()
+        return float(power.total(rows, tried[None])[0] + 1e3 * beyond)
 
-        found = minimize(
-            cost, np.zeros(3), method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-6}
-        )
-        own = power.total(rows, force[row][None])[0]
-        assert own <= power.total(rows, stance.force[row][None])[0]
-        assert own <= found.fun * (1 + 1e-4)
+    options = {"xatol": 1e-4, "fatol": 1e-6}
+    found = minimize(cost, np.zeros(3), method="Nelder-Mead", options=options)
+    own = power.total(rows, force[row][None])[0]
+    assert own <= power.total(rows, stance.force[row][None])[0]
+    assert own <= found.fun * (1 + 1e-4)
 
 
 @pytest.mark.parametrize("regeneration", [("none", 0.0), ("fraction", 0.6), ("bus", 0.0)])
