@@ -12,11 +12,10 @@ from pipeline.logs.reading.mapping import load_mapping
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.robot.urdf_source import read_urdf
-from pipeline.simulation.export import mjcf, ros2_control, urdf
+from pipeline.simulation.export.formats import LEFT, Gains, mjcf, ros2_control, urdf
 from pipeline.simulation.export.joints import found_text, joint_numbers, left_out
 from pipeline.simulation.files import base_model
-
-KINDS = ("mjcf", "urdf", "ros2_control")
+from pipeline.simulation.found_bodies import corrected_urdf
 
 
 @dataclass(frozen=True)
@@ -37,7 +36,7 @@ def exported(
     actuators: Path | None = None,
     mapping: Path | None = None,
 ) -> Exported:
-    """Write the machine of a model file, with what was found on it, as one of `KINDS`.
+    """Write the machine of a model file, with what was found on it, as one of the kinds of `LEFT`.
 
     `robot`: in place of the model file's. `actuators`: folder; the robot file's or the project's by
     default. `mapping`: mapping file whose ``[pd_gains]`` are the servos' gains.
@@ -47,23 +46,14 @@ def exported(
         PipelineError: The robot cannot be used.
         ActuatorError: The actuator cannot be used.
     """
-    if to not in KINDS:
-        raise ModelFileError(f"'{one_line(to)}' is none of the formats; {closest(to, KINDS)}")
+    if to not in LEFT:
+        raise ModelFileError(f"'{one_line(to)}' is none of the formats; {closest(to, [*LEFT])}")
     file = read_model_file(model, actuators, robot)
     bare = base_model(file, actuators)
     machine = apply_edits(bare, file.edits)
     numbers = joint_numbers(machine)
-    gains = None
-    if mapping is not None:
-        pd = load_mapping(mapping).pd_gains
-        if pd is None:
-            raise MappingError(f"{one_line(mapping.name)}: has no [pd_gains]")
-        try:
-            gains = pd.by_joint(machine.joints)
-        except ValueError as error:
-            raise MappingError(f"{one_line(mapping.name)}: {error}") from None
-    fixed = {"mjcf": mjcf.LEFT, "urdf": urdf.LEFT, "ros2_control": ros2_control.LEFT}[to]
-    left = (*left_out(machine, numbers), *fixed)
+    gains = _gains(mapping, machine.joints) if mapping is not None else {}
+    left = (*left_out(machine, numbers), *LEFT[to])
     remarks = [
         f"{machine.name} with what gap found ({one_line(model.name)}):",
         *(found_text(file.edits) or ["nothing"]),
@@ -71,13 +61,27 @@ def exported(
         *left,
     ]
     if to == "mjcf":
-        text = mjcf.mjcf(machine, numbers, remarks, gains)
+        text = mjcf(machine, numbers, remarks, gains)
     elif to == "ros2_control":
-        text = ros2_control.ros2_control(numbers, remarks, gains)
+        text = ros2_control(numbers, remarks, gains)
     else:
-        bare_urdf = file.robot.suffix.lower() == ".urdf"
-        source = (
-            read_urdf(file.robot) if bare_urdf else load_robot(load_robot_file(file.robot)).urdf
-        )
-        text = urdf.urdf(source, str(file.robot), bare, file.edits, numbers, remarks)
+        source = _urdf_of(file.robot)
+        found = corrected_urdf(source, str(file.robot), bare, file.edits)
+        text = urdf(found, numbers, remarks)
     return Exported(text, left, len(numbers), file.changed)
+
+
+def _urdf_of(robot: Path) -> str:
+    if robot.suffix.lower() == ".urdf":
+        return read_urdf(robot)
+    return load_robot(load_robot_file(robot)).urdf
+
+
+def _gains(mapping: Path, joints: tuple[str, ...]) -> Gains:
+    pd = load_mapping(mapping).pd_gains
+    if pd is None:
+        raise MappingError(f"{one_line(mapping.name)}: has no [pd_gains]")
+    try:
+        return pd.by_joint(joints)
+    except ValueError as error:
+        raise MappingError(f"{one_line(mapping.name)}: {error}") from None
