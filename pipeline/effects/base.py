@@ -48,6 +48,9 @@ class Parameter:
     low: float  #: Below this the effect makes no sense.
     high: float  #: Above this likewise.
     optional: bool = False  #: Whether it may be left out and is zero then.
+    #: Of the coordinate, see there, that the parameter itself is; 0 where it is none.
+    step: float = 0.0
+    required: bool = True  #: Likewise.
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,8 @@ class Effect(ABC):
     #: What it acts on: joint, joint pair, link, ground, effort channels or column.
     place_kind: ClassVar[str] = "joint"
     parameters: ClassVar[tuple[Parameter, ...]]  #: As written to results and model files.
-    coordinates: ClassVar[tuple[Coordinate, ...]]  #: As fitted.
+    #: As fitted; by default the parameters that have a step.
+    coordinates: ClassVar[tuple[Coordinate, ...]]
     #: Variable against which its residual shows, one of `SIGNATURES`.
     signature: ClassVar[str] = "velocity"
     excitation: ClassVar[str]  #: The motion that shows it, in words.
@@ -109,8 +113,14 @@ class Effect(ABC):
     fixed: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls) -> None:
-        """Refuse a signature that nothing can be drawn against, where the effect is written."""
+        """Complete the coordinates; refuse a signature that nothing can be drawn against."""
         super().__init_subclass__()
+        if "parameters" in vars(cls) and "coordinates" not in vars(cls):
+            cls.coordinates = tuple(
+                Coordinate(p.name, p.step, signed=p.low < 0.0, required=p.required)
+                for p in cls.parameters
+                if p.step
+            )
         if cls.signature not in SIGNATURES:
             hint = closest(cls.signature, list(SIGNATURES))
             raise EffectError(f"{cls.__name__}: no signature '{cls.signature}'; {hint}")

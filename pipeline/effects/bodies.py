@@ -34,7 +34,6 @@ class RigidBodyParameters(Effect):
         Parameter(n, u, 0.0 if n in ("mass", "Ixx", "Iyy", "Izz") else -1e6, 1e6)
         for n, u in zip(NAMES, UNITS, strict=True)
     )
-    coordinates: ClassVar = ()
     competes: ClassVar = False
     signature = "acceleration"
     excitation = "moves all joints at once, fast and slowly, through all their travel"
@@ -78,10 +77,9 @@ class LinkMass(Effect):
     additive = True
     place_kind = "link"
     parameters: ClassVar = (
-        Parameter("mass", "kg", -1e4, 1e4),
+        Parameter("mass", "kg", -1e4, 1e4, step=1e-2),
         *(Parameter(axis, "m", -FARTHEST, FARTHEST, optional=True) for axis in AXES),
     )
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("mass", 1e-2, signed=True),)
     signature = "position"
     excitation = "holds and moves the link in clearly different postures"
 
@@ -158,9 +156,8 @@ class CenterOfMassOffset(Effect):
     name = "center_of_mass_offset"
     additive = True
     place_kind = "link"
-    parameters: ClassVar = tuple(Parameter(axis, "m", -0.5, 0.5) for axis in AXES)
-    coordinates: ClassVar = tuple(
-        Coordinate(axis, 1e-3, signed=True, required=False) for axis in AXES
+    parameters: ClassVar = tuple(
+        Parameter(axis, "m", -0.5, 0.5, step=1e-3, required=False) for axis in AXES
     )
     signature = "position"
     excitation = "holds the link in postures all around its axis"
@@ -184,9 +181,8 @@ class BaseTilt(Effect):
     name = "base_tilt"
     additive = True
     place_kind = "ground"
-    parameters: ClassVar = tuple(Parameter(axis, "rad", -0.6, 0.6) for axis in ("roll", "pitch"))
-    coordinates: ClassVar = tuple(
-        Coordinate(axis, 1e-3, signed=True, required=False) for axis in ("roll", "pitch")
+    parameters: ClassVar = tuple(
+        Parameter(axis, "rad", -0.6, 0.6, step=1e-3, required=False) for axis in ("roll", "pitch")
     )
     signature = "position"
     excitation = "holds links outstretched in several directions"
@@ -210,8 +206,7 @@ class InternalFootForce(Effect):
     name = "internal_foot_force"
     additive = True
     place_kind = "ground"
-    parameters: ClassVar = (Parameter("lateral", "N", -1e5, 1e5),)
-    coordinates: ClassVar = (Coordinate("lateral", 1.0, signed=True),)
+    parameters: ClassVar = (Parameter("lateral", "N", -1e5, 1e5, step=1.0),)
     signature = "support"
     excitation = "stands on different sets of feet, with tangential forces measured"
 

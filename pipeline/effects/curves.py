@@ -8,7 +8,7 @@ import numpy as np
 
 from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.position_torque import PositionCurve
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, beside
+from pipeline.effects.base import Effect, Parameter, Place, Values, beside
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -17,6 +17,11 @@ _QUANTILES: Final = (0.2, 0.45, 0.75, 1.0)
 _SPEEDS: Final = range(1, len(_QUANTILES) + 2)
 _SPOTS: Final = range(1, 8)
 _LEVELS: Final = range(1, 10)
+
+
+def _level(name: str, unit: str, high: float, step: float, low: float = 0.0) -> Parameter:
+    """The value of a curve at a knot."""
+    return Parameter(name, unit, low, high, step=step, required=False)
 
 
 class FrictionCurveEffect(Effect):
@@ -30,18 +35,12 @@ class FrictionCurveEffect(Effect):
     additive = True
     parameters: ClassVar = (
         *(Parameter(f"speed_{k}", "rad/s", 0.0, 1e4) for k in _SPEEDS),
-        *(Parameter(f"forward_{k}", "N*m", 0.0, 1e4) for k in _SPEEDS),
-        *(Parameter(f"backward_{k}", "N*m", 0.0, 1e4) for k in _SPEEDS),
-        *(Parameter(f"share_{k}", "1", 0.0, 0.9) for k in _SPEEDS),
+        *(_level(f"forward_{k}", "N*m", 1e4, 1e-2) for k in _SPEEDS),
+        *(_level(f"backward_{k}", "N*m", 1e4, 1e-2) for k in _SPEEDS),
+        *(_level(f"share_{k}", "1", 0.9, 1e-3) for k in _SPEEDS),
         *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _SPOTS),
-        *(Parameter(f"spot_{k}", "N*m", 0.0, 1e4) for k in _SPOTS),
+        *(_level(f"spot_{k}", "N*m", 1e4, 1e-2) for k in _SPOTS),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
-    )
-    coordinates: ClassVar = (
-        *(Coordinate(f"forward_{k}", 1e-2, required=False) for k in _SPEEDS),
-        *(Coordinate(f"backward_{k}", 1e-2, required=False) for k in _SPEEDS),
-        *(Coordinate(f"share_{k}", 1e-3, required=False) for k in _SPEEDS),
-        *(Coordinate(f"spot_{k}", 1e-2, required=False) for k in _SPOTS),
     )
     has_law: ClassVar = False
     fixed: ClassVar = (*(f"speed_{k}" for k in _SPEEDS), *(f"place_{k}" for k in _SPOTS))
@@ -88,10 +87,7 @@ class PositionCurveEffect(Effect):
     additive = True
     parameters: ClassVar = (
         *(Parameter(f"place_{k}", "rad", -1e4, 1e4) for k in _LEVELS),
-        *(Parameter(f"level_{k}", "N*m", -1e4, 1e4) for k in _LEVELS),
-    )
-    coordinates: ClassVar = tuple(
-        Coordinate(f"level_{k}", 1e-2, signed=True, required=False) for k in _LEVELS
+        *(_level(f"level_{k}", "N*m", 1e4, 1e-2, low=-1e4) for k in _LEVELS),
     )
     has_law: ClassVar = False
     fixed: ClassVar = tuple(f"place_{k}" for k in _LEVELS)

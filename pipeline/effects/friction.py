@@ -9,7 +9,7 @@ import numpy as np
 
 from actuators.elements.friction import Friction
 from actuators.elements.warming import ZERO_CELSIUS, Warming
-from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, at_joint
+from pipeline.effects.base import Effect, Parameter, Place, Values, at_joint
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 
@@ -40,8 +40,7 @@ class CoulombFriction(FrictionPreset):
 
     name = "coulomb_friction"
     additive = True
-    parameters: ClassVar = (Parameter("torque", "N*m", 0.0, 1e3),)
-    coordinates: ClassVar = (Coordinate("torque", 1e-2),)
+    parameters: ClassVar = (Parameter("torque", "N*m", 0.0, 1e3, step=1e-2),)
     terms: ClassVar = {"torque": "coulomb"}
     excitation = "moves in both directions at several speeds"
 
@@ -51,8 +50,7 @@ class ViscousFriction(FrictionPreset):
 
     name = "viscous_friction"
     additive = True
-    parameters: ClassVar = (Parameter("coefficient", "N*m*s/rad", 0.0, 1e3),)
-    coordinates: ClassVar = (Coordinate("coefficient", 1e-2),)
+    parameters: ClassVar = (Parameter("coefficient", "N*m*s/rad", 0.0, 1e3, step=1e-2),)
     terms: ClassVar = {"coefficient": "viscous"}
     excitation = "moves at clearly different speeds, the fastest near the limit"
 
@@ -62,8 +60,7 @@ class QuadraticDrag(FrictionPreset):
 
     name = "quadratic_drag"
     additive = True
-    parameters: ClassVar = (Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3),)
-    coordinates: ClassVar = (Coordinate("quadratic", 1e-2),)
+    parameters: ClassVar = (Parameter("quadratic", "N*m*s^2/rad^2", 0.0, 1e3, step=1e-2),)
     terms: ClassVar = {"quadratic": "quadratic"}
     excitation = "moves at clearly different speeds, the fastest near the limit"
 
@@ -74,13 +71,9 @@ class StribeckFriction(FrictionPreset):
     name = "stribeck_friction"
     additive = True
     parameters: ClassVar = (
-        Parameter("coulomb", "N*m", 0.0, 1e3),
-        Parameter("excess", "N*m", 0.0, 1e3),
+        Parameter("coulomb", "N*m", 0.0, 1e3, step=1e-2, required=False),
+        Parameter("excess", "N*m", 0.0, 1e3, step=1e-2),
         Parameter("velocity", "rad/s", 1e-4, 1e2),
-    )
-    coordinates: ClassVar = (
-        Coordinate("coulomb", 1e-2, required=False),
-        Coordinate("excess", 1e-2),
     )
     terms: ClassVar = {"coulomb": "coulomb", "excess": "excess", "velocity": "stribeck_speed"}
     excitation = "slow passages through many speeds below the Stribeck speed"
@@ -104,8 +97,7 @@ class LoadDependentFriction(FrictionPreset):
     """Friction of loaded teeth, alike where the motor drives and where it is driven."""
 
     name = "load_dependent_friction"
-    parameters: ClassVar = (Parameter("share", "1", 0.0, 0.99),)
-    coordinates: ClassVar = (Coordinate("share", 1e-3),)
+    parameters: ClassVar = (Parameter("share", "1", 0.0, 0.99, step=1e-3),)
     terms: ClassVar = {"share": "load"}
     signature = "load"
     excitation = "moves at one speed under clearly different loads, both ways"
@@ -116,12 +108,8 @@ class BackdriveLoss(FrictionPreset):
 
     name = "backdrive_loss"
     parameters: ClassVar = (
-        Parameter("driving", "1", 0.0, 10.0),
-        Parameter("driven", "1", 0.0, 0.99),
-    )
-    coordinates: ClassVar = (
-        Coordinate("driving", 1e-3, required=False),
-        Coordinate("driven", 1e-3, required=False),
+        Parameter("driving", "1", 0.0, 10.0, step=1e-3, required=False),
+        Parameter("driven", "1", 0.0, 0.99, step=1e-3, required=False),
     )
     terms: ClassVar = {"driving": "when_driving", "driven": "when_driven"}
     signature = "load"
@@ -139,12 +127,8 @@ class DirectionDependentFriction(Effect):
     name = "direction_dependent_friction"
     additive = True
     parameters: ClassVar = (
-        Parameter("positive", "N*m", 0.0, 1e3),
-        Parameter("negative", "N*m", 0.0, 1e3),
-    )
-    coordinates: ClassVar = (
-        Coordinate("positive", 1e-2, required=False),
-        Coordinate("negative", 1e-2, required=False),
+        Parameter("positive", "N*m", 0.0, 1e3, step=1e-2, required=False),
+        Parameter("negative", "N*m", 0.0, 1e3, step=1e-2, required=False),
     )
     excitation = "moves in both directions, with stops in between"
     contains: ClassVar = ("coulomb_friction",)
@@ -192,7 +176,6 @@ class JointFrictionLaw(Effect):
         Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
-    coordinates: ClassVar = ()
     competes: ClassVar = False
     excitation = "moves both ways at many speeds and loads"
 
@@ -221,13 +204,9 @@ class WarmingFriction(Effect):
 
     name = "warming_friction"
     parameters: ClassVar = (
-        Parameter("coulomb", "N*m/K", 0.0, 1e2),
-        Parameter("viscous", "N*m*s/(rad*K)", 0.0, 1e2),
+        Parameter("coulomb", "N*m/K", 0.0, 1e2, step=1e-3, required=False),
+        Parameter("viscous", "N*m*s/(rad*K)", 0.0, 1e2, step=1e-3, required=False),
         Parameter("reference", "K", 100.0, 1000.0),
-    )
-    coordinates: ClassVar = (
-        Coordinate("coulomb", 1e-3, required=False),
-        Coordinate("viscous", 1e-3, required=False),
     )
     signature = "time"
     excitation = "repeats its first motion, both ways at several speeds, once the gears are warm"

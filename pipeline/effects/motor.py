@@ -71,14 +71,10 @@ class WindingHeating(Effect):
 
     name = "winding_heating"
     parameters: ClassVar = (
-        Parameter("rise", "K", -_HOTTEST, _HOTTEST),
-        Parameter("thermal_resistance", "K/W", 0.0, 1e3),
+        Parameter("rise", "K", -_HOTTEST, _HOTTEST, step=1.0, required=False),
+        Parameter("thermal_resistance", "K/W", 0.0, 1e3, step=0.5, required=False),
         Parameter("time_constant", "s", 0.01, 1e5),
         Parameter("sensor_gain", "1", 0.0, 30.0, optional=True),
-    )
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (
-        Coordinate("rise", 1.0, signed=True, required=False),
-        Coordinate("thermal_resistance", 0.5, required=False),
     )
     signature = "time"
     excitation = "works hard for several thermal time constants, then repeats its first motion"

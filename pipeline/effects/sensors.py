@@ -30,8 +30,7 @@ class PositionOffset(Effect):
     """A constant added by the position sensor: an encoder whose zero is off."""
 
     name = "position_offset"
-    parameters: ClassVar = (Parameter("angle", "rad", -1.6, 1.6),)
-    coordinates: ClassVar = (Coordinate("angle", 1e-3, signed=True),)
+    parameters: ClassVar = (Parameter("angle", "rad", -1.6, 1.6, step=1e-3),)
     signature = "position"
     kinds_absorbed: ClassVar = ("encoder",)
     excitation = "holds the link in postures all around its axis"
@@ -47,8 +46,7 @@ class EffortOffset(Effect):
 
     name = "effort_offset"
     additive = True
-    parameters: ClassVar = (Parameter("offset", "channel", -1e4, 1e4),)
-    coordinates: ClassVar = (Coordinate("offset", 1e-3, signed=True),)
+    parameters: ClassVar = (Parameter("offset", "channel", -1e4, 1e4, step=1e-3),)
     signature = "time"
     kinds_absorbed: ClassVar = ("effort_zero",)
     excitation = "stands still without load, then moves both ways"
@@ -129,8 +127,7 @@ class TimeDelay(Effect):
 
     name = "time_delay"
     place_kind = "effort channels"
-    parameters: ClassVar = (Parameter("delay", "s", -0.5, 0.5),)
-    coordinates: ClassVar = (Coordinate("delay", 2e-4, signed=True),)
+    parameters: ClassVar = (Parameter("delay", "s", -0.5, 0.5, step=2e-4),)
     signature = "effort rate"
     reaches: ClassVar = (1.0, 20.0, 60.0, 150.0)
     excitation = "changes its torque fast: accelerates, brakes and reverses"

@@ -116,8 +116,7 @@ class RotorInertia(Effect):
 
     name = "rotor_inertia"
     additive = True
-    parameters: ClassVar = (Parameter("added", "kg*m^2", 0.0, 1e3),)
-    coordinates: ClassVar = (Coordinate("added", 1e-7),)
+    parameters: ClassVar = (Parameter("added", "kg*m^2", 0.0, 1e3, step=1e-7),)
     signature = "acceleration"
     excitation = "accelerates hard on an axis whose load does not change"
 
@@ -138,14 +137,13 @@ class TransmissionCoupling(Effect):
     name = "transmission_coupling"
     place_kind = "joint pair"
     parameters: ClassVar = (
-        Parameter("ratio", "1", -5.0, 5.0),
+        Parameter("ratio", "1", -5.0, 5.0, step=1e-3),
         Parameter("inertia", "kg*m^2", 0.0, 1e3),
         Parameter("viscous", "N*m*s/rad", 0.0, 1e3),
         Parameter("coulomb", "N*m", 0.0, 1e3),
         Parameter("rise", "rad/s", 0.0, 1e4, optional=True),
         Parameter("travel", "rad", 0.0, 1.0, optional=True),
     )
-    coordinates: ClassVar[tuple[Coordinate, ...]] = (Coordinate("ratio", 1e-3, signed=True),)
     signature = "velocity of the other joint"
     excitation = "moves one joint of the pair while the other stands still, then the other way"
     driven: ClassVar = True  #: Whether it is that of joints with a motor in the model.

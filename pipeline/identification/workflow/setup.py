@@ -18,7 +18,7 @@ from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.mimics import mimics_in, refuse_moved
 from pipeline.identification.workflow.options import Options
 from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
-from pipeline.logs.formats.convert import is_log, sha256
+from pipeline.logs.formats.convert import is_log
 from pipeline.logs.prepared.contact import Contact, find_contact
 from pipeline.logs.prepared.parts import Parts, split
 from pipeline.logs.prepared.prepare import Prepared
@@ -162,11 +162,7 @@ def _told(changes: Mapping[str, object]) -> list[str]:
 
 
 def _on_base(files: Files, base: str | None) -> Files:
-    """The machine on the base that is asked for.
-
-    Raises:
-        GapError: It does not stand on such a base.
-    """
+    """The machine on the base that is asked for."""
     spec = files.spec
     if spec is not None and base == "fixed" and spec.floating:
         return replace(files, spec=replace(spec, floating=False))
@@ -181,11 +177,7 @@ def _on_base(files: Files, base: str | None) -> Files:
 
 
 def _alternative(options: Options, file: ModelFile | None) -> str:
-    """The actuator that options or model file name; empty where neither does.
-
-    Raises:
-        GapError: They name different ones, and the file holds effects.
-    """
+    """The actuator that options or model file name; empty where neither does."""
     asked: str = options.alternative or ""
     if file is None:
         return asked
@@ -198,11 +190,7 @@ def _alternative(options: Options, file: ModelFile | None) -> str:
 
 
 def _default(catalog: Catalog) -> str:
-    """The alternative of a machine of which nobody says how it is built.
-
-    Raises:
-        GapError: The catalogue does not have it.
-    """
+    """The alternative of a machine of which nobody says how it is built."""
     if DEFAULT_ALTERNATIVE not in catalog.alternatives:
         known = ", ".join(f"'{name}'" for name in catalog.alternatives)
         raise GapError(
@@ -226,29 +214,8 @@ def _ratio(actuators: Actuators | None, joints: tuple[str, ...]) -> np.ndarray |
     return np.array([joint.ratio for joint in drivetrains_of(actuators, joints).joints])
 
 
-def open_logs(given: Setup, options: Options) -> list[Stream]:
-    """Training logs, then test logs.
-
-    Raises:
-        GapError: The mapping cannot be used.
-    """
-    mapping = load_mapping(options.mapping) if options.mapping else None
-    paths = (*options.logs, *options.holdout)
-    if mapping is not None:
-        mapping.refuse_unknown_logs(paths)
-
-    def adjust(log: Log) -> Log:
-        return _adjusted(log, given, options)
-
-    return [Stream(path, given.expected, mapping, adjust) for path in paths]
-
-
 def _adjusted(log: Log, given: Setup, options: Options) -> Log:
-    """A log, or a piece of one, as the options want it.
-
-    Raises:
-        GapError: It does not hold what they ask for.
-    """
+    """A log, or a piece of one, as the options want it; refused where it is not."""
     if options.effort:
         log = log.with_changes(chosen_effort=options.effort)
         _ = log.effort  # refuses a channel that is not there
@@ -285,7 +252,15 @@ def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
     Raises:
         GapError: Unusable input; one line.
     """
-    streams = open_logs(given, options)
+    mapping = load_mapping(options.mapping) if options.mapping else None
+    paths = (*options.logs, *options.holdout)
+    if mapping is not None:
+        mapping.refuse_unknown_logs(paths)
+
+    def adjust(log: Log) -> Log:
+        return _adjusted(log, given, options)
+
+    streams = [Stream(path, given.expected, mapping, adjust) for path in paths]
     count = len(options.logs)
     surveys: tuple[Survey, ...] = ()
     if sum(stream.rows for stream in streams) > LONG_ROWS:
@@ -357,7 +332,6 @@ def check_options(options: Options, files: Files | None = None) -> None:
             raise LogContentError(f"{path}: is a folder; name its CSV or Parquet files")
         if not is_log(path):
             raise LogContentError(f"{path}: no such log; name a CSV or Parquet file")
-    _refuse_twice((*options.logs, *options.holdout))
     for file, what, error in (
         (options.mapping, "mapping", MappingError),
         (options.model, "model", ModelFileError),
@@ -371,20 +345,3 @@ def check_options(options: Options, files: Files | None = None) -> None:
         raise GapError(f"--gait-start {options.gait_start}: expected a time in the log [s]")
     if options.effort and options.effort not in EFFORTS:
         raise GapError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")
-
-
-def _refuse_twice(paths: Sequence[Path]) -> None:
-    """Refuse a file that is given twice, under whatever name.
-
-    Raises:
-        LogContentError: Names both.
-    """
-    seen: dict[str, Path] = {}
-    for path in paths:
-        digest = sha256(path)
-        if digest in seen:
-            raise LogContentError(
-                f"{path}: the same data as {seen[digest]}; test data must be data of its own, "
-                "and data given twice count twice; leave one out"
-            )
-        seen[digest] = path

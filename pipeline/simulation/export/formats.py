@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Final
+from typing import Any, Final
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -142,7 +142,7 @@ def ros2_control(numbers: Sequence[JointNumbers], remarks: Sequence[str], gains:
     return "\n".join(lines) + "\n"
 
 
-def _comment(remarks: Sequence[str]) -> Element:
+def _comment(remarks: Sequence[str]) -> Element[Any]:
     return ElementTree.Comment("\n" + "\n".join(r.replace("--", "- -") for r in remarks) + "\n")
 
 

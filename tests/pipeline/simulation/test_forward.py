@@ -20,7 +20,7 @@ from pipeline.logs.errors import LogContentError, ModelError
 from pipeline.logs.reading.log import Log
 from pipeline.machine.joint import JointModel
 from pipeline.machine.machine import MachineModel, machine_of_urdf
-from pipeline.simulation.forward import ForwardSimulator, ServoInput, servo_input
+from pipeline.simulation.forward import ForwardSimulator, Rollout, ServoInput, servo_input
 
 Array = NDArray[np.float64]
 URDF = Path(__file__).parents[1] / "data_files" / "xl330.urdf"
@@ -112,11 +112,16 @@ def test_load_friction_forward_is_its_inverse() -> None:
     assert np.abs(needed - given)[smooth].max() < 0.01 * np.abs(given).max()
 
 
+def energy_of(run: Rollout) -> Array:
+    """Of the pendulum at every row, (N,) [J]."""
+    kinetic = 0.5 * INERTIA * run.velocity[:, 0] ** 2
+    return np.asarray(kinetic - MASS * GRAVITY * LEVER * np.cos(run.position[:, 0]))
+
+
 def test_a_free_swing_loses_what_friction_takes() -> None:
     coulomb = 0.05
     run = ForwardSimulator(machine(Friction("c", coulomb=coulomb))).run(free(1.0, 4.0))
-    q, v = run.position[:, 0], run.velocity[:, 0]
-    energy = 0.5 * INERTIA * v**2 - MASS * GRAVITY * LEVER * np.cos(q)
+    q, v, energy = run.position[:, 0], run.velocity[:, 0], energy_of(run)
     travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(q)))])
     assert np.abs(energy[0] - energy - coulomb * travel).max() < 0.01 * (energy[0] - energy[-1])
     # It comes to rest where gravity no longer overcomes friction, and stays.
@@ -146,19 +151,13 @@ def test_a_self_locking_gear_is_not_driven_back() -> None:
     assert np.ptp(held.position) == 0.0
 
 
-def test_energy_is_conserved_without_losses() -> None:
-    run = ForwardSimulator(machine()).run(free(1.2, 2.0))
-    q, v = run.position[:, 0], run.velocity[:, 0]
-    energy = 0.5 * INERTIA * v**2 - MASS * GRAVITY * LEVER * np.cos(q)
-    assert np.ptp(energy) < 2e-4 * MASS * GRAVITY * LEVER
-
-
-def test_a_shorted_winding_brakes() -> None:
-    swing = free(1.0)
-    short = ForwardSimulator(machine()).run(replace(swing, open_bridge=False))
-    energy = 0.5 * INERTIA * short.velocity**2 - MASS * GRAVITY * LEVER * np.cos(short.position)
-    assert (np.diff(energy[:, 0]) < 1e-6).all()
-    assert energy[-1, 0] < energy[0, 0] - 0.05
+def test_energy_is_conserved_without_losses_and_a_shorted_winding_brakes() -> None:
+    swing, simulator = free(1.2), ForwardSimulator(machine())
+    assert np.ptp(energy_of(simulator.run(swing))) < 2e-4 * MASS * GRAVITY * LEVER
+    short = simulator.run(replace(swing, open_bridge=False))
+    energy = energy_of(short)
+    assert (np.diff(energy) < 1e-6).all()
+    assert energy[-1] < energy[0] - 0.05
     assert np.allclose(short.current, -CONSTANT * RATIO * short.velocity / RESISTANCE)
 
 
@@ -188,27 +187,20 @@ def test_a_held_motor_warms_until_its_loss_leaves_it() -> None:
     assert run.current[-1, 0] == pytest.approx(voltage / warm, rel=1e-3)
 
 
-def test_what_cannot_be_simulated_is_refused() -> None:
-    with pytest.raises(ModelError, match="no motor"):
-        ForwardSimulator(machine_of_urdf(URDF))
-    with pytest.raises(ModelError, match="loose"):
-        ForwardSimulator(machine(backlash=0.01))
-    n = 20
-    log = Log(
-        name="bare",
-        time=np.arange(n) / 100,
-        joints=(JOINT,),
-        position=np.zeros((n, 1)),
-        position_source="joint",
-        voltage=np.zeros((n, 1)),
-    )
+@pytest.mark.parametrize(
+    ("model", "words"), [(machine_of_urdf(URDF), "no motor"), (machine(backlash=0.01), "loose")]
+)
+def test_what_cannot_be_simulated_is_refused(model: MachineModel, words: str) -> None:
+    with pytest.raises(ModelError, match=words):
+        ForwardSimulator(model)
+
+
+def test_a_log_that_does_not_say_what_drives_the_servos_is_refused() -> None:
+    still = np.zeros((20, 1))
+    log = Log("bare", np.arange(20) / 100, (JOINT,), still, "joint", voltage=still)
     with pytest.raises(LogContentError, match="goal positions and a supply voltage and the contr"):
         servo_input(log)
-    told = log.with_changes(
-        goal_position=np.zeros((n, 1)),
-        supply=np.full(n, 5.0),
-        gain=1.0,
-        torque_off=np.ones((n, 1), dtype=np.bool_),
-    )
+    off = {"gain": 1.0, "torque_off": still == 0.0}
+    log = log.with_changes(goal_position=still, supply=np.full(20, 5.0), **off)
     with pytest.raises(LogContentError, match="torque_off_bridge"):
-        servo_input(told)
+        servo_input(log)
