@@ -31,10 +31,12 @@ _SHIFT: Final = 0.3
 #: what an end carries over the mass of all that moves, and how far out over the links' length.
 _CARRIED: Final = 0.2
 _OUT: Final = 0.5
-#: Scale of all of a body, and the mass an end carries ...
-_ALL, _MASS = "scale", "mass"
+#: ... and a drive's torque over its effort: data sheets give constants of motors within a tenth.
+_OFF: Final = 0.1
+#: Scale of all of a body, gain of an effort, and the mass an end carries ...
+_ALL, _GAIN, _MASS = "scale", "gain", "mass"
 #: ... and their least change: bodies lighter than a tenth of what the model says are none.
-_LEAST: Final = {_ALL: -0.9, _MASS: 0.0}
+_LEAST: Final = {_ALL: -0.9, _GAIN: -0.9, _MASS: 0.0}
 
 
 def wrong_columns(
@@ -103,15 +105,18 @@ class AlongLogs:
             simulator = Simulator(m)
             now = simulator.predict(self._model)
             base.append(now.effort[..., 0])
-            columns.append(base[-1][None] if rough else self._columns(simulator, now))
-        opened = (_Open("", _ALL, BodyChange(), 1.0, _SCALE),) if rough else self._open
+            gains = base[-1] * np.eye(len(of))[:, None]
+            bodies = base[-1][None] if rough else self._columns(simulator, now)
+            columns.append(np.concatenate([bodies, gains]))
+        opened = [_Open("", _ALL, BodyChange(), 1.0, _SCALE)] if rough else [*self._open]
+        opened += [_Open(joint, _GAIN, BodyChange(), 1.0, _OFF) for joint in self._model.joints]
         least = np.array([_LEAST.get(o.what, -np.inf) for o in opened])
         return Bodies(
             base=np.concatenate(base),
             columns=np.concatenate(columns, axis=1),
             spread=np.array([o.spread for o in opened]),
             least=least,
-            relative=np.array([o.what == _ALL for o in opened]),
+            relative=np.array([o.what in (_ALL, _GAIN) for o in opened]),
             v=np.concatenate([m.v for m in ms]),
             a=np.concatenate([m.a for m in ms]),
             rest=ms[0].rest_speed[of] * np.abs(factor),

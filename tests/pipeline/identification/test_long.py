@@ -167,7 +167,7 @@ def test_naming_on_stretches_gives_the_verdict_of_all_rows(
         given, where = taken_in(root, str(path))
         named = identify(given.model, where.measurements)
         verdicts.append(named.naming.found)
-        models = [("before", given.model), ("after", named.model)]
+        models = [("before", given.model), ("after", named.settled.problem.current)]
         gaps.append([s.gap for s in stages(models, where.measurements, where.loaded.long)])
     few, all_ = verdicts
     assert {(f.effect, f.place) for f in few} == {(f.effect, f.place) for f in all_}

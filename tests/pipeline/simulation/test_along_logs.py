@@ -23,6 +23,7 @@ from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.quality.finding import Finding
 from pipeline.simulation.along_logs import wrong_columns
+from tests.leg_log import leg_logs
 
 RATE = 200.0
 LINK = """<link name="l{k}"><inertial><origin xyz="{x} 0.02 0.01"/><mass value="{m}"/>
@@ -198,6 +199,13 @@ def test_a_common_scale_is_no_more_than_suspicious(
     line = re.search(r"in a mapping file: (.*)", found.detail)
     assert line is not None
     assert judged(log, urdf, tmp_path, line[1]) == []
+
+
+def test_a_motor_of_another_constant_on_an_exact_machine_is_no_wrong_column(
+    root: Path, tmp_path: Path
+) -> None:
+    (log,) = leg_logs(3, ["torque_constant_error"]).values()
+    assert judged(pd.DataFrame(log), root / "urdf" / "leg.toml", tmp_path) == []
 
 
 @pytest.mark.parametrize("seed", range(6))
