@@ -58,6 +58,8 @@ MAKE = run.make
 
 
 @pytest.mark.slow
+# The pipes of a worker that is killed are closed by nobody.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_dask_gives_the_same_rows_though_a_worker_is_killed(tmp_path: Path) -> None:
     from distributed import LocalCluster
 

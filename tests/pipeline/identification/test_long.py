@@ -177,18 +177,18 @@ def test_naming_on_stretches_gives_the_verdict_of_all_rows(
             assert p.low <= q.high
             assert q.low <= p.high
     before, after = np.array(gaps[0])
-    # Other rows prove where stretches are chosen: the gap of all joints is the same, nearly.
-    assert np.sqrt(np.mean(before**2)) == pytest.approx(np.sqrt(np.mean(gaps[1][0] ** 2)), rel=0.15)
+    # Other motions are held out where stretches are chosen: the gap of all joints is alike.
+    assert np.sqrt(np.mean(before**2)) == pytest.approx(np.sqrt(np.mean(gaps[1][0] ** 2)), rel=0.3)
     assert np.sqrt(np.mean(after**2)) < np.sqrt(np.mean(before**2))
 
 
 CHILD = """
-import resource, sys
+import re, sys
 from pipeline.cli.main import main
 try:
     main(sys.argv[1:])
-finally:
-    print("peak", resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+finally:  # of this program alone: what getrusage says begins with the memory of its parent
+    print("peak", re.search(r"VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1])
 """
 
 
