@@ -98,7 +98,7 @@ def energy(
 ) -> Mapping[str, NDArray[np.float64]]:
     """Electrical energy that a demand takes from the supply.
 
-    No file is read and no table made: a millisecond for 51 samples of 18 joints.
+    No file is read and no table made: for 51 samples of 18 joints 0.2 to 0.7 ms per alternative.
 
     Args:
         machine: Whose actuators answer.

@@ -12,6 +12,7 @@ from pipeline.simulation import memory
 from tests.command_line import Command
 
 
+@pytest.mark.slow
 def test_the_rule_is_above_what_a_walk_takes_and_of_its_size(
     tmp_path: Path, command: Command
 ) -> None:

@@ -73,6 +73,7 @@ def test_pictures_and_page_are_there(run: tuple[int, Path]) -> None:
 
 
 @needs_chromium
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [1280, 400])
 def test_the_answer_is_seen_at_first_sight(
     run: tuple[int, Path], tmp_path: Path, width: int
