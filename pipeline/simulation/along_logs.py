@@ -31,7 +31,7 @@ _SHIFT: Final = 0.3
 #: what an end carries over the mass of all that moves, and how far out over the links' length.
 _CARRIED: Final = 0.2
 _OUT: Final = 0.5
-#: ... and a drive's torque over its effort: a tenth for a motor's constant, one for its gear's loss.
+#: ... and a drive's torque over its effort: a tenth for the motor's constant, one for its gear.
 _OFF: Final = 0.15
 #: Scale of all of a body, gain of an effort, and the mass an end carries ...
 _ALL, _GAIN, _MASS = "scale", "gain", "mass"
