@@ -12,6 +12,7 @@ from actuators.errors import one_line
 from pipeline.errors import RobotFileError
 
 if TYPE_CHECKING:
+    from pipeline.api.machine import Machine
     from pipeline.simulation.settings import Settings
 
 OUT = Path("reports/out")
@@ -156,19 +157,24 @@ def changes_of(texts: Iterable[str]) -> dict[str, str]:
     return changes
 
 
-def settings_of(options: argparse.Namespace) -> Settings:
-    """The machine that is asked for, loaded, and how it walks."""
+def machine_of(options: argparse.Namespace) -> Machine:
+    """The machine that is asked for, loaded."""
     from pipeline.api.machine import load
-    from pipeline.simulation.ground_forces.force_choice import ForceChoice
 
-    machine = load(
+    return load(
         options.robot,
         model=options.model,
         gait=options.gait,
         actuators=options.actuators,
         changes=changes_of(options.set),
     )
-    return machine.walking(
+
+
+def settings_of(options: argparse.Namespace) -> Settings:
+    """The machine that is asked for, and how it walks."""
+    from pipeline.simulation.ground_forces.force_choice import ForceChoice
+
+    return machine_of(options).walking(
         samples=options.samples,
         quasi_static=options.quasi_static,
         regeneration=options.regeneration,

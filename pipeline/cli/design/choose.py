@@ -13,9 +13,9 @@ from pipeline.cli.options import (
     AddVerb,
     add_machine_options,
     add_out_option,
-    changes_of,
     decimal_of,
     folder_held,
+    machine_of,
     named_path,
 )
 from pipeline.progress import Progress
@@ -93,7 +93,6 @@ def run_choose(options: argparse.Namespace) -> int:
     """Search, write the tables, print three lines."""
     with folder_held(options), Progress("choose") as progress:
         progress.step("loading")
-        from pipeline.api.machine import load
         from pipeline.choice.answer.result import choice
         from pipeline.choice.errors import ChoiceError
         from pipeline.choice.track import Account
@@ -106,13 +105,7 @@ def run_choose(options: argparse.Namespace) -> int:
         given = vars(options)
         numbers = {name: _number(name, given[name.replace("-", "_")]) for name in _NUMBERS}
         value = {name: None if x is None else x.value for name, x in numbers.items()}
-        machine = load(
-            options.robot,
-            model=options.model,
-            gait=options.gait,
-            actuators=options.actuators,
-            changes=changes_of(options.set),
-        )
+        machine = machine_of(options)
         wanted = Wanted(
             parts=options.parts,
             kinds=tuple(options.kind),
