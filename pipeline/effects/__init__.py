@@ -1,1 +1,1 @@
-"""The effects a model may lack, one file each, and the model file that lists them."""
+"""The effects a model may lack, by where they act, and the model file that lists them."""

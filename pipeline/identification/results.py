@@ -1,4 +1,4 @@
-"""Thresholds and results of naming, in one place.
+"""What naming answers: its records, its words and the numbers it compares with.
 
 How often they let a wrong name pass stands in `pipeline/blind/README.md`.
 """
