@@ -225,14 +225,14 @@ def _thousandfold(before: ParameterSet, after: ParameterSet, key: str) -> list[s
     """Say when a change looks like another unit: about a thousand times more or less."""
     if key not in before or before[key] == 0 or after[key] == 0:
         return []
-    ratio = abs(after[key] / before[key])
-    if not (_THOUSAND[0] < max(ratio, 1 / ratio) < _THOUSAND[1]):
+    least, most = sorted((abs(before[key]), abs(after[key])))
+    if not (_THOUSAND[0] < most / least < _THOUSAND[1]):
         return []
     old, new = before.parameter(key), after.parameter(key)
+    word = "more" if abs(after[key]) == most else "less"
     return [
-        f"{key} = {new.value_as_written:g} {new.unit} is about a thousand times "
-        f"{'more' if ratio > 1 else 'less'} than the file's {old.value_as_written:g}; --set takes "
-        f"it in {new.unit}"
+        f"{key} = {new.value_as_written:g} {new.unit} is about a thousand times {word} than the "
+        f"file's {old.value_as_written:g}; --set takes it in {new.unit}"
     ]
 
 

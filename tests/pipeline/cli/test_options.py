@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
@@ -78,6 +78,7 @@ def test_any_text_is_taken_or_refused_in_one_line(text: str) -> None:
     st.sampled_from([*NUMBERS, "gait.transfer_path", "no.such", "nothing"]),
     st.one_of(st.floats().map(repr), st.integers().map(str), st.text(max_size=12)),
 )
+@example("total_mass", "5e-324")
 @hypothesis_settings(max_examples=150, deadline=None)
 def test_any_value_is_taken_or_refused_in_one_line(name: str, value: str) -> None:
     taken, refusal = outcome(f"{name}={value}")
