@@ -80,3 +80,16 @@ class Result:
 def by_name(tables: Sequence[Table]) -> dict[str, Table]:
     """Tables by the name of their file."""
     return {table.name: table for table in tables}
+
+
+def own_names(paths: Sequence[Path]) -> list[str]:
+    """Name of each file; with as many folders before it as tell it from others of that name."""
+    whole = [path.resolve().parts for path in paths]
+    out = []
+    for parts in whole:
+        others = {o for o in whole if o != parts}
+        tail = next(
+            n for n in range(1, len(parts) + 1) if all(o[-n:] != parts[-n:] for o in others)
+        )
+        out.append("/".join(parts[-tail:]))
+    return out

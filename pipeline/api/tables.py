@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from actuators.energy.limits import limit_rows, standing_rows
 from actuators.loading.build import CATALOG
-from pipeline.api.result import Computed
+from pipeline.api.result import Computed, own_names
 from pipeline.machine.drivetrains import Actuators, drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.inverse.foot_tracking import foot_tracking
@@ -187,7 +187,10 @@ def metadata(given: Settings) -> dict[str, Any]:
     spec = given.robot.spec
     files = inputs_of(given)
     return {
-        "inputs_sha256": {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in files},
+        "inputs_sha256": {
+            name: hashlib.sha256(path.read_bytes()).hexdigest()
+            for name, path in zip(own_names(files), files, strict=True)
+        },
         "urdf_sha256": hashlib.sha256(given.robot.urdf.encode()).hexdigest(),
         "versions": {name: version(name) for name in PACKAGES},
         "options": {

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from pipeline.api.result import own_names
 from pipeline.measured.evaluate import ROBOTS, predicted
 from pipeline.measured.facts import FACTS, Facts, read_facts
 from pipeline.measured.tables import (
@@ -66,7 +67,10 @@ def write_measured(
     tables = tables_of(every, found)
     inputs = [*sorted(folder.glob("*.toml")), *(ROBOTS / f.robot for f in every.values())]
     meta = {
-        "inputs_sha256": {p.name: hashlib.sha256(p.read_bytes()).hexdigest() for p in inputs},
+        "inputs_sha256": {
+            name: hashlib.sha256(path.read_bytes()).hexdigest()
+            for name, path in zip(own_names(inputs), inputs, strict=True)
+        },
         "versions": {"legwatt": version("legwatt")},
     }
     with staged(out, "measured") as target:

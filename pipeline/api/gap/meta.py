@@ -6,6 +6,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from pipeline.api.result import own_names
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.formats.convert import sha256
@@ -21,8 +22,11 @@ def inputs_of(options: Options, given: Setup) -> list[Path]:
 
 def metadata(options: Options, given: Setup) -> dict[str, Any]:
     """What every sidecar says about the run: inputs by hash, versions, options."""
+    files = inputs_of(options, given)
     return {
-        "inputs_sha256": {path.name: sha256(path) for path in inputs_of(options, given)},
+        "inputs_sha256": {
+            name: sha256(path) for name, path in zip(own_names(files), files, strict=True)
+        },
         "versions": {name: version(name) for name in PACKAGES},
         "options": {
             "step": options.step,
