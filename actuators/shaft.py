@@ -26,7 +26,8 @@ from actuators.arrays import Array, Scalars
 from actuators.errors import ShaftError
 
 REST_SPEED: Final = 1e-9  # [rad/s]
-_BY_JOINT: Final = ("position", "velocity", "acceleration", "torque", "direction")
+#: Fields of a series that have a column per joint.
+BY_JOINT: Final = ("position", "velocity", "acceleration", "torque", "direction")
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +94,7 @@ class ShaftSeries:
         return self._columns([self.joints.index(joint) for joint in joints], tuple(joints))
 
     def _columns(self, which: slice | list[int], joints: tuple[str, ...]) -> "ShaftSeries":
-        arrays = {name: getattr(self, name)[:, which] for name in _BY_JOINT}
+        arrays = {name: getattr(self, name)[:, which] for name in BY_JOINT}
         return ShaftSeries(joints=joints, time=self.time, **arrays)
 
     def with_torque(self, torque: Array) -> "ShaftSeries":

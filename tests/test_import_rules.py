@@ -111,7 +111,7 @@ def test_the_rule_can_fail() -> None:
     assert not allowed("actuators.shaft", "pinocchio")
     assert not allowed("pipeline.robot.robot", "actuators.chain")
     assert not allowed("pipeline.identification.results", "pipeline.blind.machines.trial")
-    assert not allowed("pipeline.blind.machines.plant", "actuators.elements.friction")
+    assert not allowed("pipeline.blind.machines.plant", "actuators.elements.element")
     assert not allowed("pipeline.simulation.predict", "reports.table")
     assert not allowed("reports.page", "pipeline.cli.main")
     assert allowed("pipeline.robot.robot", "actuators.units")

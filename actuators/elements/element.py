@@ -1,11 +1,43 @@
-"""The element: one law between two neighbouring shafts of an actuator."""
+"""The element, one law between two neighbouring shafts, and those that every drive is made of.
 
-from dataclasses import dataclass
-from typing import TypeAlias
+`Ratio` is an ideal transmission (Eq. 1 and 2 of the paper), `Inertia` a mass that rotates with a
+shaft (the inertial terms of Eq. 3, 7, 8, 14 and 18). `Friction` is friction at a shaft as one law,
+of whose terms the named laws of friction are choices.
+
+With v the velocity, s = sgn(v) the sense of motion and T the torque on the joint side,
+
+    friction = (coulomb + excess exp(-(v / stribeck_speed)^2)) s + skew |s|
+             + viscous v + asymmetry |v| + quadratic v |v| + saturating tanh(v / saturation_speed)
+             + (load + when_driving or when_driven) |T| s
+
+Sign: it is what the motor side supplies in addition, T' = T + friction; positive forward.
+
+- Coulomb, load-dependent and viscous (Eq. 4 to 6, 10, 15, 17, 19 of the paper, with the magnitudes
+  that Eq. 5 and 6 need in order to dissipate for every sign): `coulomb`, `load`, `viscous`.
+- Stribeck (Armstrong-Helouvry, Dupont and Canudas de Wit, Automatica 30(7), 1994): `excess`.
+- By direction (Armstrong, "Control of machines with friction", 1991): dry friction is
+  coulomb + skew forward and coulomb - skew backward. In motion `skew` equals a constant torque;
+  only standstill distinguishes the two.
+- By quadrant of power (Hamon, Gautier and Garrec, IROS 2010): `when_driving` where s T > 0, the
+  motor driving the load, `when_driven` where s T < 0.
+- The rest: the sum that Bona and Indri, "Friction compensation in robotics", CDC 2005, review.
+
+After a reversal s may rise instead of jumping: over a small displacement (`travel`, Dahl's law, see
+`actuators.presliding`) or over a speed, s = erf(v / (sqrt(2) rise)).
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import ClassVar, TypeAlias
 
 import numpy as np
+from scipy.special import erf
 
-from actuators.arrays import Array, Numbers, Scalars
+from actuators.arrays import Array, Mask, Numbers, Scalars, require
+from actuators.presliding import presliding
 from actuators.shaft import ShaftSeries
 
 #: Lower and upper ends of intervals, of any shape.
@@ -83,3 +115,179 @@ class Element(Numbers):
     def gearing(self) -> Scalars:
         """How many times faster the motor side turns."""
         return 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Ratio(Element):
+    """Speed divided from motor side to joint side, torque multiplied, power kept."""
+
+    rules: ClassVar = {"ratio": "positive"}
+    ratio: Scalars = 1.0  #: Motor-side over joint-side speed, positive, dimensionless.
+
+    def inverse(self, joint_side: ShaftSeries) -> ShaftSeries:
+        """Return the faster shaft with the smaller torque."""
+        return joint_side.geared(self.ratio, joint_side.torque / self.ratio)
+
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
+        """Return the slower shaft with the larger torque."""
+        return motor_side.geared(1.0 / np.asarray(self.ratio), motor_side.torque * self.ratio)
+
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
+        """Scale the interval."""
+        return low / self.ratio, high / self.ratio
+
+    @property
+    def gearing(self) -> Scalars:
+        """The ratio."""
+        return self.ratio
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia(Element):
+    """Torque for the acceleration of a shaft; stores kinetic energy and dissipates nothing.
+
+    Note:
+        Counted here, reflected rotor inertia must not stand in the rigid-body model as well.
+    """
+
+    inertia: Scalars = 0.0  #: Moment of inertia about the shaft [kg*m^2].
+
+    def added(self, side: ShaftSeries) -> Array:
+        """Return inertia times acceleration; nothing at standstill."""
+        return self.inertia * side.acceleration
+
+    def stored(self, joint_side: ShaftSeries) -> Array:
+        """Return the rate of kinetic energy, (N, J) [W]."""
+        return self.added(joint_side) * joint_side.velocity
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionLaw(Element):
+    """Friction with a part of its own and a share of the transmitted torque, below 1.
+
+    Note:
+        At standstill dry friction holds with its whole level, whatever `rise` and `travel`.
+    """
+
+    #: Transition velocity of dry friction after a reversal; 0 for a jump [rad/s].
+    rise: Scalars = field(default=0.0, kw_only=True)
+    #: Presliding displacement, in place of a velocity; 0 for none [rad].
+    travel: float = field(default=0.0, kw_only=True)
+
+    @abstractmethod
+    def free(self, side: ShaftSeries, sense: Array) -> Array:
+        """Return the friction torque that no load changes, (N, J) [N*m]."""
+
+    @abstractmethod
+    def share(self, velocity: Array, drives: Mask) -> Scalars:
+        """Return friction per transmitted torque, by who drives, (N, J)."""
+
+    @abstractmethod
+    def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
+        """Return levels [N*m] against negative and positive motion, and shares driving, driven."""
+
+    def sense(self, side: ShaftSeries) -> Array:
+        """Return the sense of motion, -1 to 1, (N, J)."""
+        if self.travel > 0.0:
+            columns = zip(side.position.T, side.direction.T, strict=True)
+            return np.stack([presliding(side.time, q, d, self.travel) for q, d in columns], axis=1)
+        if not np.any(self.rise):
+            return side.direction
+        width = np.maximum(np.sqrt(2.0) * np.asarray(self.rise), 1e-300)
+        return np.where(np.asarray(self.rise) > 0.0, erf(side.velocity / width), side.direction)
+
+    def added(self, side: ShaftSeries) -> Array:
+        """Return the friction torque, (N, J) [N*m]."""
+        sense = self.sense(side)
+        share = self.share(side.velocity, side.torque * sense > 0.0)
+        return self.free(side, sense) + share * np.abs(side.torque) * sense
+
+    def forward(self, motor_side: ShaftSeries) -> ShaftSeries:
+        """Subtract the friction torque; as shares are below 1, the load has the sign of the rest.
+
+        With x = torque on the motor side less the free part, x = torque + share s |torque|.
+        """
+        sense = self.sense(motor_side)
+        x = motor_side.torque - self.free(motor_side, sense)
+        along = sense * np.sign(x)
+        share = self.share(motor_side.velocity, along > 0.0)
+        return motor_side.with_torque(x / (1.0 + share * along))
+
+    def holding(self, low: Array, high: Array, position: Array | None = None) -> Span:
+        """Widen the interval by the whole dry friction at each end; monotone as shares are < 1."""
+        against, along, driving, driven = self.static()
+        return (
+            low - against - np.where(low < 0.0, driving, driven) * np.abs(low),
+            high + along + np.where(high > 0.0, driving, driven) * np.abs(high),
+        )
+
+    def loss(self, joint_side: ShaftSeries) -> Array:
+        """Return friction torque times speed, (N, J) [W]."""
+        return self.added(joint_side) * joint_side.velocity
+
+
+@dataclass(frozen=True, eq=False)
+class Friction(FrictionLaw):
+    """Friction as a sum of terms; those that a shaft does not have are zero.
+
+    Raises:
+        UnphysicalElementError: A term would give energy, or a speed is not positive.
+    """
+
+    rules: ClassVar = {
+        **{"load": "share", "skew": "signed", "asymmetry": "signed"},
+        **{"stribeck_speed": "positive", "saturation_speed": "positive"},
+    }
+    coulomb: Scalars = 0.0  #: Dry friction at every speed and load [N*m].
+    #: Per transmitted torque, dimensionless; below 1, or no load could drive the shaft.
+    load: Scalars = 0.0
+    viscous: Scalars = 0.0  #: Per speed [N*m*s/rad].
+    skew: Scalars = 0.0  #: By which dry friction is larger forward and smaller backward [N*m].
+    excess: Scalars = 0.0  #: Break-away less Coulomb friction [N*m].
+    stribeck_speed: Scalars = 1.0  #: At which 1/e of the excess is left [rad/s].
+    #: By which viscous friction is larger forward and smaller backward [N*m*s/rad].
+    asymmetry: Scalars = 0.0
+    quadratic: Scalars = 0.0  #: Per squared speed [N*m*s^2/rad^2].
+    saturating: Scalars = 0.0  #: Level of friction that grows less and less with speed [N*m].
+    saturation_speed: Scalars = 1.0  #: Over which it grows [rad/s].
+    when_driving: Scalars = 0.0  #: Besides `load` while the motor drives the load, dimensionless.
+    when_driven: Scalars = 0.0  #: Besides `load` while the load drives the motor; together below 1.
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        together = np.less(np.add(self.load, self.when_driven), 1.0)
+        require(together, self.name, "when_driven and load together must be below 1")
+        for part, whole in (("skew", "coulomb"), ("asymmetry", "viscous")):
+            within = np.less_equal(np.abs(getattr(self, part)), getattr(self, whole))
+            require(within, self.name, f"{part} must not exceed {whole}: it would give energy")
+
+    @cached_property
+    def _terms(self) -> frozenset[str]:
+        """Terms that are there, of those that not every friction has."""
+        rare = ("skew", "excess", "asymmetry", "quadratic", "saturating")
+        return frozenset(name for name in rare if np.any(getattr(self, name)))
+
+    def free(self, side: ShaftSeries, sense: Array) -> Array:
+        """Return all terms but those of the load, (N, J) [N*m]."""
+        velocity = side.velocity
+        v, terms = velocity, self._terms
+        torque = self.coulomb * sense + self.viscous * v
+        if "skew" in terms:
+            torque = torque + self.skew * np.abs(sense)
+        if "excess" in terms:
+            torque = torque + self.excess * np.exp(-((v / self.stribeck_speed) ** 2)) * sense
+        if "asymmetry" in terms or "quadratic" in terms:
+            torque = torque + (self.asymmetry + self.quadratic * v) * np.abs(v)
+        if "saturating" in terms:
+            torque = torque + self.saturating * np.tanh(v / self.saturation_speed)
+        return torque
+
+    def share(self, velocity: Array, drives: Mask) -> Scalars:
+        """Return the coefficient of the quadrant of power, (N, J)."""
+        return self.load + np.where(drives, self.when_driving, self.when_driven)
+
+    def static(self) -> tuple[Scalars, Scalars, Scalars, Scalars]:
+        """Return dry friction either way and the shares of load."""
+        level = self.coulomb + self.excess
+        driving, driven = self.load + self.when_driving, self.load + self.when_driven
+        return level - self.skew, level + self.skew, driving, driven

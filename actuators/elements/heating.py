@@ -11,12 +11,13 @@ Where a sensor on the housing is read, a winding in balance with it adds sensor_
 both rise in proportion to the loss, the winding by the larger thermal resistance.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Final
 
 import numpy as np
 
 from actuators.arrays import Array, Numbers
+from actuators.chain import DCMotor
 
 COPPER: Final = 0.00393  # [1/K]
 MAGNET: Final = -0.0011  # [1/K]
@@ -69,11 +70,10 @@ class Heating(Numbers):
         return self.sensor_gain * (temperature - REFERENCE)
 
 
-def warm_resistance(resistance: float, rise: Array) -> Array:
-    """Return the winding's resistance (N,) [ohm] warmed by `rise` (N,) [K]."""
-    return resistance * (1.0 + COPPER * rise)
-
-
-def warm_torque_constant(torque_constant: float, rise: Array) -> Array:
-    """Return the torque constant (N,) [N*m/A] with magnets warmed by `rise` (N,) [K]."""
-    return torque_constant * (1.0 + MAGNET * rise)
+def warmed(motor: DCMotor, rise: Array) -> DCMotor:
+    """Return the motor with winding and magnets warmer by `rise` (...) [K]."""
+    return replace(
+        motor,
+        torque_constant=motor.torque_constant * (1.0 + MAGNET * rise),
+        resistance=motor.resistance * (1.0 + COPPER * rise),
+    )

@@ -8,7 +8,7 @@ continuous current bounds a root mean square and no instant; it is no edge of th
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.elements.motor import DCMotor
+from actuators.chain import DCMotor
 
 
 def operating_region(motor: DCMotor, *, joint: int = 0, reach: tuple[float, float]) -> Array:

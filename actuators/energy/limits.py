@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.chain import ChainResult, HoldingResult
-from actuators.elements.motor import DCMotor
+from actuators.chain import ChainResult, DCMotor, HoldingResult
 from actuators.energy.energy import duration, weighted
 
 

@@ -8,13 +8,10 @@ from pydantic import AfterValidator, ConfigDict, Field, Strict, model_validator
 
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
 from actuators.checked import Table, Text
-from actuators.elements.element import Element
-from actuators.elements.friction import Friction
+from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
-from actuators.elements.inertia import Inertia
 from actuators.elements.position_torque import ParallelSpring
-from actuators.elements.ratio import Ratio
 from actuators.elements.second_motor import SecondMotor
 from actuators.errors import closest, one_line
 

@@ -11,9 +11,8 @@ from typing import Annotated, Any, Final
 import numpy as np
 
 from actuators.arrays import Scalars
-from actuators.chain import Chain
+from actuators.chain import Chain, DCMotor
 from actuators.checked import Table, checked
-from actuators.elements.motor import DCMotor
 from actuators.errors import ActuatorError, CatalogError, closest, one_line
 from actuators.loading.alternatives import (
     ALTERNATIVES_FILE,

@@ -21,12 +21,12 @@ from pipeline.api.machine import Machine
 from pipeline.api.result import by_name
 from pipeline.effects.model_file import edits_in
 from pipeline.identification.compare.stages import overall
-from pipeline.identification.workflow.compared import Compared, compare_logs, judged
+from pipeline.identification.workflow.compared import Compared, compare_logs, judged, load_logs
 from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.outcome import Outcome, identified
-from pipeline.identification.workflow.setup import Setup, check_options, load_logs, setup
+from pipeline.identification.workflow.setup import Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.formats.convert import plain
 from pipeline.logs.quality.finding import Finding

@@ -11,7 +11,7 @@ from pipeline.api.machine import Machine
 from pipeline.api.result import Result
 from pipeline.api.tables import inputs_of, metadata, tables_of_standing, tables_of_walking, walked
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
-from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.joint import Actuators
 from pipeline.simulation import walk_stand
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, ForceChoice

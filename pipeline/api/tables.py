@@ -15,7 +15,7 @@ from tqdm import tqdm
 from actuators.energy.limits import limit_rows, standing_rows
 from actuators.loading.build import CATALOG
 from pipeline.api.result import Computed, own_names
-from pipeline.machine.drivetrains import Actuators, drivetrains_of
+from pipeline.machine.joint import Actuators, drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.inverse.foot_tracking import foot_tracking
 from pipeline.simulation import cycle_energy

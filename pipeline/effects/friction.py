@@ -1,4 +1,4 @@
-"""Friction at a joint: effects that are choices of terms of `actuators.elements.friction`."""
+"""Friction at a joint: effects that are choices of terms of `actuators.elements.element`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from actuators.elements.friction import Friction
+from actuators.elements.element import Friction
 from actuators.elements.warming import ZERO_CELSIUS, Warming
 from pipeline.effects.base import Effect, Parameter, Place, Values, at_joint
 from pipeline.logs.prepared.measurement import Measurement

@@ -7,8 +7,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from actuators.elements.friction import Friction
-from actuators.elements.inertia import Inertia
+from actuators.elements.element import Friction, Inertia
 from pipeline.effects.base import Coordinate, Effect, Parameter, Place, Values, at_joint
 from pipeline.logs.errors import EffectError
 from pipeline.logs.prepared.measurement import Measurement

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from actuators.errors import closest
 from pipeline.logs.errors import ModelError
-from pipeline.machine.drivetrains import Actuators, Drivetrains, drivetrains_of
-from pipeline.machine.joint import JointModel, joints_of
+from pipeline.machine.joint import Actuators, Drivetrains, JointModel, drivetrains_of, joints_of
 from pipeline.robot.check import refuse_urdf
+from pipeline.robot.kinematics import LegColumns
 from pipeline.robot.leg_chains import LegChains
-from pipeline.robot.leg_columns import LegColumns
 from pipeline.robot.robot import Robot, parse_urdf
 from pipeline.robot.urdf_source import read_urdf
 

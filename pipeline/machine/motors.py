@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.loading.build import Catalog
-from pipeline.machine.drivetrains import Actuators, drivetrains_of
+from pipeline.machine.joint import Actuators, drivetrains_of
 from pipeline.machine.own_actuators import AS_BUILT, OwnActuators
 
 

@@ -40,8 +40,7 @@ from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, parameters_from_table
 from actuators.units import dimension
 from pipeline.errors import RobotFileError
-from pipeline.machine.drivetrains import Actuators, Drivetrains
-from pipeline.machine.joint import JointModel, joints_of
+from pipeline.machine.joint import Actuators, Drivetrains, JointModel, joints_of
 from pipeline.robot.guess.motors import KNOWN_SCHEME, known_folder
 from pipeline.robot.robot_file import RobotSpec
 

@@ -23,7 +23,7 @@ from scipy.optimize import brentq
 
 from actuators.arrays import Array
 from actuators.chain import Chain
-from actuators.elements.heating import warm_resistance
+from actuators.elements.heating import COPPER
 from actuators.elements.hypoid import Hypoid
 from actuators.energy.regeneration import BUS, supply
 from actuators.loading.build import Catalog
@@ -244,7 +244,7 @@ def _friction_and_winding(
             "at standstill, too: the laws have one friction for both",
         )
     number = assumptions().parameter("winding_rise")
-    factor = float(warm_resistance(1.0, np.array(number.value)))
+    factor = 1.0 + COPPER * number.value
     motors = {catalog.alternatives[name].motor for name in ALTERNATIVES}
     yield (
         "warming of the winding",

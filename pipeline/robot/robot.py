@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from actuators.arrays import Array
 from actuators.errors import closest, one_line
 from pipeline.errors import UrdfError
+from pipeline.robot.kinematics import LegColumns, leg_columns
 from pipeline.robot.leg_chains import LegChains, leg_chains
-from pipeline.robot.leg_columns import LegColumns, leg_columns
 from pipeline.robot.robot_file import RobotSpec
 from pipeline.robot.urdf_builder import build_urdf
 from pipeline.robot.urdf_source import read_elements, read_urdf

@@ -17,8 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipeline.dynamics.demand import JointDemand
-from pipeline.machine.drivetrains import Actuators, Drivetrains
-from pipeline.machine.joint import JointModel
+from pipeline.machine.joint import Actuators, Drivetrains, JointModel
 from pipeline.machine.machine import MachineModel, machine_of_robot
 from pipeline.motion.motion import Segment
 from pipeline.robot.kinematics import foot_force_torques

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.joint import Actuators
 from pipeline.motion.gait import gait_of
 from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import Effects

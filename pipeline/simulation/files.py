@@ -20,7 +20,7 @@ from actuators.parameters import ParameterSet
 from actuators.units import to_si
 from pipeline.effects.model_file import ModelFile, read_model_file
 from pipeline.errors import GaitError, RobotFileError
-from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.joint import Actuators
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import (
     OwnActuators,

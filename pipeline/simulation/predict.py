@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.chain import moved
-from actuators.elements.motor import DCMotor
+from actuators.chain import DCMotor, moved
 from actuators.shaft import ShaftSeries
 from pipeline.logs.errors import ModelError
 from pipeline.logs.prepared.measurement import Measurement

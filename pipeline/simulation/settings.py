@@ -13,7 +13,7 @@ from actuators.loading.build import Catalog
 from pipeline.dynamics.force_rules import GroundForces
 from pipeline.effects.model_file import apply_edits
 from pipeline.errors import GaitError, RobotFileError
-from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.joint import Actuators
 from pipeline.machine.motors import Motors, motors_of
 from pipeline.machine.own_actuators import OwnActuators
 from pipeline.motion.gait import gait_table

@@ -16,7 +16,7 @@ from pipeline.dynamics.contact_forces import ContactForces
 from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, PAPER, GroundForces
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
-from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.joint import Actuators
 from pipeline.motion.motion import Motion, Segment
 from pipeline.motion.standing import standing_posture
 from pipeline.motion.support import stability_margins

@@ -3,10 +3,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.chain import Chain
-from actuators.elements.friction import Friction
-from actuators.elements.motor import DCMotor
-from actuators.elements.ratio import Ratio
+from actuators.chain import Chain, DCMotor
+from actuators.elements.element import Friction, Ratio
 from actuators.energy.balance import balance_residual
 from actuators.energy.regeneration import supply
 from actuators.errors import ChainError

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.elements.motor import DCMotor
+from actuators.chain import DCMotor
 from actuators.energy.energy import integral, split_integral, stage_energies, stage_energy
 from actuators.energy.limits import limit_rows, rms_over_time, standing_rows, time_over
 from actuators.energy.regeneration import supply

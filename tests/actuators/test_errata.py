@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from actuators.elements.friction import Friction
+from actuators.elements.element import Friction, Inertia
 from actuators.elements.hypoid import Hypoid
-from actuators.elements.inertia import Inertia
 from actuators.energy.balance import balance_residual
 from tests.actuators.motions import CHAINS, constant, harmonic, split
 

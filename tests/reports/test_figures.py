@@ -14,9 +14,8 @@ import numpy as np
 import pytest
 from matplotlib.patches import Rectangle
 
-from actuators.elements.element import Element
-from actuators.elements.inertia import Inertia
-from actuators.elements.motor import DCMotor
+from actuators.chain import DCMotor
+from actuators.elements.element import Element, Inertia
 from actuators.energy.energy import StageEnergy
 from actuators.loading.build import load_catalog
 from actuators.shaft import ShaftSeries

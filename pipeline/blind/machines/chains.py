@@ -11,11 +11,10 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 FIXED: Final = ("pendulum", "leg", "arm")
 #: Link lengths [m] and masses [kg] before they are drawn; an arm draws its number of joints.
 _SIZES: Final = {

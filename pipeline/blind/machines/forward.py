@@ -13,14 +13,13 @@ from typing import Any, Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.blind.machines.chains import Machine
 from pipeline.blind.machines.motions import Course
 from pipeline.blind.machines.plant import Happened, Plant
 from pipeline.errors import PipelineError
 
-Array = NDArray[np.float64]
 #: Step of the integration [s]; the shorter one where motors turn apart from their links.
 STEPS: Final = (2.5e-4, 1e-4)
 #: Frequency of the position loop [Hz], critically damped.

@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.blind.machines.chains import FIXED, Machine, tilted, with_payload
 from pipeline.blind.machines.laws import cable, detents, hysteresis, ripple, spring
 from pipeline.blind.machines.motions import Course
 from pipeline.blind.machines.plant import Plant
 
-Array = NDArray[np.float64]
 Rng = np.random.Generator
 STRENGTH: Final = (4.0, 60.0)
 BOTH: Final = ("own", "mujoco")

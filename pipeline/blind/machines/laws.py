@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from actuators.arrays import Array
+
 #: Torque on the joint in its positive sense [N*m] of time [s], angle [rad] and speed [rad/s].
 Law = Callable[[float, float, float], float]
 #: Keeps the bristle's steady deflection defined where a shaft has no friction [N*m].

@@ -12,15 +12,14 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.blind.machines.chains import Machine
 from pipeline.blind.machines.laws import bristles
 from pipeline.blind.machines.motions import Course
 from pipeline.blind.machines.plant import Happened, Plant
 from pipeline.blind.machines.walk import walking_torque
 
-Array = NDArray[np.float64]
 #: Time a motor takes to cross its play [s].
 _CROSSING = 2e-2
 

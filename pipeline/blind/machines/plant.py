@@ -8,13 +8,11 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.blind.machines.chains import Machine
 from pipeline.blind.machines.laws import Friction, Law
 from pipeline.blind.machines.motions import Course
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from actuators.arrays import Array
 from pipeline.blind.machines.chains import Machine
 from pipeline.blind.machines.plant import Happened, Plant
 
-Array = NDArray[np.float64]
 MOTOR_COUNTS: Final = 4096  # of an encoder at the motor, per turn of the motor
 _FORCE_NOISE: Final = 0.5  # of a foot sensor [N]
 

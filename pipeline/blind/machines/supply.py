@@ -22,6 +22,7 @@ import pyarrow as pa
 from numpy.typing import NDArray
 from pyarrow import parquet
 
+from actuators.arrays import Array
 from actuators.errors import closest
 from actuators.text_file import read_toml_file
 from actuators.units import to_si
@@ -32,8 +33,6 @@ from pipeline.blind.machines.sensors import draw_sensors, measure, sampled
 from pipeline.blind.machines.trial import stream, write_given
 from pipeline.blind.machines.walk import draw_walker, gait_course
 from pipeline.errors import PipelineError
-
-Array = NDArray[np.float64]
 
 #: What may be hidden; each is drawn in half of the trials.
 HIDDEN: Final = ("constant", "drivers", "returned", "extra_friction", "sag", "wrong_sum")

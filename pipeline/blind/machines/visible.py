@@ -17,6 +17,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.blind.machines.chains import Machine, tilted
 from pipeline.blind.machines.hidden import EFFECTS, Case
 from pipeline.blind.machines.motions import Course
@@ -25,7 +26,6 @@ from pipeline.blind.machines.own import run as inverse
 from pipeline.blind.machines.plant import Happened, Plant
 from pipeline.blind.machines.sensors import Sensors, exact_torque, sampled
 
-Array = NDArray[np.float64]
 THRESHOLD: Final = 6.0
 #: Rows looked at; more tell the same.
 _ROWS: Final = 500

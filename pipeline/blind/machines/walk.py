@@ -9,9 +9,9 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
+from actuators.arrays import Array
 from pipeline.blind.machines.chains import Machine
 from pipeline.blind.machines.motions import Course
 from pipeline.dynamics.joint_demand import segment_demand
@@ -20,7 +20,6 @@ from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 
-Array = NDArray[np.float64]
 FOLDER: Final = Path(__file__).parents[3] / "urdf"
 
 

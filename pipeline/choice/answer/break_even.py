@@ -25,7 +25,7 @@ from pipeline.choice.errors import ChoiceError
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.missions.mission import Mode
 from pipeline.choice.track import Account
-from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.joint import Actuators
 from reports.tables.choice import BreakEvenRow
 
 if TYPE_CHECKING:

@@ -19,8 +19,7 @@ from actuators.supply.battery import Battery
 from pipeline.choice.loads import Load
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.track import Account
-from pipeline.machine.drivetrains import Drivetrains
-from pipeline.machine.joint import JointModel, joints_of
+from pipeline.machine.joint import Drivetrains, JointModel, joints_of
 
 #: Joints of each group, and their one design.
 Built = Mapping[str, tuple[tuple[str, ...], Designs]]

@@ -15,14 +15,10 @@ from types import MappingProxyType
 import numpy as np
 
 from actuators.arrays import Array, Index, Mask
-from actuators.chain import Chain
-from actuators.elements.element import Element
-from actuators.elements.friction import Friction
+from actuators.chain import Chain, DCMotor
+from actuators.elements.element import Element, Friction, Inertia, Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
-from actuators.elements.inertia import Inertia
-from actuators.elements.motor import DCMotor
-from actuators.elements.ratio import Ratio
 from actuators.elements.two_body import REFERENCE_K, Temperatures, TwoBody
 from actuators.loading.build import WINDING
 from actuators.supply.battery import HOUR

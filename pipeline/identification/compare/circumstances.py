@@ -12,14 +12,11 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.simulation.predict import Prediction
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: The way of sorting that leaves a joint whole.
 WHOLE: Final = "joint"

@@ -15,9 +15,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.identification.compare.observe import observe_chunk
-from pipeline.logs.prepared.contact import Contact
-from pipeline.logs.prepared.measurement import TEST, TRAIN, UNUSED, VALIDATION, Measurement
+from pipeline.logs.prepared.measurement import TEST, TRAIN, UNUSED, VALIDATION, Contact, Measurement
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.stream import CHUNK_ROWS, Stream, Survey, prepared_chunks
@@ -25,8 +25,6 @@ from pipeline.logs.quality.finding import VERDICTS, Finding, Quality
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
-
-Array = NDArray[np.float64]
 
 #: More rows than this in all logs together are gone through in chunks.
 LONG_ROWS: Final = 100_000

@@ -9,15 +9,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs.prepared.measurement import Measurement, near_rest
+from actuators.arrays import Array, Mask
+from pipeline.logs.prepared.measurement import Measurement, near_rest, sign_unsure
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.signals.derivatives import LowPass
-from pipeline.logs.signals.noise import sign_unsure, smoother_noise
+from pipeline.logs.signals.derivatives import LowPass, smoother_noise
 from pipeline.machine.machine import MachineModel
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: Speed over which friction changes sign, as a share of the joint's fast speed.
 REST_SHARE: Final = 0.003

@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.identification.compare.circumstances import gap_of
 from pipeline.identification.compare.long import LongLogs
 from pipeline.identification.regression.floor import floor_of
 from pipeline.logs.prepared.measurement import TEST, VALIDATION, Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

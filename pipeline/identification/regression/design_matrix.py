@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import REACH, Coordinate, Effect, Place
 from pipeline.logs.errors import NamingError
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
@@ -21,7 +22,6 @@ from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
 from pipeline.simulation.rigid_bodies import legs_are_separate
 
-Array = NDArray[np.float64]
 Column = Mapping[int, Array]
 
 

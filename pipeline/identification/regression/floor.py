@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.tolerances import STRAINS
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
-
-Array = NDArray[np.float64]
 
 
 def floor_of(measurements: Sequence[Measurement], *parts: int) -> Array:

@@ -16,9 +16,9 @@ from typing import Final
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from actuators.arrays import Array
 from pipeline.effects.bodies import NAMES, UNITS
 from pipeline.effects.sensors import SKEW_TOLERANCE
 from pipeline.identification.regression.design_matrix import Accepted
@@ -31,7 +31,6 @@ from pipeline.simulation.rigid_bodies import possible, strained
 
 LAW: Final = 0.01  # share to which a law holds at best
 
-Array = NDArray[np.float64]
 SAMPLES: Final = 300
 SEED: Final = 20240613
 _COVERED: Final = (0.025, 0.975)

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.identification.regression.design_matrix import DataSet
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

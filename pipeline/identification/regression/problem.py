@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import Effect, Place
 from pipeline.identification.regression.design_matrix import (
     Accepted,
@@ -34,7 +34,6 @@ from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction
 
-Array = NDArray[np.float64]
 #: Log and form of a column, and its place.
 _Key = tuple[tuple[object, ...], Place]
 #: Whether effects of a joint hardly change them; one per coordinate, each by joint.

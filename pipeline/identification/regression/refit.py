@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.identification.regression.design_matrix import Accepted, residual
 from pipeline.identification.regression.normal_equations import DesignMatrix, solve_spd
 from pipeline.identification.regression.problem import Problem
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
-Array = NDArray[np.float64]
 #: Times the columns are computed, at most, and steps that are made with the same.
 _COLUMNS, _STEPS = 3, 8
 #: Rise of twice the logarithm of the likelihood that is none.

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from actuators.elements.friction import Friction
+from actuators.arrays import Array
+from actuators.elements.element import Friction
 from pipeline.effects.bodies import observable
 from pipeline.effects.motor import CONSTANT_TOLERANCE
 from pipeline.effects.sensors import ENCODER_TOLERANCE, SKEW_TOLERANCE
@@ -23,8 +23,6 @@ from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction
 from pipeline.simulation.rigid_bodies import legs_are_separate
-
-Array = NDArray[np.float64]
 
 #: Entries of a body's strain (`rigid_bodies.strained`) and their standard deviation at an
 #: uncertainty of 1 of the URDF: a rotation of the axes in which a body is measured leaves this as

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.identification import results as limits
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.results import UNCERTAINTIES
@@ -17,8 +17,6 @@ from pipeline.identification.selection.pool import Key, Term
 from pipeline.identification.selection.search import CLOSE, Search
 from pipeline.identification.selection.settle import Settled
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

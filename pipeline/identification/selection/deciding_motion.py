@@ -15,14 +15,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import Effect, Place, Values
 from pipeline.effects.motor import TorqueRipple
 from pipeline.logs.prepared.measurement import TRAIN, Measurement
 from pipeline.logs.reading.expected import Expected
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Prediction, Simulator
-
-Array = NDArray[np.float64]
 
 RATE: Final = 100.0  # [Hz]
 DURATION: Final = 16.0  # [s]

@@ -20,8 +20,8 @@ from typing import Final
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Index
 from pipeline.effects.base import REACH
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.tolerances import STRAINS, UNCERTAINTY
@@ -29,8 +29,6 @@ from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.noise import saturated
 from pipeline.identification.selection.pool import Key, Pool, Term
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 #: How much likelier a set has to be with a name than without it, beyond even odds of all names
 #: (logarithm).
 MARGIN: Final = 3.0

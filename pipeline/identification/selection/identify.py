@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import EFFECTS, effect_named
 from pipeline.identification import results as limits
@@ -39,7 +39,6 @@ from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.progress import Progress
 
-Array = NDArray[np.float64]
 #: Times the names compete anew without those that turned out to be idle.
 _RENEWED: Final = 2
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Index
 from pipeline.identification.regression.design_matrix import DataSet
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 #: Triples of neighbouring rows below which they do not give the noise.
 _FOLLOWING = 50
 

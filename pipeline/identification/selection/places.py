@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from actuators.arrays import Array
 from pipeline.effects.bodies import AXES, AddedBody, last_links, point_mass
 from pipeline.effects.motor import TorqueRipple
 from pipeline.identification.regression.design_matrix import effect_columns, residual
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.problem import Problem
 
-Array = NDArray[np.float64]
 #: Orders of a ripple that compete at a joint.
 _PEAKS = 4
 _RIDGE = 1e-9

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array, Index
 from pipeline.effects.base import REACH, Effect, Place
 from pipeline.effects.bodies import LinkMass
 from pipeline.effects.friction import FrictionPreset
@@ -27,8 +28,6 @@ from pipeline.identification.selection.places import (
 )
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 Key = tuple[str, Place]
 
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.identification import results as limits
 from pipeline.identification.compare.circumstances import gap_of
@@ -15,7 +15,6 @@ from pipeline.identification.results import Residual
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION, Measurement
 from pipeline.simulation.predict import Prediction
 
-Array = NDArray[np.float64]
 _BINS: Final = 12
 #: Share of the remaining variance that a variable's curve explains, to be worth a word.
 _TELLING: Final = 0.08

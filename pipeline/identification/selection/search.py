@@ -8,15 +8,12 @@ from typing import Final
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Index
 from pipeline.effects.base import Effect
 from pipeline.identification.results import EXCLUDED, UNCERTAINTIES
 from pipeline.identification.selection.evidence import BODIES, COARSE, RIDGE, Evidence, State
 from pipeline.identification.selection.pool import Key, Pool, Term
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 #: Evidence that a rival may lack and still be looked at.
 CLOSE: Final = EXCLUDED + 5.0

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import REACH
 from pipeline.identification.regression.design_matrix import Accepted
 from pipeline.identification.regression.problem import Problem
@@ -25,7 +25,6 @@ from pipeline.identification.selection.pool import Key, Pool, make_pool
 from pipeline.identification.selection.search import Search
 from pipeline.progress import Progress
 
-Array = NDArray[np.float64]
 #: Times an answer is looked at again about its own estimates, at most.
 _ROUNDS: Final = 3
 #: Shares of the way to linear estimates that a nonlinear fit may start from.

@@ -15,8 +15,7 @@ from pipeline.identification.results import Estimate, Found
 from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.prepared.read_off import two_sides
-from pipeline.logs.signals.two_sides import TwoSides
+from pipeline.logs.prepared.read_off import TwoSides, two_sides
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 

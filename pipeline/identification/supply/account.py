@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.identification.supply.drawn import Drawn, drawn_along
 from pipeline.identification.supply.regression import (
     DRAWS,
@@ -28,9 +29,6 @@ from pipeline.identification.workflow.compared import legs_of
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.prepare import Prepared
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 READINGS = ("mean", "instant")
 BASIS_MODEL, BASIS_FOUND = "model", "found"

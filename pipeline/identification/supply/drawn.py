@@ -15,17 +15,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.identification.compare.observe import observe_all
 from pipeline.logs.errors import ModelError
 from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.signals.noise import smoother_noise
+from pipeline.logs.signals.derivatives import smoother_noise
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,10 +19,8 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 from scipy.stats import wilcoxon
 
+from actuators.arrays import Array, Mask
 from pipeline.identification.supply.terms import Rows, Term
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 LEVEL: Final = 0.05
 #: Share of the root mean square error by which a prediction has to be better.

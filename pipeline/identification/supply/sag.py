@@ -9,12 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.identification.supply.regression import BLOCKS, DRAWS, SEED, SMALLEST
 from pipeline.identification.supply.samples import Samples
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

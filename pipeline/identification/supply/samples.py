@@ -8,10 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.log import Log
-
-Array = NDArray[np.float64]
 
 #: Samples that are the fewest from which terms can be separated and tested.
 FEWEST: Final = 24

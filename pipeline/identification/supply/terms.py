@@ -16,11 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from actuators.arrays import Array, Mask
 from pipeline.identification.supply.drawn import Drawn
 from pipeline.identification.supply.samples import Samples
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 #: A coefficient of what the supply gives for a motor's work counts the losses on the way, too.
 _UNSEEN = "that no torque shows, at each joint, with what drivers and windings lose for it"

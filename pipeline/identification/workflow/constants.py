@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from actuators.elements.friction import Friction
+from actuators.elements.element import Friction
 from pipeline.identification.results import Naming
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.joint import JointModel

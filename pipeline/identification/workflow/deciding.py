@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.registry import effect_named
 from pipeline.identification.results import Found
 from pipeline.identification.selection.deciding_motion import RATE, Deciding, Rival, deciding_motion
@@ -18,7 +18,6 @@ from pipeline.motion.standing import standing_posture
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 
-Array = NDArray[np.float64]
 #: Of a moving foot from the ground and from other feet [m].
 CLEARANCE, APART = 0.01, 0.12
 

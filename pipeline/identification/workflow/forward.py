@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from actuators.arrays import Array
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import apply_edits
 from pipeline.identification.workflow.compared import Compared
@@ -20,8 +20,6 @@ from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import AS_IT_WAS
 from pipeline.logs.reading.log import Log
 from pipeline.simulation.forward import ForwardSimulator, Rollout, servo_input
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,9 @@
-"""From the options of `gap` to a machine, what its logs must look like, and the logs themselves."""
+"""From the options of `gap` to a machine and what its logs must look like."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,34 +11,21 @@ import numpy as np
 
 from actuators.loading.build import CATALOG, Catalog
 from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file
-from pipeline.identification.compare.bandwidth import lowered, naming_cutoff
-from pipeline.identification.compare.loaded import LoadedLogs, prepare_logs
-from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
-from pipeline.identification.compare.observe import observe_all
-from pipeline.identification.workflow.mimics import mimics_in, refuse_moved
 from pipeline.identification.workflow.options import Options
 from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.logs.formats.convert import is_log
-from pipeline.logs.prepared.contact import Contact, find_contact
-from pipeline.logs.prepared.parts import Parts, split
-from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.prepared.stream import Stream, Survey, survey
-from pipeline.logs.quality.finding import Finding, refuse
-from pipeline.logs.quality.repeats import refuse_repeats
 from pipeline.logs.reading.expected import Expected, expected_of_model, expected_of_robot
-from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import EFFORTS
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.logs.reading.plan import plan_reading
-from pipeline.machine.drivetrains import Actuators, drivetrains_of
+from pipeline.machine.joint import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.motors import Motors, motors_of
 from pipeline.machine.own_actuators import OwnActuators
 from pipeline.motion.payload import with_payload
 from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
 from pipeline.robot.robot import Robot, load_robot
-from pipeline.robot.urdf_source import read_urdf
-from pipeline.simulation.along_logs import wrong_columns
+from pipeline.robot.urdf_source import MOVING, parse_elements, read_urdf
 from pipeline.simulation.files import Files, read_files, stated
 
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
@@ -149,6 +136,16 @@ def setup(options: Options, files: Files | None = None) -> Setup:
     )
 
 
+def mimics_in(text: str, where: str) -> dict[str, str]:
+    """Moving joints of a URDF that mimic another, to the other's name."""
+    out = {}
+    for joint in parse_elements(text, where).findall("joint"):
+        mimic = joint.find("mimic")
+        if mimic is not None and joint.get("type") in MOVING:
+            out[joint.get("name", "")] = mimic.get("joint", "")
+    return out
+
+
 def _files(options: Options) -> Files:
     return read_files(
         options.robot, model=options.model, gait=options.gait, actuators=options.actuators
@@ -212,111 +209,6 @@ def _ratio(actuators: Actuators | None, joints: tuple[str, ...]) -> np.ndarray |
     if actuators is None:
         return None
     return np.array([joint.ratio for joint in drivetrains_of(actuators, joints).joints])
-
-
-def _adjusted(log: Log, given: Setup, options: Options) -> Log:
-    """A log, or a piece of one, as the options want it; refused where it is not."""
-    if options.effort:
-        log = log.with_changes(chosen_effort=options.effort)
-        _ = log.effort  # refuses a channel that is not there
-    if options.base == "measured" and log.base_roll is None and log.base_pitch is None:
-        raise LogContentError(
-            f"{log.name}: --base measured needs base__roll_rad and base__pitch_rad; log them or "
-            "use --base level"
-        )
-    if options.base in ("level", "fixed"):
-        log = log.with_changes(base_roll=None, base_pitch=None)
-    if log.supply_alone and options.step != "power":
-        raise LogContentError(
-            f"{log.name}: no effort of any joint, only the supply: that is for `gap power`; log "
-            "torque, current, voltage or power per joint, or give the servos' gains"
-        )
-    actuators = given.model.actuators
-    if actuators and actuators[0].motor is None and log.effort.channel != "torque":
-        raise LogContentError(
-            f"{log.name}: measures {log.effort.channel} and a bare URDF has no motor; name "
-            "the actuator with --alternative"
-        )
-    return log
-
-
-def load_logs(given: Setup, options: Options) -> tuple[LoadedLogs, Parts, int]:
-    """Step 1: read, check, prepare and split all logs.
-
-    All scores are taken at one bandwidth: `--cutoff`, else where the encoders' noise is silent.
-    Of logs with more than `LONG_ROWS` rows together only the most informative stretches are held.
-
-    Returns:
-        The logs, their parts, and how many of them may be fitted (the first ones).
-
-    Raises:
-        GapError: Unusable input; one line.
-    """
-    mapping = load_mapping(options.mapping) if options.mapping else None
-    paths = (*options.logs, *options.holdout)
-    if mapping is not None:
-        mapping.refuse_unknown_logs(paths)
-
-    def adjust(log: Log) -> Log:
-        return _adjusted(log, given, options)
-
-    streams = [Stream(path, given.expected, mapping, adjust) for path in paths]
-    count = len(options.logs)
-    surveys: tuple[Survey, ...] = ()
-    if sum(stream.rows for stream in streams) > LONG_ROWS:
-        lasts = [options.prove_last if k < count else None for k in range(len(streams))]
-        surveys = tuple(survey(s, prove_last=t) for s, t in zip(streams, lasts, strict=True))
-    logs = [s.log for s in surveys] or [stream.whole for stream in streams]
-    refuse_repeats(logs)
-    refuse_moved(given.mimics, logs, given.expected)
-    largest, contact = _largest(given), _contact(given, options.gait_start)
-
-    def suspects(prepared: Sequence[Prepared]) -> Sequence[Finding]:
-        seen = observe_all(given.bare, prepared)
-        return wrong_columns(given.bare, seen, logs[0], given.expected.ratio)
-
-    loaded = prepare_logs(
-        logs,
-        given.expected,
-        cutoff=options.cutoff,
-        largest=largest,
-        contact=contact,
-        wrong_columns=suspects,
-    )
-    if options.cutoff is None and options.step != "read":
-        # By the machine as its files say: what a model file adds changes no bandwidth.
-        cutoff = naming_cutoff(given.bare, loaded.prepared)
-        loaded = loaded.at(lowered(loaded.prepared, cutoff))
-    refuse(loaded.findings)
-    prepared = loaded.prepared
-    last = None if surveys else options.prove_last
-    parts = split(prepared[:count], holdout=prepared[count:], prove_last=last)
-    if surveys:
-        parts = parts_of_surveys(parts, prepared, surveys)
-        long = LongLogs(tuple(streams), surveys, prepared, parts, largest, contact)
-        loaded = replace(loaded, long=long)
-    return loaded, parts, count
-
-
-def _contact(given: Setup, start: float | None) -> Callable[[Log], Contact | None] | None:
-    robot = given.robot
-    if robot is None or not robot.floating:
-        if start is not None:
-            raise GapError(f"{given.path}: its base is fixed; leave --gait-start out")
-        return None
-    return lambda log: find_contact(log, robot, start=start)
-
-
-def _largest(given: Setup) -> dict[str, np.ndarray]:
-    """What the drives can give at most, by channel; empty where no motor is known."""
-    motors = [a.motor for a in given.model.actuators if a.motor is not None]
-    if len(motors) < len(given.model.joints):
-        return {}
-    return {
-        "current": np.array([m.peak_current for m in motors]),
-        "voltage": np.array([m.supply_voltage for m in motors]),
-        "power": np.array([m.peak_current * m.supply_voltage for m in motors]),
-    }
 
 
 def check_options(options: Options, files: Files | None = None) -> None:

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from functools import reduce
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.model_file import Edit, apply_edits
@@ -26,7 +25,6 @@ from pipeline.identification.workflow.compared import Compared
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.machine.machine import MachineModel
 
-Array = NDArray[np.float64]
 AS_IT_WAS = "model as it was"
 
 

@@ -9,15 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.prepared.contact import Contact, changes_of_stance, log_contact
-from pipeline.logs.prepared.settings import Settings, choose_settings
+from pipeline.logs.prepared.measurement import Contact, changes_of_stance, log_contact
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import EFFORTS
-from pipeline.logs.signals.derivatives import LowPass
+from pipeline.logs.signals.derivatives import LowPass, Settings, choose_settings, smoother_noise
 from pipeline.logs.signals.fusion import Fusion, fuse_by_noise, position_alone
-from pipeline.logs.signals.grid import GAP, Grid, busiest, fill_gaps, long_runs, uniform_grid
-from pipeline.logs.signals.noise import smoother_noise
-from pipeline.logs.signals.stamps import stamp_error
+from pipeline.logs.signals.grid import (
+    GAP,
+    Grid,
+    busiest,
+    fill_gaps,
+    long_runs,
+    stamp_error,
+    uniform_grid,
+)
 
 #: Share of the kernel's weight that may fall on missing samples before the output is masked.
 TOLERATED_SHARE: Final = 0.05

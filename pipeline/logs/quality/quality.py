@@ -8,6 +8,13 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array, Mask
+from pipeline.logs.quality.checks import (
+    effort_units,
+    feet_carry,
+    position_units,
+    torque_on_time,
+    velocity_units,
+)
 from pipeline.logs.quality.finding import Findings, Quality
 from pipeline.logs.quality.sampling import (
     frozen,
@@ -18,18 +25,10 @@ from pipeline.logs.quality.sampling import (
     saturated,
     standstill,
 )
-from pipeline.logs.quality.unit_check import (
-    effort_units,
-    feet_carry,
-    position_units,
-    torque_on_time,
-    velocity_units,
-)
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import EFFORTS, column_name
-from pipeline.logs.signals.grid import GAP
-from pipeline.logs.signals.spacing import interpolated, own_spacing
+from pipeline.logs.signals.grid import GAP, interpolated, own_spacing
 
 #: Fewer rows say nothing about anything.
 FEWEST_ROWS: Final = 100

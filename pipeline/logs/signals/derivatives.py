@@ -6,22 +6,33 @@ to one and the same smoothed curve. At f_c the amplitude is halved (as by a Butt
 forward and backward); below 0.4 f_c it is flat, above 1.6 f_c it is nothing. Being finite, it sees
 exactly `memory` seconds to either side: rows further apart than twice that share no sample, and
 chunks that overlap by it give the output of the whole.
+
+Several logs share one grid and one cut-off, chosen by what their channels hold (`choose_settings`).
+A channel's noise is what the filter leaves over.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import oaconvolve, welch
 
-from actuators.arrays import Array
+from actuators.arrays import Array, Mask
 from pipeline.logs.errors import PreparationError
+from pipeline.logs.reading.log import Log
+from pipeline.logs.signals.grid import busiest, fill_gaps, own_spacing, uniform_grid
 
+#: The kernel may not be longer than this share of the log.
+LONGEST_KERNEL: Final = 0.1
+#: Cut-off per own rate of a channel: bridging by straight lines takes 5 % at that frequency.
+OWN_SHARE: Final = 0.125
+#: Median absolute deviation of a normal distribution per standard deviation.
+MAD: Final = 0.6744897501960817
 #: Half-length of the kernel in units of 1 / cut-off.
 HALF_LENGTH: Final = 2.0
 #: Largest cut-off per sampling rate: above it the kernel would no longer be sampled finely enough.
@@ -107,12 +118,12 @@ class LowPass:
         value, first, second = (np.concatenate(orders) for orders in zip(*parts, strict=True))
         return value, first, second
 
-    def share(self, flag: NDArray[np.bool_], pieces: Sequence[slice] = WHOLE) -> Array:
+    def share(self, flag: Mask, pieces: Sequence[slice] = WHOLE) -> Array:
         """Share of the kernel's weight on flagged samples or beyond the ends, (N, C), 0 to 1."""
         weight = np.abs(self.kernels[0])
         return np.concatenate([self._share(flag[piece], weight / weight.sum()) for piece in pieces])
 
-    def _share(self, flag: NDArray[np.bool_], weight: Array) -> Array:
+    def _share(self, flag: Mask, weight: Array) -> Array:
         n, half = flag.shape[0], self.half
         # Weight beyond the ends is the tail sum of the kernel.
         tail = np.concatenate([np.cumsum(weight[::-1])[:half][::-1], np.zeros(max(0, n - half))])
@@ -192,3 +203,128 @@ def choose_cutoff(stretches: Sequence[Array], rate: float, *, smallest: float = 
     at_rest = level[: max(1, bins.size // 2)].max(axis=0) < SEEN * noise
     out[moves] = np.where(at_rest, np.nan, np.clip(f[bins[first_below]], smallest, largest))
     return out
+
+
+def smoother_noise(
+    x: Array, ok: Mask, pieces: Sequence[slice], lowpass: LowPass, *, in_band: bool
+) -> Array:
+    """Noise from the band just above the cut-off, taken as white from there downward.
+
+    The series is passed between 1.5 and 3 times the cut-off (or as far as the rate allows); the
+    spread of that band, by its median so that jumps do not count, gives the noise's density.
+
+    Args:
+        x: Not filtered, shape (N, C).
+        ok: Shape (N, C).
+        pieces: Stretches without a gap.
+        lowpass: The filter whose band is meant.
+        in_band: Noise that the filter lets pass; else all of it, up to half the rate.
+
+    Returns:
+        Standard deviation, shape (C,); NaN where fewer than 50 samples are good.
+    """
+    outer = LowPass(lowpass.rate, min(3.0 * lowpass.cutoff, LARGEST_SHARE * lowpass.rate))
+    inner = LowPass(lowpass.rate, min(1.5 * lowpass.cutoff, 0.8 * outer.cutoff))
+    wide, narrow = outer.kernels[0], np.array(inner.kernels[0])
+    middle = slice(inner.half - outer.half, inner.half + outer.half + 1)
+    band = -narrow
+    band[middle] += wide
+    # Passed twice: what little of the motion the first pass lets through is gone after the second.
+    gain = float(np.sqrt((np.convolve(band, band) ** 2).sum()))
+    rest, good = (np.concatenate([y[piece] for piece in pieces]) for y in (x, ok))
+    stops = np.cumsum([piece.stop - piece.start for piece in pieces]).tolist()
+    joined = [slice(start, stop) for start, stop in pairwise([0, *stops])]
+    for _ in range(2):
+        rest = outer.smooth(rest, joined) - inner.smooth(rest, joined)
+    sigma = np.full(x.shape[1], np.nan)
+    for c in range(x.shape[1]):
+        kept = rest[good[:, c], c]
+        if kept.size >= 50:
+            sigma[c] = np.median(np.abs(kept)) / MAD / gain
+    return sigma * (lowpass.noise_gain if in_band else 1.0)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How logs are brought to one grid and bandwidth; the same for all logs that are compared."""
+
+    dt: float  #: Step of the uniform grid [s].
+    cutoff: float  #: Of the low-pass [Hz].
+    reason: str  #: How the cut-off was chosen, in words.
+    #: Cut-off each joint alone would have asked for, shape (J,) [Hz].
+    per_joint: Array = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def lowpass(self) -> LowPass:
+        """The filter."""
+        return LowPass(1.0 / self.dt, self.cutoff)
+
+    @property
+    def bridged(self) -> float:
+        """Time between good samples up to which values are interpolated [s]."""
+        return 1.0 / (4.0 * self.cutoff)
+
+
+def choose_settings(
+    logs: Sequence[Log],
+    usable: Sequence[tuple[Mask, Mask]] | None = None,
+    *,
+    cutoff: float | None = None,
+) -> Settings:
+    """Choose one grid and one cut-off for several logs, by their good positions and efforts (N, J).
+
+    The cut-off [Hz] is the user's, or the lowest any moving joint asks for (`choose_cutoff`), so
+    that no joint's accelerations are mostly noise; the torque of every joint depends on those of
+    the others. It is at most `OWN_SHARE` of the slowest channel's own rate, whatever the rows'.
+
+    Raises:
+        PreparationError: The user's cut-off does not fit the rate or the length.
+    """
+    steps = [float(np.median(np.diff(log.clock))) for log in logs]
+    # The slowest log decides: its band holds nothing above.
+    dt = max(steps)
+    rate = 1.0 / dt
+    longest = max(float(log.time[-1] - log.time[0]) for log in logs)
+    smallest = 2.0 * 2.0 / (LONGEST_KERNEL * longest)
+    if smallest > LARGEST_SHARE * rate:
+        raise PreparationError(
+            f"{logs[0].name}: {longest:.3g} s at {rate:.4g} Hz are too short to be filtered; "
+            "log longer or faster"
+        )
+    if cutoff is not None:
+        if not smallest <= cutoff <= LARGEST_SHARE * rate:
+            raise PreparationError(
+                f"cut-off {cutoff:g} Hz; logs of {longest:.3g} s at {rate:.4g} Hz allow "
+                f"{smallest:.3g} to {LARGEST_SHARE * rate:.4g} Hz"
+            )
+        return Settings(dt, float(cutoff), "set by the user")
+    usable = usable or [log.finite for log in logs]
+    held = min(_held(log, good) for log, good in zip(logs, usable, strict=True))
+    asked = []
+    for log, (position_ok, _) in zip(logs, usable, strict=True):
+        grid = uniform_grid(log.time, dt, bridge=1.0 / (4.0 * max(held, smallest)))
+        q = grid.resample(fill_gaps(log.time, log.position, position_ok))
+        stretches = [q[part] for part in busiest(q, grid.pieces) if part.stop - part.start >= 64]
+        if stretches:
+            asked.append(choose_cutoff(stretches, rate, smallest=smallest))
+    per_joint = np.fmin.reduce(asked) if asked else np.full(1, np.nan)
+    if np.isnan(per_joint).all():
+        raise PreparationError(f"{logs[0].name}: no joint moves; nothing can be compared")
+    slowest = int(np.nanargmin(per_joint))
+    value = min(float(per_joint[slowest]), max(held, smallest))
+    reason = f"position spectrum of {logs[0].joints[slowest]} meets its noise"
+    if value < per_joint[slowest]:
+        reason = f"the slowest channel holds no more: one sample in {1e3 * OWN_SHARE / held:.3g} ms"
+    return Settings(dt, value, reason, per_joint)
+
+
+def _held(log: Log, usable: tuple[Mask, Mask]) -> float:
+    """Highest frequency that the slowest channel of a log holds [Hz]."""
+    steps = [own_spacing(log.clock, np.ones(log.clock.size, dtype=np.bool_))]
+    for good in usable:
+        sparse = np.flatnonzero(good.any(axis=0) & ~good.all(axis=0))
+        steps += [own_spacing(log.time, good[:, j]) for j in sparse]
+    usual = float(np.median(np.diff(log.clock)))
+    slowest = max(step for step in steps if np.isfinite(step))
+    # A step or two more than usual is what interpolation bridges anyway.
+    return OWN_SHARE / slowest if slowest > 1.9 * usual else np.inf

@@ -1,4 +1,13 @@
-"""Uniform time grid of a log, its pieces between gaps, and what to do with missing samples."""
+"""Uniform time grid of a log, its pieces between gaps, its channels' own rates, its stamps' error.
+
+A column may be slower than its log: most cells empty, each value held for several rows, or rows
+interpolated between samples afterwards. What lies above a quarter of its own rate is not in it.
+
+A stamp late by dt reads speed times dt wrong: each position is compared with the cubic through its
+four neighbours at their stamps. What it differs by has a variance of c (s_q^2 + s_t^2 v^2), with
+the encoder's noise s_q, the stamps' error s_t and c from the cubic's weights: a straight line over
+v^2.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +21,22 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
 
+#: Share of a log's time that may lie in longer steps: those are gaps, not the channel's rate.
+_IN_GAPS: Final = 0.02
+#: Steps this many times longer than the usual one are gaps.
+_GAP: Final = 20.0
+#: Share of a moving channel's rows on a straight line between their neighbours from which on rows
+#: were interpolated; noise and rounding of a sensor leave hardly any.
+_STRAIGHT: Final = 0.4
+#: Share of those rows in stretches of one length, a row more or less.
+_PACE: Final = 0.6
+#: Distance from that line, in usual changes from row to row.
+_ON_LINE: Final = 1e-4
+#: Groups of rows by speed through which the line is laid.
+_GROUPS: Final = 12
+#: Median of a squared normal variable.
+_MEDIAN_SQUARE: Final = 0.4549364
+_LEAST_ROWS: Final = 200
 #: A step this many times the usual one is a gap; the filter never runs across it.
 GAP: Final = 2.5
 #: Times that lie this near to the grid, in steps, need no interpolation.
@@ -147,3 +172,119 @@ def long_runs(time: Array, bad: Mask, longest: float) -> Mask:
             if open_end or time[right] - time[left] > longest:
                 out[start:stop, c] = True
     return out
+
+
+def own_spacing(time: Array, ok: Mask) -> float:
+    """Step between good samples [s] that all but `_IN_GAPS` of the time keeps to; inf for none."""
+    step = np.sort(np.diff(time[ok]))
+    if step.size == 0:
+        return np.inf
+    step = step[: np.searchsorted(step, _GAP * step[step.size // 2], side="right")]
+    passed = np.cumsum(step)
+    return float(step[int(np.searchsorted(passed, (1.0 - _IN_GAPS) * passed[-1]))])
+
+
+def interpolated(time: Array, x: Array) -> Mask:
+    """Rows (N,) that lie on the straight line between their neighbours; none in a sensor's own log.
+
+    All false where fewer rows than `_STRAIGHT` of the moving ones do.
+    """
+    out = np.zeros(x.size, dtype=np.bool_)
+    if x.size < 10:
+        return out
+    change = np.abs(np.diff(x))
+    alive = change[np.isfinite(change) & (change > 0)]
+    if alive.size < 10:
+        return out
+    share = (time[1:-1] - time[:-2]) / (time[2:] - time[:-2])
+    away = np.abs(x[1:-1] - (1.0 - share) * x[:-2] - share * x[2:])
+    moving = (change[1:] > 0) | (change[:-1] > 0)
+    with np.errstate(invalid="ignore"):
+        straight = away < _ON_LINE * float(np.median(alive))
+    straight &= moving
+    if straight.sum() < max(_STRAIGHT * moving.sum(), 10):
+        return out
+    # Samples between which lines were drawn come at one pace; steps of a rounded sensor do not.
+    starts, stops = runs_of(straight)
+    length = stops - starts
+    usual = float(np.median(np.repeat(length, length)))
+    if usual < 3 or length[np.abs(length - usual) <= 1].sum() < _PACE * straight.sum():
+        return out
+    out[1:-1] = straight
+    return out
+
+
+def stamp_error(time: Array, q: Array, gap: float) -> tuple[float, float]:
+    """Standard deviation of the stamps' errors and its standard error [s]; zeros if none tells.
+
+    Args:
+        time: Strictly increasing, shape (N,) [s].
+        q: Positions, shape (N, J) [rad].
+        gap: Steps longer than this are none to compare across [s].
+    """
+    if time.size < _LEAST_ROWS:
+        return 0.0, 0.0
+    with np.errstate(all="ignore"):  # numbers no clock shows leave no finite row
+        return _over_joints(time, q, gap)
+
+
+def _over_joints(time: Array, q: Array, gap: float) -> tuple[float, float]:
+    weights = _lagrange(time)
+    scatter = 1.0 + (weights**2).sum(axis=0)
+    close = np.diff(time) <= gap
+    inside = close[:-3] & close[1:-2] & close[2:-1] & close[3:]
+    squares, errors = [], []
+    for j in range(q.shape[1]):
+        x = q[:, j]
+        guess = sum(w * x[k : x.size - 4 + k] for w, k in zip(weights, (0, 1, 3, 4), strict=True))
+        rest = (x[2:-2] - guess) ** 2 / scatter
+        speed = ((x[3:-1] - x[1:-3]) / (time[3:-1] - time[1:-3])) ** 2
+        good = inside & np.isfinite(rest) & np.isfinite(speed)
+        seen = _slope(speed[good], rest[good])
+        if seen is not None and seen[1] > 0:
+            squares.append(seen[0])
+            errors.append(seen[1])
+    if not squares:
+        return 0.0, 0.0
+    # By the most certain one: variances of variances are small numbers.
+    finest = min(errors)
+    weight = (finest / np.array(errors)) ** 2
+    square = float(np.average(squares, weights=weight))
+    error = finest / float(np.sqrt(weight.sum()))
+    size = float(np.sqrt(max(square, 0.0)))
+    return size, error / (2.0 * size) if size > 0 else float(np.sqrt(error))
+
+
+def _lagrange(time: Array) -> Array:
+    """Weights of the cubic through four neighbours at the sample between, shape (4, N - 4)."""
+    n = time.size - 4
+    t = [time[k : k + n] - time[2 : 2 + n] for k in (0, 1, 3, 4)]
+    rows = []
+    for a in range(4):
+        w = np.ones(n)
+        for b in range(4):
+            if b != a:
+                w = w * (-t[b]) / (t[a] - t[b])
+        rows.append(w)
+    return np.stack(rows)
+
+
+def _slope(speed: Array, rest: Array) -> tuple[float, float] | None:
+    """Slope of squared misfit over squared speed and its standard error; None without motion."""
+    if speed.size < _LEAST_ROWS or speed.max() <= 0:
+        return None
+    order = np.argsort(speed, kind="stable")
+    groups = np.array_split(order, _GROUPS)
+    x = np.array([speed[g].mean() for g in groups])
+    y = np.array([np.median(rest[g]) / _MEDIAN_SQUARE for g in groups])
+    # A median of n squares scatters by about 2.3 / sqrt(n) of itself.
+    sigma = 2.3 * np.maximum(y, 1e-300) / np.sqrt([g.size for g in groups])
+    design = np.stack([np.ones_like(x), x], axis=1) / sigma[:, None]
+    if np.ptp(x) <= 0:
+        return None
+    scale = np.abs(design).max(axis=0)
+    if not np.isfinite(scale).all() or not np.isfinite(y / sigma).all():
+        return None  # numbers whose squares are beyond any
+    covariance = np.linalg.pinv((design / scale).T @ (design / scale))
+    solution = covariance @ ((design / scale).T @ (y / sigma)) / scale
+    return float(solution[1]), float(np.sqrt(covariance[1, 1]) / scale[1])

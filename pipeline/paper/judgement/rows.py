@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.elements.inertia import Inertia
+from actuators.elements.element import Inertia
 from actuators.energy.energy import integral, stage_energies
 from actuators.loading.build import WINDING
 from actuators.units import from_si

@@ -18,8 +18,8 @@ from pipeline.robot.guess.motors import KnownMotors, known_motors, names_of
 from pipeline.robot.guess.pace import Pace, find_pace
 from pipeline.robot.guess.source import source_of, standing_pose
 from pipeline.robot.guess.stance import Margin, Stance, Standing
+from pipeline.robot.kinematics import leg_columns
 from pipeline.robot.leg_chains import leg_chains
-from pipeline.robot.leg_columns import leg_columns
 from pipeline.robot.published import RobotSource
 from pipeline.robot.robot import model_of_angles
 from pipeline.robot.urdf_check import check_urdf

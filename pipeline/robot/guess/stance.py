@@ -33,9 +33,8 @@ from pipeline.errors import RobotFileError
 from pipeline.robot.inverse.least_motion import freedoms
 from pipeline.robot.inverse.start_posture import spread
 from pipeline.robot.inverse_kinematics import ACCEPTED, reach
-from pipeline.robot.kinematics import foot_jacobians, foot_positions
+from pipeline.robot.kinematics import LegColumns, foot_jacobians, foot_positions
 from pipeline.robot.leg_chains import LegChains
-from pipeline.robot.leg_columns import LegColumns
 
 #: Feet (1, F, 3) and a point (1, 2) to the point's margin in their hull [m], (1,).
 Margin = Callable[[Array, Array], Array]

@@ -27,7 +27,7 @@ from actuators.arrays import Array
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.force_rules import Descent, Stance
-from pipeline.machine.drivetrains import Actuators
+from pipeline.machine.joint import Actuators
 from pipeline.motion.motion import Segment
 from pipeline.simulation.ground_forces.power_law import NOTHING, PowerLaw, power_law
 

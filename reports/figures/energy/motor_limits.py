@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from actuators.elements.motor import DCMotor
+    from actuators.chain import DCMotor
     from actuators.shaft import ShaftSeries
 
 #: What the reader of the figure must know.

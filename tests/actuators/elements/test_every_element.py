@@ -5,13 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuators.elements.friction import Friction
+from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.elements.friction_curve import FrictionCurve
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
-from actuators.elements.inertia import Inertia
 from actuators.elements.position_torque import ParallelSpring, Ripple
-from actuators.elements.ratio import Ratio
 from actuators.elements.second_motor import SecondMotor
 from actuators.elements.two_body import TwoBody
 from actuators.elements.warming import Warming

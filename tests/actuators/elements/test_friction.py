@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from actuators.elements.friction import Friction
+from actuators.elements.element import Friction
 from actuators.elements.friction_curve import FrictionCurve
 from tests.actuators.motions import constant
 

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from actuators.elements.heating import Heating, warm_resistance, warm_torque_constant
-from actuators.elements.motor import DCMotor
+from actuators.chain import DCMotor
+from actuators.elements.heating import Heating, warmed
 from actuators.errors import UnphysicalElementError
 
 LIMITS = ("max_speed", "supply_voltage", "continuous_current", "peak_current")
@@ -76,7 +76,8 @@ def test_heating_in_closed_form():
 
 def test_copper_magnets_and_sensor_follow_their_coefficients():
     warm = np.array([0.0, 100.0])
-    np.testing.assert_allclose(warm_resistance(0.5, warm), [0.5, 0.5 * 1.393])
-    np.testing.assert_allclose(warm_torque_constant(0.03, warm), [0.03, 0.03 * 0.89])
+    motor = warmed(DCMotor("m", torque_constant=0.03, resistance=0.5), warm)
+    np.testing.assert_allclose(motor.resistance, [0.5, 0.5 * 1.393])
+    np.testing.assert_allclose(motor.torque_constant, [0.03, 0.03 * 0.89])
     sensed = Heating(sensor_gain=4.0).sensed(np.array([25.0, 30.0, 20.0]))
     np.testing.assert_allclose(sensed, [0.0, 20.0, -20.0])

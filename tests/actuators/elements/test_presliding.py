@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from actuators.elements.friction import Friction
+from actuators.elements.element import Friction
 from actuators.presliding import presliding
 from tests.actuators.motions import series, split
 

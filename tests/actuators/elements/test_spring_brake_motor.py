@@ -5,11 +5,10 @@ import shutil
 import numpy as np
 import pytest
 
-from actuators.chain import Chain
+from actuators.chain import Chain, DCMotor
+from actuators.elements.element import Ratio
 from actuators.elements.holding_brake import HoldingBrake
-from actuators.elements.motor import DCMotor
 from actuators.elements.position_torque import ParallelSpring, Ripple
-from actuators.elements.ratio import Ratio
 from actuators.elements.second_motor import SecondMotor
 from actuators.energy.balance import balance_residual
 from actuators.energy.energy import integral

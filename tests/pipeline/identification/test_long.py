@@ -13,15 +13,15 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-import pipeline.identification.workflow.setup
+import pipeline.identification.workflow.compared
 from pipeline.cli.gap import add_gap_options, options_of
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.selection.identify import identify
-from pipeline.identification.workflow.compared import Compared, compare_logs
-from pipeline.identification.workflow.setup import Setup, load_logs, setup
-from pipeline.logs.prepared.informative import STRETCH, choose, scan
+from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
+from pipeline.identification.workflow.setup import Setup, setup
 from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
 from pipeline.logs.prepared.parts import GUARD
+from pipeline.logs.prepared.stream import STRETCH, choose, scan
 from tests.leg_log import leg_logs
 from tests.pipeline.logs.made import made_log, motion
 
@@ -65,7 +65,7 @@ def taken_in(root: Path, *arguments: str) -> tuple[Setup, Compared]:
 @pytest.fixture
 def chunked(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """What is long from five thousand rows on."""
-    monkeypatch.setattr(pipeline.identification.workflow.setup, "LONG_ROWS", 5_000)
+    monkeypatch.setattr(pipeline.identification.workflow.compared, "LONG_ROWS", 5_000)
     return monkeypatch
 
 
@@ -124,7 +124,7 @@ def test_the_table_of_chunks_is_that_of_the_whole(
 ) -> None:
     tables = []
     for rows in (5_000, 10**9):
-        monkeypatch.setattr(pipeline.identification.workflow.setup, "LONG_ROWS", rows)
+        monkeypatch.setattr(pipeline.identification.workflow.compared, "LONG_ROWS", rows)
         _, where = taken_in(root, str(log), "--cutoff", "20")
         assert (where.loaded.long is None) == (rows == 10**9)
         tables.append({(r.joint, r.by, r.band): r for r in where.rows})
@@ -163,7 +163,7 @@ def test_naming_on_stretches_gives_the_verdict_of_all_rows(
     path = long_leg(tmp_path / "long.parquet", [effect], 10, seed=8)
     verdicts, gaps = [], []
     for rows in (5_000, 10**9):
-        monkeypatch.setattr(pipeline.identification.workflow.setup, "LONG_ROWS", rows)
+        monkeypatch.setattr(pipeline.identification.workflow.compared, "LONG_ROWS", rows)
         given, where = taken_in(root, str(path))
         named = identify(given.model, where.measurements)
         verdicts.append(named.naming.found)

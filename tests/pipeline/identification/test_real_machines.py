@@ -19,10 +19,10 @@ from pipeline.cli.main import main, parser
 from pipeline.effects.model_file import apply_edits, read_model_file
 from pipeline.identification.compare.stages import overall
 from pipeline.identification.results import SUSPECTED, Found
-from pipeline.identification.workflow.compared import Compared, compare_logs
+from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.outcome import identified
-from pipeline.identification.workflow.setup import Setup, load_logs, setup
+from pipeline.identification.workflow.setup import Setup, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.identification.workflow.written import Validated
 from pipeline.logs.prepared.measurement import TEST, Measurement

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.identification.compare.model_check import rows_left
-from pipeline.identification.workflow.compared import compare_logs
+from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import load_logs, setup
+from pipeline.identification.workflow.setup import setup
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.quality.finding import Finding

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.logs.prepared.prepare import Prepared, prepare
-from pipeline.logs.prepared.settings import Settings, choose_settings
 from pipeline.logs.prepared.stream import Stream, prepared_chunks, survey
 from pipeline.logs.quality.finding import Quality
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.mapping import Mapping
+from pipeline.logs.signals.derivatives import Settings, choose_settings
 
 Array = NDArray[np.float64]
 

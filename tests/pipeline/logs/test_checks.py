@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.logs.quality.cannot_tell import cannot_tell
-from pipeline.logs.quality.drift import Course, friction_drift
+from pipeline.identification.compare.model_check import Course, friction_drift
+from pipeline.logs.quality.checks import cannot_tell
 from pipeline.logs.quality.finding import Finding
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.expected import Expected

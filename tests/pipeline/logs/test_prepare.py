@@ -13,15 +13,19 @@ from numpy.typing import NDArray
 
 from pipeline.identification.compare.loaded import prepare_logs
 from pipeline.logs.errors import GapError, PreparationError
-from pipeline.logs.prepared.contact import log_contact, lowest_feet, scheduled_contact
-from pipeline.logs.prepared.cycles import cycle_noise, period, repeat_noise
-from pipeline.logs.prepared.measurement import TEST, TRAIN, VALIDATION
-from pipeline.logs.prepared.parts import split
+from pipeline.logs.prepared.measurement import (
+    TEST,
+    TRAIN,
+    VALIDATION,
+    log_contact,
+    lowest_feet,
+    scheduled_contact,
+)
+from pipeline.logs.prepared.parts import cycle_noise, period, repeat_noise, split
 from pipeline.logs.prepared.prepare import prepare
-from pipeline.logs.prepared.settings import Settings, choose_settings
 from pipeline.logs.reading.expected import Expected, expected_of_robot
 from pipeline.logs.reading.read import read_log
-from pipeline.logs.signals.derivatives import LowPass
+from pipeline.logs.signals.derivatives import LowPass, Settings, choose_settings
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot

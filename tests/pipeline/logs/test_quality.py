@@ -13,9 +13,9 @@ from pipeline.logs.errors import GapError
 from pipeline.logs.quality.finding import Quality
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.sampling import glitches, held, new_values, quantum
-from pipeline.logs.quality.skew import skew
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
+from pipeline.logs.signals.fusion import skew
 from tests.pipeline.logs.made import made_log, motion
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.logs.errors import LogFormatError
 from pipeline.logs.reading.expected import Expected
-from pipeline.logs.reading.sides import sides_of
+from pipeline.logs.reading.log import sides_of
 from tests.pipeline.logs.made import motion
 
 _, Q, _, _ = motion()

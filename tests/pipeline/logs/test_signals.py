@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pipeline.logs.prepared.measurement import sign_unsure
 from pipeline.logs.prepared.prepare import prepare
-from pipeline.logs.prepared.read_off import ripples, signal_findings, two_sides
-from pipeline.logs.prepared.settings import Settings
-from pipeline.logs.signals.derivatives import LowPass
-from pipeline.logs.signals.noise import sign_unsure
-from pipeline.logs.signals.orders import strongest_order
-from pipeline.logs.signals.spacing import interpolated, own_spacing
-from pipeline.logs.signals.stamps import _slope, stamp_error
-from pipeline.logs.signals.two_sides import read_off
+from pipeline.logs.prepared.read_off import (
+    read_off,
+    ripples,
+    signal_findings,
+    strongest_order,
+    two_sides,
+)
+from pipeline.logs.signals.derivatives import LowPass, Settings
+from pipeline.logs.signals.grid import _slope, interpolated, own_spacing, stamp_error
 from tests.pipeline.logs.made import made_log, motion
 
 Array = NDArray[np.float64]

@@ -12,15 +12,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuators.chain import Chain
-from actuators.elements.friction import Friction
-from actuators.elements.inertia import Inertia
-from actuators.elements.motor import DCMotor
-from actuators.elements.ratio import Ratio
+from actuators.chain import Chain, DCMotor
+from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.shaft import ShaftSeries
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.machine.drivetrains import Drivetrains
-from pipeline.machine.joint import JointModel
+from pipeline.machine.joint import Drivetrains, JointModel
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator
 from tests.pipeline.identification import bench_leg as leg

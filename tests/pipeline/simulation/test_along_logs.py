@@ -16,9 +16,9 @@ import pinocchio as pin
 import pytest
 
 from pipeline.identification.compare.observe import observe_all
-from pipeline.identification.workflow.compared import compare_logs
+from pipeline.identification.workflow.compared import compare_logs, load_logs
 from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import load_logs, setup
+from pipeline.identification.workflow.setup import setup
 from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.quality.finding import Finding

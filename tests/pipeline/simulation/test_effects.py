@@ -9,7 +9,7 @@ import pytest
 
 from actuators.loading.build import load_catalog
 from pipeline.effects.registry import effect_named
-from pipeline.machine.drivetrains import drivetrains_of
+from pipeline.machine.joint import drivetrains_of
 from pipeline.machine.machine import MachineModel
 from pipeline.robot.robot import Robot
 from pipeline.simulation.edited import Effects, effects

@@ -9,7 +9,7 @@ import matplotlib
 import numpy as np
 import pytest
 
-from actuators.elements.motor import DCMotor
+from actuators.chain import DCMotor
 from actuators.energy.energy import StageEnergy
 from actuators.shaft import ShaftSeries
 from pipeline.api.pictures.scene import Scene

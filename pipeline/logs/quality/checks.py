@@ -1,23 +1,40 @@
-"""Columns that limits or other columns betray: wrong units and signs, delays, idle feet.
+"""A log held against itself and its robot: units and signs, delays, idle feet, what stays open.
 
-None of it needs a model of the robot but its limits and its mass.
+None of it needs a model of the robot but its limits and its mass. Logs that share rows are refused:
+data given twice test nothing.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Final
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.quality.finding import Findings
-from pipeline.logs.quality.skew import Skew, skew
+from pipeline.logs.errors import LogContentError
+from pipeline.logs.quality.finding import Finding, Findings
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import column_name
+from pipeline.logs.signals.fusion import Skew, skew
 
+#: Fast over slow speeds below which laws of speed look alike.
+_SPEEDS: Final = 4.0
+#: Spread of a load's magnitude over its mean below which it might as well be constant.
+_LOADS: Final = 0.3
+#: Share of a joint's motion that has to go the other way.
+_BACK: Final = 0.1
+#: Windings warm over minutes [s].
+_WARMING: Final = 60.0
+#: Consecutive rows that have to agree in every number; a sensor's noise alone never does.
+_RUN: Final = 8
+#: Share of the shorter log's runs from which two logs count as the same data.
+_SHARE: Final = 0.02
 DEG: Final = 180.0 / math.pi
 #: Factors by which each channel is commonly wrong, and what the numbers then are.
 WRONG: Final[Mapping[str, Mapping[float, str]]] = {
@@ -213,3 +230,105 @@ def feet_carry(log: Log, weight: float | None, found: Findings) -> None:
     else:
         why = "wrong unit, a load that the model lacks, or the robot hangs or leans on something"
     found.note("", "feet_carry", share, "1", "warning", f"{detail}: {why}")
+
+
+def cannot_tell(log: Log, velocity: Array, effort: Array, ok: NDArray[np.bool_]) -> list[Finding]:
+    """One finding per thing that stays open.
+
+    Args:
+        log: As read.
+        velocity: Of its joints in the bandwidth, shape (N, J) [rad/s].
+        effort: That is compared, shape (N, J).
+        ok: Rows that count, shape (N, J).
+    """
+    out: list[str] = []
+    if log.motor_position is None or not np.isfinite(log.motor_position).any():
+        side = "motor" if log.position_source == "motor" else "joint"
+        other = "joint" if side == "motor" else "motor"
+        out.append(
+            f"play and wind-up of gears as such: positions are the {side}s' alone; log the "
+            f"{other}s' positions, too"
+        )
+    if log.torque is None or log.current is None:
+        out.append(
+            "a torque constant but by gravity: log both torque and current, or hold known weights"
+        )
+    duration = float(log.time[-1] - log.time[0])
+    if log.temperature is None and duration < _WARMING:
+        out.append(
+            f"warming: {duration:.3g} s without a temperature; log minutes, or the housings' "
+            "temperature"
+        )
+    ways: dict[str, list[str]] = {}
+    for j, joint in enumerate(log.joints):
+        for why in _by_motion(velocity[ok[:, j], j], effort[ok[:, j], j]):
+            ways.setdefault(why, []).append(joint)
+    out += [f"{why} ({_names(joints, log.joints)})" for why, joints in ways.items()]
+    return [Finding(log.name, "", "cannot_tell", 1.0, "1", "ok", text) for text in out]
+
+
+def _by_motion(v: Array, effort: Array) -> list[str]:
+    """What one joint's motion leaves open."""
+    good = np.isfinite(effort)
+    v, effort = v[good], effort[good]
+    fast = float(np.quantile(np.abs(v), 0.95)) if v.size else 0.0
+    if fast <= 0.0:
+        return []
+    moving = np.abs(v) > 0.02 * fast
+    out = []
+    if min((v[moving] > 0).mean(), (v[moving] < 0).mean()) < _BACK:
+        out.append("dry friction from an offset: move both ways")
+    if fast < _SPEEDS * float(np.quantile(np.abs(v[moving]), 0.1)):
+        out.append("dry from viscous friction: move at speeds further apart")
+    load = np.abs(effort[moving])
+    if load.size and float(load.std()) < _LOADS * float(load.mean()):
+        out.append("friction that grows with the load: vary pose or payload")
+    return out
+
+
+def _names(joints: Sequence[str], every: Sequence[str]) -> str:
+    return "every joint" if len(joints) == len(every) > 1 else ", ".join(joints)
+
+
+def refuse_repeats(logs: Sequence[Log]) -> None:
+    """Refuse logs that hold the same rows, in whole or in part.
+
+    Args:
+        logs: Of one robot.
+
+    Raises:
+        LogContentError: Two logs share a run of rows in which a joint moves.
+    """
+    for a, b in combinations(logs, 2):
+        if a.joints != b.joints or a.effort.channel != b.effort.channel:
+            continue
+        short, long = (a, b) if len(a) <= len(b) else (b, a)
+        rows = shared_rows(short, long)
+        if rows > max(_RUN, _SHARE * len(short)):
+            raise LogContentError(
+                f"{a.name} and {b.name} hold the same measurements ({rows} of {len(short)} rows): "
+                "test data must be data of their own, and data given twice count twice; leave one "
+                "out"
+            )
+
+
+def shared_rows(short: Log, long: Log) -> int:
+    """Rows of a log that lie in runs which another holds too, while a joint moves."""
+    keys = [_hashed(np.hstack([log.position, log.effort.values])) for log in (short, long)]
+    if min(map(len, keys)) < _RUN or not np.isin(keys[0], keys[1]).any():
+        return 0
+    moving = (np.diff(short.position, axis=0, prepend=short.position[:1]) != 0).any(axis=1)
+    runs = [_hashed(sliding_window_view(key.view(np.int64), _RUN)) for key in keys]
+    same = np.isin(runs[0], runs[1])
+    # A machine at rest repeats itself.
+    alive = np.convolve(moving, np.ones(_RUN), mode="valid") >= _RUN / 2
+    inside = np.convolve(same & alive, np.ones(_RUN), mode="full") > 0
+    return int(inside.sum())
+
+
+def _hashed(table: NDArray[np.float64] | NDArray[np.int64]) -> NDArray[np.uint64]:
+    """A number per row (N,) that equal rows share and others hardly ever."""
+    import pandas as pd
+
+    hashes = pd.util.hash_pandas_object(pd.DataFrame(table), index=False)
+    return np.asarray(hashes, dtype=np.uint64)
