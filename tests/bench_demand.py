@@ -14,7 +14,7 @@ from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.inverse.start_posture import neutral_postures
 from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.robot import Robot
-from pipeline.simulation.ground_forces.least_power import LeastPower
+from pipeline.simulation.least_power import LeastPower
 from tests.bench_timing import Call, ratio, spread, timed
 
 #: Aims of the project: (most, least).

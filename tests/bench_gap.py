@@ -20,8 +20,7 @@ from pipeline.identification.selection.evidence import State
 from pipeline.identification.selection.pool import make_pool
 from pipeline.identification.selection.search import Search
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import Setup, setup
+from pipeline.identification.workflow.setup import Options, Setup, setup
 from tests.leg_log import leg_logs
 
 ROOT = Path(__file__).parents[1]

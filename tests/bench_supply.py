@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 from actuators.elements.heating import COPPER
 from actuators.elements.two_body import REFERENCE_K, TwoBody
-from actuators.supply.battery import Battery
+from actuators.supply import Battery
 from pipeline.api.tables import walked
 from pipeline.sweep.case import Order
 from pipeline.sweep.sweep import sweep

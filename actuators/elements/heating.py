@@ -1,4 +1,4 @@
-"""A motor whose winding and magnets warm up.
+"""What warming does: a motor's winding and magnets, and friction that falls as a gear warms.
 
 Copper: R = R0 (1 + 0.00393 dT) (IEC 60028). Neodymium magnets lose about 0.11 % per kelvin, and
 the torque constant with them. The temperature follows from one thermal node,
@@ -9,7 +9,18 @@ with the warm winding's own R, so that warming feeds itself.
 
 Where a sensor on the housing is read, a winding in balance with it adds sensor_gain (T - 25 degC):
 both rise in proportion to the loss, the winding by the larger thermal resistance.
+
+Dry and viscous friction of a robot's joint fall with its temperature, the viscous part about as
+exp(-T / T_0) (Bittencourt and Gunnarsson 2012, "Static friction in a robot joint: modeling and
+identification of load and temperature effects", J. Dyn. Syst. Meas. Control 134(5), 051013). To
+first order about a reference,
+
+    torque = -(T - T_ref) (coulomb sgn(v) + viscous v)
+
+which is added to the friction that the joint has at the reference.
 """
+
+from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from typing import ClassVar, Final
@@ -19,6 +30,7 @@ import numpy as np
 from actuators.arrays import Array, Numbers
 from actuators.chain import DCMotor
 
+ZERO_CELSIUS: Final = 273.15  # [K]
 COPPER: Final = 0.00393  # [1/K]
 MAGNET: Final = -0.0011  # [1/K]
 EXTREME: Final = 500.0  # warming or cooling beyond which neither law means anything [K]
@@ -77,3 +89,21 @@ def warmed(motor: DCMotor, rise: Array) -> DCMotor:
         torque_constant=motor.torque_constant * (1.0 + MAGNET * rise),
         resistance=motor.resistance * (1.0 + COPPER * rise),
     )
+
+
+@dataclass(frozen=True)
+class Warming(Numbers):
+    """By how much one joint's friction falls."""
+
+    rules: ClassVar = {"reference": "positive"}
+    coulomb: float = 0.0  #: Dry friction per kelvin [N*m/K].
+    viscous: float = 0.0  #: Viscous friction per kelvin [N*m*s/(rad*K)].
+    reference: float = 298.15  #: Temperature at which nothing is taken off [K].
+
+    def torque(self, temperature: Array, direction: Array, velocity: Array) -> Array:
+        """Return what comes on top of the friction at the reference, (N,) [N*m].
+
+        The joint's sensor tells the temperature (N,) [degC]; the direction is -1 to 1, (N,).
+        """
+        warmer = temperature + ZERO_CELSIUS - self.reference  # [K]
+        return -warmer * (self.coulomb * direction + self.viscous * velocity)

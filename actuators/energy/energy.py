@@ -2,15 +2,24 @@
 
 Power is linear between samples and split at its zero crossings, which is exact for piecewise
 linear power. Breaks carry both limits and have no width, so no integral runs across a jump.
+
+Electrical power that flows back is dumped, partly used, or shared on a bus (`supply_of`). The
+balance at every sample is held against the elements' own loss laws (`balance_residual`).
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult
-from actuators.errors import EnergyError
+from actuators.errors import EnergyError, closest
+
+POLICIES: Final = ("none", "fraction", "bus")
+BUS: Final = "bus"  # the row under which a shared bus is accounted
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,3 +103,100 @@ def stage_energies(result: ChainResult) -> tuple[StageEnergy, ...]:
 def loss_energies(result: ChainResult) -> dict[str, Array]:
     """Return the energy each element dissipates, by name, (J,) [J]."""
     return {name: integral(result.joint.time, power) for name, power in result.losses.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class Supply:
+    """Power drawn from the supply and power dumped in the braking resistor."""
+
+    policy: str  #: One of `POLICIES`.
+    accounts: tuple[str, ...]  #: What each column stands for: the joints, or the one bus.
+    time: Array  #: (N,) [s].
+    electrical: Array  #: Power into the motors, per account (N, K) [W].
+    recovered: float  #: Share of the returned power that goes back into the supply.
+
+    @property
+    def supplied(self) -> Array:
+        """Power out of the supply, negative where it takes power back, (N, K) [W]."""
+        return np.maximum(self.electrical, 0.0) + self.recovered * np.minimum(self.electrical, 0.0)
+
+    @property
+    def dumped(self) -> Array:
+        """Power turned into heat in the braking resistor, (N, K) [W], not negative."""
+        return -(1.0 - self.recovered) * np.minimum(self.electrical, 0.0)
+
+    @property
+    def supplied_energy(self) -> Array:
+        """Energy out of the supply, (K,) [J]."""
+        forward, reverse = split_integral(self.time, self.electrical)
+        return forward - self.recovered * reverse
+
+    @property
+    def dumped_energy(self) -> Array:
+        """Energy dumped, (K,) [J]."""
+        return (1.0 - self.recovered) * split_integral(self.time, self.electrical)[1]
+
+
+def supply(result: ChainResult, policy: str = "none", fraction: float = 0.0) -> Supply:
+    """Return the supply's account of a chain's motors under a policy; see `supply_of`."""
+    joint = result.joint
+    return supply_of(result.electrical_power, joint.time, joint.joints, policy, fraction)
+
+
+def supply_of(
+    power: Array,
+    time: Array,
+    joints: tuple[str, ...],
+    policy: str = "none",
+    fraction: float = 0.0,
+) -> Supply:
+    """Return the supply's account under a policy.
+
+    Args:
+        power: Into each motor, its driver's loss included where there is one, (N, J) [W].
+        time: (N,) [s].
+        joints: J names.
+        policy: `none`: each joint's returned power is dumped (the paper). `fraction`: that share
+            of it goes back into the supply. `bus`: the joints share a bus, one's return feeds
+            another's demand, and what is left over is dumped.
+        fraction: Share for `fraction`, in [0, 1]; zero otherwise.
+
+    Raises:
+        EnergyError: Unknown policy, or a fraction out of place.
+    """
+    if policy not in POLICIES:
+        raise EnergyError(f"unknown regeneration '{policy}': {closest(policy, POLICIES)}")
+    if not 0.0 <= fraction <= 1.0:
+        raise EnergyError(f"regeneration fraction {fraction} must lie between 0 and 1")
+    if fraction != 0.0 and policy != "fraction":
+        raise EnergyError(f"regeneration '{policy}' takes no fraction: use policy 'fraction'")
+    accounts = joints
+    if policy == BUS:
+        power, accounts = power.sum(axis=1, keepdims=True), (BUS,)
+    return Supply(policy, accounts, time, power, fraction)
+
+
+def balance_residual(result: ChainResult, supply: Supply | None = None) -> Array:
+    """Return the relative error of the power balance, (N, J), or (N, 1) for a shared bus.
+
+        supplied - dumped - joint - sum of losses - sum of stored = 0
+
+    It is divided by the sum of the terms' magnitudes, and zero where all terms are. Losses come
+    from the elements' laws, not from differences of powers, so the balance can fail.
+
+    Args:
+        result: What a chain needs for a motion.
+        supply: The supply's account; without it the electrical power itself is the supply.
+    """
+    shared = supply is not None and supply.electrical.shape != result.electrical_power.shape
+    if supply is None:
+        residual = result.electrical_power.copy()
+        scale = np.abs(residual)
+    else:
+        residual = supply.supplied - supply.dumped
+        scale = np.abs(supply.supplied) + supply.dumped
+    for power in (result.joint.power, *result.losses.values(), *result.stored.values()):
+        term = power.sum(axis=1, keepdims=True) if shared else power
+        residual -= term
+        scale += np.abs(power).sum(axis=1, keepdims=True) if shared else np.abs(power)
+    return np.divide(residual, scale, out=np.zeros_like(residual), where=scale > 0.0)

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from actuators.energy.regeneration import supply
+from actuators.energy.energy import supply
 from actuators.shaft import ShaftSeries
 from pipeline.api.machine import Machine
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
-from pipeline.simulation.ground_forces.force_choice import ForceChoice
+from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, regeneration_of
 from pipeline.simulation.walk_stand import demand_along, joint_series
 from reports.tables.walking import walking_joint_demand

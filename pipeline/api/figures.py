@@ -17,8 +17,8 @@ from pipeline.api.pictures.walk import steps_of, stretches, thinned
 from pipeline.atomic import write_text
 from pipeline.machine.own_actuators import AS_BUILT
 from pipeline.motion.gait import gait_of, gait_table
-from pipeline.motion.ground import Ground
-from pipeline.paper.judgement.fig_21 import EnergyPerMinute
+from pipeline.motion.motion import Ground
+from pipeline.paper.judgement.evidence import EnergyPerMinute
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings

@@ -18,8 +18,7 @@ from actuators.loading.build import CATALOG, load_catalog
 from pipeline.atomic import replacing
 from pipeline.dynamics.gait_check import check_gait
 from pipeline.errors import PipelineError, RobotFileError
-from pipeline.machine.motors import Motors, motors_of
-from pipeline.machine.own_actuators import actuator_folder, own_actuators
+from pipeline.machine.own_actuators import Motors, actuator_folder, motors_of, own_actuators
 from pipeline.motion.support import support_margin
 from pipeline.robot.check import Finding, check_robot
 from pipeline.robot.guess.guess import Guess, guess_robot

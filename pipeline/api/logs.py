@@ -24,12 +24,11 @@ from pipeline.identification.compare.stages import overall
 from pipeline.identification.workflow.compared import Compared, compare_logs, judged, load_logs
 from pipeline.identification.workflow.forward import Drive, by_model, rms
 from pipeline.identification.workflow.forward import forward as drive_forward
-from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.outcome import Outcome, identified
-from pipeline.identification.workflow.setup import Setup, check_options, setup
+from pipeline.identification.workflow.setup import Options, Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
+from pipeline.logs.errors import Finding
 from pipeline.logs.formats.convert import plain
-from pipeline.logs.quality.finding import Finding
 from pipeline.progress import Progress
 from pipeline.simulation.files import Files
 from pipeline.simulation.found_bodies import FoundBodies
@@ -140,7 +139,7 @@ def read_log(
         path: CSV or Parquet.
         machine: Whose log it is.
         mapping: Mapping file for foreign columns.
-        **options: See `pipeline.identification.workflow.options.Options`.
+        **options: See `pipeline.identification.workflow.setup.Options`.
 
     Raises:
         GapError: The log cannot be used; one line says which row or column and why.
@@ -156,7 +155,7 @@ def compare(logs: Any, machine: Machine, **options: Any) -> Comparison:
     Args:
         logs: One or several, from `read_log` or by path.
         machine: The model.
-        **options: See `pipeline.identification.workflow.options.Options`.
+        **options: See `pipeline.identification.workflow.setup.Options`.
 
     Raises:
         GapError: A log cannot be used, or does not fit the machine.
@@ -173,7 +172,7 @@ def identify(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> 
         logs: To learn from, from `read_log` or by path.
         machine: The model.
         test: Logs that are held out: nothing is fitted to them.
-        **options: See `pipeline.identification.workflow.options.Options`.
+        **options: See `pipeline.identification.workflow.setup.Options`.
 
     Raises:
         GapError: A log cannot be used, or does not fit the machine.
@@ -189,7 +188,7 @@ def validate(logs: Any, machine: Machine, **options: Any) -> Identified:
     Args:
         logs: To hold the model against.
         machine: With effects: of a model file, or as `identify` returns it.
-        **options: See `pipeline.identification.workflow.options.Options`.
+        **options: See `pipeline.identification.workflow.setup.Options`.
 
     Raises:
         GapError: A log cannot be used, or the machine has no effects.
@@ -206,7 +205,7 @@ def power(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> Pow
         logs: With samples of the supply, from `read_log` or by path.
         machine: With a motor in every joint.
         test: Logs that are held out: nothing is fitted to them.
-        **options: See `pipeline.identification.workflow.options.Options`.
+        **options: See `pipeline.identification.workflow.setup.Options`.
 
     Raises:
         GapError: A log has no power at the supply, or too few samples of it.
@@ -223,7 +222,7 @@ def forward(logs: Any, machine: Machine, *, test: Any = (), **options: Any) -> D
         logs: On which tolerances are estimated.
         machine: Fixed base, a motor in every joint.
         test: Logs that are simulated; those of `logs` by default.
-        **options: See `pipeline.identification.workflow.options.Options`.
+        **options: See `pipeline.identification.workflow.setup.Options`.
 
     Raises:
         GapError: A log does not say what drives the servos.

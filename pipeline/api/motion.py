@@ -14,7 +14,7 @@ from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.machine.joint import Actuators
 from pipeline.simulation import walk_stand
 from pipeline.simulation.edited import IDEAL
-from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, ForceChoice
+from pipeline.simulation.force_choice import LEAST_POWER, ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from reports.table import Table
 

@@ -18,7 +18,7 @@ from pipeline.api.tables import (
 )
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.progress import Progress
-from pipeline.simulation.ground_forces.force_choice import ForceChoice
+from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand
 from reports.folder import staged

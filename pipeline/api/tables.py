@@ -21,7 +21,7 @@ from pipeline.robot.inverse.foot_tracking import foot_tracking
 from pipeline.simulation import cycle_energy
 from pipeline.simulation.cycle_energy import leg_joints
 from pipeline.simulation.edited import IDEAL
-from pipeline.simulation.ground_forces.force_choice import RULES
+from pipeline.simulation.force_choice import RULES
 from pipeline.simulation.settings import PAPER_FORCES, Settings
 from pipeline.simulation.walk_stand import Standing, Walking, compare_rules, walk
 from reports.table import Table, table_of

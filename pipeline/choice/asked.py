@@ -9,8 +9,7 @@ from typing import Final
 
 from actuators.elements.position_torque import ParallelSpring
 from actuators.loading.parts import Part, load_parts
-from actuators.supply.battery import Battery
-from actuators.supply.from_parts import battery_of
+from actuators.supply import Battery, battery_of
 from pipeline.api.machine import Machine
 from pipeline.choice.doubt import Design, drawn
 from pipeline.choice.errors import ChoiceError

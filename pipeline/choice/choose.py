@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Final
 
 from actuators.arrays import Array, Index
-from actuators.supply.battery import Battery
+from actuators.supply import Battery
 from pipeline.api.machine import Machine
 from pipeline.choice.answer.full import Full, through
 from pipeline.choice.asked import Asked, asked_of

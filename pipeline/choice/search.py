@@ -29,7 +29,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from actuators.arrays import Array
-from actuators.energy.regeneration import BUS
+from actuators.energy.energy import BUS
 from pipeline.choice.loads import Load
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.track import SPEED, Account, Track

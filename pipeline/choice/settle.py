@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from actuators.energy.regeneration import BUS
+from actuators.energy.energy import BUS
 from pipeline.choice.asked import Asked
 from pipeline.choice.doubt import Design
 from pipeline.choice.errors import ChoiceError

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from actuators.arrays import Array, Mask
-from actuators.energy.regeneration import BUS
+from actuators.energy.energy import BUS
 from actuators.shaft import ShaftSeries
 from pipeline.choice.loads import Load
 from pipeline.choice.parts.designs import Designs
@@ -21,7 +21,7 @@ class Account:
     """What is counted besides motors and drivers."""
 
     hotel: float = 0.0  #: Of the robot's electronics [W].
-    #: What becomes of returned power, see `actuators.energy.regeneration`; on a bus, all that a
+    #: What becomes of returned power, see `actuators.energy.energy`; on a bus, all that a
     #: group returns counts as used, and `shared` tells what is not.
     policy: str = "none"
     fraction: float = 0.0  #: Share of it that is used again, with policy ``fraction`` [1].

@@ -19,14 +19,14 @@ from pipeline.cli.options import (
     folder_held,
     named_path,
 )
-from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
+from pipeline.identification.workflow.setup import DEFAULT_OUT, STEPS, Options
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
     from pipeline.api.gap.power import Powered
     from pipeline.api.logs import Comparison, Driven, Identified
     from pipeline.identification.workflow.setup import Setup
-    from pipeline.logs.quality.finding import Finding
+    from pipeline.logs.errors import Finding
 
 logger = logging.getLogger("legwatt")
 #: Findings that are no remark on the data, and what their owner wants to know.

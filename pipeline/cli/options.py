@@ -172,7 +172,7 @@ def machine_of(options: argparse.Namespace) -> Machine:
 
 def settings_of(options: argparse.Namespace) -> Settings:
     """The machine that is asked for, and how it walks."""
-    from pipeline.simulation.ground_forces.force_choice import ForceChoice
+    from pipeline.simulation.force_choice import ForceChoice
 
     return machine_of(options).walking(
         samples=options.samples,

@@ -87,7 +87,7 @@ def _run_sweep(options: argparse.Namespace) -> int:
     from pipeline.atomic import output_errors
 
     with folder_held(options), output_errors(options.out):
-        from pipeline.simulation.ground_forces.force_choice import ForceChoice
+        from pipeline.simulation.force_choice import ForceChoice
         from pipeline.sweep.case import Order
         from pipeline.sweep.plan import read_plan
         from pipeline.sweep.sweep import sweep

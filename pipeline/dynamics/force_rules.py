@@ -4,6 +4,8 @@ The paper's rule is the least sum of squared tangential forces (`contact_forces`
 its forces and add internal forces to them, which change joint torques and leave the robot's motion
 as it is. They are given the standing legs' statics and answer with forces; a rule that knows
 actuators is made above this room and handed down.
+
+`JointDemand` is what a motion then demands of the actuated joints.
 """
 
 from __future__ import annotations
@@ -15,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.dynamics.demand import JointDemand
 from pipeline.dynamics.internal_forces import Bounds, internal_basis, out_of_bounds
 from pipeline.errors import GaitError
 from pipeline.motion.motion import Segment
@@ -147,3 +148,16 @@ class GroundForces:
 
 
 PAPER = GroundForces()
+
+
+@dataclass(frozen=True)
+class JointDemand:
+    """Motion and torque of the actuated joints over one segment."""
+
+    joints: tuple[str, ...]  #: Names, in the robot file's order; they label the columns.
+    time: Array  #: Shape (N,) [s].
+    position: Array  #: Shape (N, J) [rad].
+    velocity: Array  #: Shape (N, J) [rad/s].
+    acceleration: Array  #: Shape (N, J) [rad/s^2].
+    torque: Array  #: What the actuator must apply to the joint, shape (N, J) [N*m].
+    segment: str  #: The segment's name.

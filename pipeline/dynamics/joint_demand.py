@@ -7,11 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.dynamics.contact_forces import ContactForces, ground_frame
-from pipeline.dynamics.demand import JointDemand
+from pipeline.dynamics.contact_forces import (
+    ContactForces,
+    FeetOnGround,
+    ground_frame,
+    inverse_dynamics,
+)
 from pipeline.dynamics.falling import refuse_falling
-from pipeline.dynamics.feet_on_ground import FeetOnGround, inverse_dynamics
-from pipeline.dynamics.force_rules import PAPER, GroundForces, Stance
+from pipeline.dynamics.force_rules import PAPER, GroundForces, JointDemand, Stance
 from pipeline.errors import GaitError
 from pipeline.motion.motion import Motion, Segment
 from pipeline.robot.robot import Robot

@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from actuators.elements.element import Friction
-from actuators.elements.warming import ZERO_CELSIUS, Warming
+from actuators.elements.heating import ZERO_CELSIUS, Warming
 from pipeline.effects.base import Effect, Parameter, Place, Values, at_joint
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel

@@ -1,6 +1,15 @@
-"""What can go wrong in the gap room, each named for the fact."""
+"""What can be wrong with a log: errors, each named for the fact, and findings of the judgement."""
 
 from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from actuators.arrays import Mask
+
+#: What follows from a finding, from nothing to refusal.
+VERDICTS: Final = ("ok", "masked", "warning", "refused")
 
 
 class GapError(Exception):
@@ -41,3 +50,57 @@ class EffectError(GapError):
 
 class NamingError(GapError):
     """Nothing is left to compare: no usable row in a part of the data."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check of one column."""
+
+    log: str  #: Name of the log.
+    column: str  #: Header in the log format, or the joint, or empty for the log as a whole.
+    check: str  #: What was looked at.
+    value: float  #: The number found.
+    unit: str  #: Of `value`.
+    verdict: str  #: One of `VERDICTS`.
+    detail: str  #: In words, with the remedy where there is one.
+
+
+@dataclass(frozen=True)
+class Quality:
+    """The judgement on one log."""
+
+    findings: tuple[Finding, ...]  #: In the order of the checks.
+    usable: tuple[Mask, Mask]  #: Positions and efforts that may be used, each shape (N, J).
+
+    def refuse(self, *, overlooked: Collection[str] = ()) -> None:
+        """Refuse the log where a finding says so, but for some checks; see `refuse`."""
+        refuse([f for f in self.findings if f.check not in overlooked])
+
+
+class Findings(list[Finding]):
+    """A list of one log's findings that fills in its name."""
+
+    def __init__(self, log: str) -> None:
+        super().__init__()
+        self._log = log
+
+    def note(
+        self, column: str, check: str, value: float, unit: str, verdict: str, detail: str
+    ) -> None:
+        """Add one."""
+        self.append(Finding(self._log, column, check, float(value), unit, verdict, detail))
+
+
+def refuse(findings: Sequence[Finding]) -> None:
+    """Stop where a finding refuses its log.
+
+    Raises:
+        LogContentError: Names the log, the first refused column and how many there are.
+    """
+    refused = [finding for finding in findings if finding.verdict == "refused"]
+    if not refused:
+        return
+    first = refused[0]
+    column = f", column '{first.column}'" if first.column else ""
+    more = f" ({len(refused) - 1} more like this)" if len(refused) > 1 else ""
+    raise LogContentError(f"{first.log}{column}: {first.detail}{more}")

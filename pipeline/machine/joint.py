@@ -27,9 +27,8 @@ import numpy as np
 from actuators.arrays import Array, least_magnitude
 from actuators.chain import Chain, ChainResult, DCMotor, HoldingResult, held, moved
 from actuators.elements.element import Element
-from actuators.elements.heating import Heating, warmed
+from actuators.elements.heating import Heating, Warming, warmed
 from actuators.elements.position_torque import PositionTorque
-from actuators.elements.warming import Warming
 from actuators.shaft import BY_JOINT, ShaftSeries
 from pipeline.logs.errors import ModelError
 

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 from actuators.arrays import Array
 from pipeline.motion.feet import Course, along_ground, displaced
 from pipeline.motion.gait import Gait
-from pipeline.motion.ground import Ground
-from pipeline.motion.motion import Segment
+from pipeline.motion.motion import Ground, Segment
 
 
 def surge(gait: Gait, share: Array) -> Course:

@@ -6,7 +6,7 @@ arc backwards; a foot in the air goes straight from one foothold to the next, ov
 named path's advance and above it by its lift. Sway moves the body over all this: what a foot does
 relative to the body is then less by the sway.
 
-Everything here is in the axes of the ground (`pipeline.motion.ground`). Vectors along it are
+Everything here is in the axes of the ground (`pipeline.motion.motion`). Vectors along it are
 complex numbers x + i y, so that a turn to the left is a factor exp(i angle).
 """
 

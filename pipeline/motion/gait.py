@@ -16,7 +16,7 @@ from actuators.errors import one_line
 from pipeline.errors import GaitError
 from pipeline.motion.footfall import Footfall, in_turn, named, own
 from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
-from pipeline.motion.ground import Ground
+from pipeline.motion.motion import Ground
 from pipeline.robot.robot_file import RobotSpec
 
 #: Speed, period and stroke agree within this share.

@@ -25,7 +25,7 @@ from actuators.arrays import Array
 from actuators.chain import Chain
 from actuators.elements.heating import COPPER
 from actuators.elements.hypoid import Hypoid
-from actuators.energy.regeneration import BUS, supply
+from actuators.energy.energy import BUS, supply
 from actuators.loading.build import Catalog
 from actuators.parameters import Parameter, ParameterSet, parameters_from_table, read_toml
 from pipeline.column import column

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.paper.hexapod import MIDDLE_LEGS, PUBLISHED_LEG, Outcome, RobotPart, printed_leg
 from pipeline.paper.published import ALTERNATIVES, CYCLE, EVEN, EXTRA, PAIR
-from pipeline.simulation.energy_change import break_even
+from pipeline.simulation.cycle_energy import break_even
 
 #: Id to the number of the robot file.
 _INPUTS = {

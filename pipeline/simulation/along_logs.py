@@ -14,8 +14,8 @@ from pipeline.logs.columns.explaining import Bodies
 from pipeline.logs.columns.findings import column_findings, copies
 from pipeline.logs.columns.hypotheses import Reading, as_named
 from pipeline.logs.columns.search import search
+from pipeline.logs.errors import Finding
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.quality.finding import Finding
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import BodyChange, MachineModel
 from pipeline.simulation.predict import Prediction, Simulator

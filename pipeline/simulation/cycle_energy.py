@@ -1,7 +1,11 @@
-"""What a walking cycle and three seconds of standing cost, by leg and robot; static stability."""
+"""What a walking cycle and three seconds of standing cost, by leg and robot; static stability.
+
+And what effects change of it: energy per cycle and break-even, with and without them.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,18 +14,98 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import HoldingResult
-from actuators.energy.energy import split_integral
-from actuators.energy.regeneration import BUS, Supply
+from actuators.energy.energy import BUS, Supply, split_integral
 from pipeline.column import column
-from pipeline.dynamics.demand import JointDemand
+from pipeline.dynamics.force_rules import JointDemand
 from pipeline.dynamics.joint_demand import MotionDemand
+from pipeline.machine.joint import Actuators
+from pipeline.motion.gait import gait_of
+from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
+from pipeline.simulation.edited import Effects
+from pipeline.simulation.walk_stand import Adjust, stand, walk
 
 Legs = Mapping[str, Sequence[str]]
 #: Account of the joints outside the legs, which are held.
 HELD = "held joints"
 #: Time over which the paper adds up standing energy: that of one gait cycle [s].
 STANDING_TIME = 3.0
+#: Samples per half period of the gait: energies within 1 % and a fraction of a second.
+SAMPLES = 151
+PAIR = ("reversible", "irreversible")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Energies with one alternative."""
+
+    cycle: float  #: Electrical energy of one gait cycle, whole robot [J].
+    standing: float  #: Electrical power, standing as the robot file says, whole robot [W].
+    middle_cycle: float  #: Of the middle legs alone, on which the paper's break-even rests [J].
+    middle_standing: float  #: Likewise [W].
+
+
+@dataclass(frozen=True)
+class EnergyChange:
+    """Before and after effects."""
+
+    before: Mapping[str, Cost]  #: By alternative.
+    after: Mapping[str, Cost]  #: By alternative; of those alone in which all the effects count.
+    #: Fraction of time standing above which the irreversible actuator uses less in the middle legs
+    #: (Fig. 21 of the paper); NaN where there is none.
+    break_even_before: float
+    break_even_after: float  #: The same with the effects.
+
+
+def energy_change(
+    robot: Robot, chains: Mapping[str, Actuators], effects: Effects, known: Effects | None = None
+) -> EnergyChange:
+    """Walk and stand with and without effects, but those `known`, which count on both sides.
+
+    Raises:
+        TippingError: With the effects a foot would have to pull.
+    """
+    period = gait_of(robot.spec).period
+    if known is None:
+        before = _costs(robot, chains, None)
+    else:
+        before = _costs(known.robot, known.chains(chains), known.demand)
+    complete = {name: chain for name, chain in chains.items() if effects.counts_in(name)}
+    after = _costs(effects.robot, effects.chains(complete), effects.demand)
+    return EnergyChange(before, after, crossing(before, period), crossing(after, period))
+
+
+def _costs(robot: Robot, chains: Mapping[str, Actuators], adjust: Adjust | None) -> dict[str, Cost]:
+    walking = walk(robot, chains, samples=SAMPLES, adjust=adjust)
+    standing = stand(robot, chains, adjust=adjust)
+    legs = [leg for leg in robot.spec.legs if leg.station == "middle"] or robot.spec.legs
+    middle = [robot.joints.index(joint) for leg in legs for joint in leg.joints]
+    out = {}
+    for name in chains:
+        energy, power = walking.supplies[name].supplied_energy, standing.holding[name].power
+        out[name] = Cost(*(float(x.sum()) for x in (energy, power, energy[middle], power[middle])))
+    return out
+
+
+def crossing(costs: Mapping[str, Cost], period: float) -> float:
+    """The break-even of the alternatives of `PAIR`; NaN without one of them, too."""
+    if any(name not in costs for name in PAIR):
+        return math.nan
+    reversible, irreversible = (costs[name] for name in PAIR)
+    extra = (irreversible.middle_cycle - reversible.middle_cycle) / period  # [W]
+    saved = reversible.middle_standing - irreversible.middle_standing  # [W]
+    return break_even(extra, saved)
+
+
+def break_even(extra: float, saved: float) -> float:
+    """Fraction of time standing at which two actuators cost the same; above it the second pays.
+
+    (1 - f) extra = f saved (Fig. 21 of the paper), with what the second one costs more walking and
+    less standing for as long [J, or W]; NaN where it does not do both.
+    """
+    if extra <= 0 or saved <= 0:
+        return math.nan
+    return extra / (extra + saved)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 Inverse dynamics in one batch (`rneaInParallel`). Where a walking robot's foot forces are measured,
 they are the ground's forces and give the acceleration of the base. Else the base moves as its
 standing feet let it (they do not move, and the base does not rotate), and the ground's forces are
-those with the least tangential parts (`pipeline.dynamics.feet_on_ground`).
+those with the least tangential parts (`pipeline.dynamics.contact_forces`).
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.dynamics.feet_on_ground import FeetOnGround, inverse_dynamics
+from pipeline.dynamics.contact_forces import FeetOnGround, inverse_dynamics
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import Bodies, MachineModel
 from pipeline.robot.kinematics import foot_jacobian_rates, foot_jacobians

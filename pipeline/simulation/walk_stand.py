@@ -9,21 +9,19 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult, HoldingResult
-from actuators.energy.regeneration import BUS, Supply, supply
+from actuators.energy.energy import BUS, Supply, supply
 from actuators.reversals import split_at_reversals
 from actuators.shaft import ShaftSeries
 from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.demand import JointDemand
-from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, PAPER, GroundForces
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, PAPER, GroundForces, JointDemand
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
 from pipeline.machine.joint import Actuators
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.standing import standing_posture
-from pipeline.motion.support import stability_margins
+from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import DEFAULT_SAMPLES, walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES, ForceChoice
-from pipeline.simulation.ground_forces.least_power import Adjust
+from pipeline.simulation.force_choice import LEAST_POWER, RULES, ForceChoice
+from pipeline.simulation.least_power import Adjust
 
 
 @dataclass(frozen=True)

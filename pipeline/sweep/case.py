@@ -18,7 +18,7 @@ from pipeline.api.tables import metadata, tables_of_walking, walked
 from pipeline.column import column
 from pipeline.errors import PipelineError
 from pipeline.simulation.cycle_energy import RobotEnergy
-from pipeline.simulation.ground_forces.force_choice import ForceChoice
+from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import PAPER_FORCES, SAMPLES, Settings
 from pipeline.sweep.plan import Axis, SweepError, Value
 

@@ -25,7 +25,7 @@ from pipeline.identification.results import (
 )
 from pipeline.identification.workflow.outcome import Outcome
 from pipeline.logs.errors import EffectError
-from pipeline.simulation.energy_change import PAIR, EnergyChange
+from pipeline.simulation.cycle_energy import PAIR, EnergyChange
 from pipeline.simulation.found_bodies import FoundBodies, FoundBody
 from reports.page import TableBlock
 from reports.typeset import MINUS

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pipeline.machine.motors import Motors
+from pipeline.machine.own_actuators import Motors
 from reports.table import Table
 from reports.words import Words
 

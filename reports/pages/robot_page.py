@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.machine.motors import Motors
-from pipeline.machine.own_actuators import AS_BUILT
+from pipeline.machine.own_actuators import AS_BUILT, Motors
 from pipeline.motion.footfall import OWN
 from pipeline.motion.gait import Gait, gait_of
 from pipeline.simulation.settings import Settings

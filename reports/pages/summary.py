@@ -9,9 +9,9 @@ from typing import Any
 
 from pipeline.motion.gait import gait_table
 from pipeline.paper.calibration.store import AT_LEAST, FIXED, Calibrated, calibrated_numbers
+from pipeline.paper.judgement.evidence import ranking
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.judgement.readings import CalibratedReading, readings, verdict
-from pipeline.paper.judgement.sensitivity import ranking
 from pipeline.simulation.settings import Settings
 from reports.markdown import write_pages
 from reports.page import Page, TableBlock, table_block

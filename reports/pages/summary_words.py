@@ -9,10 +9,9 @@ import math
 from collections.abc import Mapping, Sequence
 
 from pipeline.paper.hexapod import PUBLISHED_LEG
-from pipeline.paper.judgement.evidence import Interval
+from pipeline.paper.judgement.evidence import Interval, Sensitivity, leading
 from pipeline.paper.judgement.judge import NOTABLE, Judgement
 from pipeline.paper.judgement.rows import REPRODUCED, Row, headline
-from pipeline.paper.judgement.sensitivity import Sensitivity, leading
 from pipeline.paper.motor_constants import asked_frictions
 from pipeline.paper.published import CYCLE, EVEN, EXTRA, ROLES
 from reports.page import Number

@@ -13,7 +13,7 @@ import numpy as np
 
 from actuators.units import from_si
 from pipeline.column import column
-from pipeline.paper.judgement.fig_21 import EnergyPerMinute
+from pipeline.paper.judgement.evidence import EnergyPerMinute
 from pipeline.paper.published import ROLES
 from reports.table import Table, table_of
 

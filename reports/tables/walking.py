@@ -10,9 +10,8 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult
-from actuators.energy.energy import loss_energies, stage_energies
+from actuators.energy.energy import Supply, loss_energies, stage_energies
 from actuators.energy.limits import LimitRow
-from actuators.energy.regeneration import Supply
 from pipeline.column import column
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.motion.base_motion import base_in_world

@@ -5,8 +5,7 @@ from hypothesis import strategies as st
 
 from actuators.chain import Chain, DCMotor
 from actuators.elements.element import Friction, Ratio
-from actuators.energy.balance import balance_residual
-from actuators.energy.regeneration import supply
+from actuators.energy.energy import balance_residual, supply
 from actuators.errors import ChainError
 from tests.actuators.motions import ALTERNATIVES, CHAINS, constant, harmonic, seeds, series, split
 

@@ -9,9 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuators.chain import DCMotor
-from actuators.energy.energy import integral, split_integral, stage_energies, stage_energy
+from actuators.energy.energy import integral, split_integral, stage_energies, stage_energy, supply
 from actuators.energy.limits import limit_rows, rms_over_time, standing_rows, time_over
-from actuators.energy.regeneration import supply
 from actuators.errors import EnergyError
 from tests.actuators.motions import ALTERNATIVES, CHAINS, harmonic, series, split
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from actuators.elements.element import Friction, Inertia
 from actuators.elements.hypoid import Hypoid
-from actuators.energy.balance import balance_residual
+from actuators.energy.energy import balance_residual
 from tests.actuators.motions import CHAINS, constant, harmonic, split
 
 

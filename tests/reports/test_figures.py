@@ -20,7 +20,7 @@ from actuators.energy.energy import StageEnergy
 from actuators.loading.build import load_catalog
 from actuators.shaft import ShaftSeries
 from pipeline.errors import FigureError
-from pipeline.paper.judgement.fig_21 import EnergyPerMinute
+from pipeline.paper.judgement.evidence import EnergyPerMinute
 from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
 from reports.figures.energy.electrical_energy import electrical_energy_figure
 from reports.figures.energy.energy_per_minute import BreakEven, energy_per_minute_figure

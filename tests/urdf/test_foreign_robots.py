@@ -11,7 +11,7 @@ import pytest
 from pipeline.api.init import robot_file_of
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import GaitError
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.robot.check import check_file
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file

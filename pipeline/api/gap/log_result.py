@@ -9,7 +9,7 @@ from typing import Any
 
 from pipeline.api.result import Result
 from pipeline.identification.workflow.setup import Setup
-from pipeline.logs.quality.finding import Finding
+from pipeline.logs.errors import Finding
 from reports.table import Table
 
 #: What every result of logs begins with: verb, tables, sidecar, inputs, machine, findings.

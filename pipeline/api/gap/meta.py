@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.api.result import own_names
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import Setup
+from pipeline.identification.workflow.setup import Options, Setup
 from pipeline.logs.formats.convert import sha256
 
 PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")

@@ -10,9 +10,8 @@ from pipeline.api.gap.log_result import Common, LogResult
 from pipeline.identification.compare.loaded import LoadedLogs
 from pipeline.identification.supply.account import Account, account
 from pipeline.identification.workflow.compared import judged
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import Setup
-from pipeline.logs.quality.finding import Finding
+from pipeline.identification.workflow.setup import Options, Setup
+from pipeline.logs.errors import Finding
 from pipeline.progress import Progress
 from reports.figures.gap.power import power_shares_figure, power_time_figure
 from reports.figures.save import save_figure

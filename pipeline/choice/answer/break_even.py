@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 
 from actuators.arrays import Mask
-from actuators.energy.regeneration import supply
+from actuators.energy.energy import supply
 from actuators.errors import CatalogError, closest
 from pipeline.choice.answer.full import through
 from pipeline.choice.errors import ChoiceError

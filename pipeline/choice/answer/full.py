@@ -13,9 +13,8 @@ import numpy as np
 
 from actuators.arrays import Array
 from actuators.chain import ChainResult
-from actuators.energy.energy import integral
-from actuators.energy.regeneration import BUS, supply_of
-from actuators.supply.battery import Battery
+from actuators.energy.energy import BUS, integral, supply_of
+from actuators.supply import Battery
 from pipeline.choice.loads import Load
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.track import Account

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pandas as pd
 
 from actuators.loading.parts import load_parts
-from actuators.supply.battery import HOUR
+from actuators.supply import HOUR
 from pipeline.api.result import Result, by_name
 from pipeline.api.tables import inputs_of, metadata
 from pipeline.choice.answer.break_even import known_candidate, rows

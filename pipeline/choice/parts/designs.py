@@ -21,8 +21,7 @@ from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.two_body import REFERENCE_K, Temperatures, TwoBody
 from actuators.loading.build import WINDING
-from actuators.supply.battery import HOUR
-from actuators.supply.driver import Driver
+from actuators.supply import HOUR, Driver
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from actuators.errors import CatalogError, DataSheetError, closest, one_line
 from actuators.loading.converted import converted, gear_friction
 from actuators.loading.data_sheet import ENTRIES, Number, read_sheet
 from actuators.loading.parts import DRIVER, Part, load_parts
-from actuators.supply.from_parts import driver_of
+from actuators.supply import driver_of
 from pipeline.choice.errors import ChoiceError
 from pipeline.choice.parts.designs import Designs
 

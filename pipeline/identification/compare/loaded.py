@@ -20,13 +20,12 @@ from actuators.arrays import Array, Mask
 from pipeline.identification.compare.long import LongLogs
 from pipeline.identification.compare.observe import observe_all
 from pipeline.logs.columns.findings import explained
-from pipeline.logs.errors import LogContentError, PreparationError
+from pipeline.logs.errors import Finding, LogContentError, PreparationError, refuse
 from pipeline.logs.prepared.measurement import Contact, Measurement
 from pipeline.logs.prepared.parts import period, with_repeated_noise
 from pipeline.logs.prepared.prepare import Prepared, prepare
 from pipeline.logs.prepared.read_off import signal_findings
 from pipeline.logs.quality.checks import OF_LIMITS, cannot_tell
-from pipeline.logs.quality.finding import Finding, refuse
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.sampling import new_values
 from pipeline.logs.reading.expected import Expected

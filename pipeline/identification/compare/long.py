@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.identification.compare.observe import observe_chunk
+from pipeline.logs.errors import VERDICTS, Finding, Quality
 from pipeline.logs.prepared.measurement import TEST, TRAIN, UNUSED, VALIDATION, Contact, Measurement
 from pipeline.logs.prepared.parts import Parts
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.stream import CHUNK_ROWS, Stream, Survey, prepared_chunks
-from pipeline.logs.quality.finding import VERDICTS, Finding, Quality
 from pipeline.logs.reading.log import Log
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.predict import Simulator

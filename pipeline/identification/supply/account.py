@@ -22,8 +22,7 @@ from pipeline.identification.supply.regression import (
     intervals,
     rivals_of,
 )
-from pipeline.identification.supply.sag import Sag, sag_of
-from pipeline.identification.supply.samples import FEWEST, SHORTEST, supply_samples
+from pipeline.identification.supply.samples import FEWEST, SHORTEST, Sag, sag_of, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, joined, rows_of, terms_of
 from pipeline.identification.workflow.compared import legs_of
 from pipeline.identification.workflow.setup import Setup

@@ -14,7 +14,7 @@ from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.machine.machine import MachineModel
 from pipeline.motion.gait import gait_of
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot
 

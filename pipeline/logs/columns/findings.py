@@ -13,8 +13,8 @@ from actuators.arrays import Array
 from pipeline.logs.columns.explaining import Bodies
 from pipeline.logs.columns.hypotheses import Hypothesis, Reading, as_named
 from pipeline.logs.columns.search import Mended
+from pipeline.logs.errors import Finding
 from pipeline.logs.quality.checks import DEG, WRONG
-from pipeline.logs.quality.finding import Finding
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.reading.plan import AS_NAMED

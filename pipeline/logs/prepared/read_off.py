@@ -26,8 +26,8 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array, Mask
+from pipeline.logs.errors import Finding, Findings
 from pipeline.logs.prepared.prepare import Prepared
-from pipeline.logs.quality.finding import Finding, Findings
 from pipeline.logs.reading.log_format import column_name
 from pipeline.logs.signals.derivatives import LowPass
 

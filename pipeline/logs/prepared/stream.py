@@ -21,11 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.logs.errors import LogContentError
+from pipeline.logs.errors import LogContentError, Quality
 from pipeline.logs.formats.convert import sha256
 from pipeline.logs.prepared.measurement import Contact
 from pipeline.logs.prepared.prepare import Prepared, prepare
-from pipeline.logs.quality.finding import Quality
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log

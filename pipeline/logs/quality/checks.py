@@ -16,8 +16,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.errors import LogContentError
-from pipeline.logs.quality.finding import Finding, Findings
+from pipeline.logs.errors import Finding, Findings, LogContentError
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
 from pipeline.logs.reading.log_format import column_name

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array, Mask
+from pipeline.logs.errors import Findings, Quality
 from pipeline.logs.quality.checks import (
     effort_units,
     feet_carry,
@@ -15,7 +16,6 @@ from pipeline.logs.quality.checks import (
     torque_on_time,
     velocity_units,
 )
-from pipeline.logs.quality.finding import Findings, Quality
 from pipeline.logs.quality.sampling import (
     frozen,
     glitches,

@@ -1,20 +1,28 @@
-"""What a stored calibration says of computed quantities: before the fit, and with one left out."""
+"""What a stored calibration says of computed quantities: before the fit, and with one left out.
+
+Also Fig. 21, energy in a minute against the share of it spent standing, and which unpublished
+number moves which conclusion.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from actuators.arrays import Array
+from pipeline.column import column
 from pipeline.paper.hexapod import Totals
 from pipeline.paper.published import CYCLE, EVEN, EXTRA, HELD, PAIR
-from pipeline.simulation.energy_change import break_even
+from pipeline.simulation.cycle_energy import break_even
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
+MINUTE = 60.0  # [s]
 #: Quantiles shown as low and high.
 BAND = (0.025, 0.975)
 #: Fewer values than this have no 95 % that is worth showing.
@@ -97,3 +105,83 @@ def quantiles(values: Sequence[float]) -> Interval:
         return NONE
     low, high = np.quantile(known, BAND)
     return float(low), float(high)
+
+
+@dataclass(frozen=True)
+class EnergyPerMinute:
+    """Energy in a minute against the fraction of it spent standing."""
+
+    subject: str  #: Key of `SUBJECTS`.
+    alternative: str  #: Name.
+    fraction: Array  #: (F,) [1].
+    energy: Array  #: (F,) [J].
+    prior: Array | None  #: 95 % of what data sheets and literature say, (2, F) [J].
+    left_out: Array | None  #: 95 % of the sets without this actuator's walking figures, (2, F) [J].
+
+
+def per_minute(whole: Totals, sets: Sets) -> tuple[EnergyPerMinute, ...]:
+    """The line of every subject and alternative, with what the sets say of it."""
+    fraction = np.linspace(0.0, 1.0, 101)
+
+    def energy(cycle: Array, stand: Array) -> Array:
+        """Of powers walking and standing, (W,) each [J, W]: (W, F) [J]."""
+        walking = (1 - fraction) * (cycle / CYCLE)[:, None]  # [W]
+        return MINUTE * (walking + fraction * stand[:, None])
+
+    def line(subject: str, name: str) -> EnergyPerMinute:
+        def band(key: str) -> Array | None:
+            if key not in sets or sets[key].empty:
+                return None
+            columns = (sets[key][f"{name} {total}"].to_numpy() for total in SUBJECTS[subject])
+            return np.quantile(energy(*columns), BAND, axis=0)
+
+        (ours,) = energy(*(np.array([whole[name][total]]) for total in SUBJECTS[subject]))
+        left_out = LEFT_OUT_BY.get(f"walking_ratio_{name}", "")
+        return EnergyPerMinute(subject, name, fraction, ours, band("prior"), band(left_out))
+
+    return tuple(line(subject, name) for subject in SUBJECTS for name in whole)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Which unpublished number moves which conclusion."""
+
+    table: ClassVar = "sensitivities"
+    about: ClassVar = (
+        "Every number uniform within one prior standard deviation of the calibrated point."
+    )
+    output: str = column("walking ratio, energy difference or break-even")
+    parameter: str = column("robot or component, and name in its file")
+    first_order: float = column("Sobol index of the number alone", "1")
+    first_order_95: float = column("half width of its 95 % interval", "1")
+    total: float = column("Sobol index with all interactions", "1")
+    total_95: float = column("half width of its 95 % interval", "1")
+
+
+def sensitivities(results: Mapping[str, Any]) -> list[Sensitivity]:
+    """Sobol indices of every number on every output."""
+    table = results["sensitivity"]
+    outputs = {output: own for output, own in table.items() if isinstance(own, Mapping)}
+    return [
+        Sensitivity(output, *row)
+        for output, own in outputs.items()
+        for row in zip(
+            table["names"], *(own[key] for key in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
+        )
+    ]
+
+
+def ranking(results: Mapping[str, Any], output: str) -> list[Sensitivity]:
+    """Every number's indices on an output, the largest total first."""
+    return sorted(
+        (row for row in sensitivities(results) if row.output == output), key=lambda row: -row.total
+    )
+
+
+def leading(ranked: Sequence[Sensitivity]) -> list[Sensitivity]:
+    """Those that may be the largest: their intervals reach the largest one's lower end.
+
+    One alone stands out; with more, nothing says which of them to measure first.
+    """
+    least = ranked[0].total - ranked[0].total_95
+    return [row for row in ranked if row.total + row.total_95 >= least]

@@ -18,8 +18,14 @@ from pipeline.paper.hexapod import (
     totals,
 )
 from pipeline.paper.judgement.basis import Basis
-from pipeline.paper.judgement.evidence import NONE, Interval, compared, evidence
-from pipeline.paper.judgement.fig_21 import EnergyPerMinute, per_minute
+from pipeline.paper.judgement.evidence import (
+    NONE,
+    EnergyPerMinute,
+    Interval,
+    compared,
+    evidence,
+    per_minute,
+)
 from pipeline.paper.judgement.leave_one_out import Prediction, leave_one_out
 from pipeline.paper.judgement.rows import (
     Row,

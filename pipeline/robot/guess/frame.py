@@ -1,4 +1,4 @@
-"""Whether the base's frame points as conventions say: x forward, y left, z up.
+"""The URDF to start from, its poses, and whether its base points x forward, y left, z up.
 
 A URDF does not say which way its base looks. Legs that are called left and right, front and rear,
 do, and so do feet that hang above their hips.
@@ -7,7 +7,9 @@ do, and so do feet that hang above their hips.
 from __future__ import annotations
 
 import re
+import xml.etree.ElementTree as ET
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -16,7 +18,11 @@ from pipeline.errors import RobotFileError
 from pipeline.robot.guess.limbs import Limb
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.leg_chains import LegChains
+from pipeline.robot.published import RobotSource, named_robot
+from pipeline.robot.urdf_source import number
 
+#: Poses of an SRDF that are meant to stand, those before others.
+STANDING_POSES = ("standing", "stand", "half_sitting", "home", "default")
 _AHEAD = {"front": 1, "fore": 1, "rear": -1, "hind": -1, "back": -1}
 _ASIDE = {"left": 1, "right": -1}
 #: Letters of two that name a corner; which of "rl" is the right and which the rear is usage.
@@ -98,4 +104,52 @@ def _remedy(root: str, rpy: str) -> str:
     return (
         f"make a new root link and hang '{root}' on it with a fixed joint of "
         f'<origin rpy="{rpy}"/>'
+    )
+
+
+def source_of(given: str) -> RobotSource:
+    """A URDF by path, or by its name in ``example-robot-data``.
+
+    Raises:
+        RobotFileError: It is a robot file.
+        UrdfError: It is neither, or the file cannot be read.
+    """
+    path = Path(given)
+    if path.suffix.lower() == ".toml":
+        raise RobotFileError(f"{given}: a robot file; init starts from a URDF or a robot's name")
+    known = named_robot(given)
+    if known is not None:
+        return known
+    name = f"{path.stem}.srdf"
+    beside = (path.parent / name, path.parent.parent / "srdf" / name)
+    srdf = next((p for p in beside if p.is_file()), None)
+    return RobotSource(path.stem, path, srdf, published=False)
+
+
+def standing_pose(source: RobotSource) -> tuple[str, dict[str, float]] | None:
+    """The SRDF's pose for standing: its name, and joint positions [rad, m].
+
+    Returns None where there is no SRDF, or no pose in it that is called as poses for standing are.
+
+    Raises:
+        RobotFileError: The SRDF is malformed.
+        UrdfError: A position is no number.
+    """
+    if source.srdf is None:
+        return None
+    try:
+        root = ET.fromstring(source.srdf.read_bytes())
+    except ET.ParseError as error:
+        raise RobotFileError(
+            f"{source.srdf}: line {error.position[0]}: malformed XML; correct it, or move it away "
+            "and the stance is sought"
+        ) from None
+    poses: dict[str, dict[str, float]] = {}
+    for state in root.findall("group_state"):
+        own = poses.setdefault(state.get("name", ""), {})
+        for joint in state.findall("joint"):
+            if len(joint.get("value", "").split()) == 1:  # a floating base has seven
+                own[joint.get("name", "")] = number(joint, "value", str(source.srdf))
+    return next(
+        ((name, poses[name]) for name in (source.pose, *STANDING_POSES) if poses.get(name)), None
     )

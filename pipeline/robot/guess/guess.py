@@ -12,11 +12,10 @@ import pinocchio as pin
 from actuators.errors import closest, one_line
 from pipeline.errors import RobotFileError
 from pipeline.robot.check import refused
-from pipeline.robot.guess.frame import refuse_turned
+from pipeline.robot.guess.frame import refuse_turned, source_of, standing_pose
 from pipeline.robot.guess.limbs import Limb, find_limbs
 from pipeline.robot.guess.motors import KnownMotors, known_motors, names_of
 from pipeline.robot.guess.pace import Pace, find_pace
-from pipeline.robot.guess.source import source_of, standing_pose
 from pipeline.robot.guess.stance import Margin, Stance, Standing
 from pipeline.robot.kinematics import leg_columns
 from pipeline.robot.leg_chains import leg_chains

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from actuators.arrays import Array
 from pipeline.errors import GaitError
-from pipeline.robot.inverse.damped import approach
-from pipeline.robot.inverse.least_motion import freedoms
+from pipeline.robot.inverse.least_motion import approach, freedoms
 from pipeline.robot.inverse_kinematics import ACCEPTED, beyond_reach, reach, solve_positions
 from pipeline.robot.robot import Robot
 

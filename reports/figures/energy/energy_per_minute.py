@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.paper.judgement.fig_21 import EnergyPerMinute
+from pipeline.paper.judgement.evidence import EnergyPerMinute
 from reports.figures.style import (
     CYCLE,
     INK,

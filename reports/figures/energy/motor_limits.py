@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuators.arrays import Array
-from actuators.energy.envelope import operating_region
-from actuators.energy.limits import rms_over_time
+from actuators.energy.limits import operating_region, rms_over_time
 from reports.figures.style import (
     BLUE,
     GREEN,

@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from actuators.elements.element import Friction, Inertia, Ratio
 from actuators.elements.friction_curve import FrictionCurve
+from actuators.elements.heating import Warming
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.hypoid import Hypoid
 from actuators.elements.position_torque import ParallelSpring, Ripple
 from actuators.elements.second_motor import SecondMotor
 from actuators.elements.two_body import TwoBody
-from actuators.elements.warming import Warming
 from actuators.errors import UnphysicalElementError
 from tests.actuators.motions import constant
 

@@ -10,8 +10,7 @@ from actuators.elements.element import Ratio
 from actuators.elements.holding_brake import HoldingBrake
 from actuators.elements.position_torque import ParallelSpring, Ripple
 from actuators.elements.second_motor import SecondMotor
-from actuators.energy.balance import balance_residual
-from actuators.energy.energy import integral
+from actuators.energy.energy import balance_residual, integral
 from actuators.errors import ChainError
 from actuators.loading.build import CATALOG, load_catalog
 from tests.actuators.motions import constant, harmonic, series, split

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from actuators.elements.warming import ZERO_CELSIUS, Warming
+from actuators.elements.heating import ZERO_CELSIUS, Warming
 
 
 def test_it_is_the_first_order_of_an_exponential_law() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import pipeline as lw
-from actuators.energy.balance import balance_residual
+from actuators.energy.energy import balance_residual
 from actuators.errors import DataSheetError
 from actuators.loading.build import load_catalog
 from actuators.loading.own_folder import parameters_of

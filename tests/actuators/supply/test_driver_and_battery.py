@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from actuators.errors import UnphysicalElementError
-from actuators.supply.battery import Battery
-from actuators.supply.driver import Driver
+from actuators.supply import Battery, Driver
 
 PACK = Battery("pack", energy=650 * 3600.0, full=54.0, empty=42.0, resistance=0.08)
 

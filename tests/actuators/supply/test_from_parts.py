@@ -7,7 +7,7 @@ import pytest
 
 from actuators.errors import DataSheetError
 from actuators.loading.parts import Part, load_parts
-from actuators.supply.from_parts import battery_of, driver_of
+from actuators.supply import battery_of, driver_of
 
 PARTS = load_parts()
 WH = 3600.0

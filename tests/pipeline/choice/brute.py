@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from actuators.energy.energy import supply_of
 from actuators.energy.limits import limit_rows
-from actuators.energy.regeneration import supply_of
 from pipeline.choice.parts.designs import Designs
 from pipeline.choice.search import Demanded
 

@@ -12,7 +12,7 @@ import pytest
 
 import pipeline as lw
 from actuators.loading.parts import PACK, load_parts
-from actuators.supply.battery import HOUR
+from actuators.supply import HOUR
 from pipeline.choice.answer.full import lasting, through
 from pipeline.choice.asked import Asked
 from pipeline.choice.group import groups_of

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import GaitError
-from pipeline.simulation import memory
+from pipeline.simulation import settings as memory
 from tests.command_line import Command
 
 

@@ -17,8 +17,7 @@ from pipeline.dynamics.joint_demand import motion_demand, segment_demand
 from pipeline.errors import GaitError, SlidingError, TippingError
 from pipeline.motion.motion import Segment
 from pipeline.motion.payload import with_payload
-from pipeline.motion.standing import standing_posture
-from pipeline.motion.support import stability_margins
+from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 

@@ -12,7 +12,7 @@ import pytest
 from pipeline.dynamics.force_rules import PAPER, GroundForces, LeastTorque
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.dynamics.joint_demand import segment_demand
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot, load_robot
 
 PUBLISHED_TORQUE = {"rm_joint_1": 0.0, "rm_joint_2": -30.71, "rm_joint_3": 1.46}  # [N*m]

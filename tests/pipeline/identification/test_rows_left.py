@@ -9,11 +9,9 @@ import pytest
 
 from pipeline.identification.compare.model_check import rows_left
 from pipeline.identification.workflow.compared import compare_logs, load_logs
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup
-from pipeline.logs.errors import LogContentError
+from pipeline.identification.workflow.setup import Options, setup
+from pipeline.logs.errors import Finding, LogContentError
 from pipeline.logs.prepared.measurement import Measurement
-from pipeline.logs.quality.finding import Finding
 
 PENDULUM = """<robot name="p"><link name="base"/>
 <joint name="a" type="revolute"><parent link="base"/><child link="l"/><axis xyz="0 1 0"/>

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.logs.errors import Quality
 from pipeline.logs.prepared.prepare import Prepared, prepare
 from pipeline.logs.prepared.stream import Stream, prepared_chunks, survey
-from pipeline.logs.quality.finding import Quality
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log

@@ -9,8 +9,8 @@ import pytest
 from numpy.typing import NDArray
 
 from pipeline.identification.compare.model_check import Course, friction_drift
+from pipeline.logs.errors import Finding
 from pipeline.logs.quality.checks import cannot_tell
-from pipeline.logs.quality.finding import Finding
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log

@@ -9,8 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from actuators.units import to_si
-from pipeline.logs.errors import GapError
-from pipeline.logs.quality.finding import Quality
+from pipeline.logs.errors import GapError, Quality
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.sampling import glitches, held, new_values, quantum
 from pipeline.logs.reading.expected import Expected

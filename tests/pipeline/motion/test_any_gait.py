@@ -14,7 +14,7 @@ import pytest
 from pipeline.motion.base_motion import base_in_world
 from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_positions
 from pipeline.robot.robot import Robot, load_robot

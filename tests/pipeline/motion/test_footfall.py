@@ -9,7 +9,7 @@ from pipeline.errors import GaitError
 from pipeline.motion.feet import support_course
 from pipeline.motion.footfall import GAITS, Footfall, in_turn, named, own
 from pipeline.motion.gait import Gait
-from pipeline.motion.ground import Ground
+from pipeline.motion.motion import Ground
 from pipeline.motion.support import longitudinal_margin
 from pipeline.robot.robot_file import LegSpec
 

@@ -9,7 +9,7 @@ import pytest
 
 from pipeline.errors import GaitError, OutOfReachError
 from pipeline.motion.motion import Motion
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.motion.transfer_path import TRANSFER_PATHS, transfer_path
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.kinematics import foot_jacobians, foot_positions

@@ -16,8 +16,8 @@ from pipeline.cli.options import settings_of
 from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior
 from pipeline.paper.judgement.basis import Basis, basis
+from pipeline.paper.judgement.evidence import Sensitivity
 from pipeline.paper.judgement.judge import Judgement
-from pipeline.paper.judgement.sensitivity import Sensitivity
 from pipeline.paper.omissions import Omission
 from pipeline.paper.published import Published
 from pipeline.robot.robot_file import RobotSpec

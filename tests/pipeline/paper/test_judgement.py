@@ -12,7 +12,14 @@ from pandas import DataFrame
 
 from actuators.units import to_si
 from pipeline.paper.calibration.problem import EXACT
-from pipeline.paper.judgement.evidence import LEAST, compared, evidence, quantiles
+from pipeline.paper.judgement.evidence import (
+    LEAST,
+    compared,
+    evidence,
+    quantiles,
+    ranking,
+    sensitivities,
+)
 from pipeline.paper.judgement.judge import Judgement
 from pipeline.paper.judgement.leave_one_out import leave_one_out
 from pipeline.paper.judgement.readings import (
@@ -32,7 +39,6 @@ from pipeline.paper.judgement.rows import (
     judged,
     sentences,
 )
-from pipeline.paper.judgement.sensitivity import ranking, sensitivities
 from pipeline.paper.published import DIMENSIONS, EVEN, EXTRA, HELD, ROLES, Published
 
 CONTRADICTED = ("rotor_motor_torque_2", "rotor_leg_energy_3s")

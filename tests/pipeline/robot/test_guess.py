@@ -12,8 +12,7 @@ import pytest
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import PipelineError, RobotFileError
 from pipeline.motion.gait import gait_of
-from pipeline.motion.standing import standing_posture
-from pipeline.motion.support import support_margin
+from pipeline.motion.support import standing_posture, support_margin
 from pipeline.robot.check import check_robot
 from pipeline.robot.guess.frame import quarter_turns
 from pipeline.robot.guess.guess import Guess, guess_robot

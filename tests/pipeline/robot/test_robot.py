@@ -12,8 +12,7 @@ import pytest
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.errors import GaitError, OutOfReachError, UrdfError
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.standing import standing_posture
-from pipeline.motion.support import stability_margins
+from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.inverse_kinematics import solve_positions, solve_rates
 from pipeline.robot.kinematics import foot_positions

@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuators.energy.balance import balance_residual
-from actuators.energy.energy import stage_energies
-from actuators.energy.regeneration import supply
+from actuators.energy.energy import balance_residual, stage_energies, supply
 from actuators.loading.build import load_catalog
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking, walk

@@ -17,11 +17,9 @@ import pytest
 
 from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.compared import compare_logs, load_logs
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup
+from pipeline.identification.workflow.setup import Options, setup
 from pipeline.logs.columns.findings import SUSPECTED
-from pipeline.logs.errors import LogContentError
-from pipeline.logs.quality.finding import Finding
+from pipeline.logs.errors import Finding, LogContentError
 from pipeline.simulation.along_logs import wrong_columns
 from tests.leg_log import leg_logs
 

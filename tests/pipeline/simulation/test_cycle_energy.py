@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from actuators.energy.regeneration import Supply
+from actuators.energy.energy import Supply
 from pipeline.dynamics.contact_forces import ContactForces
-from pipeline.dynamics.demand import JointDemand
+from pipeline.dynamics.force_rules import JointDemand
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.simulation.cycle_energy import (
     quasi_static_energies,

@@ -24,7 +24,7 @@ from pipeline.effects.model_file import (
 )
 from pipeline.logs.errors import MappingError, ModelFileError
 from pipeline.machine.machine import MachineModel
-from pipeline.simulation.export.exported import exported
+from pipeline.simulation.export.formats import exported
 from pipeline.simulation.export.joints import bodies_of
 from pipeline.simulation.files import base_model
 

@@ -9,16 +9,15 @@ import pytest
 from scipy.optimize import minimize
 
 from actuators.loading.build import load_catalog
-from pipeline.dynamics.demand import JointDemand
-from pipeline.dynamics.force_rules import GroundForces, LeastTorque
+from pipeline.dynamics.force_rules import GroundForces, JointDemand, LeastTorque
 from pipeline.dynamics.internal_forces import internal_basis
 from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.motion import Segment
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot
-from pipeline.simulation.ground_forces.force_choice import LEAST_POWER, RULES
-from pipeline.simulation.ground_forces.least_power import LeastPower, PowerOfJoints
+from pipeline.simulation.force_choice import LEAST_POWER, RULES
+from pipeline.simulation.least_power import LeastPower, PowerOfJoints
 from pipeline.simulation.walk_stand import Regeneration, compare_rules
 from tests.pipeline.dynamics.test_force_rules import shown, swinging
 

@@ -11,7 +11,7 @@ import trimesh
 
 from pipeline.api.pictures.scene import Scene
 from pipeline.dynamics.joint_demand import segment_demand
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures.robot.meshes import mesh_file, read_mesh, thinned

@@ -13,7 +13,7 @@ import pytest
 
 from pipeline.api.pictures.scene import Scene
 from pipeline.errors import FigureError
-from pipeline.motion.standing import standing_posture
+from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures.robot.joint_directions import joint_directions_figure

@@ -13,8 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipeline.identification.workflow.compared import load_logs
-from pipeline.identification.workflow.options import Options
-from pipeline.identification.workflow.setup import setup
+from pipeline.identification.workflow.setup import Options, setup
 from pipeline.logs.quality.checks import refuse_repeats
 from pipeline.logs.reading.expected import expected_of_robot
 from pipeline.logs.reading.read import read_log

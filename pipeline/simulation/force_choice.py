@@ -9,7 +9,7 @@ from actuators.errors import closest
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, ForceRule, GroundForces, LeastTorque
 from pipeline.errors import GaitError
 from pipeline.machine.joint import Actuators
-from pipeline.simulation.ground_forces.least_power import Adjust, LeastPower
+from pipeline.simulation.least_power import Adjust, LeastPower
 
 LEAST_TORQUE, LEAST_POWER = "least_torque", "least_power"
 RULES = (LEAST_TANGENTIAL, LEAST_TORQUE, LEAST_POWER)

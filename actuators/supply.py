@@ -1,0 +1,240 @@
+"""What stands between battery and motors: the battery itself, and the drivers on its bus.
+
+A battery's open-circuit voltage falls in proportion to the charge drawn, from `full` to `empty`,
+with mean E; behind it stands a constant internal resistance (Plett, Battery Management Systems I,
+section 2.2 and 2.3). Terminal power P is positive out of the battery:
+
+    V = E(s) - R I,    P = V I    =>    I = 2 P / (E + sqrt(E^2 - 4 R P))
+    ds/dt = -I / Q   (I > 0)    or   -returned I / Q   (I < 0),    Q = energy / E
+
+The power is greatest, E^2 / 4R, where half of the voltage is left; it is not to be had beyond.
+Discharge ends at s = 0, or where the terminals of the mode that draws most fall below a cut-off,
+at an open-circuit voltage of U + R P / U.
+
+Of the bus's direct current a driver (servo amplifier) makes the motor's. Two transistors at a time
+carry the current from terminal to terminal, in a bridge for a brushed motor and on average in one
+of three phases, where each phase flows through one: 3 I_rms^2 R_on = 2 R_on x 1.5 I_rms^2. In the
+motor's own ampere (`actuators.loading.converted`, c = 1, 0.75 or 1.5) conduction costs 2 c R_on I^2
+as the winding costs c R I^2. Hard switching costs in proportion to voltage and current, 1/2 U I
+(t_r + t_f) f (Mohan, Undeland and Robbins, Power Electronics, chapter 2); gate drivers and logic
+cost the same at any current.
+
+    loss = idle + 2 c R_on I^2 + switching U |I|            at the bus, positive
+    |U_motor| <= voltage_share U - 2 c R_on |I|
+
+`driver_of` and `battery_of` make them of what data sheets print (`actuators.loading.parts`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Final
+
+import numpy as np
+
+from actuators.arrays import Array, Numbers, Scalars, require
+from actuators.errors import DataSheetError
+
+Values = Mapping[str, float]
+#: Nodes of Gauss and Legendre over the charge; the integrand is smooth above the greatest power.
+_NODES, _WEIGHTS = (np.asarray(a) for a in np.polynomial.legendre.leggauss(24))
+HOUR: Final = 3600.0  # [s]
+
+
+@dataclass(frozen=True)
+class Battery(Numbers):
+    """One battery.
+
+    Raises:
+        UnphysicalElementError: A number is negative or not finite, nothing is in it, or it is
+            emptier than full.
+    """
+
+    rules: ClassVar = {"energy": "positive"}
+    name: str  #: Of the part.
+    energy: float  #: From full to empty at a small current [J].
+    full: float  #: Open-circuit voltage when full [V].
+    empty: float  #: Open-circuit voltage when it counts as empty [V].
+    resistance: float = 0.0  #: Internal [ohm].
+    returned: float = 1.0  #: Share of the charge fed into it that can be drawn again [1].
+    mass: float = 0.0  #: [kg]; no law uses it.
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require(0.0 < self.empty <= self.full, self.name, "0 < empty <= full voltage must hold")
+        require(self.returned <= 1.0, self.name, "returned must not be above 1")
+
+    @property
+    def charge(self) -> float:
+        """From full to empty [A*s]."""
+        return self.energy / (0.5 * (self.full + self.empty))
+
+    def open_voltage(self, charged: Array) -> Array:
+        """Return the voltage without current at a share of charge (...) that is left, (...) [V]."""
+        return self.empty + (self.full - self.empty) * np.asarray(charged)
+
+    def current(self, power: Array, charged: Array) -> Array:
+        """Return the current out of the battery, (...) [A]; NaN where it cannot give the power.
+
+        Args:
+            power: At the terminals, positive out, (...) [W].
+            charged: Share of the charge that is left, (...) in [0, 1].
+        """
+        voltage, power = self.open_voltage(charged), np.asarray(power, dtype=float)
+        left = voltage * voltage - 4.0 * self.resistance * power
+        root = np.sqrt(np.where(left >= 0.0, left, np.nan))
+        return np.asarray(2.0 * power / (voltage + root))
+
+    def charge_at_end(self, power: Array, cut_off: float = 0.0) -> Array:
+        """Return the share of charge that stays, (...) in [0, 1]; 1 where it cannot even begin.
+
+        Args:
+            power: The greatest at the terminals, (...) [W].
+            cut_off: Least voltage at the terminals that drivers work with [V].
+        """
+        power = np.maximum(power, 0.0)
+        # The branch above half of the voltage; below it the greatest power is the bound.
+        limit = np.maximum(cut_off, np.sqrt(self.resistance * power))
+        drop = np.divide(self.resistance * power, limit, out=np.zeros_like(limit), where=limit > 0)
+        needed = limit + drop
+        if self.full == self.empty:
+            return np.where(needed <= self.full, 0.0, 1.0)
+        return np.clip((needed - self.empty) / (self.full - self.empty), 0.0, 1.0)
+
+    def hours(
+        self,
+        power: Array,
+        shares: Array,
+        *,
+        peak: Array | None = None,
+        cut_off: float = 0.0,
+    ) -> Array:
+        """Return how long a full battery lasts, (...) [h]; infinite where nothing is drawn.
+
+        The modes alternate so quickly that the charge hardly changes in one round of them.
+
+        Args:
+            power: Of each mode at the terminals, hotel load and drivers included, positive out,
+                (..., M) [W]. Samples of one mode may stand for it where its power varies.
+            shares: Of the time in each mode, (M,), which sum to one.
+            peak: Greatest power within a mode, (...) [W]; that of the modes by default.
+            cut_off: Least voltage at the terminals that drivers work with [V].
+
+        Raises:
+            UnphysicalElementError: The shares are negative or do not sum to one.
+        """
+        power, shares = np.asarray(power, dtype=float), np.asarray(shares, dtype=float)
+        require(shares >= 0.0, self.name, "shares must not be negative")
+        require(math.isclose(shares.sum(), 1.0, abs_tol=1e-6), self.name, "shares must sum to 1")
+        peak = np.maximum(np.max(power, axis=-1), -np.inf if peak is None else peak)
+        last = self.charge_at_end(peak, cut_off)
+        half = 0.5 * (1.0 - last)
+        charged = (last + half)[..., None] + half[..., None] * _NODES  # (..., 24)
+        current = self.current(power[..., None, :], charged[..., None])  # (..., 24, M)
+        drawn = np.where(current < 0.0, self.returned * current, current) @ shares  # [A]
+        able = half > 0.0  # else it cannot even begin, and lasts no time
+        with np.errstate(divide="ignore"):
+            pace = np.where(able[..., None] & ~(drawn > 0.0), np.inf, 1.0 / drawn)  # [1/A]
+        lasting = np.where(able, np.where(able, half, 1.0) * (pace @ _WEIGHTS), 0.0)
+        return np.asarray(self.charge * lasting / HOUR)
+
+
+@dataclass(frozen=True, eq=False)
+class Driver(Numbers):
+    """One driver; numbers may be arrays that broadcast against current and voltage.
+
+    Raises:
+        UnphysicalElementError: A loss is negative or not finite, or a limit not positive.
+    """
+
+    rules: ClassVar = {
+        "voltage_share": "positive",
+        **dict.fromkeys(("continuous_current", "peak_current", "most_voltage"), "limit"),
+    }
+    name: str  #: Of the part.
+    resistance: Scalars = 0.0  #: In series with the winding, 2 c R_on [ohm].
+    #: Power while it is enabled, whatever the current [W]; none while it is off.
+    idle: Scalars = 0.0
+    switching: Scalars = 0.0  #: Loss over bus voltage times current [1].
+    voltage_share: Scalars = 1.0  #: Greatest motor voltage over bus voltage, without current [1].
+    continuous_current: Scalars = math.inf  #: Permissible root mean square current [A].
+    peak_current: Scalars = math.inf  #: Permissible instantaneous current [A].
+    least_voltage: Scalars = 0.0  #: Of the bus, below which it switches off [V].
+    most_voltage: Scalars = math.inf  #: Of the bus [V].
+
+    def loss(self, current: Array, bus: Scalars) -> Array:
+        """Return the power that the enabled driver turns into heat, (...) [W], not negative.
+
+        The bus [V] supplies it in addition to the motor's, whichever way its current (...) [A]
+        flows.
+        """
+        size = np.abs(current)
+        return self.idle + self.resistance * size * size + self.switching * bus * size
+
+
+def driver_of(name: str, x: Values, *, current_of: float = 1.0) -> Driver:
+    """Return a driver in the ampere of a motor, by c (`actuators.loading.data_sheet.CURRENTS`).
+
+    What is missing at full voltage and continuous current to the loss that its efficiency states,
+    in addition to idle power and conduction, is switching, which nothing else on a sheet tells.
+
+    Raises:
+        DataSheetError: An entry is missing; names all that are.
+        UnphysicalElementError: A value that cannot be.
+    """
+    _require(name, x, "on_resistance", "idle_power", "efficiency", "voltage_share", "most_voltage")
+    rated = x.get("continuous_current", x.get("peak_current", math.nan))  # [A]
+    if math.isnan(rated):
+        raise DataSheetError(f"driver '{name}': missing continuous_current or peak_current")
+    root, bus = math.sqrt(current_of), x["most_voltage"]
+    resistance = 2.0 * current_of * x["on_resistance"]
+    given = root * x["voltage_share"] * bus * rated  # into the motor at full voltage [W]
+    lost = given * (1.0 / x["efficiency"] - 1.0)  # [W]
+    rest = max(lost - x["idle_power"] - resistance * rated**2, 0.0)
+    limits = {k: x[k] for k in ("continuous_current", "peak_current", "least_voltage") if k in x}
+    return Driver(
+        name,
+        resistance,
+        x["idle_power"],
+        switching=rest / (bus * rated),
+        voltage_share=root * x["voltage_share"],
+        most_voltage=bus,
+        **limits,
+    )
+
+
+def battery_of(
+    name: str, x: Values, *, energy: float | None = None, voltage: float | None = None
+) -> Battery:
+    """Return a battery of an energy when full [J] and a nominal voltage [V], or of the sheet's.
+
+    `sag` is the share of the nominal voltage that the current of one hour costs, so that
+    R = sag U^2 / (energy / 1 h), however cells are joined.
+
+    Raises:
+        DataSheetError: An entry is missing; names all that are.
+        UnphysicalElementError: A value that cannot be.
+    """
+    stated = {"energy": energy, "voltage": voltage}
+    known = {**x, **{entry: value for entry, value in stated.items() if value is not None}}
+    _require(name, known, "energy", "voltage", "voltage_swing", "sag", "usable", "returned")
+    nominal, full, swing = known["voltage"], known["energy"], known["voltage_swing"]
+    mass = x.get("mass", 0.0)
+    if "specific_energy" in x and (energy is not None or not mass):
+        mass = full / x["specific_energy"]
+    return Battery(
+        name,
+        full * known["usable"],
+        nominal * (1.0 + swing),
+        nominal * (1.0 - swing),
+        known["sag"] * nominal**2 * HOUR / full,
+        known["returned"],
+        mass,
+    )
+
+
+def _require(name: str, x: Values, *entries: str) -> None:
+    if lacking := ", ".join(entry for entry in entries if entry not in x):
+        raise DataSheetError(f"part '{name}': missing {lacking}")

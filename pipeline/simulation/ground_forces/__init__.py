@@ -1,1 +1,0 @@
-"""Which of the forces that the ground could give is taken, by what it costs."""
