@@ -14,7 +14,7 @@ from typing import Any
 from pipeline.errors import ReportError
 from reports.roundoff import without_roundoff
 from reports.table import Table
-from reports.typeset import number_text, prose, unit_text
+from reports.typeset import number, prose, unit_text
 
 
 @dataclass(frozen=True)
@@ -40,10 +40,10 @@ class TableBlock:
         Raises:
             ReportError: A row with another number of cells than there are headers.
         """
-        for number, row in enumerate(self.rows):
+        for k, row in enumerate(self.rows):
             if len(row) != len(self.headers):
                 raise ReportError(
-                    f"table '{self.caption}', row {number}: {len(row)} cells under "
+                    f"table '{self.caption}', row {k}: {len(row)} cells under "
                     f"{len(self.headers)} headers"
                 )
 
@@ -171,5 +171,5 @@ def cell_text(value: Any, digits: int = 4) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return number_text(value, digits)
+        return number(value, digits)
     return str(value).replace("-", "\N{MINUS SIGN}") if is_number(value) else prose(str(value))

@@ -23,12 +23,13 @@ _LINK = re.compile(r"\[([^\]]+)\]\([^)]+\)")
 _NEGATIVE = re.compile(r"(?<![\w.)\]\-])-(?=\d)")
 
 
-def number_text(value: float, digits: int = 3) -> str:
+def number(value: float, digits: int = 3) -> str:
     """A number as it is where it is short, else rounded to significant digits, zeros kept.
 
     A true minus sign; a power of ten only far from 1. So 0.6, as it stands in a file, is ``0.6``,
     and 0.59996 with three digits is ``0.600``: who sees zeros at the end sees a rounded number.
     """
+    value = float(value)
     if not math.isfinite(value):
         return "\N{EN DASH}" if math.isnan(value) else f"{MINUS if value < 0 else ''}\N{INFINITY}"
     if value == 0:

@@ -13,10 +13,10 @@ from reports.page import (
     FigureBlock,
     Section,
     TableBlock,
-    cell_text,
     table_block,
 )
 from reports.table import Table
+from reports.typeset import number
 
 TEMPLATES = Path(__file__).parent / "templates"
 _FIGURE = re.compile(r"!\[(.*)\]\((.+)\)( half)?")
@@ -98,11 +98,6 @@ def _environment() -> Any:
     )
     environment.filters.update(number=number, percent=percent, listed=listed, few=few)
     return environment
-
-
-def number(value: float, digits: int = 3) -> str:
-    """A rounded number."""
-    return cell_text(float(value), digits)
 
 
 def percent(share: float, digits: int = 0) -> str:

@@ -23,20 +23,19 @@ from pipeline.paper.judgement.judge import Judgement
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking
-from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
-from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
-from reports.figures.energy.electrical_energy import electrical_energy_figure
-from reports.figures.energy.energy_per_minute import BreakEven, energy_per_minute_figure
-from reports.figures.energy.joint_demand import joint_demand_figure
-from reports.figures.energy.motor_limits import SUBTITLE, common_scale, motor_limits_figure
-from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
+from reports.figures.actuator_chain import actuator_chain_figure, chain_sections
+from reports.figures.bars import electrical_energy_figure
+from reports.figures.break_even import BreakEven, energy_per_minute_figure
+from reports.figures.demand import ground_forces_figure, joint_demand_figure, joint_torques_figure
+from reports.figures.motor_limits import SUBTITLE, common_scale, motor_limits_figure
 from reports.figures.robot.gait_steps import gait_steps
 from reports.figures.robot.gait_view import gait_figure
 from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.robot_view import robot_figure
 from reports.figures.save import save_figures
-from reports.figures.stretch import Stretch
+from reports.figures.stage_energy import energy_limits, stage_energy_figure
 from reports.figures.style import NARROW
+from reports.figures.walk import Stretch
 from reports.pages.gait_words import conditions, gait_and_conditions
 from reports.pages.names import leg_words, short_titles, shown_leg
 

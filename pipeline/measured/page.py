@@ -24,13 +24,13 @@ from pipeline.measured.tables import (
     unknown_rows,
 )
 from pipeline.progress import Progress
-from reports.figures.ranges import Range, ranges_figure
+from reports.figures.bars import Range, ranges_figure
 from reports.figures.save import save_figures
 from reports.folder import staged
 from reports.html import write_html
 from reports.page import FigureBlock, Page, Section, table_block
 from reports.table import Table, table_of
-from reports.typeset import number_text
+from reports.typeset import number
 from reports.writer import write_table
 
 if TYPE_CHECKING:
@@ -135,11 +135,11 @@ def _sentences(measured: Table) -> list[str]:
     """What is predicted and measured of each robot's first computed quantity."""
     first: dict[str, str] = {}
     for robot, quantity, (low, nominal, high), watts in _computed(measured):
-        told = f"{' to '.join(map(number_text, watts))} W" if watts else "not told"
+        told = f"{' to '.join(map(number, watts))} W" if watts else "not told"
         first.setdefault(
             robot,
-            f"{robot}, {quantity}: predicted **{number_text(low)} to {number_text(high)} W** "
-            f"(likeliest {number_text(nominal)} W), measured **{told}**.",
+            f"{robot}, {quantity}: predicted **{number(low)} to {number(high)} W** "
+            f"(likeliest {number(nominal)} W), measured **{told}**.",
         )
     return list(first.values())
 

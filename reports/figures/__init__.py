@@ -1,1 +1,1 @@
-"""One file per kind of figure; each function takes plain results and returns a Figure."""
+"""One file per subject; each function takes plain results and returns a Figure."""

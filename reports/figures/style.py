@@ -6,22 +6,19 @@ imported when the first figure is drawn, not with this module.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import cache
 from pathlib import Path
-from textwrap import shorten
 from typing import TYPE_CHECKING, Any
-
-from reports.typeset import number_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 # Okabe and Ito (2008), Color Universal Design.
-BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+ORANGE, SKY, GREEN = "#E69F00", "#56B4E9", "#009E73"
 YELLOW, BLUE, VERMILION, PURPLE = "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 INK, QUIET, FAINT, SHADE_DARK, SHADE = "#1a1a1a", "#5f6368", "#c8ccd0", "#dde1e6", "#eef1f4"
 
@@ -154,18 +151,9 @@ def horizontal_grid(axes: Axes) -> None:
     axes.spines["left"].set_visible(False)
 
 
-def name_rows(axes: Axes, names: Sequence[str], thick: float, *, above: bool) -> None:
-    """Names of horizontal bars, beside them or, in a narrow figure, above them.
-
-    Args:
-        names: From the top down, at 0, 1, ...
-    """
-    axes.set_yticks(range(len(names)), [] if above else names)
-    for row, name in enumerate(names if above else ()):
-        clear = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}  # of what lies behind
-        axes.text(0, row - thick / 2 - 0.04, shorten(name, 62), va="bottom", bbox=clear)
-    axes.tick_params(axis="y", length=0)
-    axes.spines["left"].set_visible(False)
+def on_white(pad: float) -> dict[str, Any]:
+    """The box of a text that stays legible over what lies behind, so many points wider."""
+    return {"facecolor": "white", "edgecolor": "none", "pad": pad}
 
 
 def zero_line(axes: Axes) -> None:
@@ -194,7 +182,3 @@ def arrow(
     shape = f"{style},head_width={head[0]:g},head_length={head[1]:g}"
     look = {"arrowstyle": shape, "linewidth": width, "linestyle": linestyle, "color": color}
     axes.annotate("", tip, tail, arrowprops=look | {"shrinkA": 0, "shrinkB": 0}, zorder=zorder)
-
-
-#: A value for a label, written as in the tables of a page.
-number = number_text

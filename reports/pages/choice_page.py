@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from reports.figures.choice import break_even_figure, day_figure, front_figure
+from reports.figures.bars import day_figure
+from reports.figures.break_even import break_even_figure, front_figure
 from reports.figures.save import save_figures
 from reports.html import write_html
 from reports.page import Block, FigureBlock, Page, Section, TableBlock, table_block

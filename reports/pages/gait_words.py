@@ -6,7 +6,7 @@ import math
 
 from pipeline.motion.gait import Gait, gait_of, gait_table
 from pipeline.robot.robot_file import RobotSpec
-from reports.typeset import number_text
+from reports.typeset import number
 
 #: Directions that have a name, by quarter turns to the left.
 _WAYS = {0: "", 1: "to the left", 2: "backward", 3: "to the right"}
@@ -21,7 +21,7 @@ def conditions(spec: RobotSpec) -> tuple[str, ...]:
     table, gait = gait_table(spec), gait_of(spec)
     said = [_way(gait), _ground(table.slope_forward, table.slope_left)]
     if table.payload_mass:
-        said.append(f"with a payload of {number_text(table.payload_mass)} kg")
+        said.append(f"with a payload of {number(table.payload_mass)} kg")
     return tuple(words for words in said if words)
 
 
@@ -32,12 +32,12 @@ def gait_and_conditions(spec: RobotSpec) -> str:
 
 def pace(gait: Gait) -> str:
     """How fast, and how often a step: ``at 0.16 m/s with a period of 3 s``."""
-    rate = f"{number_text(abs(gait.twist[2]))} rad/s" if gait.twist[2] else ""
+    rate = f"{number(abs(gait.twist[2]))} rad/s" if gait.twist[2] else ""
     if gait.speed:
-        fast = f"at {number_text(gait.speed)} m/s" + (f" and {rate}" if rate else "")
+        fast = f"at {number(gait.speed)} m/s" + (f" and {rate}" if rate else "")
     else:
         fast = f"at {rate}"
-    return f"{fast} with a period of {number_text(gait.period)} s"
+    return f"{fast} with a period of {number(gait.period)} s"
 
 
 def _way(gait: Gait) -> str:
@@ -69,4 +69,4 @@ def _ground(forward: float, left: float) -> str:
 
 def _degrees(angle: float) -> str:
     """Without the round-off of the way through radians."""
-    return number_text(round(abs(angle), 6))
+    return number(round(abs(angle), 6))

@@ -33,7 +33,8 @@ from reports.pages.gap_words import (
 from reports.pages.motor_words import motors_text
 from reports.pages.names import legs_text
 from reports.table import Table
-from reports.words import Shown, number, sections
+from reports.typeset import number
+from reports.words import Shown, sections
 
 #: Candidates that the page lists; `candidates.csv` has all.
 SHOWN_CANDIDATES = 15

@@ -28,8 +28,8 @@ from pipeline.logs.errors import EffectError
 from pipeline.simulation.cycle_energy import PAIR, EnergyChange
 from pipeline.simulation.found_bodies import FoundBodies, FoundBody
 from reports.page import TableBlock
-from reports.typeset import MINUS
-from reports.words import Words, listed, number
+from reports.typeset import MINUS, number
+from reports.words import Words, listed
 
 #: Of the folder of results, beside the model file.
 URDF_FILE = "model.urdf"

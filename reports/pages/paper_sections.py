@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from reports.page import TableBlock
 from reports.table import Table
-from reports.typeset import number_text, unit_text
+from reports.typeset import number, unit_text
 
 _TONES = {"yes": "good", "no": "bad", "in part": "bad"}
 
@@ -43,7 +43,7 @@ def sentences(table: Table) -> TableBlock:
 def _with_value(name: str, value: float | None, unit: str) -> str:
     if value is None:
         return name
-    return f"{name}: {number_text(value)}{'' if unit == '1' else f' {unit_text(unit)}'}"
+    return f"{name}: {number(value)}{'' if unit == '1' else f' {unit_text(unit)}'}"
 
 
 def _verdict(holds: Sequence[bool]) -> str:

@@ -15,7 +15,8 @@ from pipeline.identification.supply.account import (
 from reports.markdown import write_pages
 from reports.page import FigureBlock, Number, Page
 from reports.table import Table
-from reports.words import Shown, Words, number, percent, sections
+from reports.typeset import number
+from reports.words import Shown, Words, percent, sections
 
 WORDS = Words("power")
 

@@ -25,7 +25,7 @@ from reports.pages.motor_words import (
 )
 from reports.pages.names import leg_words, names_text, short_titles, shown_leg
 from reports.table import Table
-from reports.typeset import number_text
+from reports.typeset import number
 from reports.words import Shown, Words, sections
 
 FOOTER = "Every CSV has a .meta.json beside it: meanings, units, input hashes, versions."
@@ -95,18 +95,18 @@ def _numbers_first(
     joint, quantity, share = tightest(tables["motor_limits"])
     return (
         Number(
-            f"{' to '.join(number_text(powers[n]) for n in ends)} W",
+            f"{' to '.join(number(powers[n]) for n in ends)} W",
             f"to walk, by type of drive: {' to '.join(titles[n] for n in ends)}",
         ),
         Number(
-            f"{number_text(motors.total)} kg" if motors.total else "\N{EN DASH}",
-            f"would these motors weigh; the robot's file says {number_text(motors.robot)} kg in all"
+            f"{number(motors.total)} kg" if motors.total else "\N{EN DASH}",
+            f"would these motors weigh; the robot's file says {number(motors.robot)} kg in all"
             if motors.total
             else "the motors' mass, which their files do not state",
             "bad" if motors.too_heavy else "quiet",
         ),
         Number(
-            number_text(friction),
+            number(friction),
             "coefficient of friction that the feet need",
             "bad" if slips(friction, given.forces.friction_coefficient) else "good",
         ),

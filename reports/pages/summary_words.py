@@ -16,7 +16,7 @@ from pipeline.paper.motor_constants import asked_frictions
 from pipeline.paper.published import CYCLE, EVEN, EXTRA, ROLES
 from reports.page import Number
 from reports.table import Table
-from reports.typeset import TIMES, number_text
+from reports.typeset import TIMES, number
 from reports.words import Words, percent
 
 _REAL = ("rotor", "reversible", "irreversible")
@@ -30,7 +30,7 @@ def numbers_first(judged: Judgement) -> tuple[Number, ...]:
     out = []
     for row in (said[name] for name in _FIRST if name in said):
         share = row.id == EVEN
-        value = percent(row.computed, 1) if share else f"{number_text(row.computed)} {TIMES}"
+        value = percent(row.computed, 1) if share else f"{number(row.computed)} {TIMES}"
         part = "computed anew" if judged.by.results is None else row.role
         tone = "quiet" if row.holds else "bad"
         out.append(Number(value, f"*{part}:* {row.sentence}", tone))

@@ -21,14 +21,15 @@ from actuators.loading.build import load_catalog
 from actuators.shaft import ShaftSeries
 from pipeline.errors import FigureError
 from pipeline.paper.judgement.evidence import EnergyPerMinute
-from reports.figures.energy.actuator_chain import actuator_chain_figure, chain_sections
-from reports.figures.energy.electrical_energy import electrical_energy_figure
-from reports.figures.energy.energy_per_minute import BreakEven, energy_per_minute_figure
-from reports.figures.energy.joint_demand import joint_demand_figure
-from reports.figures.energy.motor_limits import common_scale, motor_limits_figure
-from reports.figures.energy.stage_energy import energy_limits, stage_energy_figure
+from reports.figures.actuator_chain import actuator_chain_figure, chain_sections
+from reports.figures.bars import electrical_energy_figure
+from reports.figures.break_even import BreakEven, energy_per_minute_figure
+from reports.figures.demand import joint_demand_figure
+from reports.figures.motor_limits import common_scale, motor_limits_figure
 from reports.figures.save import save_figure, save_figures
-from reports.figures.style import BLUE, VERMILION, house_style, number, own_fonts
+from reports.figures.stage_energy import energy_limits, stage_energy_figure
+from reports.figures.style import BLUE, VERMILION, house_style, own_fonts
+from reports.typeset import number
 from tests.reports.walks import stretch
 
 

@@ -8,10 +8,15 @@ import numpy as np
 import pytest
 
 from pipeline.errors import FigureError
-from reports.figures.gap.in_time import GapTrace, gap_time_figure
-from reports.figures.gap.signature import binned, gap_signature_figure
-from reports.figures.gap.waterfall import gap_waterfall_figure
-from reports.figures.gap.where import WhereGroup, where_map_figure
+from reports.figures.bars import gap_waterfall_figure
+from reports.figures.gap import (
+    GapTrace,
+    WhereGroup,
+    binned,
+    gap_signature_figure,
+    gap_time_figure,
+    where_map_figure,
+)
 from reports.figures.style import NARROW
 from reports.table import table_of
 from reports.tables.gap import FoundRow, deciding_motion

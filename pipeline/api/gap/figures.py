@@ -18,10 +18,14 @@ from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.logs.signals.grid import runs_of
 from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.predict import Prediction
-from reports.figures.gap.in_time import GapTrace, gap_time_figure
-from reports.figures.gap.signature import gap_signature_figure
-from reports.figures.gap.waterfall import gap_waterfall_figure
-from reports.figures.gap.where import WhereGroup, where_map_figure
+from reports.figures.bars import gap_waterfall_figure
+from reports.figures.gap import (
+    GapTrace,
+    WhereGroup,
+    gap_signature_figure,
+    gap_time_figure,
+    where_map_figure,
+)
 from reports.figures.save import save_figure
 from reports.figures.style import NARROW, WIDTH
 from reports.pages.gap_report import write_report

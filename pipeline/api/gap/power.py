@@ -13,7 +13,8 @@ from pipeline.identification.workflow.compared import judged
 from pipeline.identification.workflow.setup import Options, Setup
 from pipeline.logs.errors import Finding
 from pipeline.progress import Progress
-from reports.figures.gap.power import power_shares_figure, power_time_figure
+from reports.figures.bars import power_shares_figure
+from reports.figures.gap import power_time_figure
 from reports.figures.save import save_figure
 from reports.figures.style import NARROW, WIDTH
 from reports.pages.power_page import write_power_page

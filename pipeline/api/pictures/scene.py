@@ -12,8 +12,8 @@ from actuators.arrays import Array
 from pipeline.motion.gait import gait_table
 from pipeline.robot.robot import Robot
 from reports.figures.robot.solids import JointMark, Leg, Solid, outline, sphere, sticks
-from reports.figures.robot.steps import Body
 from reports.figures.robot.visuals import Visuals, read_visuals
+from reports.figures.walk import Body
 
 _STEEL = 7850.0  # [kg/m^3]
 _LOAD = (0.94, 0.89, 0.26)  # yellow, as no link of ours

@@ -24,7 +24,7 @@ from pipeline.errors import ReportError
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import walk
 from reports.figures.robot.solids import Solid, reach
-from reports.figures.robot.steps import Steps
+from reports.figures.walk import Steps
 from reports.pages.gait_words import gait_and_conditions
 
 #: Steps of a cycle.

@@ -7,8 +7,7 @@ import numpy as np
 from pipeline.api.pictures.scene import Scene, mass_centre
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking
-from reports.figures.robot.steps import Steps
-from reports.figures.stretch import Stretch
+from reports.figures.walk import Steps, Stretch
 
 #: Steps of a cycle that the moving picture shows.
 STEPS = 24

@@ -15,8 +15,9 @@ import numpy as np
 from actuators.arrays import Array
 from reports.figures.robot.projection import OBLIQUE, TOP, View
 from reports.figures.robot.solids import hull_points, outline, reach
-from reports.figures.robot.steps import Steps
-from reports.figures.style import BLUE, FAINT, GREEN, INK, QUIET, SHADE, VERMILION, YELLOW, number
+from reports.figures.style import BLUE, FAINT, GREEN, INK, QUIET, SHADE, VERMILION, YELLOW
+from reports.figures.walk import Steps
+from reports.typeset import number
 
 _WIDTH, _HEIGHT = 950.0, 560.0
 Panel = tuple[float, float, float, float]

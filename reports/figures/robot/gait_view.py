@@ -9,19 +9,10 @@ import numpy as np
 
 from actuators.arrays import Array
 from pipeline.errors import FigureError
-from reports.figures.robot.dimensions import dimension
-from reports.figures.stretch import Stretch
-from reports.figures.style import (
-    BLUE,
-    FAINT,
-    INK,
-    QUIET,
-    SHADE,
-    VERMILION,
-    house_style,
-    new_figure,
-    number,
-)
+from reports.figures.robot.robot_view import dimension
+from reports.figures.style import BLUE, FAINT, INK, QUIET, SHADE, VERMILION, house_style, new_figure
+from reports.figures.walk import Stretch
+from reports.typeset import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -26,7 +26,7 @@ from pipeline.api.pictures.walk import rows_of_steps, steps_of
 from pipeline.errors import ReportError
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking, walk
-from reports.figures.robot.steps import Steps
+from reports.figures.walk import Steps
 from tests.command_line import exit_code
 from tests.reports import browser
 

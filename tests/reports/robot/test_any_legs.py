@@ -15,16 +15,16 @@ from actuators.shaft import ShaftSeries
 from pipeline.api.pictures.scene import Scene
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.figures.energy.all_legs import ground_forces_figure, joint_torques_figure
-from reports.figures.energy.electrical_energy import electrical_energy_figure
-from reports.figures.energy.motor_limits import motor_limits_figure
-from reports.figures.energy.stage_energy import stage_energy_figure
+from reports.figures.bars import electrical_energy_figure
+from reports.figures.demand import ground_forces_figure, joint_torques_figure
+from reports.figures.motor_limits import motor_limits_figure
 from reports.figures.robot.gait_view import gait_figure
 from reports.figures.robot.joint_directions import joint_directions_figure
 from reports.figures.robot.robot_view import robot_figure
 from reports.figures.robot.solids import JointMark, Leg, sticks
-from reports.figures.stretch import Stretch
-from reports.figures.style import number
+from reports.figures.stage_energy import stage_energy_figure
+from reports.figures.walk import Stretch
+from reports.typeset import number
 from tests.reports import geometry
 from tests.reports.walks import crawl, stretch
 

@@ -17,7 +17,7 @@ from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking, walk
 from reports.figures.robot.gait_steps import gait_steps
 from reports.figures.robot.solids import hull_points, outline
-from reports.figures.robot.steps import Steps
+from reports.figures.walk import Steps
 
 SVG = "{http://www.w3.org/2000/svg}"
 

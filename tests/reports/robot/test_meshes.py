@@ -14,10 +14,9 @@ from pipeline.dynamics.joint_demand import segment_demand
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from reports.figures.robot.meshes import mesh_file, read_mesh, thinned
 from reports.figures.robot.projection import FRONT, draw_scene
 from reports.figures.robot.solids import cylinder, mesh
-from reports.figures.robot.visuals import read_visuals
+from reports.figures.robot.visuals import mesh_file, read_mesh, read_visuals, thinned
 from reports.figures.style import new_figure
 from tests.pipeline.cli.robots import own_robot
 

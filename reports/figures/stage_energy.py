@@ -18,9 +18,9 @@ from reports.figures.style import (
     horizontal_grid,
     house_style,
     new_figure,
-    number,
     zero_line,
 )
+from reports.typeset import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

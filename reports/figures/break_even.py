@@ -1,4 +1,4 @@
-"""Energy in a minute against the share of time spent standing: Fig. 21 of the paper."""
+"""Where one actuator begins to pay: energy by the share of standing, and a choice's pictures."""
 
 from __future__ import annotations
 
@@ -11,14 +11,18 @@ import numpy as np
 from actuators.arrays import Array
 from pipeline.paper.judgement.evidence import EnergyPerMinute
 from reports.figures.style import (
+    BLUE,
     CYCLE,
     INK,
+    NARROW,
     QUIET,
+    SKY,
+    VERMILION,
     horizontal_grid,
     house_style,
     new_figure,
-    number,
 )
+from reports.typeset import number
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -115,3 +119,57 @@ def _enlarge(
     if spread:
         text += f" (fitted),\nbefore the fit {number(spread[0])} to {number(spread[1])} %"
     axes.set_title(text, fontweight="bold", loc="center")
+
+
+@house_style()
+def front_figure(mass: Array, power: Array, answer: tuple[float, float]) -> Figure:
+    """Robots that none beats in mass and mean power, and the answer.
+
+    Args:
+        mass: Of all actuators [kg], shape (N,).
+        power: Mean over the day [W], shape (N,).
+        answer: Mass and power of what is recommended.
+    """
+    figure = new_figure(3.6, "Less mass costs energy", "robots that none beats", width=NARROW)
+    axes = figure.subplots()
+    order = np.argsort(mass)
+    axes.plot(mass[order], power[order], "o-", color=BLUE, markersize=3.5, label="front")
+    axes.plot(*answer, "D", color=VERMILION, markersize=7, label="answer, recomputed in full")
+    axes.set_xlabel("mass of all actuators [kg]")
+    axes.set_ylabel("mean power over the day [W]")
+    horizontal_grid(axes)
+    figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+@house_style()
+def break_even_figure(
+    share: Array, speed: Array, less: Mapping[float, Array], first: str, second: str
+) -> Figure:
+    """Where which of two candidates takes less, a panel for each idle power.
+
+    Args:
+        share: Of standing, increasing, shape (S,).
+        speed: Of walking [m/s], increasing, shape (V,).
+        less: Idle power of a driver [W] to power of the second less the first [W], shape (V, S).
+    """
+    from matplotlib.patches import Patch
+
+    title = "Which takes less"
+    figure = new_figure(1.2 + 1.75 * len(less), title, width=NARROW)
+    panels = figure.subplots(len(less), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, (idle, difference) in zip(panels, less.items(), strict=True):
+        axes.contourf(
+            100 * share, speed, difference, levels=[-1e9, 0.0, 1e9], colors=[CYCLE[4], SKY]
+        )
+        if difference.min() < 0 < difference.max():
+            axes.contour(100 * share, speed, difference, levels=[0.0], colors=[INK])
+        axes.set_title(f"{number(idle)} W idle per driver", fontsize=9, color=QUIET)
+        axes.set_ylabel("speed [m/s]")
+    panels[-1].set_xlabel("share of the time standing [%]")
+    keys = [
+        Patch(color=SKY, label=f"{first} takes less"),
+        Patch(color=CYCLE[4], label=f"{second} takes less"),
+    ]
+    figure.legend(handles=keys, loc="outside lower center", ncols=1)
+    return figure

@@ -20,8 +20,8 @@ from reports.figures.style import (
     arrow,
     house_style,
     new_figure,
-    number,
 )
+from reports.typeset import number
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

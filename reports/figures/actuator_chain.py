@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from actuators.chain import JOINT_STAGE, SUPPLY_STAGE
 from actuators.elements.element import Element
 from actuators.loading.build import Catalog
-from reports.figures.energy.stage_energy import stage_symbol
+from reports.figures.stage_energy import stage_symbol
 from reports.figures.style import (
     FORWARD,
     GREEN,
@@ -28,7 +28,7 @@ from reports.figures.style import (
     house_style,
     new_figure,
 )
-from reports.typeset import number_text, unit_text
+from reports.typeset import number, unit_text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -112,11 +112,11 @@ def _numbers(catalog: Catalog, references: Mapping[str, str]) -> tuple[str, ...]
     """Each argument's symbol, value and unit as in its file."""
     out = []
     for argument, reference in references.items():
-        number = catalog.parameter(reference)
-        unit = "" if number.unit == "1" else unit_text(number.unit)
+        given = catalog.parameter(reference)
+        unit = "" if given.unit == "1" else unit_text(given.unit)
         unit = unit if unit in ("", "°") else f"\N{NO-BREAK SPACE}{unit}"
         label = _SYMBOLS.get(argument, argument.replace("_", " "))
-        out.append(f"{label}\N{NO-BREAK SPACE}{number_text(number.value_as_written)}{unit}")
+        out.append(f"{label}\N{NO-BREAK SPACE}{number(given.value_as_written)}{unit}")
     return tuple(out)
 
 
@@ -145,8 +145,8 @@ def actuator_chain_figure(sections: Sequence[Section], *, title: str, subtitle: 
         if section.parts:
             _draw_block(axes, section, y + _GAP)
         y += section.height
-    for number, line in enumerate(legend):
-        axes.text(_MARGIN, y + 0.12 + _LINE * number, line, fontsize=8.5, color=QUIET, **look)
+    for k, line in enumerate(legend):
+        axes.text(_MARGIN, y + 0.12 + _LINE * k, line, fontsize=8.5, color=QUIET, **look)
     return figure
 
 

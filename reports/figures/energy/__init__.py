@@ -1,1 +1,0 @@
-"""Figures of demand, power and energy."""
