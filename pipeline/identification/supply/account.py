@@ -15,14 +15,16 @@ from pipeline.identification.supply.regression import (
     DRAWS,
     SEED,
     Problem,
+    Sag,
     better,
     blocks_of,
     choose,
     drawn_coefficients,
     intervals,
     rivals_of,
+    sag_of,
 )
-from pipeline.identification.supply.samples import FEWEST, SHORTEST, Sag, sag_of, supply_samples
+from pipeline.identification.supply.samples import FEWEST, SHORTEST, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, joined, rows_of, terms_of
 from pipeline.identification.workflow.compared import legs_of
 from pipeline.identification.workflow.setup import Setup

@@ -6,6 +6,10 @@ signed-rank test over blocks at 5 % over all terms tried (Bonferroni), and by 5 
 least. Terms that may stand in another's place without predicting worse by the same test are
 reported with it. Intervals are those of a bootstrap of blocks (Künsch 1989, Annals of Statistics
 17(3)).
+
+Under a supply's current its voltage falls (Plett, Battery Management Systems I, section 2.3):
+
+    V = V0 - R I - a t
 """
 
 from __future__ import annotations
@@ -20,6 +24,7 @@ from scipy.optimize import lsq_linear
 from scipy.stats import wilcoxon
 
 from actuators.arrays import Array, Mask
+from pipeline.identification.supply.samples import Samples
 from pipeline.identification.supply.terms import Rows, Term
 
 LEVEL: Final = 0.05
@@ -200,3 +205,47 @@ def blocks_of(rows: Rows, holdout: int, prove_last: float | None) -> tuple[NDArr
             proves[own] = place % PROVES == PROVES - 1
         first += count
     return block, proves
+
+
+@dataclass(frozen=True)
+class Sag:
+    """A supply's resistance with its 95 % interval, and how it shows."""
+
+    resistance: float  #: [ohm].
+    low: float  #: Lower end [ohm].
+    high: float  #: Upper end [ohm].
+    voltage: float  #: Without current, at the first sample [V].
+    #: Mean power that the resistance turns into heat before the voltage is measured [W].
+    lost: float
+
+
+def sag_of(samples: Sequence[Samples]) -> Sag | None:
+    """The supply's resistance; None where voltage and current were not both measured.
+
+    Each log has a voltage without current and a slope in time of its own: a battery runs down.
+    """
+    if not all(s.measured and np.isfinite(s.current).all() for s in samples):
+        return None
+    x, y, block = [], [], []
+    for k, s in enumerate(samples):
+        own = np.zeros((s.end.size, 1 + 2 * len(samples)))
+        own[:, 0] = -s.current
+        own[:, 1 + 2 * k], own[:, 2 + 2 * k] = 1.0, s.end - s.end[0]
+        x.append(own)
+        y.append(s.voltage)
+        count = max(1, min(BLOCKS, s.end.size // SMALLEST))
+        block.append(k * BLOCKS + np.arange(s.end.size) * count // s.end.size)
+    design, volts, number = np.concatenate(x), np.concatenate(y), np.concatenate(block)
+    current = -design[:, 0]
+    if np.ptp(current) == 0.0:
+        return None
+    found = np.linalg.lstsq(design, volts, rcond=None)[0]
+    rows = [np.flatnonzero(number == b) for b in np.unique(number)]
+    rng = np.random.default_rng(SEED)
+    draws = []
+    for _ in range(DRAWS):
+        kept = np.concatenate([rows[b] for b in rng.integers(0, len(rows), len(rows))])
+        draws.append(np.linalg.lstsq(design[kept], volts[kept], rcond=None)[0][0])
+    low, high = np.quantile(draws, [0.025, 0.975])
+    lost = float(found[0] * np.mean(current**2))
+    return Sag(float(found[0]), float(low), float(high), float(found[1]), lost)
