@@ -101,7 +101,7 @@ def energy_of_a_search() -> None:
 #: Module, function in it, and the phase of a run that its CPU time counts for.
 COUNTED = (
     ("pipeline.cli.walking", "settings_of", "loading"),
-    ("pipeline.api.reports", "stand", "computing"),
+    ("pipeline.api.reports", "stood", "computing"),
     ("pipeline.api.reports", "walked", "computing"),
     ("pipeline.api.reports", "write_table", "CSV and sidecars"),
     ("pipeline.api.judgement", "judged", "judging"),

@@ -11,8 +11,7 @@ from scipy.integrate import solve_ivp
 from actuators.elements.heating import COPPER
 from actuators.elements.two_body import REFERENCE_K, TwoBody
 from actuators.supply import Battery
-from pipeline.api.tables import walked
-from pipeline.sweep.case import Order
+from pipeline.sweep.case import Order, machine_of
 from pipeline.sweep.sweep import sweep
 from tests.bench_timing import Call, ratio, spread, timed
 
@@ -22,12 +21,12 @@ SPEEDS = [0.02 + 0.02 * k for k in range(8)]  # [m/s]
 def sweep_ratio() -> None:
     """A sweep against the same walks without rows, parts and file."""
     order = Order(samples=51)
-    machine = order.machine
+    machine = machine_of(order)
 
     def bare() -> None:
         for speed in SPEEDS:
             given = order.walking(machine.with_values({"gait.speed": f"{speed!r} m/s"}))
-            walked(given, given.chains())
+            given.walk(given.chains())
 
     def swept() -> None:
         with tempfile.TemporaryDirectory() as folder:

@@ -18,9 +18,8 @@ from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.motion.motion import Motion
 from pipeline.motion.walking import walking_motion
-from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, regeneration_of
-from pipeline.simulation.walk_stand import demand_along, joint_series
+from pipeline.simulation.walk_stand import joint_series
 from reports.tables.walking import walking_joint_demand
 
 if TYPE_CHECKING:
@@ -83,14 +82,13 @@ def demand(
     given = machine.walking(
         samples=samples,
         quasi_static=quasi_static,
-        motion=Path(motion) if isinstance(motion, str) else motion,
-        forces=ForceChoice(forces, power_of, friction_coefficient),
+        motion=motion,
+        forces=forces,
+        power_of=power_of,
+        friction_coefficient=friction_coefficient,
     )
     moved = given.motion or walking_motion(given.machine, samples=samples)
-    demanded = demand_along(
-        given.machine, moved, quasi_static=quasi_static, adjust=given.adjust, forces=given.ground
-    )
-    return Demand(moved, demanded, given.robot.sliding_joints)
+    return Demand(moved, given.demand(moved), given.robot.sliding_joints)
 
 
 def energy(

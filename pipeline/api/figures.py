@@ -53,6 +53,7 @@ SUBJECT_TITLES = {
 
 
 def write_figures(
+    scene: Scene,
     given: Settings,
     standing: Standing,
     walking: Walking,
@@ -64,6 +65,7 @@ def write_figures(
     """Draw and save every figure of a run, and its gait as a moving picture, ``gait_steps.svg``.
 
     Args:
+        scene: The run's robot.
         given: The run.
         standing: Its result.
         walking: Its result.
@@ -76,19 +78,19 @@ def write_figures(
     """
     spec = given.robot.spec
     title, subtitle = f"{spec.name}: {gait_of(spec).title}", ", ".join(conditions(spec))
-    moving = gait_steps(steps_of(Scene(given.robot), walking), title=title, subtitle=subtitle)
+    moving = gait_steps(steps_of(scene, walking), title=title, subtitle=subtitle)
     write_text(out / "gait_steps.svg", moving)
-    every = drawings(given, standing, walking, paper=paper)
+    every = drawings(scene, given, standing, walking, paper=paper)
     return 1 + save_figures(every, out, done=done)
 
 
 def drawings(
-    given: Settings, standing: Standing, walking: Walking, *, paper: bool = False
+    scene: Scene, given: Settings, standing: Standing, walking: Walking, *, paper: bool = False
 ) -> Drawings:
     """Every figure of a run."""
     parts = stretches(given.robot, walking)
     return {
-        **robot_drawings(Scene(given.robot), standing, parts),
+        **robot_drawings(scene, standing, parts),
         **_energy(given, walking),
         **_all_legs(given, parts),
         **_demand(given, parts, paper),

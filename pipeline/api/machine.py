@@ -64,13 +64,12 @@ class Machine:
             raise RobotFileError(
                 f"{self.path}: a URDF says nothing of legs and gait; give a robot file"
             )
-        fixed = not self.loaded.robot.floating
-        if fixed and options.get("motion") is None:
+        if options.get("motion") is None and not self.loaded.robot.floating:
             raise RobotFileError(
                 f"{self.path}: a robot on a stand neither stands nor walks; "
                 "give one with a floating base"
             )
-        return self.ready.walking(**options)
+        return self.loaded.walking(**options)
 
     def with_values(self, values: Mapping[str, object]) -> Machine:
         """The same machine with other numbers; no file is read for an actuator's or the gait's.
@@ -199,4 +198,4 @@ def load(
         gait=Path(gait) if gait else None,
         actuators=Path(actuators) if actuators else None,
     )
-    return Machine(files)._of(files, changes or {})
+    return Machine(files)._of(files, dict(changes or {}))

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result
-from pipeline.api.tables import inputs_of, metadata, tables_of_standing, tables_of_walking, walked
+from pipeline.api.tables import inputs_of, said_of, tables_of_standing, tables_of_walking
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.machine.joint import Actuators
-from pipeline.simulation import walk_stand
 from pipeline.simulation.edited import IDEAL
-from pipeline.simulation.force_choice import LEAST_POWER, ForceChoice
+from pipeline.simulation.force_choice import LEAST_POWER
 from pipeline.simulation.settings import SAMPLES, Settings
+from pipeline.simulation.walk_stand import Standing, Walking
 from reports.table import Table
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 class Stand(Result):
     """The robot standing still."""
 
-    result: walk_stand.Standing  #: Arrays: posture, demand, contacts, what holds, by alternative.
+    result: Standing  #: Arrays: posture, demand, contacts, what holds, by alternative.
 
     @property
     def holding(self) -> Table:
@@ -51,7 +51,7 @@ class Walk(Result):
     """The robot over one gait cycle."""
 
     #: Arrays: motion, demand, margins, stages and supplies, by alternative.
-    result: walk_stand.Walking
+    result: Walking
 
     @property
     def demand(self) -> Table:
@@ -91,13 +91,20 @@ def stand(
         PipelineError: The robot stands on a fixed base.
         ActuatorError: No such alternative.
     """
-    choice = _choice(forces, actuator, friction_coefficient)
-    given = machine.walking(forces=choice, walks=False)
-    chains = _beside_ideal(given, actuator)
-    result = walk_stand.stand(given.machine, chains, adjust=given.adjust, forces=given.ground)
-    inputs = tuple(inputs_of(given))
+    given = machine.walking(
+        forces=forces,
+        power_of=actuator if forces == LEAST_POWER else None,
+        friction_coefficient=friction_coefficient,
+        walks=False,
+    )
+    return stood(given, actuator)
+
+
+def stood(given: Settings, actuator: str | None = None) -> Stand:
+    """Standing as settings say; see `stand`."""
+    result = given.stand(_beside_ideal(given, actuator))
     tables = tables_of_standing(given, result)
-    return Stand("stand", tables, lambda: metadata(given), inputs, result)
+    return Stand("stand", tables, said_of(given), inputs_of(given), result)
 
 
 def walk(
@@ -136,21 +143,22 @@ def walk(
         ActuatorError: No such alternative.
     """
     given = machine.walking(
-        motion=Path(motion) if isinstance(motion, str) else motion,
+        motion=motion,
         samples=samples,
         quasi_static=quasi_static,
         regeneration=regeneration,
-        forces=_choice(forces, actuator, friction_coefficient),
+        forces=forces,
+        power_of=actuator if forces == LEAST_POWER else None,
+        friction_coefficient=friction_coefficient,
         compare_forces=compare_forces,
     )
-    result = walked(given, _beside_ideal(given, actuator))
-    inputs = tuple(inputs_of(given))
-    return Walk("walk", tables_of_walking(given, result), lambda: metadata(given), inputs, result)
+    return walked(given, actuator)
 
 
-def _choice(rule: str, actuator: str | None, friction_coefficient: float | None) -> ForceChoice:
-    own = actuator if rule == LEAST_POWER else None
-    return ForceChoice(rule, own, friction_coefficient)
+def walked(given: Settings, actuator: str | None = None) -> Walk:
+    """Walking as settings say; see `walk`."""
+    result = given.walk(_beside_ideal(given, actuator))
+    return Walk("walk", tables_of_walking(given, result), said_of(given), inputs_of(given), result)
 
 
 def _beside_ideal(given: Settings, actuator: str | None) -> Mapping[str, Actuators]:

@@ -8,19 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.api.machine import Machine
-from pipeline.api.result import Computed
-from pipeline.api.tables import (
-    inputs_of,
-    metadata,
-    tables_of_standing,
-    tables_of_walking,
-    walked,
-)
+from pipeline.api.motion import stood, walked
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.progress import Progress
-from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.settings import SAMPLES, Settings
-from pipeline.simulation.walk_stand import Standing, Walking, stand
+from pipeline.simulation.walk_stand import Standing, Walking
 from reports.folder import staged
 from reports.pages.motor_words import limits_text, motors_text
 from reports.pages.names import short_titles
@@ -75,7 +67,9 @@ def reports(
         samples=samples,
         quasi_static=quasi_static,
         regeneration=regeneration,
-        forces=ForceChoice(forces, power_of, friction_coefficient),
+        forces=forces,
+        power_of=power_of,
+        friction_coefficient=friction_coefficient,
         compare_forces=compare_forces,
     )
     return write(given, "reports", Path(folder), decimal)
@@ -106,33 +100,31 @@ def write(
     """
     progress = progress or Progress()
     said: list[str] = []
-    named: Computed = {}
     standing = walking = judged = None
     if verb != "walk":
         progress.step("standing")
         logger.info("standing on %s", ", ".join(given.robot.spec.standing_feet))
-        standing = stand(given.machine, given.chains(), adjust=given.adjust, forces=given.ground)
-        named |= tables_of_standing(given, standing)
+        standing = stood(given)
     if verb != "stand":
         progress.step("walking")
         logger.info("walking one cycle, %d samples per segment", given.samples)
-        walking = walked(given, given.chains())
+        walking = walked(given)
         progress.step("tables of walking")
-        named |= tables_of_walking(given, walking)
-    tables = [table() for table in named.values()]
+    results = [one for one in (standing, walking) if one]
+    tables = [*{name: t for one in results for name, t in one.tables.items()}.values()]
     if verb == "reports":
         progress.step("comparing with the paper")
         judged, more = _held_against_the_paper(given, said)
         tables += more
     progress.step("writing tables")
-    meta = metadata(given)
-    with staged(folder, verb, inputs=inputs_of(given)) as out:
+    with staged(folder, verb, inputs=results[0].inputs) as out:
         for table in tables:
-            write_table(table, out, meta=meta, decimal=decimal)
+            write_table(table, out, meta=results[0].meta, decimal=decimal)
         files = len(tables)
-        if standing is not None and walking is not None:
+        if standing and walking:
             progress.step("drawing figures")
-            files += _pictures(given, (standing, walking), judged, tables, out, said, progress)
+            both = standing.result, walking.result
+            files += _pictures(given, both, judged, tables, out, said, progress)
     said.append(f"{files} tables{' and figures' if verb == 'reports' else ''} in {folder}")
     return (*_first_lines(given, tables, judged), *said, *given.remarks)
 
@@ -152,7 +144,6 @@ def _held_against_the_paper(
 ) -> tuple[Judgement | None, list[Table]]:
     """The judgement of the paper's robot, of no other; what there is to say is added to `said`."""
     from pipeline.api.judgement import judged
-    from pipeline.api.pictures.scene import Scene
     from pipeline.paper.judgement.basis import basis
 
     result: Judgement | None = None
@@ -164,8 +155,6 @@ def _held_against_the_paper(
         logger.info("holding the run against the paper")
         result, tables = judged(given, by)
         said += [by.word] if by.word else []
-    remark = Scene(given.robot).visuals.remark
-    said += [remark] if remark else []
     return result, tables
 
 
@@ -180,10 +169,13 @@ def _pictures(
 ) -> int:
     """Figures and pages; how many files."""
     from pipeline.api.figures import write_fig_21, write_figures
+    from pipeline.api.pictures.scene import Scene
     from reports.pages.robot_page import write_robot_page
     from reports.pages.summary import write_summary
 
-    files = write_figures(given, *results, out, paper=judged is not None, done=progress.done)
+    scene = Scene(given.robot)
+    said += filter(None, [scene.visuals.remark])
+    files = write_figures(scene, given, *results, out, paper=judged is not None, done=progress.done)
     if judged is None:
         return files + write_robot_page(given, tables, out, [*said, *given.remarks])
     titles = {name: a.title.split(": ")[-1] for name, a in given.catalog.alternatives.items()}

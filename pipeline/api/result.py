@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from actuators.errors import closest
 from pipeline.errors import TableError
+from pipeline.logs.formats.convert import sha256
 from reports.folder import staged
 from reports.table import Table
 from reports.writer import write_table
 
 #: Tables by file name, computed when they are asked for.
 Computed = dict[str, Callable[[], Table]]
+#: Whose versions numbers hang on.
+PACKAGES: Final = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +28,8 @@ class Result:
 
     verb: str  #: Of the command line that writes the same.
     _tables: Mapping[str, Table | Callable[[], Table]] = field(repr=False)
-    _meta: Callable[[], dict[str, Any]] = field(repr=False)
+    #: What its sidecars say of the run beside inputs and versions.
+    _said: Mapping[str, Any] = field(repr=False)
     #: Files that were read; they stay where they lie in a folder that is written.
     inputs: tuple[Path, ...] = field(repr=False)
 
@@ -56,7 +61,7 @@ class Result:
     @cached_property
     def meta(self) -> dict[str, Any]:
         """What every sidecar says of the run: inputs by hash, versions, options."""
-        return self._meta()
+        return {**run_meta(self.inputs), **self._said}
 
     def save(self, folder: str | Path, *, decimal: str = ".") -> Path:
         """Write every table as CSV with its sidecar; a run that the folder held is replaced.
@@ -80,6 +85,12 @@ class Result:
 def by_name(tables: Sequence[Table]) -> dict[str, Table]:
     """Tables by the name of their file."""
     return {table.name: table for table in tables}
+
+
+def run_meta(inputs: Sequence[Path], packages: Sequence[str] = PACKAGES) -> dict[str, Any]:
+    """What the sidecars of every run say: its inputs by hash, and versions."""
+    hashes = zip(own_names(inputs), map(sha256, inputs), strict=True)
+    return {"inputs_sha256": dict(hashes), "versions": {name: version(name) for name in packages}}
 
 
 def own_names(paths: Sequence[Path]) -> list[str]:

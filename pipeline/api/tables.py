@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import sys
-from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cache
-from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from tqdm import tqdm
 
 from actuators.energy.limits import limit_rows, standing_rows
 from actuators.loading.build import CATALOG
-from pipeline.api.result import Computed, own_names
-from pipeline.machine.joint import Actuators, drivetrains_of
+from actuators.units import from_si
+from pipeline.api.result import Computed
+from pipeline.column import column
+from pipeline.machine.joint import drivetrains_of
 from pipeline.motion.gait import gait_of, gait_table
 from pipeline.robot.inverse.foot_tracking import foot_tracking
 from pipeline.simulation import cycle_energy
@@ -23,13 +24,10 @@ from pipeline.simulation.cycle_energy import leg_joints
 from pipeline.simulation.edited import IDEAL
 from pipeline.simulation.force_choice import RULES
 from pipeline.simulation.settings import PAPER_FORCES, Settings
-from pipeline.simulation.walk_stand import Standing, Walking, compare_rules, walk
+from pipeline.simulation.walk_stand import Standing, Walking, compare_rules
 from reports.table import Table, table_of
-from reports.tables import parameters as parameter_tables
 from reports.tables import standing as standing_tables
 from reports.tables import walking as walking_tables
-
-PACKAGES = ("legwatt", "pin", "numpy", "scipy", "pyarrow", "matplotlib")
 
 
 def tables_of_standing(given: Settings, standing: Standing) -> Computed:
@@ -58,28 +56,6 @@ def _standing_limits(given: Settings, standing: Standing) -> Table:
     return walking_tables.motor_limits(rows, "standing_limits")
 
 
-def walked(
-    given: Settings, chains: Mapping[str, Actuators], *, quasi_static: bool | None = None
-) -> Walking:
-    """One gait cycle as the settings say.
-
-    Args:
-        given: Robot, samples, ground and regeneration.
-        chains: By alternative.
-        quasi_static: Leave out the links' inertial terms; as the settings say by default.
-    """
-    return walk(
-        given.machine,
-        chains,
-        samples=given.samples,
-        quasi_static=given.quasi_static if quasi_static is None else quasi_static,
-        regeneration=given.regeneration,
-        adjust=given.adjust,
-        forces=given.ground,
-        motion=given.motion,
-    )
-
-
 def tables_of_walking(given: Settings, walking: Walking) -> Computed:
     """The tables of one walking cycle, by name."""
     demand, supplies, results = walking.demand, walking.supplies, walking.results
@@ -91,7 +67,7 @@ def tables_of_walking(given: Settings, walking: Walking) -> Computed:
 
     @cache
     def static() -> Walking:
-        return walked(given, given.chains(*results), quasi_static=True)
+        return replace(given, quasi_static=True).walk(given.chains(*results))
 
     tables: Computed = {
         "walking_joint_demand": lambda: walking_tables.walking_joint_demand(
@@ -165,34 +141,59 @@ def _force_rules(given: Settings, walking: Walking) -> Table:
     return walking_tables.force_rules(list(shown), given.forces.friction_coefficient)
 
 
+@dataclass(frozen=True)
+class InputRow:
+    """One number that went in, in the unit of its file."""
+
+    table: ClassVar = "parameters"
+    group: str = column("robot file or component")
+    parameter: str = column("name in its file")
+    value: float | str = column("in the row's unit", "see unit")
+    unit: str = column("unit as the file writes it; 1 is a pure number")
+    basis: str = column(
+        "published, datasheet, derived, calibrated, identified (from a log) or assumed"
+    )
+    source: str = column("where the number comes from")
+    interval_low: float | None = column(
+        "lower end of where the true value is thought to lie", "see unit"
+    )
+    interval_high: float | None = column("upper end", "see unit")
+    reason: str = column("why this value, for an assumption")
+
+
 def _parameters(given: Settings) -> Table:
     """Every number that went in."""
     groups = [(given.robot.spec.name, given.robot.spec.parameters.rows())]
     groups += [(c.name, c.parameters.rows()) for c in given.catalog.components.values()]
     groups += given.own.groups
-    return parameter_tables.parameters(groups)
+    rows = []
+    for owner, numbers in groups:
+        for p in numbers:
+            ends = (from_si(x, p.unit) for x in p.interval) if p.interval else (None, None)
+            said = (p.name, p.value_as_written, p.unit, p.basis, p.source, *ends, p.reason)
+            rows.append(InputRow(owner, *said))
+    return table_of(InputRow, rows, exact=True)
 
 
-def inputs_of(given: Settings) -> list[Path]:
+def inputs_of(given: Settings) -> tuple[Path, ...]:
     """Every file that was read."""
     spec = given.robot.spec
     files = [*spec.sources, *([] if spec.build else [spec.urdf])]
     files += sorted((given.files.actuators or CATALOG).glob("*.toml"))
     more = (given.files.gait, given.files.model_path, given.motion_file)
-    return [*files, *(path for path in more if path)]
+    return (*files, *filter(None, more))
 
 
-def metadata(given: Settings) -> dict[str, Any]:
-    """What every sidecar says about the run: inputs by hash, versions, options."""
-    spec = given.robot.spec
-    files = inputs_of(given)
+def said_of(given: Settings) -> dict[str, Any]:
+    """What every sidecar says of the run beside `pipeline.api.result.run_meta`: its options."""
+    spec, choice = given.robot.spec, given.forces
+    forces = {  # what differs from the paper's rule on ground that holds
+        "forces": choice.rule if choice.rule != PAPER_FORCES.rule else None,
+        "power_of": choice.power_of,
+        "friction_coefficient": choice.friction_coefficient,
+    }
     return {
-        "inputs_sha256": {
-            name: hashlib.sha256(path.read_bytes()).hexdigest()
-            for name, path in zip(own_names(files), files, strict=True)
-        },
         "urdf_sha256": hashlib.sha256(given.robot.urdf.encode()).hexdigest(),
-        "versions": {name: version(name) for name in PACKAGES},
         "options": {
             "set": [f"{key}={value}" for key, value in given.changes.items()],
             "samples_per_segment": given.samples,
@@ -201,7 +202,7 @@ def metadata(given: Settings) -> dict[str, Any]:
             "regeneration_fraction": given.regeneration.fraction,
             "transfer_path": gait_table(spec).transfer_path,
             "effects": list(given.effects.names) if given.effects else [],
-            **_forces_options(given),
+            **{name: value for name, value in forces.items() if value is not None},
             **({"motion": str(given.motion_file or "a table")} if given.motion else {}),
         },
         "conventions": "SI units; x forward, y left, z up; torque and velocity positive in the "
@@ -209,14 +210,3 @@ def metadata(given: Settings) -> dict[str, Any]:
         "zero_pose": spec.zero_pose,
         "warnings": list(given.remarks),
     }
-
-
-def _forces_options(given: Settings) -> dict[str, Any]:
-    """What differs from the paper's rule on ground that holds."""
-    choice = given.forces
-    options = {
-        "forces": choice.rule if choice.rule != PAPER_FORCES.rule else None,
-        "power_of": choice.power_of,
-        "friction_coefficient": choice.friction_coefficient,
-    }
-    return {name: value for name, value in options.items() if value is not None}

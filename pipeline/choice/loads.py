@@ -21,7 +21,7 @@ from pipeline.motion.gait import gait_of
 from pipeline.motion.motion import Motion
 from pipeline.robot.robot import Robot
 from pipeline.simulation.settings import LEAST_SAMPLES, SAMPLES
-from pipeline.simulation.walk_stand import demand_along, joint_series, stand
+from pipeline.simulation.walk_stand import joint_series
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +115,7 @@ def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> 
     spec = machine.ready.robot.spec
     weight = machine.ready.machine.mass * spec.parameters["gravity"]  # [N]
     if mode.stands:
-        still = machine.walking(walks=False)
-        held = stand(still.machine, {}, adjust=still.adjust, forces=still.ground).demand
+        held = machine.walking(walks=False).stand({}).demand
         torque = np.repeat(held.torque * (mode.hold != "none"), 2, axis=0)
         zero, time = np.zeros_like(torque), np.array([0.0, 1.0])
         posture = np.repeat(held.position, 2, axis=0)
@@ -125,8 +124,7 @@ def _load(machine: Machine, mode: Mode, samples: int, motion: Motion | None) -> 
     own = mode.motion is not None
     speed = 0.0 if own else gait_of(spec).speed
     if motion is not None:
-        moved = machine.ready.walking(walks=False)
-        parts = demand_along(moved.machine, motion, adjust=moved.adjust, forces=moved.ground)
+        parts = machine.ready.walking(walks=False).demand(motion)
         return Load(mode, joint_series(parts), weight, speed, motion)
     asked = demand(machine, mode.motion, samples=SAMPLES if own else samples)
     if own and spec.floating:

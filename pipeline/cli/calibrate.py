@@ -5,14 +5,22 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from pipeline.paper.calibration.calibrate import Effort, calibrate
-from pipeline.paper.calibration.prior import load_prior
-from pipeline.paper.calibration.store import AT_LEAST, calibrated_numbers, save
+from pipeline.atomic import output_errors
+from pipeline.cli.options import AddVerb, named_path
 from pipeline.paper.errors import CalibrationError
-from pipeline.paper.hexapod import MIDDLE_LEGS, POSTURE, ROBOT
-from pipeline.robot.robot_file import load_robot_file, read_toml
+from reports.folder import holding
 
 WORK = Path(".calibration")
+
+
+def add_verb(add: AddVerb) -> None:
+    """Declare the verb."""
+    text = "fit the unpublished numbers to the paper's figures and store them"
+    calibrate = add("calibrate", text, run_calibrate)
+    robot = named_path("urdf/hexapod.toml")
+    calibrate.add_argument("--robot", type=named_path, default=robot, help="robot file")
+    calibrate.add_argument("--workers", type=int, default=2, help="number of processes")
+    calibrate.add_argument("--seed", type=int, default=1, help="of the random numbers")
 
 
 def run_calibrate(options: argparse.Namespace) -> int:
@@ -21,13 +29,20 @@ def run_calibrate(options: argparse.Namespace) -> int:
     Raises:
         PipelineError: Unusable robot, prior or target file, or no admissible point.
     """
-    _refuse_options(options)
+    from pipeline.paper.calibration.calibrate import Effort, calibrate
+    from pipeline.paper.calibration.prior import load_prior
+    from pipeline.paper.calibration.store import AT_LEAST, calibrated_numbers, save
+
+    if options.workers < 1:
+        raise CalibrationError(f"--workers {options.workers}: at least one process is needed")
+    if options.seed < 0:
+        raise CalibrationError(f"--seed {options.seed}: expected zero or a positive number")
     refuse_other_robot(options.robot)
-    effort = Effort(workers=options.workers, seed=options.seed)
-    results = calibrate(options.robot, effort, WORK)
-    results["robot"] = options.robot.name
-    for path in save(results, options.robot):
-        print(path.name)
+    with holding(WORK), output_errors(WORK):
+        results = calibrate(options.robot, Effort(workers=options.workers, seed=options.seed), WORK)
+        results["robot"] = options.robot.name
+        for path in save(results, options.robot):
+            print(path.name)
     numbers = calibrated_numbers(results, load_prior())
     worst = max(numbers, key=lambda n: n.r_hat)
     least = min(n.effective_sample_size for n in numbers)
@@ -48,13 +63,6 @@ def run_calibrate(options: argparse.Namespace) -> int:
     return 0
 
 
-def _refuse_options(options: argparse.Namespace) -> None:
-    if options.workers < 1:
-        raise CalibrationError(f"--workers {options.workers}: at least one process is needed")
-    if options.seed < 0:
-        raise CalibrationError(f"--seed {options.seed}: expected zero or a positive number")
-
-
 def refuse_other_robot(path: Path) -> None:
     """Refuse a robot that the paper does not print numbers of, before twenty minutes are spent.
 
@@ -66,6 +74,10 @@ def refuse_other_robot(path: Path) -> None:
         CalibrationError: It does not walk, lacks the middle legs, or holds no numbers of its own
             to write the result into.
     """
+    from pipeline.paper.calibration.prior import load_prior
+    from pipeline.paper.hexapod import MIDDLE_LEGS, POSTURE, ROBOT
+    from pipeline.robot.robot_file import load_robot_file, read_toml
+
     spec = load_robot_file(path)
     such = "calibrate fits the paper's hexapod; give urdf/hexapod.toml or a copy of it"
     if not spec.floating:

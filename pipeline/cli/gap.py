@@ -10,21 +10,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pipeline.cli.options import (
+    DECIMAL,
     AddVerb,
     add_machine_options,
     add_out_option,
     add_verbose_option,
     changes_of,
-    decimal_of,
-    folder_held,
     named_path,
 )
 from pipeline.identification.workflow.setup import DEFAULT_OUT, STEPS, Options
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:
-    from pipeline.api.gap.power import Powered
-    from pipeline.api.logs import Comparison, Driven, Identified
+    from pipeline.api.gap.results import Comparison, Driven, LogResult
     from pipeline.identification.workflow.setup import Setup
     from pipeline.logs.errors import Finding
 
@@ -38,11 +36,6 @@ SAID = 5
 def add_verb(add: AddVerb) -> None:
     """Declare the verb."""
     sub = add("gap", "find what the model lacks: from a measured log to a named effect", run_gap)
-    add_gap_options(sub)
-
-
-def add_gap_options(sub: argparse.ArgumentParser) -> None:
-    """Declare the options."""
     sub.add_argument(
         "items",
         nargs="+",
@@ -113,7 +106,7 @@ def options_of(given: argparse.Namespace) -> Options:
         "logs": tuple(Path(item) for item in (rest if one else given.items)),
         "holdout": tuple(given.holdout),
         "changes": changes_of(given.set),
-        "decimal": decimal_of(given),
+        "decimal": DECIMAL[given.decimal],
     }
     return Options(**named)
 
@@ -124,33 +117,42 @@ def run_gap(given: argparse.Namespace) -> int:
     Returns:
         0 where the gap is down to noise, 1 where a part stays unexplained.
     """
-    with folder_held(given), Progress("gap") as progress:
+    with Progress("gap") as progress:
         progress.step("loading")
-        from pipeline.api.gap.power import Powered
-        from pipeline.api.logs import Comparison, Driven, Identified, analyse
+        from pipeline.api.logs import analyse
 
         options = options_of(given)
         result = analyse(options, progress)
         progress.step("writing")
         result.save(options.out, decimal=options.decimal)
-        progress.close()
-        if isinstance(result, Identified):
-            _say_warnings(result.given, result.findings)
-            _say_answer(result, options.out)
-            logger.info("what took long: %s", progress.took())
-            return int(result.unexplained)
-        if isinstance(result, Driven):
-            return _say_errors(result)
-        if isinstance(result, Powered):
-            _say_warnings(result.given, result.findings)
-            _say_power(result, options.out)
-            return int(result.account.negative)
-        if isinstance(result, Comparison):
-            _say_warnings(result.given, result.findings)
-            _say_where(result)
-        else:
-            _say_findings(result.findings)
-        return 0
+    negative = _say(result, options.out)
+    logger.info("what took long: %s", progress.took())
+    return int(negative)
+
+
+def _say(result: LogResult, out: Path) -> bool:
+    """What a person wants to know first; whether the finding is negative."""
+    from pipeline.api.gap.results import Comparison, Driven, Identified, Powered
+    from reports.pages.gap_report import answer, whose_motors
+    from reports.pages.power_page import power_answer
+    from reports.typeset import plain
+
+    if isinstance(result, Driven):
+        return _say_errors(result)
+    if not isinstance(result, Comparison | Identified | Powered):
+        _say_findings(result.findings)
+        return False
+    _say_warnings(result.given, result.findings)
+    if isinstance(result, Comparison):
+        _say_where(result)
+        return False
+    if isinstance(result, Identified):
+        said = [whose_motors(result.outcome), *answer(result.outcome, result.bodies)]
+        negative = result.unexplained
+    else:
+        said, negative = [*power_answer(result.account)], result.account.negative
+    print(*map(plain, said), f"written to {out}", sep="\n")
+    return negative
 
 
 def _say_findings(findings: Sequence[Finding]) -> None:
@@ -184,28 +186,10 @@ def _say_where(result: Comparison) -> None:
         )
 
 
-def _say_answer(result: Identified, out: Path) -> None:
-    from reports.pages.gap_report import answer, whose_motors
-    from reports.typeset import plain
-
-    for paragraph in (whose_motors(result.outcome), *answer(result.outcome, result.bodies)):
-        print(plain(paragraph))
-    print(f"written to {out}")
-
-
-def _say_power(result: Powered, out: Path) -> None:
-    from reports.pages.power_page import power_answer
-    from reports.typeset import plain
-
-    for paragraph in power_answer(result.account):
-        print(plain(paragraph))
-    print(f"written to {out}")
-
-
-def _say_errors(result: Driven) -> int:
-    """Position errors; 1 where the model file's effects bring positions no nearer."""
+def _say_errors(result: Driven) -> bool:
+    """Position errors; true where the model file's effects bring positions no nearer."""
     logs = len({drive.log.name for drive in result.drives})
     errors = result.errors()
     for model, error in errors:
         print(f"{model}: position misses by {1e3 * error:.1f} mrad root mean square, {logs} logs")
-    return int(len(errors) > 1 and errors[-1][1] >= errors[0][1])
+    return len(errors) > 1 and errors[-1][1] >= errors[0][1]

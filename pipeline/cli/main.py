@@ -10,20 +10,42 @@ import argparse
 import logging
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
-from pipeline.cli import components, gap, robots, studies, walking
-from pipeline.cli.design import choose
-from pipeline.cli.exchange.export import add_export
-from pipeline.cli.exchange.mapping import add_mapping
-from pipeline.cli.options import Run
-from pipeline.errors import PipelineError, StanceError
+from actuators.errors import ActuatorError
+from pipeline.cli import (
+    blind,
+    calibrate,
+    choose,
+    components,
+    export,
+    gap,
+    mapping,
+    robots,
+    sweep,
+    walking,
+)
+from pipeline.cli.options import AddVerb, Run
+from pipeline.errors import PipelineError, ReportError, StanceError
+from pipeline.logs.errors import GapError
+from reports.folder import holding, settled
 
+#: What declares the verbs, in the order of the help.
+VERBS: Final[tuple[Callable[[AddVerb], None], ...]] = (
+    *(robots.add_verbs, components.add_verb, choose.add_verb, walking.add_verbs),
+    *(gap.add_verb, mapping.add_verb, export.add_verb, sweep.add_verb, blind.add_verbs),
+    *(walking.add_diff, walking.add_measured, calibrate.add_verb),
+)
 #: Verbs of two words, each with options of its own.
-TWO_WORDS = ("gap mapping", "gap export")
+TWO_WORDS: Final = ("gap mapping", "gap export")
+#: Verbs that hold their folder of results from the start.
+HOLDING: Final = {
+    *("stand", "walk", "reports", "measured", "choose", "gap", "sweep", "twin", "blind")
+}
 EXIT_OK, EXIT_NEGATIVE, EXIT_UNUSABLE, EXIT_INTERRUPTED = 0, 1, 2, 130
 
 
@@ -60,17 +82,8 @@ def parser() -> argparse.ArgumentParser:
         sub.set_defaults(run=run)
         return sub
 
-    robots.add_verbs(add)
-    components.add_verb(add)
-    choose.add_verb(add)
-    walking.add_verbs(add)
-    gap.add_verb(add)
-    add_mapping(add)
-    add_export(add)
-    studies.add_verbs(add)
-    walking.add_diff(add)
-    walking.add_measured(add)
-    studies.add_calibrate(add)
+    for declare in VERBS:
+        declare(add)
     return root
 
 
@@ -86,13 +99,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser().parse_args(arguments)
     level = logging.INFO if getattr(options, "verbose", False) else logging.WARNING
     logging.basicConfig(level=level, format="%(message)s")
-    from actuators.errors import ActuatorError
-    from pipeline.errors import ReportError
-    from pipeline.logs.errors import GapError
-
     run: Run = options.run
     try:
-        return run(options)
+        if getattr(options, "model", None):
+            settled(options.model.parent)
+        with holding(options.out) if options.verb in HOLDING else nullcontext():
+            return run(options)
     except StanceError as error:
         print(error, file=sys.stderr)
         return EXIT_NEGATIVE

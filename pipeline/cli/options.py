@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Final
 
 from actuators.errors import one_line
 from pipeline.errors import RobotFileError
@@ -16,6 +15,14 @@ if TYPE_CHECKING:
     from pipeline.simulation.settings import Settings
 
 OUT = Path("reports/out")
+#: Sign of decimals by the word that asks for it.
+DECIMAL: Final = {"dot": ".", "comma": ","}
+#: Options that `load` and `Machine.walking` take by these names.
+OF_MACHINE: Final = ("robot", "model", "gait", "actuators")
+OF_WALK: Final = (
+    *("samples", "quasi_static", "regeneration", "compare_forces", "motion"),
+    *("forces", "power_of", "friction_coefficient"),
+)
 #: Runs a verb and returns the exit code.
 Run = Callable[[argparse.Namespace], int]
 #: Adds a verb: its name, what it does, and what runs it.
@@ -44,7 +51,7 @@ def add_out_option(sub: argparse.ArgumentParser, default: Path = OUT) -> None:
     sub.add_argument("--out", type=named_path, default=default, help=text)
     sub.add_argument(
         "--decimal",
-        choices=["dot", "comma"],
+        choices=DECIMAL,
         default="dot",
         help="comma: write copies for a decimal-comma spreadsheet beside the plain files",
     )
@@ -53,22 +60,6 @@ def add_out_option(sub: argparse.ArgumentParser, default: Path = OUT) -> None:
 def add_verbose_option(sub: argparse.ArgumentParser, text: str = "say what is being done") -> None:
     """How much is said."""
     sub.add_argument("-v", "--verbose", action="store_true", help=text)
-
-
-def decimal_of(options: argparse.Namespace) -> str:
-    """The decimal sign that was asked for."""
-    return "," if options.decimal == "comma" else "."
-
-
-@contextmanager
-def folder_held(options: argparse.Namespace) -> Iterator[None]:
-    """Hold the folder of results from the start, and see that the model's folder is settled."""
-    from reports.folder import holding, settled
-
-    if getattr(options, "model", None):
-        settled(options.model.parent)
-    with holding(options.out):
-        yield
 
 
 def add_machine_options(sub: argparse.ArgumentParser, robot: str, changes: str) -> None:
@@ -157,29 +148,19 @@ def changes_of(texts: Iterable[str]) -> dict[str, str]:
     return changes
 
 
+def named(options: argparse.Namespace, names: Iterable[str]) -> dict[str, Any]:
+    """Those options by name that the verb has."""
+    return {name: getattr(options, name) for name in names if name in options}
+
+
 def machine_of(options: argparse.Namespace) -> Machine:
     """The machine that is asked for, loaded."""
     from pipeline.api.machine import load
 
-    return load(
-        options.robot,
-        model=options.model,
-        gait=options.gait,
-        actuators=options.actuators,
-        changes=changes_of(options.set),
-    )
+    return load(**named(options, OF_MACHINE), changes=changes_of(options.set))
 
 
 def settings_of(options: argparse.Namespace) -> Settings:
     """The machine that is asked for, and how it walks."""
-    from pipeline.simulation.force_choice import ForceChoice
-
-    return machine_of(options).walking(
-        samples=options.samples,
-        quasi_static=options.quasi_static,
-        regeneration=options.regeneration,
-        forces=ForceChoice(options.forces, options.power_of, options.friction_coefficient),
-        compare_forces=getattr(options, "compare_forces", False),
-        motion=getattr(options, "motion", None),
-        walks=options.verb != "stand",
-    )
+    walks = options.verb != "stand"
+    return machine_of(options).walking(**named(options, OF_WALK), walks=walks)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 
 from pipeline.cli.options import (
+    DECIMAL,
     OUT,
     AddVerb,
     add_out_option,
     add_verbose_option,
     add_walk_options,
-    decimal_of,
-    folder_held,
     named_path,
     settings_of,
 )
@@ -64,25 +63,23 @@ def add_measured(add: AddVerb) -> None:
 
 def run_measured(options: argparse.Namespace) -> int:
     """Predict every measured robot; write tables, figure and page."""
-    with folder_held(options), Progress(options.verb) as progress:
-        from pipeline.measured.page import write_measured
+    from pipeline.measured.page import write_measured
 
-        lines = write_measured(options.out, decimal_of(options), progress)
-        progress.close()
-        print(*lines, sep="\n")
+    with Progress(options.verb) as progress:
+        lines = write_measured(options.out, DECIMAL[options.decimal], progress)
+    print(*lines, sep="\n")
     return 0
 
 
 def run_reports(options: argparse.Namespace) -> int:
     """Compute what the verb asks for and write it to the output folder."""
-    with folder_held(options), Progress(options.verb) as progress:
+    with Progress(options.verb) as progress:
         progress.step("loading")
         from pipeline.api.reports import write
 
         given = settings_of(options)
-        lines = write(given, options.verb, options.out, decimal_of(options), progress)
-        progress.close()
-        print(*lines, sep="\n")
+        lines = write(given, options.verb, options.out, DECIMAL[options.decimal], progress)
+    print(*lines, sep="\n")
     return 0
 
 
@@ -116,5 +113,6 @@ def run_diff(options: argparse.Namespace) -> int:
     """Compare two folders and write the page."""
     from pipeline.api.diff.page import write_diff
 
-    print(*write_diff(options.a, options.b, options.out, decimal_of(options)), sep="\n")
+    lines = write_diff(options.a, options.b, options.out, DECIMAL[options.decimal])
+    print(*lines, sep="\n")
     return 0

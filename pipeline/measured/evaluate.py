@@ -20,8 +20,9 @@ from actuators.units import from_si
 from pipeline.api.demand import demand, energy
 from pipeline.api.machine import Machine, load
 from pipeline.api.motion import stand
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import PipelineError, RobotFileError
-from pipeline.measured.facts import USUAL_FORCES, Facts, Quantity, Spring, Unknown, Way
+from pipeline.measured.facts import Facts, Quantity, Spring, Unknown, Way
 from pipeline.progress import Progress
 
 #: Robot files, from the project's own folder.
@@ -100,7 +101,7 @@ def _over_numbers(
     ways = [u.way[k] for u, k in zip(facts.unknown, chosen, strict=True) if u.way]
     springs = [s for s in (quantity.spring, *(w.spring for w in ways)) if s is not None]
     posed = _sprung(_posed(facts, machine, ways), facts, springs)
-    forces = next((w.forces for w in ways if w.forces), USUAL_FORCES)
+    forces = next((w.forces for w in ways if w.forces), LEAST_TANGENTIAL)
     walked = demand(posed, samples=SAMPLES, forces=forces) if quantity.does == "walk" else None
     less = walked is not None and any(w.less_standing for w in ways)
     stood = None

@@ -9,7 +9,6 @@ from typing import Annotated, Any, Final, Literal
 from pydantic import Field, Strict
 
 from actuators.checked import Number, Table, Text, checked
-from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import RobotFileError
 from pipeline.robot.robot_file import read_toml
 
@@ -86,10 +85,6 @@ class Facts(Table):
     #: What was measured.
     quantity: Annotated[tuple[Quantity, ...], Strict(False), Field(min_length=1)]
     ratio: Annotated[tuple[Ratio, ...], Strict(False)] = ()  #: Quotients.
-
-
-#: Where nothing is said of the ground's forces.
-USUAL_FORCES: Final = LEAST_TANGENTIAL
 
 
 def read_facts(folder: Path = FACTS) -> Mapping[str, Facts]:

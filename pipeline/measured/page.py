@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping
-from importlib.metadata import version
 from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from pipeline.api.result import own_names
+from pipeline.api.result import by_name, run_meta
 from pipeline.measured.evaluate import ROBOTS, predicted
 from pipeline.measured.facts import FACTS, Facts, read_facts
 from pipeline.measured.tables import (
@@ -66,13 +64,7 @@ def write_measured(
     }
     tables = tables_of(every, found)
     inputs = [*sorted(folder.glob("*.toml")), *(ROBOTS / f.robot for f in every.values())]
-    meta = {
-        "inputs_sha256": {
-            name: hashlib.sha256(path.read_bytes()).hexdigest()
-            for name, path in zip(own_names(inputs), inputs, strict=True)
-        },
-        "versions": {"legwatt": version("legwatt")},
-    }
+    meta = run_meta(inputs, ("legwatt",))
     with staged(out, "measured") as target:
         for table in tables.values():
             write_table(table, target, meta=meta, decimal=decimal)
@@ -84,12 +76,12 @@ def write_measured(
 
 def tables_of(every: Mapping[str, Facts], found: Mapping[str, Predictions]) -> dict[str, Table]:
     """The three tables of facts, and of predictions by quantity, by robot."""
-    out = {}
-    kinds: dict[Any, Any] = {Measured: measured_rows, UnknownMoves: unknown_rows}
-    for kind, rows in (kinds | {MeasuredRatio: ratio_rows}).items():
-        each = [row for name, facts in every.items() for row in rows(facts, found[name])]
-        out[kind.table] = table_of(kind, each)
-    return out
+    kinds = ((Measured, measured_rows), (UnknownMoves, unknown_rows), (MeasuredRatio, ratio_rows))
+    tables = [
+        table_of(kind, [row for name, facts in every.items() for row in rows(facts, found[name])])
+        for kind, rows in kinds
+    ]
+    return by_name(tables)
 
 
 def _page(every: Mapping[str, Facts], tables: Mapping[str, Table], folder: Path) -> Page:

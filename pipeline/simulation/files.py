@@ -157,22 +157,22 @@ def _changed(
         return _other_gait(spec, key.removeprefix(GAIT), value, place), catalog
     if spec is not None and key == STANDING_FEET:
         return _other_feet(spec, value, place), catalog
-    numbers = spec.parameters if spec is not None else {}
-    references = [f"{component}.{p.name}" for component, p in catalog.rows()]
-    if key not in numbers and key not in references:
-        known = [*([*gait_keys(), STANDING_FEET] if spec else []), *numbers, *references]
+    numbers = {p.name: p for p in spec.parameters.rows()} if spec is not None else {}
+    numbers |= {f"{component}.{p.name}": p for component, p in catalog.rows()}
+    if key not in numbers:
+        known = [*([*gait_keys(), STANDING_FEET] if spec else []), *numbers]
         raise RobotFileError(f"{place}: there is no such number; {_hint(key, known)}")
     if spec is not None and key == TOTAL_MASS and not spec.build:
         raise RobotFileError(
             f"{place}: the bodies of this robot are those of {spec.urdf.name}, which it does not "
             "change; change masses there, or put a load on with gait.payload_mass='2 kg'"
         )
+    unit = numbers[key].unit
     try:
-        if spec is not None and key in numbers:
-            unit = spec.parameters.parameter(key).unit
-            return spec.with_parameters({key: to_si(_number(place, value, unit), unit)}), catalog
-        unit = catalog.parameter(key).unit
-        return spec, catalog.replaced(key, to_si(_number(place, value, unit), unit))
+        number = to_si(_number(place, value, unit), unit)
+        if spec is not None and key in spec.parameters:
+            return spec.with_parameters({key: number}), catalog
+        return spec, catalog.replaced(key, number)
     except ActuatorError as error:
         raise RobotFileError(f"{place}: {error}") from None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from actuators.errors import closest
 from pipeline.dynamics.force_rules import LEAST_TANGENTIAL, ForceRule, GroundForces, LeastTorque
@@ -23,11 +23,6 @@ class ForceChoice:
     power_of: str | None = None  #: Alternative whose power is the least; of ``least_power`` only.
     #: Greatest tangential over normal force [1]; None for no limit.
     friction_coefficient: float | None = None
-
-    def on(self, ground: float | None) -> ForceChoice:
-        """The same on a ground whose coefficient [1] holds where no option names one."""
-        own = self.friction_coefficient
-        return replace(self, friction_coefficient=ground if own is None else own)
 
     def checked(self, alternatives: Mapping[str, object]) -> ForceChoice:
         """The same, refused where it asks for what there is not.

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from actuators.errors import CatalogError
 from actuators.loading.build import Catalog
 from pipeline.dynamics.force_rules import GroundForces
+from pipeline.dynamics.joint_demand import MotionDemand
 from pipeline.effects.model_file import apply_edits
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.joint import Actuators
@@ -30,7 +31,14 @@ from pipeline.simulation.edited import IDEAL, Effects, effects
 from pipeline.simulation.files import Files, Stated, stated
 from pipeline.simulation.force_choice import ForceChoice
 from pipeline.simulation.least_power import Adjust
-from pipeline.simulation.walk_stand import Regeneration
+from pipeline.simulation.walk_stand import (
+    Regeneration,
+    Standing,
+    Walking,
+    demand_along,
+    stand,
+    walk,
+)
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -84,16 +92,19 @@ class Settings:
         samples: int = SAMPLES,
         quasi_static: bool = False,
         regeneration: str = "none",
-        forces: ForceChoice = PAPER_FORCES,
+        forces: str = PAPER_FORCES.rule,
+        power_of: str | None = None,
+        friction_coefficient: float | None = None,
         compare_forces: bool = False,
-        motion: Path | DataFrame | Array | None = None,
+        motion: str | Path | DataFrame | Array | None = None,
         walks: bool = True,
     ) -> Settings:
         """The same machine, to walk in this way; defaults are the command line's.
 
         `regeneration`: ``none``, ``bus`` or a fraction of returned energy that is used again.
-        `motion`: see `pipeline.simulation.own_motion`. `walks`: whether a gait cycle will be
-        computed, which must fit into memory. For the rest see `Settings`.
+        `forces`, `power_of`, `friction_coefficient`: see `ForceChoice`; the gait's coefficient
+        holds where none is given. `motion`: see `pipeline.simulation.own_motion`. `walks`: whether
+        a gait cycle will be computed, which must fit into memory. For the rest see `Settings`.
 
         Raises:
             GaitError: Too few samples or too many, or forces that cannot be.
@@ -110,13 +121,16 @@ class Settings:
         if walks and motion is None:
             refuse_beyond_memory(samples, len(self.robot.joints), len(self.catalog.alternatives))
         spec = self.robot.spec
-        friction = gait_table(spec).friction_coefficient if spec.floating else None
+        if friction_coefficient is None and spec.floating:
+            friction_coefficient = gait_table(spec).friction_coefficient
+        choice = ForceChoice(forces, power_of, friction_coefficient)
+        motion = Path(motion) if isinstance(motion, str) else motion
         return replace(
             self,
             samples=samples,
             quasi_static=quasi_static,
             regeneration=regeneration_of(regeneration),
-            forces=forces.on(friction).checked(self.catalog.alternatives),
+            forces=choice.checked(self.catalog.alternatives),
             compare_forces=compare_forces and spec.floating,
             motion=None if motion is None else self._moved(motion),
             motion_file=motion if isinstance(motion, Path) else None,
@@ -126,6 +140,33 @@ class Settings:
         from pipeline.simulation.own_motion import read_motion  # pandas, where it is needed
 
         return read_motion(motion, self.machine)
+
+    def stand(self, chains: Mapping[str, Actuators]) -> Standing:
+        """Stand still and hold; see `pipeline.simulation.walk_stand.stand`."""
+        return stand(self.machine, chains, adjust=self.adjust, forces=self.ground)
+
+    def demand(self, motion: Motion) -> MotionDemand:
+        """What a motion demands of the actuators."""
+        return demand_along(
+            self.machine,
+            motion,
+            quasi_static=self.quasi_static,
+            adjust=self.adjust,
+            forces=self.ground,
+        )
+
+    def walk(self, chains: Mapping[str, Actuators]) -> Walking:
+        """Walk one gait cycle, or move; see `pipeline.simulation.walk_stand.walk`."""
+        return walk(
+            self.machine,
+            chains,
+            samples=self.samples,
+            quasi_static=self.quasi_static,
+            regeneration=self.regeneration,
+            adjust=self.adjust,
+            forces=self.ground,
+            motion=self.motion,
+        )
 
     @cached_property
     def _chains(self) -> dict[str, Actuators]:
@@ -180,7 +221,7 @@ class Settings:
 
 
 def settings(
-    files: Files, changes: Mapping[str, object] | None = None, before: Settings | None = None
+    files: Files, changes: Mapping[str, object], before: Settings | None = None
 ) -> Settings:
     """Apply changed numbers to what the files of a robot say, build robot, actuators and effects.
 
@@ -191,14 +232,13 @@ def settings(
         ActuatorError: A changed parameter cannot be used.
         GapError: Effects do not fit the robot.
     """
-    changes = changes or {}
     said = stated(files, changes)
     assert said.spec is not None
     bare, warnings = _bare(said.spec, before)
     robot = before.robot if before and bare is before.bare else with_payload(bare)
     effects = _effects(files, robot, said) if files.model else None
     return Settings(
-        files, dict(changes), bare, robot, said.catalog, said.own, effects, said.notes, warnings
+        files, changes, bare, robot, said.catalog, said.own, effects, said.notes, warnings
     )
 
 

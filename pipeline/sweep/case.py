@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from itertools import chain
@@ -14,12 +15,14 @@ import numpy as np
 
 from actuators.errors import ActuatorError
 from pipeline.api.machine import Machine, load
-from pipeline.api.tables import metadata, tables_of_walking, walked
+from pipeline.api.motion import walked
+from pipeline.api.result import run_meta
+from pipeline.api.tables import inputs_of, said_of
 from pipeline.column import column
+from pipeline.dynamics.force_rules import LEAST_TANGENTIAL
 from pipeline.errors import PipelineError
 from pipeline.simulation.cycle_energy import RobotEnergy
-from pipeline.simulation.force_choice import ForceChoice
-from pipeline.simulation.settings import PAPER_FORCES, SAMPLES, Settings
+from pipeline.simulation.settings import SAMPLES, Settings
 from pipeline.sweep.plan import Axis, SweepError, Value
 
 Row = dict[str, Any]
@@ -55,9 +58,9 @@ class Order:
     samples: int = SAMPLES  #: Per half period.
     quasi_static: bool = False  #: See `walk`.
     regeneration: str = "none"  #: See `walk`.
-    forces: ForceChoice = PAPER_FORCES  #: See `walk`.
-    axes: tuple[Axis, ...] = ()  #: What is varied.
-    digest: str = ""  #: Of everything read; empty until it is known.
+    forces: str = LEAST_TANGENTIAL  #: See `walk`.
+    power_of: str | None = None  #: See `reports`.
+    friction_coefficient: float | None = None  #: See `walk`.
 
     def walking(self, machine: Machine) -> Settings:
         """A machine ready to walk."""
@@ -66,62 +69,70 @@ class Order:
             quasi_static=self.quasi_static,
             regeneration=self.regeneration,
             forces=self.forces,
+            power_of=self.power_of,
+            friction_coefficient=self.friction_coefficient,
         )
-
-    @property
-    def machine(self) -> Machine:
-        """Before anything is varied, loaded once in a process."""
-        return _loaded(self.robot, self.model, self.gait, self.actuators, self.changes)
 
 
 @cache
-def _loaded(
-    robot: Path | None,
-    model: Path | None,
-    gait: Path | None,
-    actuators: Path | None,
-    changes: tuple[tuple[str, object], ...],
-) -> Machine:
-    return load(robot, model=model, gait=gait, actuators=actuators, changes=dict(changes))
+def machine_of(order: Order) -> Machine:
+    """The machine before anything is varied, loaded once in a process."""
+    files = {"model": order.model, "gait": order.gait, "actuators": order.actuators}
+    return load(order.robot, **files, changes=dict(order.changes))
 
 
-def digest_of(given: Settings) -> str:
+def digest_of(order: Order) -> str:
     """Hash of everything that was read and every option."""
-    said = metadata(given)
+    given = order.walking(machine_of(order))
+    said = said_of(given) | run_meta(inputs_of(given))
     kept = {k: said[k] for k in ("inputs_sha256", "urdf_sha256", "options")}
     kept["version"] = said["versions"]["legwatt"]
     return hashlib.sha256(json.dumps(kept, sort_keys=True, default=str).encode()).hexdigest()
 
 
 @cache
-def _checked(order: Order) -> Machine:
+def _checked(order: Order, digest: str) -> Machine:
     """The order's machine; what another computer reads must be the same.
 
     Raises:
         SweepError: It is not.
     """
-    machine = order.machine
-    if digest_of(order.walking(machine)) != order.digest:
+    if digest_of(order) != digest:
         raise SweepError(
             "a worker reads other robot or actuator files, or is of another version, than the "
             "process that asked it; give both the same"
         )
-    return machine
+    return machine_of(order)
 
 
-def rows_of_block(order: Order, block: tuple[int, tuple[tuple[Value, ...], ...]]) -> list[Row]:
-    """The rows of some cases in a row: number of the first, and the values of each."""
+def rows_of_block(
+    order: Order,
+    digest: str,
+    axes: Sequence[Axis],
+    block: tuple[int, tuple[tuple[Value, ...], ...]],
+) -> list[Row]:
+    """The rows of some cases in a row.
+
+    Args:
+        order: The machine and how it walks.
+        digest: Of everything that the order reads.
+        axes: What is varied.
+        block: Number of the first case, and the values of each.
+    """
     first, cases = block
-    rows = (_rows(order, _checked(order), k, values) for k, values in enumerate(cases, first))
+    machine = _checked(order, digest)
+    rows = (_rows(order, machine, axes, k, values) for k, values in enumerate(cases, first))
     return list(chain.from_iterable(rows))
 
 
-def _rows(order: Order, machine: Machine, number: int, values: tuple[Value, ...]) -> list[Row]:
-    head: Row = {"case": number}
-    head |= {axis.header: value for axis, value in zip(order.axes, values, strict=True)}
-    changes = {a.key: a.change(v) for a, v in zip(order.axes, values, strict=True)}
+def _rows(
+    order: Order, machine: Machine, axes: Sequence[Axis], number: int, values: tuple[Value, ...]
+) -> list[Row]:
+    pairs = list(zip(axes, values, strict=True))
+    head: Row = {"case": number} | {axis.header: value for axis, value in pairs}
     try:
-        return [head | row for row in _walked(order.walking(machine.with_values(changes)))]
+        given = order.walking(machine.with_values({a.key: a.change(v) for a, v in pairs}))
+        return [head | row for row in _walked(given)]
     except (PipelineError, ActuatorError) as error:
         empty = dict.fromkeys(f.name for f in fields(SweepRow))
         reason = str(error).removeprefix(f"{machine.path}: ")  # a file may lie elsewhere
@@ -129,12 +140,12 @@ def _rows(order: Order, machine: Machine, number: int, values: tuple[Value, ...]
 
 
 def _walked(given: Settings) -> list[Row]:
-    walking = walked(given, given.chains())
-    tables = tables_of_walking(given, walking)
+    walk = walked(given)
+    demand = walk.result.demand
     energy, stability, limits = (
-        tables[name]().frame() for name in ("robot_energy", "walking_stability", "motor_limits")
+        walk.table(name).frame() for name in ("robot_energy", "walking_stability", "motor_limits")
     )
-    peaks = np.max([np.abs(part.torque).max(axis=0) for part in walking.demand.segments], axis=0)
+    peaks = np.max([np.abs(part.torque).max(axis=0) for part in demand.segments], axis=0)
     most = int(peaks.argmax())
     rows: list[Row] = []
     for record in energy.to_dict("records"):
@@ -148,7 +159,7 @@ def _walked(given: Settings) -> list[Row]:
                 "least_normal_force_N": stability.least_normal_force_N.min(),
                 "greatest_friction_needed": stability.greatest_friction_needed.max(),
                 "peak_torque_Nm": float(peaks[most]),
-                "joint_of_peak_torque": walking.demand.joints[most],
+                "joint_of_peak_torque": demand.joints[most],
                 "peak_speed_rad_s": found["speed"],
                 "peak_voltage_V": found["voltage"],
                 "peak_current_A": found["current"],

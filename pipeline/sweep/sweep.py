@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Final
@@ -13,7 +13,7 @@ from typing import Final
 import pyarrow.parquet as pq
 
 from pipeline.spread import spread
-from pipeline.sweep.case import Order, digest_of, rows_of_block
+from pipeline.sweep.case import Order, digest_of, machine_of, rows_of_block
 from pipeline.sweep.plan import cases_of, read_axes
 from pipeline.sweep.store import Store
 
@@ -56,7 +56,7 @@ def sweep(
     of workers, and however often it was stopped.
 
     Args:
-        order: The machine and how it walks; its axes and digest are filled in here.
+        order: The machine and how it walks.
         vary: Axes as ``--vary`` writes them.
         out: Folder, which the caller holds.
         sample: See `cases_of`, as are method and seed.
@@ -70,11 +70,9 @@ def sweep(
             gone; what was finished stays.
         ActuatorError: An actuator file cannot be used.
     """
-    machine = order.machine
-    digest = digest_of(order.walking(machine))
-    axes = read_axes(vary, machine)
+    digest = digest_of(order)
+    axes = read_axes(vary, machine_of(order))
     cases = cases_of(axes, sample, method, seed)
-    order = replace(order, axes=axes, digest=digest)
     whole = hashlib.sha256(f"{digest} {axes} {cases}".encode()).hexdigest()
     blocks = [(k, tuple(cases[k : k + BLOCK])) for k in range(0, len(cases), BLOCK)]
     store = Store(out, axes, whole, len(blocks))
@@ -82,7 +80,7 @@ def sweep(
     if not store.complete:
         left = [k for k in range(len(blocks)) if k not in store.done]
         for place, rows in spread(
-            partial(rows_of_block, order),
+            partial(rows_of_block, order, digest, axes),
             [blocks[k] for k in left],
             workers=workers,
             scheduler=scheduler,

@@ -9,6 +9,7 @@ import pytest
 from matplotlib.figure import Figure
 
 from pipeline.api.figures import Drawings, drawings
+from pipeline.api.pictures.scene import Scene
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
 from pipeline.simulation.walk_stand import stand, walk
@@ -31,7 +32,7 @@ def run(robot: Path) -> Drawings:
     given = settings_of(parser().parse_args(["reports", "--robot", str(robot), "--samples", "151"]))
     standing = stand(given.machine, given.chains())
     walking = walk(given.machine, given.chains(), samples=given.samples)
-    return drawings(given, standing, walking)
+    return drawings(Scene(given.robot), given, standing, walking)
 
 
 @pytest.fixture(scope="module")

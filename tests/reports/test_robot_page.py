@@ -11,6 +11,7 @@ import pytest
 
 from pipeline.api.figures import drawings
 from pipeline.api.machine import load
+from pipeline.api.pictures.scene import Scene
 from pipeline.api.tables import tables_of_standing, tables_of_walking
 from pipeline.simulation.settings import Settings
 from pipeline.simulation.walk_stand import Standing, Walking, stand, walk
@@ -44,7 +45,7 @@ def solo(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
 def page(solo: Run, tmp_path_factory: pytest.TempPathFactory) -> tuple[Page, Path]:
     given, standing, walking, tables = solo
     folder = tmp_path_factory.mktemp("page")
-    names = list(drawings(given, standing, walking))
+    names = list(drawings(Scene(given.robot), given, standing, walking))
     for name in (*names, "gait_steps"):
         (folder / f"{name}.svg").write_text("<svg xmlns='http://www.w3.org/2000/svg'/>")
     return robot_page(given, tables, folder, ["a remark"]), folder
@@ -112,7 +113,7 @@ def test_every_figure_of_the_run_is_on_the_page_but_plain_ones(
         for block in section.blocks
         if isinstance(block, FigureBlock)
     }
-    drawn = {*drawings(given, standing, walking)} | {"gait_steps"}
+    drawn = {*drawings(Scene(given.robot), given, standing, walking)} | {"gait_steps"}
     first = page[0].picture
     assert first is not None
     assert drawn - shown == {"stage_energy_ideal", "stage_energy_rotor", first.file.stem}
@@ -173,7 +174,7 @@ def test_all_of_it_is_seen_at_first_sight(
 ) -> None:
     given, standing, walking, _ = solo
     name = "electrical_energy_narrow"
-    save_figures({name: drawings(given, standing, walking)[name]}, tmp_path)
+    save_figures({name: drawings(Scene(given.robot), given, standing, walking)[name]}, tmp_path)
     content = replace(page[0], picture=first_picture(tmp_path), sections=())
     seen = layout(write_html(content, tmp_path / "index.html"), width, tmp_path)
     assert seen.at_first_sight()

@@ -38,7 +38,6 @@ class Run:
     folder: Path  #: As given.
     verb: str  #: That wrote it.
     tables: Mapping[str, RunTable]  #: By name; those over time left out.
-    series: tuple[str, ...]  #: Names of the tables over time.
     meta: Mapping[str, Any]  #: What every sidecar says of the run.
     figures: Mapping[str, str]  #: Names of the SVG files to their SHA-256.
     changed: tuple[str, ...]  #: Tables that are no longer as the run wrote them.
@@ -69,7 +68,7 @@ def read_run(folder: Path) -> Run:
     if manifest.verb.split()[0] not in KINDS:
         raise ReportError(f"{shown}: holds a run of '{one_line(manifest.verb)}'; {expected}")
     tables: dict[str, RunTable] = {}
-    series, changed = [], []
+    changed = []
     meta: dict[str, Any] = {}
     for name, digest in manifest.files.items():
         side, path = folder / f"{name[:-4]}.meta.json", folder / name
@@ -78,7 +77,6 @@ def read_run(folder: Path) -> Run:
         said = _sidecar(side)
         meta = meta or said
         if said["columns"][0]["name"] == TIME:
-            series.append(said["table"])
             continue
         tables[said["table"]] = _table(path, said["columns"])
         if sha256(path) != digest:
@@ -86,7 +84,7 @@ def read_run(folder: Path) -> Run:
     figures = {
         n: d for n, d in manifest.files.items() if n.endswith(".svg") and (folder / n).is_file()
     }
-    return Run(folder, manifest.verb, tables, tuple(series), meta, figures, tuple(changed))
+    return Run(folder, manifest.verb, tables, meta, figures, tuple(changed))
 
 
 def _sidecar(path: Path) -> dict[str, Any]:

@@ -13,17 +13,19 @@ from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
 from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
 from pipeline.identification.compare.stages import Stage, overall
+from pipeline.identification.supply.account import Account
 from pipeline.identification.workflow.outcome import Outcome, signature_name
 from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.logs.signals.grid import runs_of
 from pipeline.simulation.found_bodies import FoundBodies
 from pipeline.simulation.predict import Prediction
-from reports.figures.bars import gap_waterfall_figure
+from reports.figures.bars import gap_waterfall_figure, power_shares_figure
 from reports.figures.gap import (
     GapTrace,
     WhereGroup,
     gap_signature_figure,
     gap_time_figure,
+    power_time_figure,
     where_map_figure,
 )
 from reports.figures.save import save_figure
@@ -232,6 +234,15 @@ def signature_variable(
     if variable == "velocity of the other joint" and others:
         return f"velocity of {m.joints[others[0]]} [rad/s]", m.v[:, others[0]]
     return f"velocity of {name} [rad/s]", m.v[:, joint]
+
+
+def write_power_figures(balance: Account, robot: str, out: Path) -> None:
+    """Draw `power_in_time` of the first log and `power_shares`."""
+    title = f"{robot}: power at the supply"
+    save_figure(power_time_figure(balance, title=title), out, "power_in_time")
+    title = f"{robot}: what the supply gives"
+    for name, width in (("power_shares", WIDTH), ("power_shares_narrow", NARROW)):
+        save_figure(power_shares_figure(balance.shares, title=title, width=width), out, name)
 
 
 def write_pictures_and_page(

@@ -47,11 +47,6 @@ class Scene:
         return self.robot.configuration(joints, np.zeros((1, 3)))[0]
 
     @cached_property
-    def legs_of_bodies(self) -> dict[int, str]:
-        """Number of a moving body to its leg; the trunk and what it carries are in none."""
-        return {body: leg for leg, bodies in self._bodies_of_legs.items() for body in bodies[1:]}
-
-    @cached_property
     def _bodies_of_legs(self) -> dict[str, list[int]]:
         """The trunk and the moving bodies of each leg, from the base outward."""
         number, trunk = self.robot.model.getJointId, int(self.robot.floating)
@@ -131,11 +126,13 @@ class Scene:
         """
         model, data = self.robot.model, self.robot.model.createData()
         legs = self.legs(configurations[0])
+        # The trunk and what it carries are in no leg.
+        leg_of = {body: leg for leg, own in self._bodies_of_legs.items() for body in own[1:]}
         parts: dict[tuple[int, str, bool], list[Solid]] = {}
         solids = self._solids(configurations[0])
         for i, solid in enumerate(solids):
             load = self.load is not None and i == len(solids) - 1
-            key = (solid.body, self.legs_of_bodies.get(solid.body, ""), load)
+            key = (solid.body, leg_of.get(solid.body, ""), load)
             parts.setdefault(key, []).append(solid)
         for leg in legs:
             if leg.name in self.bare:

@@ -22,7 +22,6 @@ from pipeline.api.pictures.scene import Scene
 from pipeline.api.pictures.walk import steps_of
 from pipeline.errors import ReportError
 from pipeline.simulation.settings import Settings
-from pipeline.simulation.walk_stand import walk
 from reports.figures.robot.solids import Solid, reach
 from reports.figures.walk import Steps
 from reports.pages.gait_words import gait_and_conditions
@@ -65,14 +64,7 @@ def player(given: Settings, *, host: str = "127.0.0.1", port: int = 8080) -> Pla
         StanceError: A foot would have to pull or slide.
     """
     viser_module()  # refused before anything is computed
-    walking = walk(
-        given.machine,
-        {},
-        samples=given.samples,
-        quasi_static=given.quasi_static,
-        adjust=given.adjust,
-        forces=given.ground,
-    )
+    walking = given.walk({})
     title = f"{given.machine.spec.name}, {gait_and_conditions(given.machine.spec)}"
     return Player(title, steps_of(Scene(given.machine), walking, STEPS), host, port)
 

@@ -15,6 +15,7 @@ from actuators.arrays import Array
 
 #: Torque on the joint in its positive sense [N*m] of time [s], angle [rad] and speed [rad/s].
 Law = Callable[[float, float, float], float]
+_TERMS = (*("coulomb", "excess", "viscous", "quadratic"), "driving", "driven", "asymmetry")
 #: Keeps the bristle's steady deflection defined where a shaft has no friction [N*m].
 _NONE = 1e-12
 #: Deflection of bristles in steady sliding [rad] (presliding of a gear's teeth and seals).
@@ -51,8 +52,7 @@ class Friction:
 
     def without(self, joint: int) -> Friction:
         """The same with a joint that has none."""
-        names = (*("coulomb", "excess", "viscous", "quadratic"), "driving", "driven", "asymmetry")
-        return self.at(joint, **dict.fromkeys(names, 0.0))
+        return self.at(joint, **dict.fromkeys(_TERMS, 0.0))
 
     def with_spot(self, joint: int, law: Callable[[float, float], float]) -> Friction:
         """The same with a further level of dry friction."""
@@ -60,9 +60,8 @@ class Friction:
 
     def terms(self, joints: tuple[str, ...]) -> dict[str, list[str]]:
         """Terms that are there, by joint."""
-        names = (*("coulomb", "excess", "viscous", "quadratic"), "driving", "driven", "asymmetry")
         return {
-            joint: [name for name in names if getattr(self, name)[j]]
+            joint: [name for name in _TERMS if getattr(self, name)[j]]
             + ["spot" for at, _ in self.spots if at == j]
             for j, joint in enumerate(joints)
         }

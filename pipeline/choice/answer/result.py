@@ -12,7 +12,7 @@ import pandas as pd
 from actuators.loading.parts import load_parts
 from actuators.supply import HOUR
 from pipeline.api.result import Result, by_name
-from pipeline.api.tables import inputs_of, metadata
+from pipeline.api.tables import inputs_of, said_of
 from pipeline.choice.answer.break_even import known_candidate, rows
 from pipeline.choice.answer.sides import side_rows
 from pipeline.choice.answer.tables import ROBOT, tables_of, words
@@ -124,5 +124,5 @@ def choice(
         found = rows(machine, compare, idle=idle, chosen=chosen, joints=compare_joints)
         tables.append(table_of(BreakEvenRow, list(found)))
     given = machine.ready
-    inputs: Sequence[Path] = (*inputs_of(given), path)
-    return Choice("choose", by_name(tables), lambda: metadata(given), tuple(inputs), chosen)
+    inputs = (*inputs_of(given), path)
+    return Choice("choose", by_name(tables), said_of(given), inputs, chosen)

@@ -1,16 +1,15 @@
 """Many trials: the same rows whatever the number of workers, after a resume, and on Dask."""
 
-import json
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 from threading import Timer
 
 import pytest
 
 import pipeline.blind.run as run
-from pipeline.blind.rates import name_rows, trial_row
-from pipeline.blind.score import Score
+from pipeline.blind.rates import blind_rows, name_rows, trial_row
 from tests.command_line import exit_code, rows_of
 
 MODEL = """
@@ -34,23 +33,20 @@ def answer(folder: Path, options: list[str]) -> dict[str, object]:
     return {"code": 1, "seconds": 1.0, "message": ""}
 
 
-def rows(scores: list[Score]) -> str:
-    return json.dumps([[trial_row(s), name_rows(s)] for s in scores])
-
-
 def test_rows_are_the_same_whatever_the_workers_and_after_a_resume(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(run, "ask", answer)
     one = run.run_trials(["own"], 3, 3, tmp_path / "one")
-    assert rows(one) == rows(run.run_trials(["own"], 3, 3, tmp_path / "two", workers=2))
+    rows = blind_rows(one)
+    assert rows == blind_rows(run.run_trials(["own"], 3, 3, tmp_path / "two", workers=2))
     # Killed in the second trial: half a line is left of it.
     kept = tmp_path / "one" / "answers.jsonl"
     lines = kept.read_text(encoding="utf-8").splitlines(keepends=True)
     kept.write_text("".join(lines[:2]) + lines[2][:40], encoding="utf-8")
     made = []
     monkeypatch.setattr(run, "make", lambda *block: made.append(block[2]) or MAKE(*block))
-    assert rows(one) == rows(run.run_trials(["own"], 3, 3, tmp_path / "one"))
+    assert rows == blind_rows(run.run_trials(["own"], 3, 3, tmp_path / "one"))
     assert made == [1, 2]
 
 
@@ -70,7 +66,7 @@ def test_dask_gives_the_same_rows_though_a_worker_is_killed(tmp_path: Path) -> N
         spread = run.run_trials(["own"], 3, 2, tmp_path / "dask", scheduler=address)
     alone = run.run_trials(["own"], 3, 2, tmp_path / "alone")
     for one, two in zip(spread, alone, strict=True):
-        assert {**trial_row(one), "cpu_s": 0} == {**trial_row(two), "cpu_s": 0}
+        assert replace(trial_row(one), cpu_s=0) == replace(trial_row(two), cpu_s=0)
         assert name_rows(one) == name_rows(two)
 
 

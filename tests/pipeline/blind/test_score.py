@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from pipeline.blind.answer import Answer, Name, read_answer
-from pipeline.blind.rates import name_rows, rate_rows, trial_row, wilson
+from pipeline.blind.rates import RateRow, blind_rows, name_rows, wilson
 from pipeline.blind.score import score
 
 
@@ -138,8 +138,8 @@ def test_a_payload_is_told_in_kilograms() -> None:
     known = truth(hidden("link_mass", "link_3", 2, mass=2.0))
     s = score(known, Answer(0, 1.0, (name("link_mass", "link_3", mass=2.05),)))
     (row,) = name_rows(s)
-    assert row["mass_ratio"] == pytest.approx(1.025)
-    assert row["mass_inside"]
+    assert row.mass_ratio == pytest.approx(1.025)
+    assert row.mass_inside
 
 
 def test_model_file_and_classes_are_read() -> None:
@@ -175,9 +175,7 @@ def test_rates_count_what_they_say() -> None:
     outside = truth(hidden("detents", "joint_1"), kind="outside", source="mujoco")
     missed = score(outside, Answer(0, 1.0, (name("torque_ripple", "joint_1", amplitude=1.0),)))
     every = [right, wrong, silent, loud, missed]
-    trials = [trial_row(s) for s in every]
-    names = [row for s in every for row in name_rows(s)]
-    rates = {(r["source"], r["rate"]): (r["hits"], r["count"]) for r in rate_rows(trials, names)}
+    rates = {(r.source, r.rate): (r.hits, r.count) for r in blind_rows(every)[RateRow]}
     assert rates["own", "single_right"] == (1, 2)
     assert rates["own", "wrong_confirmed"] == (1, 4)
     assert rates["own", "empty_silent_and_explained"] == (1, 2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import subprocess
 import sys
 from itertools import pairwise
@@ -14,7 +13,8 @@ import pyarrow.parquet as pq
 import pytest
 
 import pipeline.identification.workflow.compared
-from pipeline.cli.gap import add_gap_options, options_of
+from pipeline.cli.gap import options_of
+from pipeline.cli.main import parser
 from pipeline.identification.compare.stages import stages
 from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
@@ -52,12 +52,8 @@ def long_leg(path: Path, effects: list[str], logs: int, seed: int = 5, times: in
 
 
 def taken_in(root: Path, *arguments: str) -> tuple[Setup, Compared]:
-    parser = argparse.ArgumentParser()
-    add_gap_options(parser)
-    options = options_of(
-        parser.parse_args([*arguments, "--robot", str(root / "urdf" / "leg.toml")])
-    )
-
+    words = ["gap", *arguments, "--robot", str(root / "urdf" / "leg.toml")]
+    options = options_of(parser().parse_args(words))
     given = setup(options)
     return given, compare_logs(given, given.model, *load_logs(given, options))
 

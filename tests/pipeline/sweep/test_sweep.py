@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas
@@ -12,7 +13,7 @@ import pipeline as lw
 from pipeline.cli.main import main
 from pipeline.spread import SpreadError
 from pipeline.sweep import sweep as module
-from pipeline.sweep.case import Order, rows_of_block
+from pipeline.sweep.case import Order, machine_of, rows_of_block
 from pipeline.sweep.plan import cases_of, read_axes
 from pipeline.sweep.sweep import sweep
 
@@ -74,11 +75,11 @@ def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
     """A stop after the first block, with a half-written part that a kill left."""
     computed: list[int] = []
 
-    def once(order: Order, block: tuple) -> list:
+    def once(*given: Any) -> list:
         if computed:
             raise SpreadError("a worker process ended")
-        computed.append(block[0])
-        return rows_of_block(order, block)
+        computed.append(given[-1][0])
+        return rows_of_block(*given)
 
     monkeypatch.setattr(module, "rows_of_block", once)
     with pytest.raises(SpreadError):
@@ -87,9 +88,9 @@ def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
     assert [path.name for path in parts.iterdir()] == ["0000000.parquet"]
     (parts / ".0000001.parquet.999999.tmp").write_bytes(b"PAR1 half")
 
-    def others(order: Order, block: tuple) -> list:
-        computed.append(block[0])
-        return rows_of_block(order, block)
+    def others(*given: Any) -> list:
+        computed.append(given[-1][0])
+        return rows_of_block(*given)
 
     monkeypatch.setattr(module, "rows_of_block", others)
     done = sweep(ORDER, VARY, tmp_path)
@@ -167,7 +168,7 @@ def test_a_plan_that_cannot_be_read_is_one_line(
 
 
 def test_samples_fill_the_ranges_and_are_the_same_for_a_seed() -> None:
-    machine = ORDER.machine
+    machine = machine_of(ORDER)
     axes = read_axes(["speed=0.1:0.4 m/s", "payload=0, 5, 10 kg", "hip_spacing=200:240mm"], machine)
     for method in ("sobol", "lhs"):
         cases = cases_of(axes, 30, method, seed=3)

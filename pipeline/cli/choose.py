@@ -9,19 +9,18 @@ from actuators.loading.data_sheet import Entry, Number, read_entry
 from actuators.loading.parts import DRIVER, PACK, PARTS
 from actuators.units import quantity
 from pipeline.cli.options import (
+    DECIMAL,
     OUT,
     AddVerb,
     add_machine_options,
     add_out_option,
-    decimal_of,
-    folder_held,
     machine_of,
     named_path,
 )
 from pipeline.progress import Progress
 
 #: The day that comes with the project, of any walking robot.
-DAY = Path(__file__).parents[2] / "choice" / "missions" / "day.csv"
+DAY = Path(__file__).parents[1] / "choice" / "missions" / "day.csv"
 #: Draws beyond which an answer changes no more, and memory ends.
 MOST_DRAWS = 100_000
 _NUMBERS = {
@@ -91,7 +90,7 @@ def add_verb(add: AddVerb) -> None:
 
 def run_choose(options: argparse.Namespace) -> int:
     """Search, write the tables, print three lines."""
-    with folder_held(options), Progress("choose") as progress:
+    with Progress("choose") as progress:
         progress.step("loading")
         from pipeline.choice.answer.result import choice
         from pipeline.choice.errors import ChoiceError
@@ -133,9 +132,8 @@ def run_choose(options: argparse.Namespace) -> int:
             progress=progress,
         )
         progress.step("writing")
-        result.save(options.out, decimal=decimal_of(options))
-        progress.close()
-        print(*result.lines, f"wrote {options.out}", sep="\n")
+        result.save(options.out, decimal=DECIMAL[options.decimal])
+    print(*result.lines, f"wrote {options.out}", sep="\n")
     return 0
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 OUT = Path("mapping.toml")
 
 
-def add_mapping(add: AddVerb) -> None:
+def add_verb(add: AddVerb) -> None:
     """Declare the verb."""
     text = "write a first mapping file for a foreign log, every line a guess with its reason"
     sub = add("gap mapping", text, run_mapping)

@@ -10,7 +10,7 @@ from pipeline.cli.options import AddVerb, named_path
 KINDS = ("mjcf", "urdf", "ros2_control")
 
 
-def add_export(add: AddVerb) -> None:
+def add_verb(add: AddVerb) -> None:
     """Declare the verb."""
     text = "write a model file's machine as MJCF, URDF or ROS 2 control, and what these leave out"
     sub = add("gap export", text, run_export)

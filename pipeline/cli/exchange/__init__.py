@@ -1,1 +1,0 @@
-"""Verbs by which logs come in from other tools, and results go out to them."""

@@ -1,0 +1,61 @@
+"""The verb sweep: walk with many numbers; a row for each case and actuator."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import fields
+
+from pipeline.cli.options import (
+    OUT,
+    AddVerb,
+    add_verbose_option,
+    add_walk_options,
+    changes_of,
+    named,
+    named_path,
+)
+
+
+def add_verb(add: AddVerb) -> None:
+    """Declare the verb."""
+    text = "walk with many speeds, loads, postures, dimensions; a row for each case and actuator"
+    sub = add("sweep", text, run_sweep)
+    sub.add_argument(
+        "--vary",
+        action="append",
+        default=[],
+        metavar="NAME=VALUES",
+        help="a number of --set with its values, 'speed=0.1:0.4:7 m/s' (first, last, how many), "
+        "'payload=0,5,10 kg', or with --sample a range, 'lift=20:60 mm'; 'gait.' may be left out",
+    )
+    text = 'TOML with a table [vary] of lines NAME = "VALUES", in place of or beside --vary'
+    sub.add_argument("--plan", type=named_path, metavar="FILE", help=text)
+    text = "draw so many cases; every combination by default"
+    sub.add_argument("--sample", type=int, metavar="N", help=text)
+    text = "of the draw: sobol (default), or lhs, a Latin hypercube"
+    sub.add_argument("--method", default="sobol", help=text)
+    sub.add_argument("--seed", type=int, default=1, help="of the draw; 1")
+    add_walk_options(sub, samples=101)
+    sub.add_argument("--workers", type=int, default=2, help="number of processes; 2")
+    text = "send the cases to a Dask scheduler, such as tcp://host:8786, in place of processes"
+    sub.add_argument("--scheduler", metavar="ADDRESS", help=text)
+    text = "folder for sweep.parquet; the same command goes on where it was stopped there"
+    sub.add_argument("--out", type=named_path, default=OUT / "sweep", help=text)
+    add_verbose_option(sub)
+
+
+def run_sweep(options: argparse.Namespace) -> int:
+    """Walk every case; 1 where the robot walks in none."""
+    from pipeline.atomic import output_errors
+    from pipeline.sweep.case import Order
+    from pipeline.sweep.plan import read_plan
+    from pipeline.sweep.sweep import sweep
+
+    asked = named(options, (f.name for f in fields(Order)))
+    how = named(options, ("sample", "method", "seed", "workers", "scheduler"))
+    with output_errors(options.out):
+        order = Order(**asked, changes=tuple(changes_of(options.set).items()))
+        vary = [*(read_plan(options.plan) if options.plan else ()), *options.vary]
+        done = sweep(order, vary, options.out, **how)
+    print(done)
+    return int(sum(done.refused.values()) == done.cases)
