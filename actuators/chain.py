@@ -14,8 +14,8 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from actuators.arrays import Array, Numbers, Scalars, least_magnitude, require
-from actuators.elements.element import Element
+from actuators.arrays import Array, Scalars, least_magnitude
+from actuators.elements.element import Element, Numbers, require
 from actuators.errors import ChainError, closest
 from actuators.shaft import ShaftSeries
 

@@ -34,7 +34,8 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from actuators.arrays import Array, Numbers, Scalars, require
+from actuators.arrays import Array, Scalars
+from actuators.elements.element import Numbers, require
 from actuators.errors import DataSheetError
 
 Values = Mapping[str, float]

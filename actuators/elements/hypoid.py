@@ -20,8 +20,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from actuators.arrays import Array, Scalars, require
-from actuators.elements.element import Element, Span
+from actuators.arrays import Array, Scalars
+from actuators.elements.element import Element, Span, require
 from actuators.errors import SelfLockingError
 from actuators.shaft import ShaftSeries
 

@@ -21,7 +21,8 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from actuators.arrays import Array, Numbers, Scalars
+from actuators.arrays import Array, Scalars
+from actuators.elements.element import Numbers
 from actuators.elements.heating import COPPER, REFERENCE
 
 #: Temperature for which data sheets hold [K].
