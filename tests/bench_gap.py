@@ -12,7 +12,7 @@ import pyarrow.parquet as pq
 
 import pipeline.identification.workflow.setup as setup_module
 from pipeline.effects.registry import catalogue
-from pipeline.identification.compare.stages import stages
+from pipeline.identification.compare.circumstances import stages
 from pipeline.identification.regression.design_matrix import make_data_sets
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.results import UNCERTAINTIES
@@ -20,7 +20,8 @@ from pipeline.identification.selection.evidence import State
 from pipeline.identification.selection.pool import make_pool
 from pipeline.identification.selection.search import Search
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
-from pipeline.identification.workflow.setup import Options, Setup, setup
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import Setup, setup
 from tests.leg_log import leg_logs
 
 ROOT = Path(__file__).parents[1]

@@ -16,7 +16,7 @@ import pytest
 from pygments.lexers import find_lexer_class_by_name
 
 from pipeline.cli.main import parser
-from pipeline.identification.workflow.setup import STEPS
+from pipeline.identification.workflow.options import STEPS
 from tests.pages import (
     HOW_TO,
     PYTHON,

@@ -9,8 +9,7 @@ import pytest
 
 from pipeline.logs.reading.log_format import BASE_COLUMNS, FOOT_COLUMNS, JOINT_COLUMNS
 from pipeline.logs.reading.mapping import ColumnTable, Mapping
-from pipeline.robot.robot_numbers import GAIT_SCHEMA
-from pipeline.robot.robot_tables import OwnLegTable, RobotTable
+from pipeline.robot.robot_tables import GAIT_SCHEMA, OwnLegTable, RobotTable
 from tests.pages import pages
 from tests.readme import BLOCKS, PAGES, SHOWN, number, renewed
 

@@ -21,8 +21,7 @@ from pipeline.errors import PipelineError, RobotFileError
 from pipeline.machine.own_actuators import Motors, actuator_folder, motors_of, own_actuators
 from pipeline.motion.support import support_margin
 from pipeline.robot.check import Finding, check_robot
-from pipeline.robot.guess.guess import Guess, guess_robot
-from pipeline.robot.guess.pace import shorter
+from pipeline.robot.guess.guess import Guess, guess_robot, shorter
 from pipeline.robot.guess.writer import robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file

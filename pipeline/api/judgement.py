@@ -5,8 +5,7 @@ from __future__ import annotations
 from pipeline.paper.calibration.store import Calibrated, calibrated_numbers
 from pipeline.paper.judgement.basis import Basis
 from pipeline.paper.judgement.evidence import Sensitivity, sensitivities
-from pipeline.paper.judgement.judge import Judgement, judge
-from pipeline.paper.judgement.leave_one_out import Prediction
+from pipeline.paper.judgement.judge import Judgement, Prediction, judge
 from pipeline.paper.judgement.readings import ReadingRow, reading_rows
 from pipeline.paper.omissions import Omission
 from pipeline.simulation.settings import Settings

@@ -26,8 +26,9 @@ from pipeline.api.result import by_name
 from pipeline.identification.supply.account import account
 from pipeline.identification.workflow.compared import compare_logs, judged, load_logs
 from pipeline.identification.workflow.forward import forward as drive_forward
+from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.outcome import Outcome, identified
-from pipeline.identification.workflow.setup import Options, Setup, check_options, setup
+from pipeline.identification.workflow.setup import Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
 from pipeline.logs.errors import Finding
 from pipeline.logs.formats.convert import plain

@@ -153,7 +153,7 @@ class Machine:
             RobotFileError: The machine has no effects.
             ReportError: The file cannot be written.
         """
-        from pipeline.identification.workflow.model_writer import model_text
+        from pipeline.identification.workflow.written import model_text
 
         file, target = self.model, Path(path)
         if file is None:

@@ -10,8 +10,8 @@ from typing import Final
 from actuators.arrays import Array, Index
 from actuators.supply import Battery
 from pipeline.api.machine import Machine
-from pipeline.choice.answer.full import Full, through
-from pipeline.choice.asked import Asked, asked_of
+from pipeline.choice.answer.break_even import Full, through
+from pipeline.choice.asked import Asked, Wanted, asked_of
 from pipeline.choice.doubt import Design, Doubt, doubt, drawn, drawn_machines
 from pipeline.choice.group import Found, merged
 from pipeline.choice.loads import Load, loads_of
@@ -21,7 +21,6 @@ from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Feedback
 from pipeline.choice.settle import Robots
 from pipeline.choice.springs import found_springs
-from pipeline.choice.wanted import Wanted
 from pipeline.progress import Progress
 
 #: Rounds of mass fed back, at most; two or three settle it.

@@ -93,9 +93,9 @@ def run_choose(options: argparse.Namespace) -> int:
     with Progress("choose") as progress:
         progress.step("loading")
         from pipeline.choice.answer.result import choice
+        from pipeline.choice.asked import Wanted
         from pipeline.choice.errors import ChoiceError
         from pipeline.choice.track import Account
-        from pipeline.choice.wanted import Wanted
         from pipeline.simulation.settings import regeneration_of
 
         policy = regeneration_of(options.regeneration)

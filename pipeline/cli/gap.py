@@ -18,7 +18,7 @@ from pipeline.cli.options import (
     changes_of,
     named_path,
 )
-from pipeline.identification.workflow.setup import DEFAULT_OUT, STEPS, Options
+from pipeline.identification.workflow.options import DEFAULT_OUT, STEPS, Options
 from pipeline.progress import Progress
 
 if TYPE_CHECKING:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pinocchio as pin
 
 from actuators.arrays import Array
 from actuators.errors import one_line
@@ -17,6 +18,7 @@ from pipeline.errors import GaitError
 from pipeline.motion.footfall import Footfall, in_turn, named, own
 from pipeline.motion.gait_table import GaitTable, by_leg, read_gait_table
 from pipeline.motion.motion import Ground
+from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import RobotSpec
 
 #: Speed, period and stroke agree within this share.
@@ -101,7 +103,7 @@ def _gait(table: GaitTable, spec: RobotSpec) -> Gait:
             "gait.stability_margin is kept by the body's sway; state gait.sway = 'least', too"
         )
     margin = DEFAULT_MARGIN if table.stability_margin is None else table.stability_margin
-    # Half the body's way ahead and back; see `pipeline.motion.base_motion.surge`.
+    # Half the body's way ahead and back; see `pipeline.motion.sway.surge`.
     share = float(np.mean(list(footfall.duty.values())))
     stroke = float(np.hypot(twist[0], twist[1])) * share * period
     rate, height = 4.0 * np.pi / period, -float(neutral[:, 2].mean())  # [rad/s], [m]
@@ -281,3 +283,18 @@ def _refuse_other_strokes(table: GaitTable, spec: RobotSpec, follows: Array) -> 
             f"'{one_line(names[k])}' moves {found[k]:.4g} m on the ground, but gait.stroke is "
             f"{stated[k]:.4g} m; change one or leave one out"
         )
+
+
+def with_payload(robot: Robot) -> Robot:
+    """The robot with the payload of its ``[gait]`` fixed to the base link; itself without one.
+
+    The load is a point mass: give the place of its centre of mass. The URDF's text stays without.
+    """
+    table = gait_table(robot.spec)
+    if not table.payload_mass:
+        return robot
+    place = np.array([table.payload_x, table.payload_y, table.payload_z])
+    model = robot.model.copy()
+    load = pin.Inertia(table.payload_mass, place, np.zeros((3, 3)))
+    model.appendBodyToJoint(1 if robot.floating else 0, load, pin.SE3.Identity())
+    return replace(robot, model=model)

@@ -14,13 +14,16 @@ from actuators.text_file import UnreadableTextError, read_toml_file
 from actuators.units import si_unit
 from pipeline.errors import RobotFileError
 from pipeline.robot.published import SCHEME, published_names, urdf_path
-from pipeline.robot.robot_numbers import BUILD_SCHEMA, GAIT_NUMBERS, GAIT_SCHEMA, check_parameters
 from pipeline.robot.robot_tables import (
+    BUILD_SCHEMA,
+    GAIT_NUMBERS,
+    GAIT_SCHEMA,
     BuiltLegTable,
     FileTable,
     LegTable,
     OwnLegTable,
     RobotTable,
+    check_parameters,
 )
 
 #: Of the project, from the folder it is run in.

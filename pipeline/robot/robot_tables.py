@@ -1,15 +1,68 @@
-"""What may stand in a robot file: its tables, their keys and what each of them may say."""
+"""What may stand in a robot file: its tables, their keys, the numbers that each robot needs."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, ClassVar, Final, Generic, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, Strict, model_validator
 
 from actuators.checked import Names, Number, Table, Text, finite
-from pipeline.robot.robot_numbers import LARGEST_LENGTH
+from actuators.parameters import Parameter, ParameterSet
+from pipeline.errors import RobotFileError
 
+#: Numbers every walking robot needs, with their dimension.
+GAIT_SCHEMA: Final = {
+    "total_mass": "mass",
+    "foot_stroke": "length",
+    "foot_lift": "length",
+    "walking_speed": "velocity",
+    "gait_period": "time",
+    "gravity": "acceleration",
+}
+#: Numbers from which `pipeline.robot.urdf_builder` builds the hexapod and the leg on a stand.
+BUILD_SCHEMA: Final = {
+    "body_length": "length",
+    "robot_width": "length",
+    "hip_spacing": "length",
+    "joint_1_axis_angle": "angle",
+    "joint_2_lateral": "length",
+    "body_height": "length",
+    "coxa_length": "length",
+    "femur_length": "length",
+    "tibia_length": "length",
+    "trunk_height": "length",
+    "link_width": "length",
+    "hip_link_mass": "mass",
+    "femur_mass": "mass",
+    "tibia_mass": "mass",
+    "femur_com": "ratio",
+    "tibia_com": "ratio",
+    "trunk_com_left": "length",
+    "joint_1_range": "angle",
+    "joint_2_lower": "angle",
+    "joint_2_upper": "angle",
+    "joint_3_lower": "angle",
+    "joint_3_upper": "angle",
+    "joint_effort_limit": "torque",
+    "joint_velocity_limit": "angular velocity",
+}
+#: A gait's numbers among the parameters; ``[gait]`` may state its own instead.
+GAIT_NUMBERS: Final = frozenset({"foot_stroke", "foot_lift", "walking_speed", "gait_period"})
+#: Lengths of walking robots lie between these; outside, a unit is wrong by a thousand [m].
+SMALLEST_LENGTH, LARGEST_LENGTH = 1e-3, 10.0
+#: No planet pulls more [m/s^2].
+LARGEST_GRAVITY: Final = 30.0
+#: Lengths that may be zero, or lie on either side.
+_ANY_LENGTH: Final = ("coxa_length", "joint_2_lateral", "trunk_com_left")
+#: Numbers that may be zero, but not negative.
+_NOT_NEGATIVE: Final = ("foot_lift", "coxa_length")
+#: Numbers of either sign, or with limits of their own.
+_ANY_SIGN: Final = (
+    *("joint_1_axis_angle", "joint_2_lateral", "femur_com", "tibia_com", "trunk_com_left"),
+    *("joint_2_lower", "joint_2_upper", "joint_3_lower", "joint_3_upper"),
+)
 #: Joints of a built leg: hip, femur, tibia.
 _BUILT_JOINTS: Final = 3
 
@@ -131,3 +184,72 @@ class FileTable(Table, Generic[_Leg]):
     assumed: dict[str, Text] = Field(default={})
     parameters: dict[str, Any]
     actuators: dict[str, Any] = Field(default={})
+
+
+def check_parameters(parameters: ParameterSet, build: str | None, where: str) -> None:
+    """Refuse numbers that no robot or gait can have, after loading and after a change.
+
+    `build`: which builder makes the URDF, or None for a URDF of the user's own.
+
+    Raises:
+        RobotFileError: A mass, length or period that is not positive, a unit that is wrong by a
+            thousand, or a contradiction; all of them.
+    """
+    schema = GAIT_SCHEMA | BUILD_SCHEMA
+    wrong: list[str] = []
+    for row in parameters.rows():
+        if build or row.name in GAIT_SCHEMA:
+            wrong += _sign(row)
+        wrong += _size(row, schema[row.name])
+    if build:
+        wrong += _built(parameters)
+    if wrong:
+        raise RobotFileError(f"{where}: {'; '.join(wrong)}")
+
+
+def _sign(row: Parameter) -> Iterator[str]:
+    """What is wrong with a number's sign."""
+    if row.name in _NOT_NEGATIVE and row.value < 0:
+        yield f"parameters.{row.name} must not be negative"
+    elif row.name not in (*_NOT_NEGATIVE, *_ANY_SIGN) and row.value <= 0:
+        yield f"parameters.{row.name} = {_written(row)} must be positive"
+
+
+def _size(row: Parameter, dimension: str) -> Iterator[str]:
+    """Metres written for millimetres and the reverse, radians for degrees."""
+    size, number = abs(row.value), f"{row.value_as_written:g}"
+    small = 0 < size < SMALLEST_LENGTH and row.name not in _ANY_LENGTH
+    other = ""
+    if row.name == "gravity" and size > LARGEST_GRAVITY:
+        yield "parameters.gravity is beyond any planet; check its unit"
+        return
+    if dimension == "angle" and size > 2 * math.pi:
+        what, other = "more than a turn", "deg" if row.unit == "rad" else ""
+    elif dimension == "length" and (small or size > LARGEST_LENGTH):
+        what = f"{'shorter' if small else 'longer'} than in any walking robot"
+        other = {("mm", True): "m", ("m", False): "mm"}.get((row.unit, small), "")
+    else:
+        return
+    hint = f"is {number} {other} meant?" if other else "check its unit"
+    yield f"parameters.{row.name} = {_written(row)} is {what}; {hint}"
+
+
+def _built(parameters: ParameterSet) -> Iterator[str]:
+    """Numbers of a built robot that contradict one another."""
+    for joint in ("joint_2", "joint_3"):
+        if parameters[f"{joint}_lower"] >= parameters[f"{joint}_upper"]:
+            yield f"parameters.{joint}_lower must be below {joint}_upper"
+    for name in ("femur_com", "tibia_com"):
+        if not 0 <= parameters[name] <= 1:
+            yield (
+                f"parameters.{name} = {parameters[name]:g} lies outside the link; expected 0 to 1, "
+                "a fraction of its length"
+            )
+    if parameters["joint_2_lateral"] < parameters["coxa_length"]:
+        yield (
+            "joint_2_lateral is smaller than coxa_length, so joint 1 would lie beyond the mid-plane"
+        )
+
+
+def _written(row: Parameter) -> str:
+    return f"{row.value_as_written:g} {row.unit}"

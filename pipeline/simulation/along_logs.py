@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.columns.explaining import Bodies
+from pipeline.logs.columns.explaining import Bodies, Reading, as_named
 from pipeline.logs.columns.findings import column_findings, copies
-from pipeline.logs.columns.hypotheses import Reading, as_named
 from pipeline.logs.columns.search import search
 from pipeline.logs.errors import Finding
 from pipeline.logs.prepared.measurement import Measurement

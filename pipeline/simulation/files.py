@@ -33,7 +33,7 @@ from pipeline.motion.gait import gait_of, gait_table
 from pipeline.motion.gait_table import changed_table, gait_keys, spec_with_gait
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import DEFAULT_ROBOT, RobotSpec, leg_list
-from pipeline.robot.robot_numbers import GAIT_NUMBERS, check_parameters
+from pipeline.robot.robot_tables import GAIT_NUMBERS, check_parameters
 
 #: What a change of the table ``[gait]`` begins with.
 GAIT: Final = "gait."

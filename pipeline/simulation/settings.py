@@ -21,9 +21,8 @@ from pipeline.effects.model_file import apply_edits
 from pipeline.errors import GaitError, RobotFileError
 from pipeline.machine.joint import Actuators
 from pipeline.machine.own_actuators import Motors, OwnActuators, motors_of
-from pipeline.motion.gait import gait_table
+from pipeline.motion.gait import gait_table, with_payload
 from pipeline.motion.motion import Motion
-from pipeline.motion.payload import with_payload
 from pipeline.robot.check import refuse_impossible
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import RobotSpec

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.effects.base import place_text
-from pipeline.identification.compare.circumstances import WHOLE
-from pipeline.identification.compare.stages import noise_floor
+from pipeline.identification.compare.circumstances import WHOLE, noise_floor
 from pipeline.identification.results import ACCEPTED, REJECTED, named
 from pipeline.identification.workflow.constants import voltage_remarks
 from pipeline.identification.workflow.outcome import Outcome

@@ -11,8 +11,7 @@ import numpy as np
 from actuators.arrays import Array
 from pipeline.effects.base import CHANNEL_UNITS
 from pipeline.effects.registry import effect_named
-from pipeline.identification.compare.circumstances import WHOLE, Where, gap_of
-from pipeline.identification.compare.stages import Stage, overall
+from pipeline.identification.compare.circumstances import WHOLE, Stage, Where, gap_of, overall
 from pipeline.identification.supply.account import Account
 from pipeline.identification.workflow.outcome import Outcome, signature_name
 from pipeline.logs.prepared.measurement import TEST, Measurement

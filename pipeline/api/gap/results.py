@@ -10,7 +10,7 @@ from pipeline.api.gap.bodies import write_model
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result
 from pipeline.effects.model_file import edits_in
-from pipeline.identification.compare.stages import overall
+from pipeline.identification.compare.circumstances import overall
 from pipeline.identification.supply.account import Account
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.forward import Drive, by_model, rms

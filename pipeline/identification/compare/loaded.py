@@ -28,9 +28,8 @@ from pipeline.logs.prepared.read_off import signal_findings
 from pipeline.logs.quality.checks import OF_LIMITS, cannot_tell
 from pipeline.logs.quality.quality import judge
 from pipeline.logs.quality.sampling import new_values
-from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import column_name
+from pipeline.logs.reading.log_format import Expected, column_name
 from pipeline.logs.signals.derivatives import (
     LONGEST_KERNEL,
     Settings,

@@ -26,8 +26,8 @@ from pipeline.effects.base import REACH
 from pipeline.identification.regression.normal_equations import solve_spd
 from pipeline.identification.regression.tolerances import STRAINS, UNCERTAINTY
 from pipeline.identification.results import UNCERTAINTIES
-from pipeline.identification.selection.noise import saturated
 from pipeline.identification.selection.pool import Key, Pool, Term
+from pipeline.identification.selection.residual import saturated
 
 #: How much likelier a set has to be with a name than without it, beyond even odds of all names
 #: (logarithm).

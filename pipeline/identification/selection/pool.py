@@ -19,13 +19,13 @@ from pipeline.effects.friction import FrictionPreset
 from pipeline.effects.motor import TorqueRipple
 from pipeline.effects.registry import catalogue
 from pipeline.identification.regression.problem import Problem
-from pipeline.identification.selection.noise import fast_noise, saturated
 from pipeline.identification.selection.places import (
     absolute,
     payload_places,
     rests_by_joint,
     ripple_orders,
 )
+from pipeline.identification.selection.residual import fast_noise, saturated
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 
 Key = tuple[str, Place]

@@ -19,15 +19,16 @@ from pipeline.identification.compare.loaded import (
 from pipeline.identification.compare.long import LONG_ROWS, LongLogs, parts_of_surveys
 from pipeline.identification.compare.model_check import against_model, drifts, rows_left
 from pipeline.identification.compare.observe import observe, observe_all
-from pipeline.identification.workflow.setup import Options, Setup
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.errors import Finding, GapError, LogContentError, refuse
 from pipeline.logs.prepared.measurement import Contact, Measurement, find_contact
 from pipeline.logs.prepared.parts import Parts, split
 from pipeline.logs.prepared.prepare import Prepared
 from pipeline.logs.prepared.stream import Stream, Survey, survey
 from pipeline.logs.quality.checks import refuse_repeats
-from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.along_logs import wrong_columns

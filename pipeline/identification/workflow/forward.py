@@ -15,7 +15,8 @@ from actuators.arrays import Array
 from pipeline.effects.base import place_text
 from pipeline.effects.model_file import apply_edits
 from pipeline.identification.workflow.compared import Compared
-from pipeline.identification.workflow.setup import Options, Setup
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import Setup
 from pipeline.identification.workflow.written import AS_IT_WAS
 from pipeline.logs.reading.log import Log
 from pipeline.simulation.forward import ForwardSimulator, Rollout, servo_input

@@ -11,7 +11,7 @@ import numpy as np
 
 from pipeline.effects.model_file import Edit, apply_edits, edits_in
 from pipeline.errors import GaitError, StanceError
-from pipeline.identification.compare.stages import Stage, noise_floor, overall
+from pipeline.identification.compare.circumstances import Stage, noise_floor, overall
 from pipeline.identification.regression.floor import floor_of
 from pipeline.identification.results import Found, Naming, named
 from pipeline.identification.selection.deciding_motion import Deciding
@@ -19,9 +19,15 @@ from pipeline.identification.selection.identify import Identified, estimated_alo
 from pipeline.identification.selection.two_positions import READ_OFF, read_off_two
 from pipeline.identification.workflow.compared import Compared
 from pipeline.identification.workflow.deciding import decide
-from pipeline.identification.workflow.model_writer import edits_of, model_text
-from pipeline.identification.workflow.setup import Options, Setup
-from pipeline.identification.workflow.written import Validated, validate_found, with_found
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import Setup
+from pipeline.identification.workflow.written import (
+    Validated,
+    edits_of,
+    model_text,
+    validate_found,
+    with_found,
+)
 from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.prepared.measurement import TEST
 from pipeline.logs.signals.grid import runs_of

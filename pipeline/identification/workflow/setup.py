@@ -1,4 +1,4 @@
-"""What a run of the workflow is asked to do; its machine, and what its logs must look like."""
+"""From the options of `gap` to a machine and what its logs must look like."""
 
 from __future__ import annotations
 
@@ -6,38 +6,26 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Final
 
 import numpy as np
 
 from actuators.loading.build import CATALOG, Catalog
 from pipeline.effects.model_file import ModelFile, apply_edits, new_model_file
+from pipeline.identification.workflow.options import Options
 from pipeline.logs.errors import GapError, LogContentError, MappingError, ModelFileError
 from pipeline.logs.formats.convert import is_log
-from pipeline.logs.reading.expected import Expected, expected_of_model, expected_of_robot
-from pipeline.logs.reading.log_format import EFFORTS
+from pipeline.logs.reading.log_format import EFFORTS, Expected, expected_of_model, expected_of_robot
 from pipeline.logs.reading.mapping import load_mapping
 from pipeline.logs.reading.plan import plan_reading
 from pipeline.machine.joint import Actuators, drivetrains_of
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import Motors, OwnActuators, motors_of
-from pipeline.motion.payload import with_payload
+from pipeline.motion.gait import with_payload
 from pipeline.robot.check import check_urdf, refuse_impossible, source_of, tolerated
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.urdf_source import MOVING, parse_elements, read_urdf
 from pipeline.simulation.files import Files, read_files, stated
 
-#: The steps; without one all but `forward` run, which needs goals and the servos' law.
-STEPS: Final = {
-    "read": "judge the logs: quality.csv",
-    "where": "where model and machine disagree: where.csv and the where-map",
-    "name": "which effects the model lacks: candidates.csv, found.csv",
-    "add": "the same, and write the effects into model.toml",
-    "forward": "drive the model under its servos' law and compare positions: forward.csv",
-    "power": "what the supply gives, against the sum over the drives: power.csv",
-    "shrink": "the gap with and without the effects of a model file (--model)",
-}
-DEFAULT_OUT: Final = Path("reports/out/gap")
 #: The alternative that holds nothing but a motor's data sheet: what gears lose is what a log shows.
 DEFAULT_ALTERNATIVE = "rotor"
 #: The channel that is compared without an actuator, for a robot file as for a bare URDF.
@@ -247,31 +235,3 @@ def check_options(options: Options, files: Files | None = None) -> None:
         raise GapError(f"--gait-start {options.gait_start}: expected a time in the log [s]")
     if options.effort and options.effort not in EFFORTS:
         raise GapError(f"--effort {options.effort}: expected one of {', '.join(EFFORTS)}")
-
-
-@dataclass(frozen=True)
-class Options:
-    """Logs, machine and choices of one run; names and defaults are those of the command line."""
-
-    logs: tuple[Path, ...]  #: CSV or Parquet, to learn from.
-    step: str = "all"  #: One of `STEPS`, or ``all``.
-    robot: Path | None = None  #: Robot file or URDF; the model file's or the hexapod by default.
-    model: Path | None = None  #: Model file with effects found earlier.
-    #: File with a table ``[gait]`` that was walked instead of the robot file's.
-    gait: Path | None = None
-    holdout: tuple[Path, ...] = ()  #: Test logs.
-    #: ``fixed``, ``level`` or ``measured``; as log and robot say by default.
-    base: str | None = None
-    gait_start: float | None = None  #: Time in the log at which a period of the gait begins [s].
-    mapping: Path | None = None  #: Mapping file for foreign columns.
-    alternative: str | None = None  #: Actuator between joint and supply, by name.
-    actuators: Path | None = None  #: Folder of actuator files of one's own.
-    #: Numbers that differ from the files', by their keys.
-    changes: Mapping[str, object] = field(default_factory=dict)
-    effort: str | None = None  #: Channel to compare; the log's most direct by default.
-    cutoff: float | None = None  #: Bandwidth of the comparison [Hz]; the data's own by default.
-    #: Last share of every log that is for the test; blocks in between by default.
-    prove_last: float | None = None
-    #: Folder for what is written; the model file names its robot relative to it.
-    out: Path = DEFAULT_OUT
-    decimal: str = "."  #: Sign of decimals in copies of the tables.

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuators.arrays import Array
-from pipeline.logs.columns.explaining import Bodies
-from pipeline.logs.columns.hypotheses import Hypothesis, Reading, as_named
+from pipeline.logs.columns.explaining import Bodies, Hypothesis, Reading, as_named
 from pipeline.logs.columns.search import Mended
 from pipeline.logs.errors import Finding
 from pipeline.logs.quality.checks import DEG, WRONG

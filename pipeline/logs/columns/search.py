@@ -14,13 +14,15 @@ from typing import Final, Protocol
 import numpy as np
 
 from actuators.arrays import Array, Mask
-from pipeline.logs.columns.explaining import Bodies, Explaining, Score
-from pipeline.logs.columns.hypotheses import (
+from pipeline.logs.columns.explaining import (
     CAUSES,
     LEAST,
     MOST,
+    Bodies,
+    Explaining,
     Hypothesis,
     Reading,
+    Score,
     as_named,
     of_efforts,
     of_positions,

@@ -9,19 +9,20 @@ from typing import Final
 import numpy as np
 
 from actuators.arrays import Array
-from pipeline.logs.first_mapping.names import Named, assign
-from pipeline.logs.first_mapping.numbers import (
+from pipeline.logs.first_mapping.names import (
     ANGLES,
     DERIVATIVE,
     NO_DERIVATIVE,
     Follows,
+    Named,
     angle_units,
+    assign,
     follows,
     mean_of,
     rate_of,
 )
-from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import SUPPLY
+from pipeline.logs.reading.log_format import Expected
 
 POSITIONS: Final = ("position", "motor_position")
 #: Factor between a position and its velocity beyond which the position is a motor's.

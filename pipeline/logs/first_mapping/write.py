@@ -15,14 +15,13 @@ from actuators.arrays import Array
 from actuators.errors import one_line
 from pipeline.logs.errors import GapError, LogFormatError
 from pipeline.logs.first_mapping.guess import Guess, current_unit, guesses
-from pipeline.logs.first_mapping.names import Named, read_name, words_of
-from pipeline.logs.first_mapping.numbers import clock_units
-from pipeline.logs.formats.arrays import TIMES
+from pipeline.logs.first_mapping.names import Named, clock_units, read_name, words_of
+from pipeline.logs.formats.convert import TIMES
 from pipeline.logs.reading.csv_head import unit_spelt
-from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log_format import (
     JOINT_COLUMNS,
     TIME,
+    Expected,
     column_name,
     parse_column,
     plotted,

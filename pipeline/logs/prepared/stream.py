@@ -26,8 +26,8 @@ from pipeline.logs.formats.convert import sha256
 from pipeline.logs.prepared.measurement import Contact
 from pipeline.logs.prepared.prepare import Prepared, prepare
 from pipeline.logs.quality.quality import judge
-from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.log_format import Expected
 from pipeline.logs.reading.mapping import Mapping as MappingFile
 from pipeline.logs.reading.read import read_log, stream_log
 from pipeline.logs.reading.table_file import TableFile, open_table, row_count

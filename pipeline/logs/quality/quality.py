@@ -25,9 +25,8 @@ from pipeline.logs.quality.sampling import (
     saturated,
     standstill,
 )
-from pipeline.logs.reading.expected import Expected
 from pipeline.logs.reading.log import Log
-from pipeline.logs.reading.log_format import EFFORTS, column_name
+from pipeline.logs.reading.log_format import EFFORTS, Expected, column_name
 from pipeline.logs.signals.grid import GAP, interpolated, own_spacing
 
 #: Fewer rows say nothing about anything.

@@ -1,8 +1,12 @@
-"""The calibration's results: one file of numbers, and the calibrated values in their own files."""
+"""The calibration's results: one file of numbers, and the calibrated values in their own files.
+
+`fingerprint` says which numbers a calibration was made with: it judges no others.
+"""
 
 from __future__ import annotations
 
 import json
+import math
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -13,18 +17,20 @@ from typing import Any, ClassVar
 import numpy as np
 import tomlkit
 
-from actuators.loading.build import CATALOG, load_catalog
-from actuators.units import from_si, to_si
+from actuators.loading.build import CATALOG, Catalog, load_catalog
+from actuators.units import dimension, from_si, to_si
 from pipeline.atomic import replacing
 from pipeline.column import column
-from pipeline.paper.calibration.fingerprint import fingerprint
 from pipeline.paper.calibration.prior import Prior, load_prior
 from pipeline.paper.errors import CalibrationError
 from pipeline.paper.hexapod import POSTURE, ROBOT, SPLITS
 from pipeline.paper.motor_constants import UNITS
-from pipeline.paper.published import load_published
-from pipeline.robot.robot_file import load_robot_file
+from pipeline.paper.published import Published, load_published
+from pipeline.robot.robot_file import RobotSpec, load_robot_file
 
+Fingerprint = Mapping[str, float | str]
+#: Stored numbers have nine digits.
+_SAME = 1e-8
 RESULTS_FILE = Path(__file__).parent / "results" / "calibration.json"
 _DIGITS = 9
 #: Standard deviation of the posterior, in the prior's, below which a number counts as known.
@@ -248,3 +254,41 @@ def load_results(path: Path = RESULTS_FILE) -> dict[str, Any]:
             f"{path.name}: no calibration results; run `make calibrate`"
         ) from None
     return results
+
+
+def fingerprint(
+    spec: RobotSpec, catalog: Catalog, published: Mapping[str, Published], prior: Prior
+) -> Fingerprint:
+    """Everything a judgement depends on, by name: SI numbers and texts."""
+    out: dict[str, float | str] = {f"robot.{name}": x for name, x in spec.parameters.items()}
+    out |= {f"gait.{key}": _text(value) for key, value in sorted(spec.gait.items())}
+    out["standing.feet"] = repr(spec.standing_feet)
+    out["legs"] = repr([(leg.name, leg.joints, leg.foot, leg.side) for leg in spec.legs])
+    # No law takes a part's mass.
+    parts = [(component, p) for component, p in catalog.rows() if dimension(p.unit) != "mass"]
+    out |= {f"{component}.{p.name}": p.value for component, p in parts}
+    for name, a in catalog.alternatives.items():
+        elements = [(e.name, e.law, e.stage, sorted(e.arguments.items())) for e in a.elements]
+        out[f"alternatives.{name}"] = repr((a.motor, a.ratio, elements))
+    for p in published.values():
+        out[f"published.{p.id}"] = repr((p.unit, p.value, p.half_width, p.role))
+    for f in prior.free:
+        out[f"prior.{f.key}"] = repr((f.centre, f.deviation, f.bounds, f.logarithmic))
+    return out
+
+
+def _text(value: object) -> str:
+    if isinstance(value, list):
+        return repr(tuple(tuple(v) if isinstance(v, list) else v for v in value))
+    return value if isinstance(value, str) else repr(value)
+
+
+def differences(stored: Fingerprint, now: Fingerprint) -> list[str]:
+    """Names under which two fingerprints differ, in order; empty where they are the same."""
+    return [name for name in {**now, **stored} if not _same(stored.get(name), now.get(name))]
+
+
+def _same(a: float | str | None, b: float | str | None) -> bool:
+    if isinstance(a, str) or isinstance(b, str) or a is None or b is None:
+        return a == b
+    return math.isclose(a, b, rel_tol=_SAME, abs_tol=1e-12)

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from actuators.loading.build import Catalog
-from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior, load_prior
-from pipeline.paper.calibration.store import RESULTS_FILE, load_results
+from pipeline.paper.calibration.store import RESULTS_FILE, differences, fingerprint, load_results
 from pipeline.paper.published import Published, load_published
 from pipeline.simulation.settings import PAPER_FORCES, Settings
 

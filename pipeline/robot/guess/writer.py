@@ -8,8 +8,7 @@ from pathlib import Path
 import tomlkit
 
 from actuators.arrays import Array
-from pipeline.robot.guess.guess import Guess
-from pipeline.robot.guess.pace import Pace
+from pipeline.robot.guess.guess import Guess, Pace
 
 _PLACES = 4  # digits of feet and postures [m, rad]
 

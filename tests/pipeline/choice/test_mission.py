@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 import pipeline as lw
+from pipeline.choice.asked import Wanted
 from pipeline.choice.choose import choose
 from pipeline.choice.errors import ChoiceError, MissionError
 from pipeline.choice.loads import loads_of
 from pipeline.choice.missions.mission import read_mission
-from pipeline.choice.wanted import Wanted
 
 WRONG = {
     "mode,share\nwalk,0.5\n": "sum to 0.5",

@@ -10,13 +10,13 @@ import pytest
 import pipeline as lw
 from actuators.loading.data_sheet import read_entry
 from actuators.loading.parts import KINDS, load_parts
+from pipeline.choice.asked import Wanted, filtered
 from pipeline.choice.group import front, merged, search
 from pipeline.choice.loads import Load, loads_of
 from pipeline.choice.missions.mission import read_mission
 from pipeline.choice.parts.shelf import Shelf, combinations
 from pipeline.choice.search import Demanded
 from pipeline.choice.track import Account
-from pipeline.choice.wanted import Wanted, filtered
 from tests.pipeline.choice.brute import in_full
 
 ACCOUNT = Account()

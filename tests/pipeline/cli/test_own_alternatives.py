@@ -11,7 +11,8 @@ import pytest
 
 from actuators.loading.build import CATALOG
 from pipeline.cli.main import main
-from pipeline.identification.workflow.setup import Options, setup
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup
 from pipeline.logs.errors import GapError
 
 PAPERS = ("ideal", "rotor", "reversible", "irreversible")

@@ -15,8 +15,8 @@ from pipeline.dynamics.contact_forces import ContactForces, least_tangential_for
 from pipeline.dynamics.force_rules import GroundForces
 from pipeline.dynamics.joint_demand import motion_demand, segment_demand
 from pipeline.errors import GaitError, SlidingError, TippingError
+from pipeline.motion.gait import with_payload
 from pipeline.motion.motion import Segment
-from pipeline.motion.payload import with_payload
 from pipeline.motion.support import stability_margins, standing_posture
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot

@@ -10,9 +10,8 @@ import pinocchio as pin
 import pytest
 
 from pipeline.dynamics.joint_demand import MotionDemand, motion_demand, segment_demand
-from pipeline.motion.gait import gait_of
+from pipeline.motion.gait import gait_of, with_payload
 from pipeline.motion.motion import Motion, Segment
-from pipeline.motion.payload import with_payload
 from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file

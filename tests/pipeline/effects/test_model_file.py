@@ -26,7 +26,7 @@ from pipeline.effects.motor import SensedHeating
 from pipeline.effects.registry import EFFECTS, catalogue
 from pipeline.effects.transmission import BareCoupling
 from pipeline.errors import PipelineError
-from pipeline.identification.workflow.model_writer import model_text
+from pipeline.identification.workflow.written import model_text
 from pipeline.logs.errors import GapError, ModelFileError
 from pipeline.machine.machine import MachineModel
 from pipeline.simulation.files import base_model

@@ -19,8 +19,8 @@ from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.constants import voltage_per_speed, voltage_remarks
 from pipeline.logs.prepared.measurement import Measurement
 from pipeline.logs.prepared.parts import split
-from pipeline.logs.reading.expected import expected_of_model
 from pipeline.logs.reading.log import Log
+from pipeline.logs.reading.log_format import expected_of_model
 from pipeline.machine.machine import MachineModel, machine_of_urdf
 from pipeline.simulation.forward import ForwardSimulator, ServoInput
 

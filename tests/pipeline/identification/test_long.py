@@ -15,7 +15,7 @@ import pytest
 import pipeline.identification.workflow.compared
 from pipeline.cli.gap import options_of
 from pipeline.cli.main import parser
-from pipeline.identification.compare.stages import stages
+from pipeline.identification.compare.circumstances import stages
 from pipeline.identification.selection.identify import identify
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
 from pipeline.identification.workflow.setup import Setup, setup

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from pipeline.cli.gap import options_of
 from pipeline.cli.main import main, parser
 from pipeline.effects.model_file import apply_edits, read_model_file
-from pipeline.identification.compare.stages import overall
+from pipeline.identification.compare.circumstances import overall
 from pipeline.identification.results import SUSPECTED, Found
 from pipeline.identification.workflow.compared import Compared, compare_logs, load_logs
-from pipeline.identification.workflow.model_writer import edits_of, model_text
 from pipeline.identification.workflow.outcome import identified
 from pipeline.identification.workflow.setup import Setup, setup
 from pipeline.identification.workflow.validate import check
-from pipeline.identification.workflow.written import Validated
+from pipeline.identification.workflow.written import Validated, edits_of, model_text
 from pipeline.logs.prepared.measurement import TEST, Measurement
 from pipeline.progress import Progress
 from pipeline.simulation.files import base_model

@@ -13,8 +13,8 @@ from pipeline.identification.regression.design_matrix import Accepted, make_data
 from pipeline.identification.regression.intervals import _certain
 from pipeline.identification.regression.problem import Problem
 from pipeline.identification.regression.refit import _bounded, gradient, refit
-from pipeline.identification.selection.noise import _correlation, fast_noise
 from pipeline.identification.selection.pool import make_pool
+from pipeline.identification.selection.residual import _correlation, fast_noise
 from pipeline.identification.selection.search import Search
 from pipeline.identification.selection.settle import as_accepted, estimated
 from pipeline.logs.prepared.measurement import Measurement

@@ -9,7 +9,8 @@ import pytest
 
 from pipeline.identification.compare.model_check import rows_left
 from pipeline.identification.workflow.compared import compare_logs, load_logs
-from pipeline.identification.workflow.setup import Options, setup
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup
 from pipeline.logs.errors import Finding, LogContentError
 from pipeline.logs.prepared.measurement import Measurement
 

@@ -23,7 +23,7 @@ from pipeline.logs.prepared.measurement import (
 )
 from pipeline.logs.prepared.parts import cycle_noise, period, repeat_noise, split
 from pipeline.logs.prepared.prepare import prepare
-from pipeline.logs.reading.expected import Expected, expected_of_robot
+from pipeline.logs.reading.log_format import Expected, expected_of_robot
 from pipeline.logs.reading.read import read_log
 from pipeline.logs.signals.derivatives import LowPass, Settings, choose_settings
 from pipeline.motion.motion import Motion

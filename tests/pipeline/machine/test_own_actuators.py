@@ -13,7 +13,8 @@ from actuators.loading.build import load_catalog
 from pipeline.api.machine import load
 from pipeline.effects.model_file import Edit, EditParameter, new_model_file
 from pipeline.errors import RobotFileError
-from pipeline.identification.workflow.setup import Options, setup
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup
 from pipeline.machine.own_actuators import AS_BUILT, actuator_folder, own_actuators
 from pipeline.robot.robot_file import load_robot_file
 from pipeline.simulation.files import base_model

@@ -11,9 +11,8 @@ import pinocchio as pin
 import pytest
 
 from pipeline.errors import GaitError
-from pipeline.motion.gait import gait_of
+from pipeline.motion.gait import gait_of, with_payload
 from pipeline.motion.gait_table import changed_table, read_gait_file, read_gait_table
-from pipeline.motion.payload import with_payload
 from pipeline.motion.support import standing_posture
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import RobotSpec, load_robot_file, merged_gait

@@ -13,8 +13,8 @@ from actuators.loading.build import CATALOG, Catalog, load_catalog
 from pipeline.api.judgement import judged
 from pipeline.cli.main import parser
 from pipeline.cli.options import settings_of
-from pipeline.paper.calibration.fingerprint import differences, fingerprint
 from pipeline.paper.calibration.prior import Prior
+from pipeline.paper.calibration.store import differences, fingerprint
 from pipeline.paper.judgement.basis import Basis, basis
 from pipeline.paper.judgement.evidence import Sensitivity
 from pipeline.paper.judgement.judge import Judgement

@@ -20,8 +20,7 @@ from pipeline.paper.judgement.evidence import (
     ranking,
     sensitivities,
 )
-from pipeline.paper.judgement.judge import Judgement
-from pipeline.paper.judgement.leave_one_out import leave_one_out
+from pipeline.paper.judgement.judge import Judgement, leave_one_out
 from pipeline.paper.judgement.readings import (
     CalibratedReading,
     reading_rows,

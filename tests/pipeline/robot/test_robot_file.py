@@ -13,7 +13,7 @@ from actuators.units import from_si
 from pipeline.errors import RobotFileError
 from pipeline.robot.robot import Robot
 from pipeline.robot.robot_file import load_robot_file
-from pipeline.robot.robot_numbers import check_parameters
+from pipeline.robot.robot_tables import check_parameters
 
 
 def with_values(hexapod: Robot, **values: float) -> ParameterSet:

@@ -17,7 +17,8 @@ import pytest
 
 from pipeline.identification.compare.observe import observe_all
 from pipeline.identification.workflow.compared import compare_logs, load_logs
-from pipeline.identification.workflow.setup import Options, setup
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup
 from pipeline.logs.columns.findings import SUSPECTED
 from pipeline.logs.errors import Finding, LogContentError
 from pipeline.simulation.along_logs import wrong_columns

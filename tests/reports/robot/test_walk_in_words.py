@@ -8,8 +8,7 @@ import pytest
 from pipeline.api.figures import robot_drawings
 from pipeline.api.pictures.scene import Scene
 from pipeline.api.pictures.walk import steps_of, stretches
-from pipeline.motion.gait import gait_of
-from pipeline.motion.payload import with_payload
+from pipeline.motion.gait import gait_of, with_payload
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.simulation.walk_stand import Walking, stand, walk
 from reports.pages.gait_words import conditions, gait_and_conditions, pace

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.identification.results import APPROXIMATE, CONFIRMED, SUSPECTED, Estimate, Found
-from pipeline.identification.workflow.model_writer import edits_of
+from pipeline.identification.workflow.written import edits_of
 from tests.command_line import exit_code, rows_of
 
 SEED = 5  # of the machine: its tolerances, its motion and what is hidden

@@ -10,7 +10,7 @@ import pytest
 
 from pipeline.effects.model_file import Edit, ModelFile, edits_in
 from pipeline.effects.registry import effect_named
-from pipeline.identification.compare.stages import overall
+from pipeline.identification.compare.circumstances import overall
 from pipeline.identification.results import (
     APPROXIMATE,
     CONFIRMED,
@@ -19,8 +19,7 @@ from pipeline.identification.results import (
     Found,
 )
 from pipeline.identification.selection.identify import estimated_alone, identify
-from pipeline.identification.workflow.model_writer import edits_of, model_text
-from pipeline.identification.workflow.written import Validated, validate_found
+from pipeline.identification.workflow.written import Validated, edits_of, model_text, validate_found
 from reports.pages.gap_words import smaller_words
 from tests.pipeline.identification import bench_leg as leg
 

@@ -16,8 +16,8 @@ from pipeline.effects.base import Coordinate
 from pipeline.identification.regression.tolerances import UNCERTAINTY
 from pipeline.identification.results import UNCERTAINTIES
 from pipeline.identification.selection.evidence import FOLDS, MARGIN, State, noise_weights
-from pipeline.identification.selection.noise import saturated
 from pipeline.identification.selection.pool import Channel, Pool, Term
+from pipeline.identification.selection.residual import saturated
 from pipeline.identification.selection.search import Search
 from pipeline.logs.prepared.measurement import TRAIN, VALIDATION
 

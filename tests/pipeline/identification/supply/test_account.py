@@ -28,7 +28,8 @@ from pipeline.identification.supply.regression import (
 from pipeline.identification.supply.samples import Samples, supply_samples
 from pipeline.identification.supply.terms import OWN, Rows, Term, joined, rows_of, terms_of
 from pipeline.identification.workflow.compared import load_logs
-from pipeline.identification.workflow.setup import Options, setup
+from pipeline.identification.workflow.options import Options
+from pipeline.identification.workflow.setup import setup
 from pipeline.logs.errors import LogContentError
 from pipeline.logs.reading.log import Log
 from tests.command_line import exit_code
