@@ -122,8 +122,7 @@ def _motors(path: Path, mass: float) -> Motors:
     spec = load_robot_file(path)
     catalog = load_catalog(actuator_folder(spec) or CATALOG)
     own = own_actuators(spec, catalog)
-    catalog = own.catalog(catalog)
-    return motors_of(catalog, own, own.every(catalog), spec.joints, mass, stated=False)
+    return motors_of(own, spec.joints, mass, stated=False)
 
 
 def _draw(robot: Robot, path: Path) -> Path:

@@ -25,9 +25,10 @@ joints built as different ones make an alternative more, `as_built`.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Final
@@ -71,8 +72,10 @@ class _Written(Table):
 
 @dataclass(frozen=True)
 class OwnActuators:
-    """What a robot file says of its joints' actuators."""
+    """Actuator files, and what a robot file says of its joints' actuators."""
 
+    #: Components and alternatives, the machine as it is built among them.
+    catalog: Catalog
     where: str = ""  #: Robot file and table, for messages.
     joints: tuple[str, ...] = ()  #: Of the robot.
     alternative: str = ""  #: As which the machine is built; empty where the file does not say.
@@ -92,13 +95,12 @@ class OwnActuators:
     def __bool__(self) -> bool:
         return bool(self.alternative or self.built or self.numbers)
 
-    def catalog(self, catalog: Catalog) -> Catalog:
-        """The catalogue with the machine as it is built among its alternatives."""
-        if not self.built:
-            return catalog
+    def _with_as_built(self) -> OwnActuators:
+        """The same with the machine as it is built among the alternatives."""
         count = Counter(self._alternative(AS_BUILT, joint) for joint in self.joints)
-        names = [name for name in catalog.alternatives if name in count]
-        parts = [catalog.alternatives[name] for name in names]
+        every = self.catalog.alternatives
+        names = [name for name in every if name in count]
+        parts = [every[name] for name in names]
         *_, motor = parts[0].elements
         shared = [set(a.stage_names) for a in parts]
         elements = tuple(
@@ -109,12 +111,15 @@ class OwnActuators:
         )
         title = "As built: " + ", ".join(f"{name} at {count[name]} joints" for name in names)
         mixed = parts[0].model_copy(update={"title": title, "elements": elements})
-        return replace(
-            catalog, alternatives=MappingProxyType({**catalog.alternatives, AS_BUILT: mixed})
-        )
+        alternatives = MappingProxyType({**every, AS_BUILT: mixed})
+        return replace(self, catalog=replace(self.catalog, alternatives=alternatives))
 
-    def actuators(self, catalog: Catalog, alternative: str) -> Actuators:
-        """One alternative with what single joints have of their own.
+    @cached_property
+    def _made(self) -> dict[str, Actuators]:
+        return {}
+
+    def actuators(self, alternative: str) -> Actuators:
+        """One alternative with what single joints have of their own, built when first asked for.
 
         `alternative`: one of them, or `AS_BUILT` where joints are built differently.
 
@@ -122,32 +127,35 @@ class OwnActuators:
             CatalogError: No such alternative.
             RobotFileError: An own number does not fit it.
         """
+        if alternative not in self._made:
+            self._made[alternative] = self._built(alternative)
+        return self._made[alternative]
+
+    def _built(self, alternative: str) -> Actuators:
         if not self.numbers and not (self.built and alternative == AS_BUILT):
-            return catalog.chain(alternative)
+            return self.catalog.chain(alternative)
         made: dict[object, Chain] = {}
         joints: list[JointModel] = []
         for joint in self.joints:
             name, numbers = self._alternative(alternative, joint), self.numbers.get(joint, {})
             key = (name, *((n, id(p)) for n, p in numbers.items()))
             if key not in made:
-                made[key] = self._chain(catalog, name, joint, numbers)
+                made[key] = self._chain(name, joint, numbers)
             joints += joints_of(made[key], (joint,))
         return Drivetrains(alternative, tuple(joints))
 
-    def every(self, catalog: Catalog) -> dict[str, Actuators]:
-        """Every alternative of a catalogue; see `actuators`."""
-        return {name: self.actuators(catalog, name) for name in catalog.alternatives}
+    def every(self, *names: str) -> dict[str, Actuators]:
+        """Alternatives by name, all by default; see `actuators`."""
+        return {name: self.actuators(name) for name in names or self.catalog.alternatives}
 
     def _alternative(self, name: str, joint: str) -> str:
         return self.built.get(joint, self.alternative) if name == AS_BUILT else name
 
-    def _chain(
-        self, catalog: Catalog, name: str, joint: str, numbers: Mapping[str, Parameter]
-    ) -> Chain:
+    def _chain(self, name: str, joint: str, numbers: Mapping[str, Parameter]) -> Chain:
         if not numbers:
-            return catalog.chain(name)
+            return self.catalog.chain(name)
         try:
-            return _with_numbers(catalog, name, numbers).chain(name)
+            return _with_numbers(self.catalog, name, numbers).chain(name)
         except ActuatorError as error:
             raise RobotFileError(f"{self.where}: joint '{joint}': {error}") from None
 
@@ -222,8 +230,11 @@ def own_actuators(spec: RobotSpec, catalog: Catalog) -> OwnActuators:
             f"{where}: an alternative of the actuator files is called '{AS_BUILT}', as the machine "
             "whose joints differ; rename it"
         )
-    out = OwnActuators(where, spec.joints, alternative, built, numbers, tuple(groups), table.source)
-    out.every(out.catalog(catalog))  # what loads works
+    out = OwnActuators(
+        *(catalog, where, spec.joints, alternative, built, numbers, tuple(groups), table.source)
+    )
+    out = out._with_as_built() if built else out
+    out.every()  # what loads works
     return out
 
 
@@ -301,26 +312,22 @@ class Motors:
 
 
 def motors_of(
-    catalog: Catalog,
-    own: OwnActuators,
-    every: Mapping[str, Actuators],
-    names: Iterable[str],
-    robot: float,
-    *,
-    stated: bool,
+    own: OwnActuators, joints: tuple[str, ...], robot: float, *names: str, stated: bool
 ) -> Motors:
     """The motors of a machine.
 
-    `robot`: mass of the robot [kg]. `stated`: whether the catalogue is the user's; what the robot
-    file states is stated, too.
+    `robot`: mass of the robot [kg]. `names`: alternatives that count where it is not said as which
+    it is built; all by default. `stated`: whether the catalogue is the user's; what the robot file
+    states is stated, too.
     """
-    joints = tuple(names)
+    every = own.every(*names)
     usual = own.usual if own.usual in every else ""
     counted = {usual: every[usual]} if usual else every
     rows = [drivetrains_of(actuators, joints).joints for actuators in counted.values()]
     masses = np.array([[j.motor.mass if j.motor else 0.0 for j in row] for row in rows])
     ratios = [j.ratio for row in rows for j in row]
     built = {*own.built.values(), own.alternative} - {""} if usual == AS_BUILT else counted
+    catalog = own.catalog
     titles = (catalog.components[catalog.alternatives[name].motor].title for name in built)
     return Motors(
         titles=tuple(dict.fromkeys(titles)),

@@ -20,7 +20,6 @@ from actuators.parameters import ParameterSet
 from actuators.units import to_si
 from pipeline.effects.model_file import ModelFile, read_model_file
 from pipeline.errors import GaitError, RobotFileError
-from pipeline.machine.joint import Actuators
 from pipeline.machine.machine import MachineModel, machine_of_robot, machine_of_urdf
 from pipeline.machine.own_actuators import (
     OwnActuators,
@@ -62,13 +61,8 @@ class Stated:
     """Robot and actuators with changed numbers."""
 
     spec: RobotSpec | None  #: The robot file's contents; None for a URDF.
-    catalog: Catalog  #: With the machine as it is built among its alternatives.
-    own: OwnActuators  #: What single joints have of their own.
-    notes: tuple[str, ...]  #: What a reader of the numbers should know of the changes.
-
-    def chain(self, alternative: str) -> Actuators:
-        """One alternative; see `OwnActuators.actuators`."""
-        return self.own.actuators(self.catalog, alternative)
+    own: OwnActuators  #: The actuators, with what single joints have of their own.
+    notes: tuple[str, ...] = ()  #: What a reader of the numbers should know of the changes.
 
 
 def read_files(
@@ -118,7 +112,7 @@ def base_model(file: ModelFile, actuators: Path | None = None) -> MachineModel:
     """
     files = read_files(actuators=actuators, known=file)
     machine = stated(files, {})
-    chain = machine.chain(file.alternative) if file.alternative else None
+    chain = machine.own.actuators(file.alternative) if file.alternative else None
     if machine.spec is None:
         return machine_of_urdf(files.robot, actuators=chain)
     return machine_of_robot(load_robot(machine.spec), chain)
@@ -139,13 +133,12 @@ def stated(files: Files, changes: Mapping[str, object]) -> Stated:
         if before is not None and spec is not None:
             notes += _thousandfold(before.parameters, spec.parameters, key)
     if spec is None:
-        return Stated(None, catalog, OwnActuators(), ())
+        return Stated(None, OwnActuators(catalog))
     if changes:
         # After all changes: two numbers that bind each other may be changed together.
         check_parameters(spec.parameters, spec.build, "--set")
         _refuse_unused(spec, changes)
-    own = own_actuators(spec, catalog)
-    return Stated(spec, own.catalog(catalog), own, tuple(notes))
+    return Stated(spec, own_actuators(spec, catalog), tuple(notes))
 
 
 def _changed(

@@ -71,8 +71,7 @@ class Settings:
     changes: Mapping[str, object]  #: Numbers that differ from the files', by the keys of ``--set``.
     bare: Robot  #: The robot without the payload of its gait.
     robot: Robot  #: Loaded and checked, with the payload.
-    catalog: Catalog  #: Actuator components and alternatives.
-    own: OwnActuators  #: What single joints have of their own.
+    own: OwnActuators  #: The actuators, with what single joints have of their own.
     effects: Effects | None = None  #: Of the model file; None without one.
     notes: tuple[str, ...] = ()  #: What a reader of the numbers should know of the changes.
     warnings: tuple[str, ...] = ()  #: The same of the robot's bodies.
@@ -167,6 +166,11 @@ class Settings:
             motion=self.motion,
         )
 
+    @property
+    def catalog(self) -> Catalog:
+        """Actuator components and alternatives."""
+        return self.own.catalog
+
     @cached_property
     def _chains(self) -> dict[str, Actuators]:
         return {}
@@ -178,7 +182,7 @@ class Settings:
             CatalogError: No such alternative.
         """
         if alternative not in self._chains:
-            chain = self.own.actuators(self.catalog, alternative)
+            chain = self.own.actuators(alternative)
             self._chains[alternative] = self.effects.chain(chain) if self.effects else chain
         return self._chains[alternative]
 
@@ -199,14 +203,8 @@ class Settings:
     @property
     def motors(self) -> Motors:
         """Whose motors drive the joints, and what they weigh."""
-        return motors_of(
-            self.catalog,
-            self.own,
-            self.own.every(self.catalog),
-            self.robot.joints,
-            self.machine.mass,
-            stated=self.files.actuators is not None,
-        )
+        stated = self.files.actuators is not None
+        return motors_of(self.own, self.robot.joints, self.machine.mass, stated=stated)
 
     @property
     def adjust(self) -> Adjust | None:
@@ -236,9 +234,7 @@ def settings(
     bare, warnings = _bare(said.spec, before)
     robot = before.robot if before and bare is before.bare else with_payload(bare)
     effects = _effects(files, robot, said) if files.model else None
-    return Settings(
-        files, changes, bare, robot, said.catalog, said.own, effects, said.notes, warnings
-    )
+    return Settings(files, changes, bare, robot, said.own, effects, said.notes, warnings)
 
 
 def _bare(spec: RobotSpec, before: Settings | None) -> tuple[Robot, tuple[str, ...]]:
@@ -257,12 +253,12 @@ def _effects(files: Files, robot: Robot, said: Stated) -> Effects:
     """The model file's effects on this robot."""
     file = files.model
     assert file is not None
-    others = [name for name in said.catalog.alternatives if name != IDEAL]
+    others = [name for name in said.own.catalog.alternatives if name != IDEAL]
     if not (file.alternative or others):
         raise CatalogError("effects need an actuator with a motor of its own; add an alternative")
     return effects(
         robot,
-        said.chain(file.alternative or others[0]),
+        said.own.actuators(file.alternative or others[0]),
         lambda machine: apply_edits(machine, file.edits),
         tuple(edit.effect for edit in file.edits),
         found_with=file.alternative,

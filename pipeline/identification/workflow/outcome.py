@@ -122,7 +122,7 @@ def found_effects(given: Setup, found: Sequence[Found], *, known: bool = True) -
     names = (*(edit.effect for edit in edits), *(f.effect for f in found))
     # A log that was compared without an actuator: what bodies and ground change needs none.
     name = given.alternative or next(iter(given.catalog.alternatives))
-    actuators = given.own.actuators(given.catalog, name)
+    actuators = given.own.actuators(name)
 
     def apply(model: MachineModel) -> MachineModel:
         return with_every(apply_edits(model, edits), found)
@@ -145,7 +145,7 @@ def cost(
     edits = found_effects(given, found, known=known)
     start = found_effects(given, ()) if known and given.file.edits else None
     try:
-        every = given.own.every(given.catalog)
+        every = given.own.every()
         return energy_change(given.robot, every, edits, start), edits.remarks
     except StanceError as error:
         return None, (f"With these effects {error}",)

@@ -41,8 +41,7 @@ class Setup:
     robot: Robot | None  #: None for a bare URDF.
     model: MachineModel  #: As the workflow computes it.
     expected: Expected  #: What a log of it looks like.
-    catalog: Catalog  #: Actuator components and alternatives.
-    own: OwnActuators  #: What single joints have of their own.
+    own: OwnActuators  #: The actuators, with what single joints have of their own.
     alternative: str  #: Name of the actuator chain; empty without one.
     #: The model file whose edits are in `model`; without edits where none was given.
     file: ModelFile
@@ -50,6 +49,11 @@ class Setup:
     warnings: tuple[str, ...] = ()  #: What of the files a reader should know, in words.
     #: Joints of the URDF that mimic another, to the other's name; no log may move them.
     mimics: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def catalog(self) -> Catalog:
+        """Actuator components and alternatives."""
+        return self.own.catalog
 
     @property
     def path(self) -> Path:
@@ -61,10 +65,9 @@ class Setup:
         """Whose motors the logs are compared with; None where torque is compared at the joints."""
         if not self.alternative:
             return None
-        used = {self.alternative: self.own.actuators(self.catalog, self.alternative)}
         mass = float(sum(inertia.mass for inertia in self.bare.rigid.inertias))
         said = self.files.actuators is not None
-        return motors_of(self.catalog, self.own, used, self.bare.joints, mass, stated=said)
+        return motors_of(self.own, self.bare.joints, mass, self.alternative, stated=said)
 
     @property
     def legged(self) -> bool:
@@ -90,7 +93,7 @@ def setup(options: Options, files: Files | None = None) -> Setup:
     alternative = _alternative(options, given_file)
     if said.spec is None:
         robot, text, where = None, read_urdf(path), str(path)
-        chain = said.chain(alternative) if alternative else None
+        chain = said.own.actuators(alternative) if alternative else None
         bare = machine_of_urdf(path, actuators=chain)
         expected = expected_of_model(
             bare.rigid, bare.name, joints=bare.joints, ratio=_ratio(chain, bare.joints)
@@ -102,8 +105,8 @@ def setup(options: Options, files: Files | None = None) -> Setup:
         text, where = robot.urdf, source_of(robot)
         robot = with_payload(robot)
         # Motor-side positions need a ratio whatever channel is compared.
-        usual = alternative or said.own.usual or _default(said.catalog)
-        chain = said.chain(usual)
+        usual = alternative or said.own.usual or _default(said.own.catalog)
+        chain = said.own.actuators(usual)
         expected = expected_of_robot(robot, ratio=_ratio(chain, robot.joints))
         electrical = options.step == "power" or _channel(options, expected) != AT_JOINT
         if not alternative and electrical:
@@ -119,7 +122,6 @@ def setup(options: Options, files: Files | None = None) -> Setup:
         robot=robot,
         model=apply_edits(bare, edits),
         expected=expected,
-        catalog=said.catalog,
         own=said.own,
         alternative=alternative,
         file=replace(new_model_file(path, alternative, folder), edits=edits, noise=noise),

@@ -65,7 +65,7 @@ def test_the_gear_next_to_the_motor_meets_the_total_ratio(given: Settings) -> No
         ("reversible", "harmonic_drive", "timing_belt"),
         ("irreversible", "hypoid", "planetary"),
     ):
-        drives = given.own.actuators(given.catalog, name)
+        drives = given.own.actuators(name)
         assert not isinstance(drives, Chain)
         joint = drives.joints[given.robot.joints.index("lf_joint_2")]
         ratios = {e.name: e.gearing for e in joint.elements if e.gearing != 1.0}
