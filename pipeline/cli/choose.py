@@ -15,6 +15,7 @@ from pipeline.cli.options import (
     add_machine_options,
     add_out_option,
     machine_of,
+    named,
     named_path,
 )
 from pipeline.progress import Progress
@@ -106,22 +107,19 @@ def run_choose(options: argparse.Namespace) -> int:
         value = {name: None if x is None else x.value for name, x in numbers.items()}
         machine = machine_of(options)
         wanted = Wanted(
-            parts=options.parts,
+            **named(options, ("parts", "driver", "pack", "draws")),
             kinds=tuple(options.kind),
             only=tuple(options.only),
             without=tuple(options.without),
             voltage=value["voltage"],
-            driver=options.driver,
             idle=numbers["idle"],
             brakes=not options.no_brakes,
             groups=tuple(options.group),
             account=Account(value["hotel"] or 0.0, policy.policy, policy.fraction),
-            pack=options.pack,
             battery=value["battery"],
             present=value["present"],
             present_battery=value["present-battery"],
             springs=tuple(options.spring),
-            draws=options.draws,
         )
         result = choice(
             machine,

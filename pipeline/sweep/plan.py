@@ -76,18 +76,6 @@ class Axis:
         return self.values[int(share * len(self.values))]
 
 
-def read_axis(text: str, machine: Machine) -> Axis:
-    """One ``NAME=VALUES`` of ``--vary``, a number of the machine.
-
-    Raises:
-        SweepError: It cannot be read, or the machine has no such number in this unit; one line.
-    """
-    try:
-        return _axis(text, machine)
-    except (ValueError, ActuatorError) as error:
-        raise SweepError(f"--vary {one_line(text)}: {error}") from None
-
-
 def _axis(text: str, machine: Machine) -> Axis:
     name, _, written = (part.strip() for part in text.partition("="))
     if not name or not written:
@@ -187,18 +175,24 @@ def read_plan(path: Path) -> list[str]:
 
 
 def read_axes(texts: Iterable[str], machine: Machine) -> tuple[Axis, ...]:
-    """All axes.
+    """The axes of each ``NAME=VALUES`` of ``--vary``, a number of the machine.
 
     Raises:
-        SweepError: None, one that cannot be read, or a number twice.
+        SweepError: None, one that cannot be read or that the machine does not have in this unit, or
+            a number twice.
     """
-    axes = tuple(read_axis(text, machine) for text in texts)
+    axes: dict[str, Axis] = {}
+    for text in texts:
+        try:
+            axis = _axis(text, machine)
+        except (ValueError, ActuatorError) as error:
+            raise SweepError(f"--vary {one_line(text)}: {error}") from None
+        if axis.key in axes:
+            raise SweepError(f"--vary {axis.key}: stands twice")
+        axes[axis.key] = axis
     if not axes:
         raise SweepError("nothing is varied: give --vary NAME=VALUES or --plan FILE")
-    for k, axis in enumerate(axes):
-        if axis.key in [other.key for other in axes[:k]]:
-            raise SweepError(f"--vary {axis.key}: stands twice")
-    return axes
+    return tuple(axes.values())
 
 
 def cases_of(

@@ -179,20 +179,20 @@ def _cell(table: RunTable, row: Any, quantity: str) -> tuple[str, float]:
 def _inputs(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[tuple[str, str, str], ...]:
     """Options, versions and files that are not the same."""
     out = []
-    for group, hashes in (("inputs_sha256", True), ("options", False), ("versions", False)):
+    labels = {"inputs_sha256": "file", "options": "option", "versions": "version of"}
+    for group, label in labels.items():
         own, other = ((m.get(group) or {}) for m in (a, b))
         for key in dict.fromkeys((*own, *other)):
             if own.get(key) == other.get(key):
                 continue
-            if hashes:
-                words = ["read" if key in m else "not read" for m in (own, other)]
-                if key in own and key in other:
-                    words = ["read", "read, with other contents"]
+            if group != "inputs_sha256":
+                x, y = (_words(m.get(key)) for m in (own, other))
+            elif key in own and key in other:
+                x, y = "read", "read, with other contents"
             else:
-                words = [_words(m.get(key)) for m in (own, other)]
-            label = {"inputs_sha256": "file", "options": "option", "versions": "version of"}[group]
-            out.append((f"{label} {key}", *words))
-    return tuple((what, x, y) for what, x, y in out)
+                x, y = ("read" if key in m else "not read" for m in (own, other))
+            out.append((f"{label} {key}", x, y))
+    return tuple(out)
 
 
 def _words(value: Any) -> str:

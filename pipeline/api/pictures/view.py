@@ -63,7 +63,6 @@ def player(given: Settings, *, host: str = "127.0.0.1", port: int = 8080) -> Pla
         ReportError: The package viser is not installed.
         StanceError: A foot would have to pull or slide.
     """
-    viser_module()  # refused before anything is computed
     walking = given.walk({})
     title = f"{given.machine.spec.name}, {gait_and_conditions(given.machine.spec)}"
     return Player(title, steps_of(Scene(given.machine), walking, STEPS), host, port)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.command_line import Command, exit_code, rows_of, sidecar_of, stand_and_walk
+from tests.command_line import Command, exit_code, rows_of, sidecar_of
 
 LEGS = ("lf", "lm", "lr", "rf", "rm", "rr")
 JOINTS = tuple(f"{leg}_joint_{k}" for leg in LEGS for k in (1, 2, 3))
@@ -256,10 +256,3 @@ def test_losses_and_work_add_up_over_the_cycle(out: Path) -> None:
             assert taken - returned == pytest.approx(
                 work - back + heat, abs=1e-4 * (taken + returned + work + back)
             )
-
-
-def test_same_input_same_bytes(out: Path, tmp_path: Path, command: Command) -> None:
-    stand_and_walk(tmp_path, command)
-    assert {p.name for p in tmp_path.iterdir()} == {p.name for p in out.iterdir()}
-    for path in out.iterdir():
-        assert path.read_bytes() == (tmp_path / path.name).read_bytes(), path.name
