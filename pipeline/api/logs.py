@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pipeline.api.gap.bodies import bodies_of, refuse_own_urdf
 from pipeline.api.gap.results import (
     Comparison,
     Driven,
@@ -23,6 +22,7 @@ from pipeline.api.gap.tables import (
 )
 from pipeline.api.machine import Machine
 from pipeline.api.result import by_name
+from pipeline.effects.model_file import edits_in
 from pipeline.identification.supply.account import account
 from pipeline.identification.workflow.compared import compare_logs, judged, load_logs
 from pipeline.identification.workflow.forward import forward as drive_forward
@@ -30,10 +30,17 @@ from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.outcome import Outcome, identified
 from pipeline.identification.workflow.setup import Setup, check_options, setup
 from pipeline.identification.workflow.validate import check
-from pipeline.logs.errors import Finding
+from pipeline.logs.errors import Finding, GapError
 from pipeline.logs.formats.convert import plain
 from pipeline.progress import Progress
-from pipeline.simulation.found_bodies import FoundBodies
+from pipeline.robot.urdf_source import read_urdf
+from pipeline.simulation.found_bodies import (
+    FoundBodies,
+    corrected_urdf,
+    found_bodies,
+    not_in_urdf,
+)
+from reports.pages.gap_words import URDF_FILE
 from reports.table import Table, table_of
 from reports.tables.gap import QualityRow, WhereRow, bodies, deciding_motion
 from reports.tables.power import power_tables
@@ -185,7 +192,7 @@ def analyse(
     for k, path in enumerate(logs):
         plain(path, lambda share, k=k: progress.done((k + share) / len(logs)))  # type: ignore[misc]
     given = setup(options, files)
-    refuse_own_urdf(given, options.out)
+    _refuse_own_urdf(given, options.out)
     step, joints = options.step, given.model.joints
     progress.step("reading and judging the logs")
     loaded, parts, fitted = load_logs(given, options)
@@ -216,7 +223,7 @@ def analyse(
     else:
         progress.step("letting effects compete")
         outcome = identified(given, compared, options, progress)
-    found = bodies_of(given, outcome.validated.text)
+    found = _bodies_of(given, outcome.validated.text)
     tables += _answer_tables(outcome, given, found)
     common = _common(options, given, tables, findings)
     return Identified(**common, outcome=outcome, bodies=found, machine=machine)
@@ -250,6 +257,35 @@ def _common(
         "given": given,
         "findings": findings,
     }
+
+
+def _bodies_of(given: Setup, text: str) -> FoundBodies:
+    """Bodies by the URDF and by a model file, and the URDF with them.
+
+    Args:
+        given: Robot, and the model file that was given.
+        text: Of the model file that is written; empty for none: then there is no URDF either.
+    """
+    edits = edits_in(text) if text else given.file.edits
+    bodies = found_bodies(given.bare, edits)
+    urdf = ""
+    if text and bodies:
+        source = given.robot.urdf if given.robot else read_urdf(given.path)
+        urdf = corrected_urdf(source, str(given.path), given.bare, edits)
+    return FoundBodies(bodies, not_in_urdf(edits), urdf)
+
+
+def _refuse_own_urdf(given: Setup, out: Path) -> None:
+    """Refuse a robot whose URDF lies where the corrected one may be written.
+
+    Raises:
+        GapError: A model file that names it would put what was found into it twice.
+    """
+    if (out / URDF_FILE).resolve() in {source.resolve() for source in given.sources}:
+        raise GapError(
+            f"{out / URDF_FILE}: the robot's URDF lies where a corrected one is written; choose "
+            "another folder with --out, or copy it elsewhere"
+        )
 
 
 def _answer_tables(outcome: Outcome, given: Setup, found: FoundBodies) -> list[Table]:

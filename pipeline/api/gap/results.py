@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pipeline.api.gap.bodies import write_model
 from pipeline.api.machine import Machine
 from pipeline.api.result import Result
+from pipeline.atomic import write_text
 from pipeline.effects.model_file import edits_in
 from pipeline.identification.compare.circumstances import overall
 from pipeline.identification.supply.account import Account
@@ -18,6 +18,7 @@ from pipeline.identification.workflow.outcome import Outcome
 from pipeline.identification.workflow.setup import Setup
 from pipeline.logs.errors import Finding
 from pipeline.simulation.found_bodies import FoundBodies
+from reports.pages.gap_words import URDF_FILE
 from reports.table import Table
 
 
@@ -103,8 +104,10 @@ class Identified(LogResult):
     def _write(self, out: Path, decimal: str) -> None:
         """The tables; but for ``name`` the model file; for all steps or ``shrink`` a page."""
         super()._write(out, decimal)
-        if self.verb != "gap name":
-            write_model(out, self.outcome.validated.text, self.bodies)
+        files = {"model.toml": self.outcome.validated.text, URDF_FILE: self.bodies.urdf}
+        for name, text in files.items() if self.verb != "gap name" else ():
+            if text:
+                write_text(out / name, text)
         if self.verb in ("gap", "gap shrink"):
             from pipeline.api.gap.figures import write_pictures_and_page
 
