@@ -18,6 +18,8 @@ from pipeline.cli.main import main
 Rows = list[dict[str, str]]
 #: Runs a verb on the hexapod with `--out`, and returns the exit code, argparse's own included.
 Command = Callable[..., int]
+#: Runs a command that is refused, and returns its one line.
+Refused = Callable[..., str]
 
 
 def exit_code(arguments: Sequence[str]) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from pipeline.motion.walking import walking_motion
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
 from reports.figures import save as saving
-from tests.command_line import Command, exit_code, stand_and_walk
+from tests.command_line import Command, Refused, exit_code, stand_and_walk
 from tests.demo import DEMO
 
 # No clock in a test: a loaded machine is no failure.
@@ -53,6 +54,26 @@ def command(root: Path) -> Command:
         return exit_code([verb, "--robot", str(root / "urdf" / robot), "--out", str(out), *more])
 
     return run
+
+
+@pytest.fixture
+def refused(capsys: pytest.CaptureFixture[str]) -> Refused:
+    """The one line of a command that leaves with a code, prints nothing else, makes no folder."""
+
+    def line(arguments: Sequence[str | Path], out: Path | None = None, code: int = 2) -> str:
+        capsys.readouterr()
+        to = ["--out", str(out)] if out else []
+        left = exit_code([*map(str, arguments), *to])
+        said = capsys.readouterr()
+        assert left == code, said.err
+        assert said.out == ""
+        assert said.err.endswith("\n")
+        assert said.err.count("\n") == 1, said.err
+        assert "Traceback" not in said.err
+        assert out is None or not out.exists()
+        return said.err
+
+    return line
 
 
 @pytest.fixture(scope="session")

@@ -27,7 +27,7 @@ from pipeline.errors import ReportError
 from pipeline.robot.robot import Robot
 from pipeline.simulation.walk_stand import Walking, walk
 from reports.figures.walk import Steps
-from tests.command_line import exit_code
+from tests.command_line import Refused, exit_code
 from tests.reports import browser
 
 COUNT = 8
@@ -156,21 +156,17 @@ def test_a_browser_shows_the_robot(
 
 
 def test_without_viser_one_line_says_how_to_install_it(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, refused: Refused
 ) -> None:
     monkeypatch.setitem(sys.modules, "viser", None)
     with pytest.raises(ReportError, match="make view"):
         viser_module()
-    assert exit_code(["view"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "reports/view.lock" in said
+    assert "reports/view.lock" in refused(["view"])
 
 
 @pytest.mark.parametrize("port", ["0", "70000", "http"])
-def test_a_port_that_is_none_is_refused(port: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert exit_code(["view", "--port", port]) == 2
-    assert "expected 1 to 65535" in capsys.readouterr().err
+def test_a_port_that_is_none_is_refused(port: str, refused: Refused) -> None:
+    assert "expected 1 to 65535" in refused(["view", "--port", port])
 
 
 def test_the_lock_of_the_extra_is_where_the_message_says(root: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 import pipeline as lw
 from pipeline.errors import GaitError, SlidingError
-from tests.command_line import Command, rows_of, sidecar_of
+from tests.command_line import Command, Refused, rows_of, sidecar_of
 
 RULES = ["least_tangential", "least_torque", "least_power"]
 
@@ -69,29 +69,16 @@ def test_a_rule_is_in_the_tables_and_in_their_sidecars(
     ],
 )
 def test_what_cannot_be_chosen_is_told_in_one_line(
-    options: list[str],
-    said: str,
-    tmp_path: Path,
-    command: Command,
-    capsys: pytest.CaptureFixture[str],
+    options: list[str], said: str, tmp_path: Path, refused: Refused
 ) -> None:
-    assert command("walk", tmp_path / "new", *options) == 2
-    error = capsys.readouterr().err
-    assert said in error
-    assert error.count("\n") == 1
-    assert not (tmp_path / "new").exists()
+    assert said in refused(["walk", *options], tmp_path / "new")
 
 
-def test_ground_that_is_too_smooth_is_a_finding(
-    tmp_path: Path, command: Command, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_ground_that_is_too_smooth_is_a_finding(tmp_path: Path, refused: Refused) -> None:
     options = ["--friction-coefficient", "0.0001", "--samples", "51"]
-    assert command("walk", tmp_path / "new", *options) == 1
-    error = capsys.readouterr().err
+    error = refused(["walk", *options], tmp_path / "new", 1)
     assert "the robot slides at t = " in error
     assert "0.0001 is given" in error
-    assert error.count("\n") == 1
-    assert not (tmp_path / "new").exists()
 
 
 def test_python_takes_the_same(root: Path) -> None:

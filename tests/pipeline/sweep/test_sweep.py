@@ -10,12 +10,12 @@ import pandas
 import pytest
 
 import pipeline as lw
-from pipeline.cli.main import main
 from pipeline.spread import SpreadError
 from pipeline.sweep import sweep as module
 from pipeline.sweep.case import Order, machine_of, rows_of_block
 from pipeline.sweep.plan import cases_of, read_axes
 from pipeline.sweep.sweep import sweep
+from tests.command_line import Refused
 
 VARY = ("speed=0.1:0.3:2 m/s", "payload=0,5,600 kg", "body_pitch=0,80 deg")
 ORDER = Order(samples=51)
@@ -102,24 +102,14 @@ def test_a_stopped_sweep_goes_on_without_loss_or_repetition(
 
 
 def test_another_sweep_in_the_way_is_one_line_and_stays(
-    swept: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    swept: Path, tmp_path: Path, refused: Refused
 ) -> None:
     (tmp_path / "sweep.parquet").write_bytes(swept.read_bytes())
-    line = refused(["--vary", "speed=0.1,0.2 m/s", "--out", str(tmp_path)], capsys)
-    assert "not of this sweep" in line
+    another = ["sweep", "--vary", "speed=0.1,0.2 m/s", "--out", tmp_path]
+    assert "not of this sweep" in refused(another)
     assert (tmp_path / "sweep.parquet").read_bytes() == swept.read_bytes()
     (tmp_path / "sweep.parquet").write_bytes(b"no parquet")
-    assert "not of this sweep" in refused(
-        ["--vary", "speed=0.1,0.2 m/s", "--out", str(tmp_path)], capsys
-    )
-
-
-def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
-    assert main(["sweep", *arguments]) == 2
-    said = capsys.readouterr()
-    assert said.out == ""
-    assert said.err.count("\n") == 1
-    return said.err
+    assert "not of this sweep" in refused(another)
 
 
 @pytest.mark.parametrize(
@@ -149,22 +139,20 @@ def test_bad_input_is_one_line(
     arguments: list[str],
     words: str,
     tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    refused: Refused,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("pipeline.spread._PATIENCE", "300ms")
-    out = tmp_path / "out"
-    assert words in refused([*arguments, "--out", str(out)], capsys)
-    assert not out.exists()
+    assert words in refused(["sweep", *arguments], tmp_path / "out")
 
 
 @pytest.mark.parametrize("text", ["[other]\nspeed = '1'\n", "[vary]\nspeed = 3\n", "[vary"])
 def test_a_plan_that_cannot_be_read_is_one_line(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    text: str, tmp_path: Path, refused: Refused
 ) -> None:
     plan = tmp_path / "plan.toml"
     plan.write_text(text)
-    assert "plan.toml" in refused(["--plan", str(plan), "--out", str(tmp_path / "out")], capsys)
+    assert "plan.toml" in refused(["sweep", "--plan", plan], tmp_path / "out")
 
 
 def test_samples_fill_the_ranges_and_are_the_same_for_a_seed() -> None:

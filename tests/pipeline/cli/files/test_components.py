@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.actuators.test_parts import TEXT
-from tests.command_line import exit_code
+from tests.command_line import Refused, exit_code
 
 
 def test_listed_filtered_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
@@ -35,13 +35,8 @@ def test_listed_filtered_and_shown(capsys: pytest.CaptureFixture[str]) -> None:
         (["--parts", "nowhere"], "nowhere: no such folder"),
     ],
 )
-def test_refused_in_one_line(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], says: str
-) -> None:
-    assert exit_code(["components", *arguments]) == 2
-    said = capsys.readouterr().err
-    assert says in said
-    assert said.count("\n") == 1
+def test_refused_in_one_line(refused: Refused, arguments: list[str], says: str) -> None:
+    assert says in refused(["components", *arguments])
 
 
 def test_a_contradiction_of_ones_own_part_is_a_finding(

@@ -10,6 +10,7 @@ import pytest
 import pipeline as lw
 from pipeline.cli.main import main
 from pipeline.errors import RobotFileError
+from tests.command_line import Refused
 from tests.pipeline.robot.walkers import urdf_text
 
 
@@ -43,15 +44,12 @@ def test_init_writes_a_robot_file_and_a_picture_and_says_what_to_look_at(
 def test_what_init_cannot_do_leaves_nothing(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    refused: Refused,
     arguments: list[str],
     message: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(["init", *arguments]) == 2
-    captured = capsys.readouterr()
-    assert message in captured.err
-    assert captured.err.count("\n") == 1
+    assert message in refused(["init", *arguments])
     assert list(tmp_path.iterdir()) == []
 
 

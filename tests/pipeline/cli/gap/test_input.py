@@ -21,7 +21,7 @@ from pipeline.logs.reading.read import read_log
 from pipeline.machine.machine import machine_of_urdf
 from pipeline.robot.robot import load_robot
 from pipeline.robot.robot_file import load_robot_file
-from tests.command_line import exit_code, rows_of, sidecar_of
+from tests.command_line import Refused, exit_code, rows_of, sidecar_of
 from tests.demo import DEMO
 from tests.leg_log import leg_logs
 
@@ -61,25 +61,16 @@ def _rounded(c: Columns) -> Columns:
     return c
 
 
-def refused(arguments: list[str], out: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """The one line of a command that is refused and writes nothing."""
-    assert exit_code([*arguments, "--out", str(out)]) == 2
-    err = capsys.readouterr().err
-    assert err.count("\n") == 1
-    assert not out.exists()
-    return err
-
-
 @pytest.mark.parametrize("spoil", [_degrees, _rounded])
 def test_a_bad_log_is_refused_in_one_line(
     tmp_path: Path,
     root: Path,
-    capsys: pytest.CaptureFixture[str],
+    refused: Refused,
     spoil: Callable[[Columns], Columns],
 ) -> None:
     log = write_log(tmp_path / "bad.csv", spoil(leg_columns()))
     robot = root / "urdf" / "leg.toml"
-    assert "bad" in refused(["gap", str(log), "--robot", str(robot)], tmp_path / "out", capsys)
+    assert "bad" in refused(["gap", str(log), "--robot", str(robot)], tmp_path / "out")
 
 
 @pytest.fixture(scope="module")
@@ -111,14 +102,14 @@ SPOILT = {
 def test_a_wrong_unit_that_the_model_betrays_is_refused_by_column(
     tmp_path: Path,
     root: Path,
-    capsys: pytest.CaptureFixture[str],
+    refused: Refused,
     simulated_leg: Columns,
     case: str,
 ) -> None:
     spoil, words = SPOILT[case]
     log = write_log(tmp_path / "spoilt.csv", spoil(dict(simulated_leg)))
     robot = root / "urdf" / "leg.toml"
-    err = refused(["gap", "where", str(log), "--robot", str(robot)], tmp_path / "out", capsys)
+    err = refused(["gap", "where", str(log), "--robot", str(robot)], tmp_path / "out")
     assert all(word in err for word in words)
 
 
@@ -156,7 +147,7 @@ def test_the_same_log_unspoilt_is_accepted(
 def test_bad_options_are_refused_in_one_line(
     tmp_path: Path,
     root: Path,
-    capsys: pytest.CaptureFixture[str],
+    refused: Refused,
     robot: str,
     more: list[str],
     word: str,
@@ -166,7 +157,7 @@ def test_bad_options_are_refused_in_one_line(
     (tmp_path / "wave.toml").write_text('[gait]\nname = "wave"\n', encoding="utf-8")
     more = [str(tmp_path / x) if (tmp_path / x).exists() else x for x in more]
     arguments = ["gap", "where", str(log), "--robot", str(root / "urdf" / robot), *more]
-    assert word in refused(arguments, tmp_path / "out", capsys)
+    assert word in refused(arguments, tmp_path / "out")
 
 
 def _contact_source(tmp_path: Path, log: Path, more: list[str]) -> str:
@@ -227,7 +218,7 @@ def _gap(step: str, logs: list[Path], out: Path, *more: str, robot: Path) -> int
 
 
 def test_data_given_twice_is_refused_under_any_name(
-    tmp_path: Path, root: Path, capsys: pytest.CaptureFixture[str], simulated_leg: Columns
+    tmp_path: Path, root: Path, refused: Refused, simulated_leg: Columns
 ) -> None:
     robot = root / "urdf" / "leg.toml"
     log = write_log(tmp_path / "one.csv", simulated_leg)
@@ -238,7 +229,7 @@ def test_data_given_twice_is_refused_under_any_name(
     part = write_log(tmp_path / "part.csv", {k: v[1000:4000] for k, v in simulated_leg.items()})
     for more in ([log], ["--holdout", copy], ["--holdout", shifted], ["--holdout", part]):
         arguments = ["gap", "where", log, *more, "--robot", robot]
-        assert "the same" in refused([*map(str, arguments)], tmp_path / "out", capsys)
+        assert "the same" in refused([*map(str, arguments)], tmp_path / "out")
     expected = expected_of_robot(load_robot(load_robot_file(robot)))
     logs = leg_logs(3, [], 2)
     refuse_repeats(
@@ -250,14 +241,14 @@ def test_data_given_twice_is_refused_under_any_name(
 def test_a_slip_of_the_pen_in_a_header_is_no_other_log(
     tmp_path: Path,
     root: Path,
-    capsys: pytest.CaptureFixture[str],
+    refused: Refused,
     simulated_leg: Columns,
     old: str,
     new: str,
 ) -> None:
     slipped = {k.replace(old, new): v for k, v in simulated_leg.items()}
     log, robot = write_log(tmp_path / "log.csv", slipped), root / "urdf" / "leg.toml"
-    err = refused(["gap", "read", str(log), "--robot", str(robot)], tmp_path / "out", capsys)
+    err = refused(["gap", "read", str(log), "--robot", str(robot)], tmp_path / "out")
     assert f"did you mean 'rm_joint_1__{old}'" in err
 
 
