@@ -5,13 +5,11 @@ from __future__ import annotations
 import atexit
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 import numpy as np
-import pinocchio as pin
 
 from actuators.errors import one_line
 from actuators.loading.build import CATALOG, load_catalog
@@ -25,9 +23,6 @@ from pipeline.robot.guess.guess import Guess, guess_robot, shorter
 from pipeline.robot.guess.writer import robot_text
 from pipeline.robot.robot import Robot, load_robot
 from pipeline.robot.robot_file import load_robot_file
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -127,21 +122,17 @@ def _motors(path: Path, mass: float) -> Motors:
 
 def _draw(robot: Robot, path: Path) -> Path:
     """The stance in four views, beside the robot file."""
-    from pipeline.api.pictures.scene import Scene
+    from pipeline.api.pictures.scene import Scene, mass_centre
     from reports.figures.robot.robot_view import robot_figure
     from reports.figures.save import save_figures
 
     stance = robot.configuration(robot.joint_positions(robot.start_posture[None]), np.zeros((1, 3)))
-    data = robot.model.createData()
-    centre = pin.centerOfMass(robot.model, data, stance[0]).copy()
-
-    def draw() -> Figure:
-        return robot_figure(
-            *Scene(robot).at(stance[0]),
-            title=f"{robot.spec.name}: the stance guessed",
-            subtitle="left and right, front and rear, feet and knees as they should be?",
-            mass_centre=centre,
-        )
-
+    draw = partial(
+        robot_figure,
+        *Scene(robot).at(stance[0]),
+        title=f"{robot.spec.name}: the stance guessed",
+        subtitle="left and right, front and rear, feet and knees as they should be?",
+        mass_centre=mass_centre(robot, stance)[0],
+    )
     save_figures({path.stem: draw}, path.absolute().parent)
     return path.with_suffix(".png")

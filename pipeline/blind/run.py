@@ -77,11 +77,7 @@ def run_trials(
             here = None if scheduler else str(out / "trials" / source / f"{k:04d}")
             blocks[f"{source} {k}"] = (source, seed, k, here)
     found = point.run(answered, blocks, workers=workers, scheduler=scheduler, title="trials")
-    return [_judged(one) for one in found]
-
-
-def _judged(done: dict[str, Any]) -> Score:
-    return score(done["truth"], read_answer(done["files"], done["run"]))
+    return [score(one["truth"], read_answer(one["files"], one["run"])) for one in found]
 
 
 def _key(seed: int) -> str:
