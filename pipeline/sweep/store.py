@@ -23,7 +23,6 @@ from pipeline.sweep.plan import Axis, SweepError
 FILE: Final = "sweep.parquet"
 PARTS: Final = "sweep.parts"
 _KEY: Final = b"legwatt_sweep"
-_TEXT: Final = {"alternative", "joint_of_peak_torque", "beyond", "refusal"}
 
 
 def schema_of(axes: Sequence[Axis], digest: str) -> pa.Schema:
@@ -37,7 +36,7 @@ def schema_of(axes: Sequence[Axis], digest: str) -> pa.Schema:
         )
     for declared in fields(SweepRow):
         meaning, unit, _ = declared.metadata["column"]
-        kind = pa.string() if declared.name in _TEXT else pa.float64()
+        kind = pa.string() if declared.type == "str" else pa.float64()
         about = {"meaning": meaning, "unit": unit}
         columns.append(pa.field(declared.name, kind, metadata=about))
     return pa.schema(columns, metadata={_KEY: digest.encode()})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import re
 import shutil
 from pathlib import Path
@@ -14,6 +13,7 @@ from pipeline.cli.main import main
 from pipeline.identification.workflow.options import Options
 from pipeline.identification.workflow.setup import setup
 from pipeline.logs.errors import GapError
+from tests.command_line import rows_of
 
 PAPERS = ("ideal", "rotor", "reversible", "irreversible")
 
@@ -43,8 +43,7 @@ def _catalogue(kind: str, folder: Path) -> tuple[str, ...]:
 
 
 def _column(file: Path, name: str) -> list[str]:
-    with file.open(encoding="utf-8", newline="") as stream:
-        return [row[name] for row in csv.DictReader(stream)]
+    return [row[name] for row in rows_of(file)]
 
 
 @pytest.mark.usefixtures("sketched")
