@@ -45,7 +45,7 @@ from pipeline.robot.leg_chains import LegChains
 
 _DAMPED_ITERATIONS = 60
 _MAX_STEP = 0.35  # [rad] per iteration, keeps the knee on the branch of the start posture
-_CONVERGED, _STILL = 1e-13, 1e-12  # [m], [rad] of a step: what is left is out of reach
+_REACHED, _STILL = 1e-13, 1e-12  # [m], [rad] of a step: what is left is out of reach
 _LEAST_DAMPING, _DAMPING = 1e-8, 1e-2  # [m], relaxed as the iteration comes close
 _STRIDE = 16  # samples of a path between those that are solved first
 #: Share of a leg's reach within which a spline's guess is trusted to lie on the path's branch.
@@ -240,7 +240,7 @@ def _iterated(chains: LegChains, target: Array, q: Array) -> tuple[Array, Array]
         feet, jacobians = foot_jacobians(chains, q[busy])
         error = target[busy] - feet
         left[busy] = np.linalg.norm(error, axis=-1)
-        going = (left[busy] > _CONVERGED).any(axis=1)
+        going = (left[busy] > _REACHED).any(axis=1)
         if iteration == _DAMPED_ITERATIONS or not going.any():
             break
         busy, own = busy[going], np.ascontiguousarray(jacobians[going])
